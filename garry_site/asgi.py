@@ -1,0 +1,22 @@
+"""The server's entry: pages by Django, sockets by Channels."""
+
+import os
+from typing import Any
+
+from channels.routing import ProtocolTypeRouter, URLRouter
+from django.conf import settings
+from django.contrib.staticfiles.handlers import ASGIStaticFilesHandler
+from django.core.asgi import get_asgi_application
+
+os.environ.setdefault("DJANGO_SETTINGS_MODULE", "garry_site.settings")
+pages: Any = get_asgi_application()
+if not settings.HOSTED:  # one machine serves its files as they lie; hosted, WhiteNoise does
+    pages = ASGIStaticFilesHandler(pages)
+
+from rehab.routing import websocket_urlpatterns  # noqa: E402  (models must be loaded first)
+
+# Devices send no Origin, so it is not asked for here; cookies count only on sockets that our own
+# pages opened (rehab.sessions.live.admission).
+application = ProtocolTypeRouter(
+    {"http": pages, "websocket": URLRouter(websocket_urlpatterns)},
+)

@@ -1,0 +1,262 @@
+"""The deployment: one file, every knob a GARRY_* variable, good defaults for a clinic."""
+
+import os
+import secrets
+from pathlib import Path
+from zoneinfo import available_timezones
+
+import dj_database_url
+from csp.constants import NONCE, NONE, SELF
+from django.core.exceptions import ImproperlyConfigured
+
+BASE_DIR = Path(__file__).resolve().parent.parent
+
+# --- typed readers: a wrong value stops the start and says what would be right ------------------
+
+KNOBS: dict[str, str] = {}  # every variable that was asked for, and what it is for
+
+
+def text(name: str, default: str, about: str) -> str:
+    """Read a variable as text."""
+    KNOBS[name] = about
+    return os.environ.get(name, "") or default
+
+
+def flag(name: str, default: bool, about: str) -> bool:
+    """Read a variable as yes or no."""
+    value = text(name, "yes" if default else "no", about).lower()
+    if value not in {"1", "true", "yes", "on", "0", "false", "no", "off"}:
+        raise ImproperlyConfigured(f"{name}={value!r} is neither yes nor no. Set it to 1 or 0.")
+    return value in {"1", "true", "yes", "on"}
+
+
+def number(name: str, default: int, about: str, *, low: int, high: int) -> int:
+    """Read a variable as a whole number within bounds."""
+    value = text(name, str(default), about)
+    if not (value.isascii() and value.isdigit() and low <= int(value) <= high):
+        raise ImproperlyConfigured(f"{name}={value!r} must be a whole number from {low} to {high}.")
+    return int(value)
+
+
+def words(name: str, default: str, about: str) -> list[str]:
+    """Read a variable as a list separated by commas."""
+    return [word.strip() for word in text(name, default, about).split(",") if word.strip()]
+
+
+# --- where and how it runs ----------------------------------------------------------------------
+
+HOSTED = flag("GARRY_HOSTED", False, "many clinics on one server, behind TLS")
+DEBUG = flag("GARRY_DEBUG", False, "Django's debug pages; for developers only")
+DATA_DIR = Path(text("GARRY_DATA_DIR", str(BASE_DIR / "var"), "folder of database and secrets"))
+HOST = text("GARRY_HOST", "127.0.0.1", "address that the server listens on")
+PORT = number("GARRY_PORT", 8000, "port that the server listens on", low=1, high=65535)
+ALLOWED_HOSTS = words(
+    "GARRY_ALLOWED_HOSTS",
+    "" if HOSTED else f"localhost,127.0.0.1,[::1],{HOST}",
+    "names that browsers reach the server by",
+)
+
+
+def _secret_key() -> str:
+    """Read the key, or make one and keep it in the data folder (one machine only)."""
+    given = text("GARRY_SECRET_KEY", "", "secret that signs cookies and tokens")
+    if given or HOSTED:
+        return given or "garry-missing-secret-key"  # check garry.E001 refuses to start with it
+    file = DATA_DIR / "secret_key"
+    if not file.exists():
+        DATA_DIR.mkdir(parents=True, exist_ok=True)
+        try:
+            with os.fdopen(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w") as out:
+                out.write(secrets.token_urlsafe(50))
+        except FileExistsError:
+            pass  # another process was faster; its key is the key
+    return file.read_text().strip()
+
+
+SECRET_KEY = _secret_key()
+
+# --- applications -------------------------------------------------------------------------------
+
+INSTALLED_APPS = [
+    "rehab",  # before daphne: its own `runserver` wins
+    "daphne",
+    "channels",
+    "django.contrib.admin",
+    "django.contrib.auth",
+    "django.contrib.contenttypes",
+    "django.contrib.sessions",
+    "django.contrib.messages",
+    "django.contrib.staticfiles",
+    "csp",
+]
+MIDDLEWARE = [
+    "django.middleware.security.SecurityMiddleware",
+    "csp.middleware.CSPMiddleware",
+    *(["whitenoise.middleware.WhiteNoiseMiddleware"] if HOSTED else []),
+    "django.contrib.sessions.middleware.SessionMiddleware",
+    "django.middleware.common.CommonMiddleware",
+    "django.middleware.csrf.CsrfViewMiddleware",
+    "django.contrib.auth.middleware.AuthenticationMiddleware",
+    "django.contrib.messages.middleware.MessageMiddleware",
+    "django.middleware.clickjacking.XFrameOptionsMiddleware",
+    "rehab.stations.tablets.TabletMiddleware",
+    "rehab.people.access.AccessMiddleware",
+]
+ROOT_URLCONF = "garry_site.urls"
+ASGI_APPLICATION = "garry_site.asgi.application"
+TEMPLATES = [
+    {
+        "BACKEND": "django.template.backends.django.DjangoTemplates",
+        "DIRS": [BASE_DIR / "templates"],
+        "APP_DIRS": True,
+        "OPTIONS": {
+            "context_processors": [
+                "django.template.context_processors.request",
+                "django.contrib.auth.context_processors.auth",
+                "django.contrib.messages.context_processors.messages",
+                "csp.context_processors.nonce",
+            ]
+        },
+    }
+]
+
+# --- database and channel layer -----------------------------------------------------------------
+
+DATABASE_URL = text(
+    "GARRY_DATABASE_URL",
+    f"sqlite:///{DATA_DIR / 'garry.sqlite3'}",
+    "database; SQLite on one machine, postgres://… when hosted",
+)
+try:
+    DATABASES = {"default": dj_database_url.parse(DATABASE_URL)}
+except ValueError as problem:
+    raise ImproperlyConfigured(
+        "GARRY_DATABASE_URL is no database address. Give sqlite:////path/to/file or "
+        "postgres://user:password@host/name."
+    ) from problem
+if DATABASES["default"]["ENGINE"].endswith("sqlite3"):
+    DATA_DIR.mkdir(parents=True, exist_ok=True)
+    # FULL keeps acknowledged steps through a power cut, not only through a crash (stack.md, T3).
+    DATABASES["default"]["OPTIONS"] = {
+        "transaction_mode": "IMMEDIATE",
+        "timeout": 20,
+        "init_command": (
+            "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA journal_size_limit=67108864; "
+            "PRAGMA mmap_size=134217728; PRAGMA cache_size=-16000; "
+            # The live path moves the log into the database file beside its commits (runtime.py);
+            # left to SQLite, every fiftieth commit would wait for that.
+            "PRAGMA wal_autocheckpoint=20000;"
+        ),
+    }
+else:
+    DATABASES["default"] |= {"CONN_MAX_AGE": 0}
+    DATABASES["default"]["OPTIONS"] = {
+        **DATABASES["default"].get("OPTIONS", {}),
+        "pool": {"min_size": 1, "max_size": 8, "timeout": 10},
+    }
+DEFAULT_AUTO_FIELD = "django.db.models.BigAutoField"
+
+REDIS_URL = text("GARRY_REDIS_URL", "", "channel layer between several server processes")
+CHANNEL_LAYERS = {
+    "default": {
+        # Pub/sub, not the core layer: stack.md, T2.
+        "BACKEND": "channels_redis.pubsub.RedisPubSubChannelLayer",
+        "CONFIG": {"hosts": [REDIS_URL]},
+    }
+    if REDIS_URL
+    else {"BACKEND": "channels.layers.InMemoryChannelLayer"}
+}
+
+# --- people -------------------------------------------------------------------------------------
+
+AUTH_USER_MODEL = "rehab.User"
+PASSWORD_HASHERS = [
+    "django.contrib.auth.hashers.Argon2PasswordHasher",
+    "django.contrib.auth.hashers.PBKDF2PasswordHasher",
+]
+AUTH_PASSWORD_VALIDATORS = [
+    {"NAME": f"django.contrib.auth.password_validation.{name}"}
+    for name in (
+        "UserAttributeSimilarityValidator",
+        "MinimumLengthValidator",
+        "CommonPasswordValidator",
+        "NumericPasswordValidator",
+    )
+]
+LOGIN_URL = "admin:login"
+SESSION_COOKIE_AGE = 12 * 3600  # one working day
+SESSION_COOKIE_SAMESITE = "Lax"
+
+# --- words, time, files -------------------------------------------------------------------------
+
+LANGUAGE_CODE = "en"
+USE_TZ = True
+TIME_ZONE = text("GARRY_TIME_ZONE", "UTC", "time zone of dates in admin and reports")
+if TIME_ZONE not in available_timezones():
+    raise ImproperlyConfigured(
+        f"GARRY_TIME_ZONE={TIME_ZONE!r} is no time zone. Give a name such as Europe/Madrid."
+    )
+STATIC_URL = "static/"
+STATIC_ROOT = DATA_DIR / "static"
+BROWSER_LIBRARIES = {  # browser libraries come from node_modules and are never committed
+    "uplot": BASE_DIR / "node_modules" / "uplot" / "dist",
+    "canvas-confetti": BASE_DIR / "node_modules" / "canvas-confetti" / "dist",
+}
+STATICFILES_DIRS = [
+    BASE_DIR / "static",
+    *((name, folder) for name, folder in BROWSER_LIBRARIES.items() if folder.is_dir()),
+]
+STORAGES = {
+    "default": {"BACKEND": "django.core.files.storage.FileSystemStorage"},
+    "staticfiles": {
+        "BACKEND": "whitenoise.storage.CompressedManifestStaticFilesStorage"
+        if HOSTED
+        else "django.contrib.staticfiles.storage.StaticFilesStorage"
+    },
+}
+DATA_UPLOAD_MAX_MEMORY_SIZE = 2 * 1024 * 1024
+
+# --- browsers -----------------------------------------------------------------------------------
+
+CONTENT_SECURITY_POLICY = {
+    "DIRECTIVES": {
+        "default-src": [SELF],
+        "script-src": [SELF, NONCE],
+        "style-src": [SELF],
+        "img-src": [SELF, "data:"],
+        "connect-src": [SELF],
+        "object-src": [NONE],
+        "base-uri": [NONE],
+        "form-action": [SELF],
+        "frame-ancestors": [NONE],
+    }
+}
+X_FRAME_OPTIONS = "DENY"
+SECURE_REFERRER_POLICY = "same-origin"
+if HOSTED:
+    SESSION_COOKIE_SECURE = CSRF_COOKIE_SECURE = True
+    SECURE_SSL_REDIRECT = True
+    SECURE_PROXY_SSL_HEADER = ("HTTP_X_FORWARDED_PROTO", "https")
+    SECURE_HSTS_SECONDS = 365 * 24 * 3600
+    SECURE_HSTS_INCLUDE_SUBDOMAINS = True
+    SECURE_HSTS_PRELOAD = True
+CSRF_TRUSTED_ORIGINS = [f"https://{host}" for host in ALLOWED_HOSTS if HOSTED and host != "*"]
+
+# --- logs ---------------------------------------------------------------------------------------
+
+LOG_LEVEL = text(
+    "GARRY_LOG_LEVEL", "INFO", "how much is logged: DEBUG, INFO, WARNING, ERROR"
+).upper()
+if LOG_LEVEL not in {"DEBUG", "INFO", "WARNING", "ERROR"}:
+    raise ImproperlyConfigured("GARRY_LOG_LEVEL must be DEBUG, INFO, WARNING or ERROR.")
+LOGGING = {
+    "version": 1,
+    "disable_existing_loggers": False,
+    "formatters": {"line": {"format": "%(asctime)s %(levelname)s %(name)s: %(message)s"}},
+    "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "line"}},
+    "root": {"handlers": ["stderr"], "level": "WARNING"},
+    "loggers": {
+        "rehab": {"level": LOG_LEVEL},
+        "django.request": {"level": "ERROR"},  # a 404 is not news
+    },
+}

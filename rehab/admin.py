@@ -1,0 +1,8 @@
+"""Gathers the rooms' admin pages, nothing else."""
+
+from rehab.boards import admin as boards
+from rehab.people import admin as people
+from rehab.sessions import admin as sessions
+from rehab.stations import admin as stations
+
+__all__ = ["boards", "people", "sessions", "stations"]

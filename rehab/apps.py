@@ -1,0 +1,19 @@
+"""The application that Django loads."""
+
+from django.apps import AppConfig
+from django.db.models.signals import post_migrate
+
+
+class RehabConfig(AppConfig):
+    """GARRY's one application."""
+
+    name = "rehab"
+    verbose_name = "GARRY"
+    default_auto_field = "django.db.models.BigAutoField"
+
+    def ready(self) -> None:
+        """Register the checks, and the shared rows that every database begins with."""
+        from rehab import checks  # noqa: F401
+        from rehab.sessions.defaults import install_defaults
+
+        post_migrate.connect(install_defaults, sender=self)

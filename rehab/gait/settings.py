@@ -1,0 +1,49 @@
+"""What a detector may be told, and the cure for what it may not."""
+
+from __future__ import annotations
+
+from rehab.gait.strides import GaitInputError
+
+RATE_MIN_HZ, RATE_MAX_HZ = 50.0, 5000.0
+MASS_MIN_KG, MASS_MAX_KG = 10.0, 300.0
+LOOK_AHEAD_MAX_S = 0.2
+
+
+def check_settings(
+    rate_hz: float,
+    mass_kg: float | None,
+    look_ahead_s: float,
+    cutoff_hz: float,
+    contact_n: float,
+    release_n: float,
+) -> None:
+    """Raise GaitInputError, with the cure, for settings that nothing can be measured with."""
+    if mass_kg is None or not MASS_MIN_KG <= mass_kg <= MASS_MAX_KG:
+        raise GaitInputError(
+            f"A body mass of {mass_kg} kg cannot be used. Weigh the patient and give "
+            f"{MASS_MIN_KG:g} to {MASS_MAX_KG:g} kg: A2 is power by body mass."
+        )
+    check_rate(rate_hz)
+    if not 0 <= look_ahead_s <= LOOK_AHEAD_MAX_S:
+        raise GaitInputError(
+            f"A look-ahead of {look_ahead_s:g} s cannot be used. Give 0 to {LOOK_AHEAD_MAX_S:g} s."
+        )
+    if not 1 <= cutoff_hz <= rate_hz / 5:
+        raise GaitInputError(
+            f"A cut-off of {cutoff_hz:g} Hz cannot be used at {rate_hz:g} Hz. Give 1 to "
+            f"{rate_hz / 5:g} Hz; 6 Hz is the custom."
+        )
+    if not 0 < release_n < contact_n:
+        raise GaitInputError(
+            f"Contact at {contact_n:g} N and release at {release_n:g} N cannot be told apart. "
+            "Give a release above 0 N and a contact above the release."
+        )
+
+
+def check_rate(rate_hz: float) -> None:
+    """Raise GaitInputError, with the cure, for a rate that nothing can be measured at."""
+    if not RATE_MIN_HZ <= rate_hz <= RATE_MAX_HZ:
+        raise GaitInputError(
+            f"A rate of {rate_hz:g} Hz cannot be used. Give the samples' rate, "
+            f"{RATE_MIN_HZ:g} to {RATE_MAX_HZ:g} Hz."
+        )

@@ -1,0 +1,112 @@
+"""One stride as it was measured, and why it may not count."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class GaitInputError(ValueError):
+    """Input that nothing can be measured from; the message says the cure."""
+
+
+class Reason(StrEnum):
+    """Why a stride does not count. A stride without one is valid."""
+
+    TIME_BACKWARDS = "time_backwards"  # the clock stood still or jumped back
+    GAP = "gap"  # samples are missing
+    RATE = "rate"  # samples come at another rate than was said
+    FORCE_LOST = "force_lost"  # the vertical force vanished or was not finite
+    FORCE_TOO_LARGE = "force_too_large"  # more than anybody's weight: unit, or mass
+    SHORT_STANCE = "short_stance"
+    LONG_STANCE = "long_stance"  # standing
+    IRREGULAR = "irregular"  # far from the usual stance: stumble, stop, both feet on one plate
+    CROSS_STEP = "cross_step"  # the other foot was not where a walker has it
+    WEIGHT = "weight"  # both plates together do not carry this person
+    MOMENT_LOST = "moment_lost"  # not finite, frozen or jumping
+    MOMENT_SIGN = "moment_sign"  # plantarflexion is not positive
+    MOMENT_TOO_SMALL = "moment_too_small"
+    MOMENT_TOO_LARGE = "moment_too_large"
+    MOMENT_IN_SWING = "moment_in_swing"  # of the other leg, out of time, or drifting
+    MOMENT_OUT_OF_STEP = "moment_out_of_step"  # its lever on the force is longer than a foot
+    ANGLE_LOST = "angle_lost"
+    ANGLE_FLAT = "angle_flat"
+    ANGLE_TOO_LARGE = "angle_too_large"  # degrees instead of radians
+    ANGLE_OUT_OF_STEP = "angle_out_of_step"  # of the other leg, or out of time
+    POWER_REVERSED = "power_reversed"  # the ankle brakes where it pushes: a sign is turned
+    NO_PUSH_OFF = "no_push_off"
+    OUT_OF_BOUNDS = "out_of_bounds"
+
+
+class Flag(StrEnum):
+    """What the therapist should know of a stride that counts all the same."""
+
+    OFFSET = "offset"  # the plate's zero has moved by more than 15 N; taken out of the contacts
+    SUPPORTED = "supported"  # a handrail or harness carries more than 5 % of the weight
+
+
+@dataclass(frozen=True, slots=True)
+class Stride:
+    """A stance and the swing before it, told at its terminal contact.
+
+    Attributes
+    ----------
+    number
+        Counts this leg's strides from 1.
+    initial_contact_s, terminal_contact_s
+        When the foot met and left the floor [s, the clock of the samples].
+    a2_w_kg, a2_time_s
+        Peak ankle push-off power [W/kg] and when it was reached [s]; None where there is none. Only
+        a valid stride's value may be shown to anybody.
+    valid, reasons, flags
+        Whether the stride counts, why not, and what is worth knowing nevertheless.
+    stance_s
+        From initial to terminal contact [s].
+    stride_s, swing_s
+        Of the cycle that ended at this initial contact [s]; None where it was not seen whole.
+    force_peak_n_kg, moment_peak_nm_kg
+        Largest vertical force and plantarflexion moment of the stance, by body mass.
+    a2_moment_nm_kg, a2_velocity_rad_s
+        What the power was made of at its peak.
+    propulsion_n_kg
+        Largest forward force of the second half of stance, if a forward force is sent.
+    position_m
+        Where the foot was at initial contact, if a position is sent [m, forward].
+    offset_n
+        What the plate read in swing and was taken off [N].
+    side
+        "left" or "right" where both legs are measured, else None.
+    step_s, step_length_m, step_symmetry
+        From the other foot's initial contact to this one, and (this − other) / (this + other) of
+        the two last step lengths.
+    first_double_support_s, second_double_support_s
+        Both feet on the floor after this initial and before this terminal contact [s].
+    weight_ratio
+        Mean force of both plates over the cycle that ended here, by body weight.
+    """
+
+    number: int
+    initial_contact_s: float
+    terminal_contact_s: float
+    a2_w_kg: float | None
+    a2_time_s: float | None
+    valid: bool
+    reasons: tuple[Reason, ...]
+    flags: tuple[Flag, ...]
+    stance_s: float
+    stride_s: float | None
+    swing_s: float | None
+    force_peak_n_kg: float | None
+    moment_peak_nm_kg: float | None
+    a2_moment_nm_kg: float | None
+    a2_velocity_rad_s: float | None
+    propulsion_n_kg: float | None
+    position_m: float | None
+    offset_n: float
+    side: str | None = None
+    step_s: float | None = None
+    step_length_m: float | None = None
+    step_symmetry: float | None = None
+    first_double_support_s: float | None = None
+    second_double_support_s: float | None = None
+    weight_ratio: float | None = None

@@ -1,0 +1,112 @@
+"""`manage.py serve`: the whole clinic in one process."""
+
+from __future__ import annotations
+
+import shlex
+import socket
+import sys
+from argparse import ArgumentParser
+from typing import Any
+
+from channels.routing import get_default_application
+from django.conf import settings
+from django.core.management import BaseCommand, CommandError
+
+from rehab.people.first_start import (
+    FIRST_USERNAME,
+    first_clinic,
+    first_password,
+    prepare_database,
+)
+from rehab.sessions.live.runtime import current
+from rehab.sessions.live.sources import local_address
+from rehab.stations.builtin import builtin_token, first_station
+from rehab.stations.models import Device
+from robot.bases import BASES
+
+
+class Command(BaseCommand):
+    """Prepares the database, says where to go, and serves pages and sockets until Ctrl-C."""
+
+    help = "Serve GARRY: pages and sockets, one process."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Offer address and port."""
+        parser.add_argument("--host", default=settings.HOST)
+        parser.add_argument("--port", type=int, default=settings.PORT)
+        parser.add_argument(
+            "--child",
+            action="append",
+            default=[],
+            metavar="COMMAND",
+            help="run this command beside the server, again when it fails (may be repeated)",
+        )
+        parser.add_argument(
+            "--robot",
+            choices=("none", *sorted(BASES)),
+            default="none",
+            metavar="BASE",
+            help="run a robot with this base at the first station, unless that has one of its own",
+        )
+
+    def handle(
+        self, *args: Any, host: str, port: int, child: list[str], robot: str, **options: Any
+    ) -> None:
+        """Serve. Raises CommandError, with the cure, where the port is taken."""
+        if robot != "none" and settings.HOSTED:
+            raise CommandError("A hosted server runs no robot. Run `python -m robot` beside it.")
+        check_port(host, port)
+        prepare_database()
+        self._say_where(local_address(host, port))
+        token = robot_token() if robot != "none" else None
+        from rehab.sessions.live.server import LiveServer  # installs a reactor: not at import
+
+        LiveServer(
+            get_default_application(),
+            endpoints=[f"tcp:port={port}:interface={host.replace(':', chr(92) + ':')}"],
+            server_name="GARRY",
+            verbosity=0,
+            on_ready=lambda: self._begin(child, local_address(host, port), robot, token),
+        ).run()
+
+    def _begin(self, commands: list[str], address: str, base: str, token: str | None) -> None:
+        current().address = address
+        if token is not None:
+            robot = [sys.executable, "-m", "robot", "--base", base, "--server", address, "--child"]
+            current().children.start("robot", robot, {"GARRY_ROBOT_TOKEN": token})
+        for number, command in enumerate(commands, start=1):
+            current().children.start(f"child {number}", shlex.split(command))
+        self.stdout.write("Ready. Ctrl-C stops the server.")
+        self.stdout.flush()
+
+    def _say_where(self, address: str) -> None:
+        self.stdout.write(f"GARRY serves at {address}/")
+        password = None if settings.HOSTED else first_password()
+        if password:
+            self.stdout.write(
+                f"Sign in at {address}/start/ as {FIRST_USERNAME!r} with the password {password}"
+            )
+        self.stdout.flush()
+
+
+def robot_token() -> str | None:
+    """Give the first station's built-in robot a fresh token; None where a robot of its own is."""
+    station = first_station(first_clinic())
+    robots = Device.everywhere.filter(station=station, kind=Device.Kind.ROBOT, builtin=False)
+    if robots.filter(revoked_at__isnull=True).exists():
+        return None
+    return builtin_token(station, Device.Kind.ROBOT)
+
+
+def check_port(host: str, port: int) -> None:
+    """Raise CommandError, with the cure, where the address cannot be served at."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as problem:
+            raise CommandError(
+                f"Cannot serve at {host}:{port} ({problem.strerror}). Stop the other program, or "
+                f"choose another port: GARRY_PORT={port + 1 if port < 65535 else 8000} make run."
+            ) from problem

@@ -1,0 +1,100 @@
+"""Who may open a page: every view says so, and one that does not is closed to all.
+
+`@public` opens a view to strangers, `@for_roles(Role.PT, …)` to signed-in people of these roles.
+Which rows they then see is `visible_to`'s business. The admin guards itself (`ScopedAdmin`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from django.contrib.auth.views import redirect_to_login
+from django.core.exceptions import PermissionDenied
+from django.http import HttpRequest, HttpResponseBase
+
+from rehab.people.models import Clinic, User
+from rehab.people.roles import Role
+
+View = Callable[..., HttpResponseBase]
+PUBLIC: frozenset[Role] = frozenset()
+
+
+class UndeclaredView(PermissionDenied):
+    """A view that does not say who may open it."""
+
+
+def public(view: View) -> View:
+    """Open a view to everyone, strangers included."""
+    view.access = PUBLIC  # type: ignore[attr-defined]
+    return view
+
+
+def for_roles(*roles: Role, tablets: bool = False) -> Callable[[View], View]:
+    """Open a view to signed-in people of these roles, and to paired ``tablets``."""
+
+    def declare(view: View) -> View:
+        view.access = frozenset(roles)  # type: ignore[attr-defined]
+        view.tablets = tablets  # type: ignore[attr-defined]
+        return view
+
+    return declare
+
+
+def person(request: HttpRequest) -> User:
+    """Give the signed-in person. Raises PermissionDenied for a stranger."""
+    if not isinstance(request.user, User):
+        raise PermissionDenied
+    return request.user
+
+
+def tablet_of(request: HttpRequest) -> Any:
+    """Give the paired tablet that a request comes from; None for any other browser."""
+    return getattr(request, "tablet", None)
+
+
+def actor_of(request: HttpRequest) -> Any:
+    """Give whose eyes a page is for: the person who is signed in, or else the tablet."""
+    return request.user if request.user.is_authenticated else tablet_of(request)
+
+
+def clinic_of(user: User) -> Clinic:
+    """Give somebody's clinic. Raises PermissionDenied for a host, who has none."""
+    if user.clinic is None:
+        raise PermissionDenied
+    return user.clinic
+
+
+class AccessMiddleware:
+    """Holds every view to what it declared. Sync and thread-safe: it keeps no state."""
+
+    def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
+        self.get_response = get_response
+
+    def __call__(self, request: HttpRequest) -> HttpResponseBase:
+        """Pass the request on."""
+        return self.get_response(request)
+
+    def process_view(
+        self, request: HttpRequest, view: View, args: Any, kwargs: Any
+    ) -> HttpResponseBase | None:
+        """Let the view run, send to the login, or refuse."""
+        match = request.resolver_match
+        if match is not None and match.app_names == ["admin"]:
+            return None
+        access: frozenset[Role] | None = getattr(view, "access", None)
+        if access is None:
+            raise UndeclaredView(
+                f"The view {view!r} does not declare who may open it. "
+                "Mark it with @public or @for_roles(…) from rehab.people.access."
+            )
+        if access == PUBLIC:
+            return None
+        user = request.user
+        if user.is_authenticated and user.is_active and user.role in access:
+            return None
+        if getattr(view, "tablets", False) and tablet_of(request) is not None:
+            return None
+        if not user.is_authenticated:
+            return redirect_to_login(request.get_full_path())
+        raise PermissionDenied

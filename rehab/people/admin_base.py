@@ -1,0 +1,122 @@
+"""The admin of a clinic's people: each row by scope, each act by the table of roles."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from django import forms
+from django.contrib import admin
+from django.db import models
+from django.db.models import QuerySet
+from django.http import HttpRequest
+
+from rehab.people.access import person
+from rehab.people.roles import Right, Role, rights_of
+from rehab.people.scope import ScopedModel, visible
+
+
+def rights(request: HttpRequest, model: type[models.Model]) -> Right:
+    """Give what the person behind this request may do with a model's rows."""
+    user = request.user
+    if not user.is_authenticated or not user.is_active:
+        return Right.NONE
+    return rights_of(user.role, model.__name__)
+
+
+def owns(user: Any, row: ScopedModel) -> bool:
+    """Whether a visible row is this person's to change: shared rows are the host's alone."""
+    if not row.scope.shared or user.role == Role.HOST:
+        return True
+    owner: Any = row
+    for step in row.scope.clinic.split("__"):
+        owner = getattr(owner, step)
+    return owner is not None
+
+
+class ScopedOptions(admin.options.BaseModelAdmin):
+    """What a model's own pages and its rows inside another model's page have in common."""
+
+    def get_queryset(self, request: HttpRequest) -> QuerySet[Any]:
+        """Give the rows that this person may see, and no other."""
+        rows: QuerySet[Any] = self.model.objects.visible_to(request.user)
+        ordering = self.get_ordering(request)
+        return rows.order_by(*ordering) if ordering else rows
+
+    def get_field_queryset(self, db: str | None, db_field: Any, request: HttpRequest) -> Any:
+        """Offer related rows that this person may see, and no other."""
+        model = db_field.remote_field.model
+        condition = visible(model, request.user)
+        rows = super().get_field_queryset(db, db_field, request)
+        rows = QuerySet(model) if rows is None else rows
+        return rows.none() if condition is None else rows.filter(condition)
+
+    def has_view_permission(self, request: HttpRequest, obj: Any = None) -> bool:
+        """Whether rows may be read."""
+        return Right.VIEW in rights(request, self.model)
+
+    def has_add_permission(self, request: HttpRequest, obj: Any = None) -> bool:
+        """Whether rows may be added."""
+        return self._may(request, Right.ADD, obj)
+
+    def has_change_permission(self, request: HttpRequest, obj: Any = None) -> bool:
+        """Whether this row may be changed."""
+        return self._may(request, Right.CHANGE, obj)
+
+    def has_delete_permission(self, request: HttpRequest, obj: Any = None) -> bool:
+        """Whether this row may be deleted."""
+        return self._may(request, Right.DELETE, obj)
+
+    def _may(self, request: HttpRequest, right: Right, obj: Any) -> bool:
+        """Ask the table; ``obj`` is the row, or for rows inside a page the row of that page."""
+        if right not in rights(request, self.model):
+            return False
+        return not isinstance(obj, ScopedModel) or owns(request.user, obj)
+
+
+class ClinicForm(forms.ModelForm):
+    """A form whose row belongs to a clinic that nobody chooses."""
+
+    new_clinic_id: ClassVar[int | None] = None
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        if self.instance.pk is None and hasattr(self.instance, "clinic_id"):
+            self.instance.clinic_id = self.new_clinic_id
+
+    def _get_validation_exclusions(self) -> set[str]:
+        # The clinic is not in the form, but "once per clinic" must be checked all the same.
+        return super()._get_validation_exclusions() - {"clinic"}  # type: ignore[misc, no-any-return]
+
+
+class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
+    """A model's pages. New rows belong to the clinic of whoever adds them."""
+
+    form = ClinicForm
+    list_per_page = 50
+
+    def has_module_permission(self, request: HttpRequest) -> bool:
+        """Whether the model is on the front page."""
+        return bool(rights(request, self.model))
+
+    def get_exclude(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Leave the clinic out: it follows from who is signed in."""
+        exclude = tuple(super().get_exclude(request, obj) or ())
+        return (*exclude, "clinic") if hasattr(self.model, "clinic") else exclude
+
+    def get_form(
+        self, request: HttpRequest, obj: Any = None, change: bool = False, **kwargs: Any
+    ) -> Any:
+        """Give the form; a new row's clinic is the person's own, or none for a host."""
+        form: Any = super().get_form(request, obj, change=change, **kwargs)
+        return type(form)(form.__name__, (form,), {"new_clinic_id": person(request).clinic_id})
+
+
+class ReadOnlyAdmin(ScopedAdmin):
+    """Pages of a log: rows are read, and reached from the session that they belong to."""
+
+    show_full_result_count = False
+    actions = None
+
+    def has_module_permission(self, request: HttpRequest) -> bool:
+        """Keep logs off the front page."""
+        return False

@@ -1,0 +1,147 @@
+"""Clinics, the people who work there, and the patients who walk."""
+
+from __future__ import annotations
+
+import secrets
+from typing import Any, ClassVar
+from zoneinfo import available_timezones
+
+from django.contrib.auth.base_user import BaseUserManager
+from django.contrib.auth.models import AbstractUser, UserManager
+from django.core.exceptions import ValidationError
+from django.core.validators import MaxValueValidator, MinValueValidator
+from django.db import models
+from django.db.models import Q
+
+from rehab.people.roles import Role
+from rehab.people.scope import ClinicRow, Scope, ScopedManager, ScopedModel
+from rehab.training.steps import Side
+
+SIDES = [(Side.LEFT.value, "Left"), (Side.RIGHT.value, "Right")]
+LANGUAGES = [("en", "English"), ("es", "Español")]
+# Neither 0 and O nor 1, I and L: read aloud and typed without doubt.
+UNAMBIGUOUS = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
+
+
+def check_time_zone(name: str) -> None:
+    """Refuse a name that is no time zone."""
+    if name not in available_timezones():
+        raise ValidationError(f"{name!r} is no time zone. Give a name such as Europe/Madrid.")
+
+
+class Clinic(ScopedModel):
+    """A place of care. Whatever belongs to it is seen by its own people alone."""
+
+    scope = Scope(clinic="pk", host=Q())
+
+    name = models.CharField(max_length=100, unique=True)
+    time_zone = models.CharField(max_length=64, default="UTC", validators=[check_time_zone])
+    language = models.CharField(max_length=8, choices=LANGUAGES, default="en")
+    created_at = models.DateTimeField(auto_now_add=True)
+
+    class Meta(ScopedModel.Meta):
+        ordering: ClassVar = ["name"]
+
+    def __str__(self) -> str:
+        return self.name
+
+
+class AccountManager(UserManager["User"]):
+    """Creates accounts. `createsuperuser` makes a host: someone who runs the server."""
+
+    def create_superuser(
+        self,
+        username: str,
+        email: str | None = None,
+        password: str | None = None,
+        **extra_fields: Any,
+    ) -> User:
+        """Make a host account."""
+        return self.create_user(username, email, password, **extra_fields | {"role": Role.HOST})
+
+
+class VisibleAccounts(ScopedManager["User"], BaseUserManager["User"]):
+    """Accounts by scope, with the helpers that Django's own account class asks of `objects`."""
+
+
+class User(AbstractUser):
+    """A person with an account. The role decides what the account may do."""
+
+    actor_kind = "user"
+    scope: ClassVar[Scope] = Scope(clinic="clinic", host=Q())
+
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.PROTECT, related_name="users", null=True, blank=True
+    )
+    role = models.CharField(max_length=16, choices=Role.choices)
+
+    everywhere = AccountManager()
+    objects: ClassVar[VisibleAccounts] = VisibleAccounts()  # type: ignore[assignment]
+
+    class Meta(AbstractUser.Meta):
+        default_manager_name = "everywhere"
+        base_manager_name = "everywhere"
+        ordering: ClassVar = ["username"]
+        constraints: ClassVar = [
+            models.CheckConstraint(
+                condition=Q(role=Role.HOST, clinic__isnull=True)
+                | (~Q(role=Role.HOST) & Q(clinic__isnull=False)),
+                name="user_clinic_fits_role",
+                violation_error_message="A host has no clinic; every other role needs one.",
+            ),
+            models.CheckConstraint(condition=Q(role__in=Role.values), name="user_role_is_known"),
+        ]
+
+    def save(self, *args: Any, **kwargs: Any) -> None:
+        """Save the account; Django's own flags follow the role."""
+        self.is_staff = True  # every person works in the admin; what they see there is their role's
+        self.is_superuser = False  # nobody passes by the table of roles
+        super().save(*args, **kwargs)
+
+    def __str__(self) -> str:
+        return self.get_full_name() or self.username
+
+    @classmethod
+    def is_taken(cls, username: str) -> bool:
+        """Whether an account of any clinic has this name, in capitals or not."""
+        return cls.everywhere.filter(username__iexact=username).exists()
+
+
+def new_pseudonym() -> str:
+    """Make a name that says nothing about a patient."""
+    return "P-" + "".join(secrets.choice(UNAMBIGUOUS) for _ in range(8))
+
+
+class Patient(ClinicRow):
+    """Someone who walks. The clinic's code and a nickname, never a full name."""
+
+    scope = Scope(clinic="clinic")
+
+    clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="patients")
+    code = models.CharField(
+        max_length=32, help_text="The clinic's own number for this patient, never a name."
+    )
+    nickname = models.CharField(
+        max_length=32, help_text="What the screens say, so that patient and therapist can check."
+    )
+    pseudonym = models.CharField(max_length=16, unique=True, default=new_pseudonym, editable=False)
+    body_mass_kg = models.FloatField(
+        "body mass (kg)",
+        null=True,
+        blank=True,
+        validators=[MinValueValidator(10), MaxValueValidator(300)],
+        help_text="Needed when sensors send raw signals: A2 is power per kilogram.",
+    )
+    paretic_side = models.CharField(max_length=8, choices=SIDES, blank=True)
+    language = models.CharField(max_length=8, choices=LANGUAGES, default="en")
+    simulated = models.BooleanField(default=False, editable=False)
+    created_at = models.DateTimeField(auto_now_add=True)
+
+    class Meta(ClinicRow.Meta):
+        ordering: ClassVar = ["nickname", "code"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(fields=["clinic", "code"], name="patient_code_once_per_clinic")
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.nickname} ({self.code})"

@@ -1,0 +1,75 @@
+"""Who may do what: one table for admin, pages, API and sockets."""
+
+from __future__ import annotations
+
+from enum import Flag, auto
+
+from django.db.models import TextChoices
+
+
+class Role(TextChoices):
+    """What a person is to GARRY. A device is no person: see `stations.models.Device`."""
+
+    HOST = "host", "Host"
+    LEAD = "lead", "Clinic lead"
+    PT = "pt", "Physical therapist"
+    RESEARCHER = "researcher", "Researcher"
+
+
+class Right(Flag):
+    """What a role may do with the rows of a noun that it can see."""
+
+    NONE = 0
+    VIEW = auto()
+    ADD = auto()
+    CHANGE = auto()
+    DELETE = auto()
+    EDIT = VIEW | ADD | CHANGE
+    ALL = VIEW | ADD | CHANGE | DELETE
+
+
+# Noun (model name) → role → rights. What is not named is not allowed. A host runs the server and
+# sees accounts and shared settings, never a patient. A researcher sees pseudonyms only. Sessions,
+# steps and events are a log: nobody edits them in place.
+RIGHTS: dict[str, dict[Role, Right]] = {
+    "Clinic": {Role.HOST: Right.EDIT, Role.LEAD: Right.VIEW | Right.CHANGE},
+    "User": {Role.HOST: Right.EDIT, Role.LEAD: Right.EDIT},
+    "Patient": {Role.LEAD: Right.EDIT, Role.PT: Right.EDIT},
+    "Station": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
+    "Device": {Role.LEAD: Right.EDIT, Role.PT: Right.VIEW},
+    "Pairing": {},
+    "Measure": {
+        Role.HOST: Right.EDIT,
+        Role.LEAD: Right.EDIT,
+        Role.PT: Right.VIEW,
+        Role.RESEARCHER: Right.VIEW,
+    },
+    "Protocol": {
+        Role.HOST: Right.ALL,
+        Role.LEAD: Right.ALL,
+        Role.PT: Right.ALL,
+        Role.RESEARCHER: Right.VIEW,
+    },
+    "ProtocolPhase": {
+        Role.HOST: Right.ALL,
+        Role.LEAD: Right.ALL,
+        Role.PT: Right.ALL,
+        Role.RESEARCHER: Right.VIEW,
+    },
+    "TrainingSession": {
+        Role.LEAD: Right.VIEW,
+        Role.PT: Right.VIEW,
+        Role.RESEARCHER: Right.VIEW,
+    },
+    "Step": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
+    "SessionEvent": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
+    "SessionMetric": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
+    "Leaderboard": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
+}
+
+
+def rights_of(role: str, noun: str) -> Right:
+    """Give what a role may do with a noun; nothing for a role or noun that the table lacks."""
+    if role not in Role.values:
+        return Right.NONE
+    return RIGHTS.get(noun, {}).get(Role(role), Right.NONE)

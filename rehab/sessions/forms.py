@@ -1,0 +1,245 @@
+"""What a PT fills in before a session: who walks, and how the session is set up."""
+
+from __future__ import annotations
+
+import math
+import secrets
+from pathlib import Path
+from typing import Any, ClassVar
+
+from django import forms
+from django.conf import settings
+from django.core.exceptions import ValidationError
+from django.db.models import QuerySet
+
+from rehab.people.access import clinic_of
+from rehab.people.models import SIDES, Patient, User
+from rehab.sessions.models import Protocol, TrainingSession
+from rehab.sessions.services import create_session
+from rehab.sources.recording import RecordingError, read_recording
+from rehab.sources.synthetic import PROFILES
+from rehab.stations.models import Station
+from rehab.training.changes import OPEN
+from rehab.training.goals import GoalRule, Target
+from rehab.training.measures import A2, InvalidSetting
+from rehab.training.steps import Side
+from rehab.training.valences import VALENCES
+
+LIVE = "live"
+# The paper's example of a goal for a whole session (product.md 1): 60 % of the steps, ten minutes.
+WANTED_HITS_PERCENT = 60
+PLANNED_MINUTES = 10
+# Mean A2 of a healthy walk in the recordings (gait.md 1.3): where a first goal begins.
+FIRST_GOAL_W_KG = 3.9
+TRAINING_ONLY, WITH_BASELINE = "Training only", "Baseline, training, washout"
+
+
+class PatientForm(forms.ModelForm):
+    """A new patient of the PT's clinic."""
+
+    class Meta:
+        model = Patient
+        fields: ClassVar = ["nickname", "code", "paretic_side", "body_mass_kg"]
+
+    def __init__(self, *args: Any, by: User, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.instance.clinic = clinic_of(by)
+        self._by = by
+        self.fields["paretic_side"].required = True
+        self.fields["nickname"].widget.attrs["autofocus"] = True
+
+    def clean_code(self) -> str:
+        """Refuse a code that is taken, and say by whom."""
+        code: str = self.cleaned_data["code"]
+        others = Patient.objects.visible_to(self._by).filter(code=code)
+        if (other := others.first()) is not None:
+            raise ValidationError(f"Code {code} already exists: it is {other.nickname}'s.")
+        return code
+
+
+def list_recordings() -> list[Path]:
+    """Give the recordings on this machine. None on a hosted server: they belong to no clinic."""
+    folder: Path = settings.DATA_DIR / "recordings"
+    return [] if settings.HOSTED or not folder.is_dir() else sorted(folder.glob("*.csv"))
+
+
+def list_sources() -> list[tuple[str, str]]:
+    """Give what steps can come from, with its words."""
+    simulated = [(f"synthetic {name}", f"Simulated patient, {name}") for name in PROFILES]
+    recordings = [
+        (f"recording {file.name}", f"Recording {file.name}") for file in list_recordings()
+    ]
+    return [(LIVE, "Live sensor"), *simulated, *recordings]
+
+
+class NumberField(forms.FloatField):
+    """A number, with a point or a comma."""
+
+    def to_python(self, value: Any) -> Any:
+        """Read it."""
+        return super().to_python(value.replace(",", ".") if isinstance(value, str) else value)
+
+
+class SessionForm(forms.Form):
+    """Everything a session of one patient needs. Nothing has to be typed."""
+
+    valence = forms.ChoiceField(choices=[(v.slug, v.label) for v in VALENCES.values()])
+    goal_by = forms.ChoiceField(choices=[("value", A2.unit), ("percent", "% of baseline")])
+    goal_value = NumberField(min_value=0.05, max_value=A2.goal_max, required=False)
+    goal_percent = NumberField(min_value=50, max_value=200, required=False)
+    wanted_hits = forms.IntegerField(min_value=1, max_value=100, required=False)
+    minutes = forms.IntegerField(min_value=1, max_value=240, required=False)
+    protocol: forms.ModelChoiceField[Protocol] = forms.ModelChoiceField(
+        queryset=None, empty_label=None, widget=forms.RadioSelect
+    )
+    station: forms.ModelChoiceField[Station] = forms.ModelChoiceField(
+        queryset=None, empty_label=None, widget=forms.RadioSelect
+    )
+    source = forms.ChoiceField(widget=forms.RadioSelect)
+    trained_side = forms.ChoiceField(choices=SIDES, widget=forms.RadioSelect)
+
+    def __init__(self, *args: Any, patient: Patient, by: User, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.patient, self.by = patient, by
+        fields: dict[str, Any] = self.fields
+        fields["protocol"].queryset = Protocol.objects.visible_to(by)
+        fields["station"].queryset = Station.objects.visible_to(by)
+        fields["source"].choices = list_sources()
+
+    def clean_station(self) -> Station:
+        """Refuse a station where somebody else may be walking right now."""
+        station: Station = self.cleaned_data["station"]
+        busy = TrainingSession.objects.visible_to(self.by).filter(
+            station=station, state__in=[state.value for state in OPEN]
+        )
+        if (session := busy.select_related("patient").first()) is not None:
+            raise ValidationError(
+                f"{station} still has an open session of {session.patient}. End it first, or "
+                "choose another station."
+            )
+        return station
+
+    def clean_source(self) -> str:
+        """Refuse a recording that cannot be played, in its reader's own words."""
+        source: str = self.cleaned_data["source"]
+        kind, _, name = source.partition(" ")
+        if kind == "recording":
+            try:
+                read_recording(settings.DATA_DIR / "recordings" / name)
+            except RecordingError as problem:
+                raise ValidationError(str(problem)) from problem
+        return source
+
+    def save(self) -> TrainingSession:
+        """Create the session. Raises InvalidSetting for a plan that could not be walked."""
+        data = self.cleaned_data
+        by_value = data["goal_by"] == "value"
+        hits, minutes = data["wanted_hits"], data["minutes"]
+        kind, _, name = data["source"].partition(" ")
+        return create_session(
+            self.patient,
+            valence=data["valence"],
+            goal=GoalRule(
+                value=data["goal_value"] if by_value else None,
+                percent_of_baseline=None if by_value else data["goal_percent"],
+            ),
+            protocol=data["protocol"],
+            trained_side=Side(data["trained_side"]),
+            target=Target(
+                hit_rate=hits / 100 if hits else None, duration_s=minutes * 60 if minutes else None
+            ),
+            station=data["station"],
+            created_by=self.by,
+            source=dict(list_sources()).get(data["source"], ""),
+            simulated=kind == "synthetic",
+            runs=_arguments(kind, name),
+        )
+
+    def create(self) -> TrainingSession | None:
+        """Create the session, or give None and say in ``errors`` what hinders."""
+        if not self.is_valid():
+            return None
+        try:
+            return self.save()
+        except InvalidSetting as problem:
+            self.add_error(None, str(problem))
+            return None
+
+
+def _arguments(kind: str, name: str) -> list[str]:
+    """Give what the server runs as `python -m rehab.sources` for a choice of ``list_sources``."""
+    match kind:
+        case "synthetic":
+            return ["synthetic", "--profile", name, "--seed", str(secrets.randbelow(2**31))]
+        case "recording":
+            return ["recording", str(settings.DATA_DIR / "recordings" / name)]
+    return []
+
+
+# Usual stride time of the recordings (gait.md 1.4), to tell how long a phase of strides takes.
+STRIDE_S = 1.1
+
+
+def minutes_of(protocol: Protocol | None) -> int | None:
+    """Give how long a protocol takes; None where a phase lasts until the PT moves on."""
+    total_s = 0.0
+    for phase in () if protocol is None else protocol.to_rules():
+        limits = [phase.seconds, phase.strides and phase.strides * STRIDE_S]
+        known = [limit for limit in limits if limit]
+        if not known:
+            return None
+        total_s += min(known)
+    return math.ceil(total_s / 60) or None
+
+
+def _free(stations: QuerySet[Station]) -> Station | None:
+    """Give the first station where nobody has an open session, or else the first."""
+    taken = stations.filter(sessions__state__in=[state.value for state in OPEN])
+    return stations.exclude(pk__in=taken.values("pk")).first() or stations.first()
+
+
+def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
+    """Give what the set-up begins with: the patient's last session, or sensible first values."""
+    stations = Station.objects.visible_to(by)
+    words = dict(list_sources())
+    last = (
+        TrainingSession.objects.visible_to(by)
+        .filter(patient=patient, protocol__isnull=False)
+        .order_by("-created_at", "-pk")
+        .first()
+    )
+    if last is None:
+        name = TRAINING_ONLY if patient.simulated else WITH_BASELINE
+        protocols = Protocol.objects.visible_to(by)
+        protocol = protocols.filter(name=name, clinic=None).first() or protocols.first()
+        return {
+            "valence": "positive",
+            "goal_by": "value" if patient.simulated else "percent",
+            "goal_value": FIRST_GOAL_W_KG,
+            "goal_percent": 100,
+            "wanted_hits": WANTED_HITS_PERCENT,
+            "minutes": minutes_of(protocol) or PLANNED_MINUTES,
+            "protocol": protocol,
+            "station": _free(stations),
+            "source": (source := "synthetic good" if patient.simulated else LIVE),
+            "source_words": words[source],
+            "trained_side": patient.paretic_side or Side.LEFT.value,
+        }
+    plan = last.to_plan()
+    source = next((name for name, label in words.items() if label == last.source), LIVE)
+    if last.runs and not patient.simulated:
+        source = LIVE  # one trial with a simulator makes nobody a simulated patient
+    hits, seconds = plan.target.hit_rate, plan.target.duration_s
+    return {
+        "valence": last.valence,
+        "goal_by": "percent" if plan.goal.needs_baseline else "value",
+        "goal_value": round(last.goal if last.goal is not None else FIRST_GOAL_W_KG, 2),
+        "goal_percent": plan.goal.percent_of_baseline or 100,
+        "wanted_hits": round(100 * hits) if hits else None,
+        "minutes": round(seconds / 60) if seconds else None,
+        "protocol": last.protocol,
+        "station": last.station or _free(stations),
+        "source": source,
+        "source_words": words[source],
+        "trained_side": last.trained_side,
+    }

@@ -1,0 +1,143 @@
+"""A whole session without pages: a recording or a simulated patient, through the one path."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import defaultdict
+from collections.abc import Awaitable, Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from django.utils import timezone
+
+from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.session import LiveSession
+from rehab.sessions.models import Step, TrainingSession
+from rehab.sources.recording import Recording
+from rehab.sources.synthetic import SyntheticWalker
+from rehab.training.changes import ChangeKind
+from rehab.training.figures import describe_session
+from rehab.training.fold import SessionFold
+from rehab.training.measures import A2
+from rehab.training.scoring import judge
+from rehab.training.steps import Measurement
+
+# Steps on their way to the disk at full speed: commits cost little, memory stays flat.
+BATCH = 500
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast strides arrive: ``speed`` times true cadence, or as fast as they are stored (None).
+
+    Clock and sleep are parameters, so that no test has to wait.
+    """
+
+    speed: float | None = None
+    clock: Callable[[], float] = time.monotonic
+    sleep: Callable[[float], Awaitable[None]] = asyncio.sleep
+
+
+def simulate_strides(
+    walker: SyntheticWalker, fold: SessionFold, count: int
+) -> Iterator[Measurement]:
+    """Let a simulated patient walk, each stride in the phase that the session has reached."""
+    return (walker.next_stride(fold.phase) for _ in range(count))
+
+
+async def run_session(
+    session_id: int, strides: Callable[[SessionFold], Iterator[Measurement]], pace: Pace
+) -> SessionFold:
+    """Start a session, send it strides through the live path, finish it; give its fold.
+
+    A failure on the way leaves the session aborted, with the steps that were stored.
+    """
+    runtime = runtimes.current()
+    try:
+        live = await runtime.session(session_id)
+        fold = live.actor.fold
+        await runtime.change(session_id, ChangeKind.START, None, None)
+        try:
+            await _send(live, strides(fold), pace)
+        except BaseException:
+            await runtime.change(session_id, ChangeKind.ABORT, None, None)
+            raise
+        await runtime.change(session_id, ChangeKind.FINISH, None, None)
+        return fold
+    finally:
+        await runtime.drain()
+
+
+async def _send(live: LiveSession, strides: Iterator[Measurement], pace: Pace) -> None:
+    began: float | None = None
+    for count, stride in enumerate(strides, start=1):
+        if pace.speed is not None:
+            began = pace.clock() - stride.time_s / pace.speed if began is None else began
+            await pace.sleep(max(0.0, began + stride.time_s / pace.speed - pace.clock()))
+        live.take(stride, timezone.now())
+        if count % BATCH == 0:
+            await live.settled()
+    await live.settled()
+
+
+def robot_steps(session: TrainingSession, fold: SessionFold) -> Iterator[tuple[float, float]]:
+    """Give what a robot would have heard of a stored session: time [s] and performance of steps."""
+    feedback = [index for index, phase in enumerate(fold.plan.phases) if phase.feedback]
+    steps = Step.everywhere.filter(session=session, phase__in=feedback).order_by("number")
+    for time_s, performance in steps.values_list("time_s", "performance").iterator():
+        if performance is not None:
+            yield time_s, performance
+
+
+def compare_with_flags(session: TrainingSession, recording: Recording) -> dict[int, dict[str, int]]:
+    """Compare our rule with the recording's own flags; phase → counts.
+
+    ``compared`` counts the rows with a recorded value and flag, valid or not; ``agree`` those where
+    shown ≥ goal by our rule is what the file says; ``hits`` the hits by our rule.
+    """
+    counts: dict[int, dict[str, int]] = defaultdict(lambda: {"compared": 0, "agree": 0, "hits": 0})
+    steps = Step.everywhere.filter(session=session).order_by("number").iterator()
+    for step, stride in zip(steps, recording.strides, strict=True):
+        if stride.recorded_hit is None or step.value is None or step.goal is None:
+            continue
+        hit = judge(A2, step.value, step.gain, step.goal).hit
+        count = counts[step.phase]
+        count["compared"] += 1
+        count["agree"] += hit == stride.recorded_hit
+        count["hits"] += hit
+    return counts
+
+
+def report(
+    session: TrainingSession,
+    fold: SessionFold,
+    wall_s: float,
+    recording: Recording | None = None,
+    robot: dict[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Give the JSON that `runsession` prints; ``robot`` is what a robot did, if one answered."""
+    figures = describe_session(fold)
+    if recording is not None:
+        counts = compare_with_flags(session, recording)
+        figures["recorded_success"] = _sum_counts(list(counts.values()))
+        for phase in figures["phases"]:
+            phase["recorded_success"] = _sum_counts(
+                [counts[block["phase"]] for block in phase["blocks"] if block["phase"] in counts]
+            )
+    return {
+        "session": session.pk,
+        "valence": session.valence,
+        **figures,
+        "robot": {"base": "null", "windows": 0, "activated_share": None},
+        "gestures": [],
+        **(robot or {}),
+        "wall_s": round(wall_s, 3),
+        "steps_per_s": round(fold.last_number / wall_s) if wall_s > 0 else None,
+    }
+
+
+def _sum_counts(counts: list[dict[str, int]]) -> dict[str, Any]:
+    total = {name: sum(count[name] for count in counts) for name in ("compared", "agree", "hits")}
+    rate = total["hits"] / total["compared"] if total["compared"] else None
+    return {**total, "hit_rate": rate}

@@ -1,0 +1,177 @@
+"""One session that runs in this process: turns measurements and changes into rows to be written."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from datetime import datetime
+from typing import Any, NamedTuple
+
+from rehab.people.models import User
+from rehab.sessions.models import (
+    Remark,
+    RobotEntry,
+    SessionEvent,
+    SessionMetric,
+    Step,
+    TrainingSession,
+)
+from rehab.training.changes import ENDED, Change, ChangeKind, State
+from rehab.training.fold import SessionFold
+from rehab.training.metrics import measure_session
+from rehab.training.steps import Measurement, ScoredStep, Side
+
+
+class StepRow(NamedTuple):
+    """A scored stride on its way into the log."""
+
+    session_id: int
+    step: ScoredStep
+    received_at: datetime
+
+
+Row = StepRow | SessionEvent | SessionMetric
+MARKED = frozenset({ChangeKind.GOAL.value, *(remark.value for remark in Remark)})
+MARKS = 100  # the newest; more would hide the strides
+Summary = dict[str, Any]
+
+
+class SessionActor:
+    """Folds one session. Its rows count only once a writer has committed them.
+
+    If a commit fails the actor is ahead of the log and must be dropped; ``load`` rebuilds it from
+    what was committed.
+    """
+
+    def __init__(self, session: TrainingSession) -> None:
+        self.session = session
+        self.fold = SessionFold(session.to_plan())
+        self.marks: deque[dict[str, Any]] = deque(maxlen=MARKS)  # what a PT's chart points out
+
+    @classmethod
+    def load(cls, session: TrainingSession) -> SessionActor:
+        """Rebuild the actor of a session from its log."""
+        actor = cls(session)
+        for entry in read_log(session):
+            if isinstance(entry, Change):
+                actor.fold.change(entry)
+            else:
+                actor.fold.step(entry)
+        marked = SessionEvent.everywhere.filter(session=session, kind__in=MARKED).order_by("-pk")
+        for event in reversed(marked[:MARKS]):
+            actor.mark(event)
+        return actor
+
+    def mark(self, event: SessionEvent) -> None:
+        """Keep an event at hand for those who join later."""
+        mark = {"after": event.after_number, "kind": event.kind, "value": event.value}
+        self.marks.append(mark)
+
+    def take(self, measurement: Measurement, received_at: datetime) -> StepRow:
+        """Score one stride and give its row. Raises what ``SessionFold.step`` raises."""
+        return StepRow(self.session.pk, self.fold.step(measurement), received_at)
+
+    def change(self, change: Change, by: User | None, at: datetime) -> list[Row]:
+        """Apply a change from the next step on and give the rows that record it.
+
+        Raises what ``SessionFold.change`` raises; nothing has then happened.
+        """
+        old = self._current(change.kind)
+        self.fold.change(change)
+        event = SessionEvent(
+            session=self.session,
+            after_number=self.fold.last_number,
+            kind=change.kind.value,
+            old=old,
+            value=change.value,
+            by=by,
+            at=at,
+        )
+        if event.kind in MARKED:
+            self.mark(event)
+        rows: list[Row] = [event]
+        if change.kind is ChangeKind.START:
+            self.session.started_at = at
+        if self.fold.state in ENDED:
+            self.session.ended_at = at
+        if self.fold.state is State.FINISHED:
+            rows += [
+                SessionMetric(session=self.session, slug=slug, value=value)
+                for slug, value in measure_session(self.fold).items()
+            ]
+        return rows
+
+    def note(
+        self,
+        kind: RobotEntry | Remark,
+        by: User | None,
+        at: datetime,
+        data: dict[str, Any],
+        value: float | None = None,
+    ) -> SessionEvent:
+        """Give the row that records a remark, or what became of the robot."""
+        event = SessionEvent(
+            session=self.session,
+            after_number=self.fold.last_number,
+            kind=kind.value,
+            value=value,
+            by=by,
+            at=at,
+            data=data,
+        )
+        if event.kind in MARKED:
+            self.mark(event)
+        return event
+
+    def summary(self) -> Summary:
+        """Give the session's columns as they follow from the log, to be written with its rows."""
+        return {
+            "state": self.fold.state.value,
+            "goal": self.fold.goal,
+            "active_s": self.fold.active_s,
+            "started_at": self.session.started_at,
+            "ended_at": self.session.ended_at,
+        }
+
+    def _current(self, kind: ChangeKind) -> float | None:
+        match kind:
+            case ChangeKind.GOAL:
+                return self.fold.goal
+            case ChangeKind.GAIN:
+                return self.fold.gain
+            case ChangeKind.PHASE:
+                return self.fold.phase_index
+            case ChangeKind.ACTIVATION_THRESHOLD:
+                return self.fold.activation_threshold
+        return None
+
+
+def read_log(session: TrainingSession) -> Iterator[Measurement | Change]:
+    """Give a session's committed steps and changes in the order in which they took effect."""
+    changes = SessionEvent.everywhere.filter(session=session, kind__in=list(ChangeKind))
+    events = list(changes.order_by("pk"))
+    events.reverse()
+    number = 0
+    for step in Step.everywhere.filter(session=session).order_by("number").iterator():
+        while events and events[-1].after_number <= number:
+            yield _to_change(events.pop())
+        yield to_measurement(step)
+        number = step.number
+    while events:
+        yield _to_change(events.pop())
+
+
+def _to_change(event: SessionEvent) -> Change:
+    return Change(ChangeKind(event.kind), event.value)
+
+
+def to_measurement(step: Step) -> Measurement:
+    """Give back what the source said of a stride; scored again, it gets the verdict it has."""
+    return Measurement(
+        number=step.number,
+        time_s=step.time_s,
+        side=Side(step.side),
+        value=step.value,
+        reasons=tuple(step.reasons),
+        extra=step.extra,
+    )

@@ -1,0 +1,128 @@
+"""Who is at the other end of a socket, and what they may open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+from urllib.parse import urlsplit
+
+from channels.db import database_sync_to_async
+from django.conf import settings
+from django.contrib.auth import get_user
+from django.contrib.sessions.models import Session
+from django.http import HttpRequest, parse_cookie
+from django.http.request import split_domain_port, validate_host
+from django.utils import timezone
+from django.utils.module_loading import import_string
+
+from rehab.people.models import User
+from rehab.sessions.models import TrainingSession
+from rehab.stations import tablets
+from rehab.stations.models import Device, find_device
+from rehab.stations.tablets import find_tablet
+from rehab.training.changes import OPEN
+
+Actor = User | Device | None
+
+
+def headers_of(scope: Mapping[str, Any]) -> dict[str, str]:
+    """Give a socket's headers by their lower-case names."""
+    return {
+        name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]
+    }
+
+
+def token_of(scope: Mapping[str, Any]) -> str | None:
+    """Give the device token in the Authorization header."""
+    kind, _, token = headers_of(scope).get("authorization", "").partition(" ")
+    return token.strip() if kind.lower() == "bearer" and token else None
+
+
+def is_own_page(scope: Mapping[str, Any]) -> bool:
+    """Say whether a page of ours opened this socket: only then do its cookies count."""
+    try:
+        place = urlsplit(headers_of(scope).get("origin", "")).netloc
+    except ValueError:
+        return False
+    host, _ = split_domain_port(place)
+    return bool(host) and validate_host(host, settings.ALLOWED_HOSTS)
+
+
+@database_sync_to_async
+def find_actor(scope: Mapping[str, Any]) -> Actor:
+    """Give the device or person at the other end; None for a stranger."""
+    token = token_of(scope)
+    if token is not None:
+        return find_device(token)
+    if not is_own_page(scope):
+        return None
+    return _signed_in(scope) or find_tablet(cookies_of(scope).get(tablets.COOKIE))
+
+
+@database_sync_to_async
+def find_device_by(token: str) -> Device | None:
+    """Give the device that a token in a first frame belongs to."""
+    return find_device(token) if token.isascii() else None
+
+
+def cookies_of(scope: Mapping[str, Any]) -> dict[str, str]:
+    """Give a socket's cookies."""
+    return parse_cookie(headers_of(scope).get("cookie", ""))
+
+
+def session_key_of(scope: Mapping[str, Any]) -> str | None:
+    """Give the key of the browser session that a socket's cookies name."""
+    return cookies_of(scope).get(settings.SESSION_COOKIE_NAME)
+
+
+def _signed_in(scope: Mapping[str, Any]) -> User | None:
+    request = HttpRequest()
+    key = session_key_of(scope)
+    if key is None:
+        return None
+    store = import_string(f"{settings.SESSION_ENGINE}.SessionStore")
+    request.session = store(key)
+    user = get_user(request)
+    return user if isinstance(user, User) else None
+
+
+@database_sync_to_async
+def find_unwelcome(admitted: Sequence[tuple[Actor, Mapping[str, Any]]]) -> list[int]:
+    """Say which of these actors, each with its socket's scope, would no longer be let in: devices
+    whose token was revoked or renewed, people who have signed out or were switched off.
+    """
+    devices = {actor.pk for actor, _ in admitted if isinstance(actor, Device)}
+    people = {actor.pk for actor, _ in admitted if isinstance(actor, User)}
+    keys = {session_key_of(scope) for actor, scope in admitted if isinstance(actor, User)}
+    valid = Device.everywhere.filter(pk__in=devices, revoked_at__isnull=True)
+    hashes = dict(valid.values_list("pk", "token_hash"))
+    active = set(User.everywhere.filter(pk__in=people, is_active=True).values_list("pk", flat=True))
+    open_keys = set(
+        Session.objects.filter(session_key__in=keys, expire_date__gt=timezone.now()).values_list(
+            "session_key", flat=True
+        )
+    )
+
+    def is_welcome(actor: Actor, scope: Mapping[str, Any]) -> bool:
+        if isinstance(actor, Device):
+            return hashes.get(actor.pk) == actor.token_hash
+        return actor is None or (actor.pk in active and session_key_of(scope) in open_keys)
+
+    return [index for index, one in enumerate(admitted) if not is_welcome(*one)]
+
+
+@database_sync_to_async
+def may_open(actor: Actor, session_id: int) -> bool:
+    """Say whether the session is one that this actor sees."""
+    return TrainingSession.objects.visible_to(actor).filter(pk=session_id).exists()
+
+
+@database_sync_to_async
+def open_session_of(device: Device, session_id: int | None) -> int | None:
+    """Give the station's open session (the newest one, or the one that is named)."""
+    sessions = TrainingSession.objects.visible_to(device).filter(
+        state__in=[state.value for state in OPEN]
+    )
+    if session_id is not None:
+        sessions = sessions.filter(pk=session_id)
+    return sessions.order_by("-created_at", "-pk").values_list("pk", flat=True).first()

@@ -1,0 +1,154 @@
+"""Processes that run beside the server and end with it: simulated patients, recordings, robots.
+
+A child's standard input is a pipe that nobody writes to. When the server ends, however it ends, the
+pipe closes; children that GARRY brings along take that as their end.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import os
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+log = logging.getLogger(__name__)
+
+FIRST_PAUSE_S = 0.5
+LONGEST_PAUSE_S = 30.0
+STEADY_S = 60.0  # a child that ran so long failed for a new reason: its pauses begin anew
+STOP_S = 5.0
+
+
+@dataclass
+class Child:
+    """One supervised process."""
+
+    name: str
+    command: Sequence[str]
+    state: str = "starting"
+    pid: int | None = None
+    restarts: int = 0
+    last_words: deque[str] = field(default_factory=lambda: deque(maxlen=20))
+    task: asyncio.Task[None] | None = None
+
+    def describe(self) -> dict[str, Any]:
+        """Give what an operator wants to know."""
+        return {
+            "name": self.name,
+            "command": list(self.command),
+            "state": self.state,
+            "pid": self.pid,
+            "restarts": self.restarts,
+            "last_words": list(self.last_words)[-3:],
+        }
+
+
+class Children:
+    """Starts children again when they fail, and leaves none behind.
+
+    ``report`` is a file that always says how they are, for `manage.py doctor`.
+    """
+
+    def __init__(self, report: Path, first_pause_s: float = FIRST_PAUSE_S) -> None:
+        self.report = report
+        self.first_pause_s = first_pause_s
+        self.all: dict[str, Child] = {}
+
+    def start(
+        self,
+        name: str,
+        command: Sequence[str],
+        variables: Mapping[str, str] | None = None,
+        *,
+        once: bool = False,
+    ) -> Child:
+        """Start a child; one of the same name must have been stopped before.
+
+        ``once`` forgets it as soon as it has done its work.
+        """
+        if name in self.all:
+            raise ValueError(f"There is a child {name!r} already. Stop it first.")
+        child = self.all[name] = Child(name, command)
+        environment = os.environ | dict(variables or {})
+        child.task = asyncio.get_running_loop().create_task(self._keep_up(child, environment, once))
+        return child
+
+    async def stop(self, name: str) -> None:
+        """End a child: politely, then for certain."""
+        child = self.all.pop(name, None)
+        if child is not None and child.task is not None:
+            child.task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await child.task
+        self._tell()
+
+    async def stop_all(self) -> None:
+        """End all children."""
+        await asyncio.gather(*(self.stop(name) for name in list(self.all)))
+
+    async def _keep_up(self, child: Child, environment: Mapping[str, str], once: bool) -> None:
+        pause_s = self.first_pause_s
+        loop = asyncio.get_running_loop()
+        while True:
+            began = loop.time()
+            status = await self._run(child, environment)
+            if status == 0:
+                child.state = "done"
+                if once:
+                    self.all.pop(child.name, None)
+                self._tell()
+                return
+            if loop.time() - began > STEADY_S:
+                pause_s = self.first_pause_s
+            child.state = "failed"
+            child.restarts += 1
+            log.warning("%s ended with %s; again in %.1f s", child.name, status, pause_s)
+            self._tell()
+            await asyncio.sleep(pause_s)
+            pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+
+    async def _run(self, child: Child, environment: Mapping[str, str]) -> int:
+        try:
+            process = await asyncio.create_subprocess_exec(
+                *child.command,
+                env=environment,
+                stdin=asyncio.subprocess.PIPE,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.STDOUT,
+            )
+        except OSError as problem:
+            child.last_words.append(str(problem))
+            return 127
+        child.state, child.pid = "running", process.pid
+        self._tell()
+        try:
+            if process.stdout is not None:
+                async for line in process.stdout:
+                    child.last_words.append(line.decode(errors="replace").rstrip()[:300])
+            return await process.wait()
+        finally:
+            child.pid = None
+            if process.returncode is None:
+                await _end(process)
+
+    def _tell(self) -> None:
+        children = [child.describe() for child in self.all.values()]
+        fresh = self.report.with_suffix(".new")
+        fresh.write_text(json.dumps({"server": os.getpid(), "children": children}))
+        fresh.replace(self.report)
+
+
+async def _end(process: asyncio.subprocess.Process) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        process.terminate()
+        try:
+            await asyncio.wait_for(process.wait(), STOP_S)
+        except TimeoutError:
+            process.kill()
+            await process.wait()

@@ -1,0 +1,1 @@
+"""The sockets that sources, screens and robots dial in on (docs/protocol.md)."""

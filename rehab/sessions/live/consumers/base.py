@@ -1,0 +1,213 @@
+"""What all sockets have in common: who is there, frames in, frames out, a clean end."""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+import logging
+from collections.abc import Awaitable, Callable, Coroutine
+from typing import Any
+
+from channels.exceptions import StopConsumer
+from channels.generic.websocket import AsyncWebsocketConsumer
+
+from rehab.sessions.events import Message, to_text
+from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.admission import Actor
+from rehab.sessions.live.messages import BadFrame, read_object
+from rehab.sessions.live.session import LiveSession, NotStored
+
+log = logging.getLogger(__name__)
+
+FIRST_FRAME_S = 10.0
+FRAMES_PER_S = 200.0
+FRAME_BURST = 1000.0
+
+
+class Closing(Exception):
+    """Ends a socket with a code, after telling why."""
+
+    def __init__(self, code: int, error: str, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+        self.error = error
+
+
+class Outbox:
+    """Messages that others want sent: they never wait, one task sends."""
+
+    def __init__(self, send: Callable[[str], Awaitable[None]]) -> None:
+        self._send = send
+        self._texts: list[str] = []
+        self._ends_with_ack = False
+        self._awake = asyncio.Event()
+
+    def tell(self, message: Message) -> None:
+        """Queue a message."""
+        self._texts.append(to_text(message))
+        self._ends_with_ack = False
+        self._awake.set()
+
+    def acknowledge(self, number: int) -> None:
+        """Queue an ack; a newer one takes its place, for acks cover all that came before."""
+        if self._ends_with_ack:
+            self._texts.pop()
+        self._texts.append(f'{{"type":"ack","number":{number}}}')
+        self._ends_with_ack = True
+        self._awake.set()
+
+    async def run(self) -> None:
+        """Send until cancelled."""
+        while True:
+            await self._awake.wait()
+            self._awake.clear()
+            texts, self._texts, self._ends_with_ack = self._texts, [], False
+            for text in texts:
+                await self._send(text)
+
+
+class Socket(AsyncWebsocketConsumer):
+    """A socket of the live path.
+
+    It uses no channel layer (the hub is in this process) and, unlike Channels' own dispatch, hops
+    to no database thread for each frame: half of what a step costs (stack.md, T1). Subclasses
+    implement ``opened``, ``heard`` and ``left``.
+    """
+
+    live: LiveSession | None = None
+    actor: Actor = None  # once admitted
+    first_frame_s = FIRST_FRAME_S
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        """Serve the socket until either side ends it."""
+        self.scope = scope
+        self.base_send: Any = send
+        self.runtime = runtimes.current()
+        self.is_closed = False
+        self.outbox = Outbox(self.send)
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._context = contextvars.copy_context()
+        self._budget, self._budget_at = FRAME_BURST, self.runtime.loop.time()
+        self.runtime.sockets.add(self)
+        try:
+            await self._serve(receive)
+        except StopConsumer:
+            pass
+        finally:
+            self.runtime.sockets.discard(self)
+            self.is_closed = True
+            for task in self._tasks:
+                task.cancel()
+            self.left()
+
+    async def _serve(self, receive: Any) -> None:
+        while True:
+            message = await receive()
+            match message["type"]:
+                case "websocket.connect":
+                    await self.accept()
+                    if self.runtime.draining:
+                        await self.shut(4012)
+                    else:
+                        self.start(self.outbox.run())
+                        await self._guard(self.opened())
+                case "websocket.receive":
+                    if not self.is_closed:
+                        await self._guard(self._heard(message))
+                case "websocket.disconnect":
+                    raise StopConsumer
+
+    async def _heard(self, message: dict[str, Any]) -> None:
+        self._spend_budget()
+        await self.heard(message.get("text"))
+
+    def _spend_budget(self) -> None:
+        """Count a frame. Raises Closing where they come faster than any honest client sends."""
+        now = self.runtime.loop.time()
+        elapsed, self._budget_at = now - self._budget_at, now
+        self._budget = min(FRAME_BURST, self._budget + elapsed * FRAMES_PER_S) - 1
+        if self._budget < 0:
+            raise Closing(4029, "flood", f"Send at most {FRAMES_PER_S:g} frames a second.")
+
+    async def _guard(self, work: Awaitable[None]) -> None:
+        """Do the work; whatever is wrong with it is told to the sender and harms nobody else."""
+        try:
+            await work
+        except BadFrame as problem:
+            await self.end(4400, problem.code, str(problem))
+        except Closing as problem:
+            await self.end(problem.code, problem.error, str(problem))
+        except NotStored as problem:
+            await self.end(4011, "not_stored", str(problem))
+        except Exception:
+            log.exception("A socket failed")
+            await self.end(4011, "server_error", "The server failed. Connect again.")
+
+    def start(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Run a task that lives as long as the socket."""
+        # The socket's own context: asgiref's marks of a page that caused this have no place here.
+        task = self.runtime.loop.create_task(self._guard(work), context=self._context)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        task.add_done_callback(lambda _: work.close())  # for one cancelled before it began
+        return task
+
+    async def send(  # type: ignore[override]
+        self, text_data: str | None = None, bytes_data: bytes | None = None, close: bool = False
+    ) -> None:
+        """Send a text frame, unless the socket is closed."""
+        if not self.is_closed and text_data is not None:
+            await self._pass_on({"type": "websocket.send", "text": text_data})
+
+    async def say(self, message: Message) -> None:
+        """Send a message now."""
+        await self.send(to_text(message))
+
+    async def end(self, code: int, error: str, message: str) -> None:
+        """Say what is wrong and close."""
+        await self.say({"type": "error", "code": error, "message": message})
+        await self.shut(code)
+
+    def send_off(self) -> None:
+        """End a socket that would no longer be let in."""
+        self.start(self.end(4001, "revoked", "The token or sign-in is no longer valid."))
+
+    async def shut(self, code: int) -> None:
+        """Close with a code."""
+        if not self.is_closed:
+            await self._pass_on({"type": "websocket.close", "code": code})
+            self.is_closed = True
+
+    async def _pass_on(self, message: dict[str, Any]) -> None:
+        try:
+            await self.base_send(message)
+        except Exception as problem:  # each server has its own for a client that is gone
+            log.debug("A client was gone: %s", problem)
+            self.is_closed = True
+
+    def close_soon(self, code: int) -> None:
+        """Close from code that cannot wait."""
+        self.start(self.shut(code))
+
+    async def refuse_silence(self) -> None:
+        """Close a socket that says nothing. Cancelled by the first good frame."""
+        await asyncio.sleep(self.first_frame_s)
+        raise Closing(4400, "silent", f"Send hello within {self.first_frame_s:g} s.")
+
+    async def opened(self) -> None:
+        """Deal with a new connection."""
+
+    async def heard(self, text: str | None) -> None:
+        """Deal with a frame."""
+        read_object(text)
+
+    def left(self) -> None:
+        """Undo what the socket stood for."""
+
+
+class NowhereConsumer(Socket):
+    """What answers at an address that no socket has."""
+
+    async def opened(self) -> None:
+        """Say so."""
+        raise Closing(4004, "no_address", "No socket has this address; see docs/protocol.md.")

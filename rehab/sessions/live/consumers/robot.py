@@ -1,0 +1,78 @@
+"""The socket of a robot: its cue and the steps to answer, and what it reports."""
+
+from __future__ import annotations
+
+import asyncio
+
+from django.utils import timezone
+
+from rehab.sessions.events import Audience, Message, describe_cue
+from rehab.sessions.live.consumers.device import DeviceSocket
+from rehab.sessions.live.hub import Lagged, Viewer
+from rehab.sessions.live.messages import BadFrame, read_name, read_report
+from rehab.sessions.live.session import LiveSession
+from rehab.stations.models import Device
+
+MAX_REPORT = 8 * 1024
+
+
+class RobotConsumer(DeviceSocket):
+    """A robot hears fresh, valid steps of feedback phases only."""
+
+    kind = Device.Kind.ROBOT
+    slot = "robot"
+    viewer: Viewer | None = None
+    _pumping: asyncio.Task[None] | None = None
+
+    async def asked(self, message: Message, text: str) -> None:
+        """Deal with hello and reports."""
+        match message.get("type"):
+            case "hello":
+                read_name(message, "base")
+                await self.greet(None)
+            case "report":
+                self._heard_report(message, text)
+            case _:
+                raise BadFrame('A robot sends "hello" and "report".')
+
+    async def attached(self, live: LiveSession) -> None:
+        """Begin to send; nothing more of the session before."""
+        if self._pumping is not None:
+            self._pumping.cancel()
+        self._pumping = self.start(self._pump(live))
+
+    async def _pump(self, live: LiveSession) -> None:
+        """Send the order and then steps. What a robot missed is past, and never made up for."""
+        while self.live is live:
+            _, viewer = await live.join(Audience.ROBOT, self.send)
+            self.viewer = viewer
+            fold = live.actor.fold
+            cue, state = describe_cue(fold), fold.state.value
+            stopped, watched = live.robot_stopped, live.is_watched
+            welcome = {"type": "welcome", "session": live.id, "state": state, "cue": cue}
+            await self.say(welcome | {"stopped": stopped, "watched": watched})
+            try:
+                await viewer.pump()
+            except Lagged:
+                continue
+            finally:
+                live.channel.viewers.discard(viewer)
+
+    def _heard_report(self, message: Message, text: str) -> None:
+        if len(text) > MAX_REPORT:
+            raise BadFrame(f'"report" is an object of at most {MAX_REPORT} characters.')
+        report = read_report(message)
+        if self.live is None:
+            return
+        if report.get("kind") == "stop":  # felt, or its button pressed: a person has to see to it
+            for session in self.runtime.at_station_of(self.live):
+                told = {"device": self.device_id, "reason": report["reason"]}
+                session.stop_robot(None, timezone.now(), told)
+        else:
+            self.live.heard_robot(report, timezone.now())
+
+    def left(self) -> None:
+        """Stop listening, and free the session for another robot."""
+        if self.live is not None and self.viewer is not None:
+            self.live.channel.viewers.discard(self.viewer)
+        super().left()

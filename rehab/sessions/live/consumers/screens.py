@@ -1,0 +1,212 @@
+"""The sockets of pages: the patient's and the PT's."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from typing import ClassVar
+from urllib.parse import parse_qs
+
+from django.utils import timezone
+
+from rehab.people.models import User
+from rehab.people.roles import Role
+from rehab.sessions.events import Audience, Message, history_entry, to_text
+from rehab.sessions.live.admission import Actor, find_actor, may_open
+from rehab.sessions.live.consumers.base import Closing, Socket
+from rehab.sessions.live.hub import Lagged, Unseen, Viewer
+from rehab.sessions.live.messages import (
+    BadFrame,
+    read_change,
+    read_name,
+    read_object,
+    read_order,
+    read_remark,
+    read_whole,
+)
+from rehab.sessions.live.owners import OwnedElsewhere
+from rehab.sessions.live.past import read_steps
+from rehab.sessions.live.session import LiveSession, NotStored
+from rehab.stations.models import Device
+from rehab.training.changes import ENDED, ChangeKind
+from rehab.training.measures import InvalidSetting
+
+
+class ScreenConsumer(Socket):
+    """A page that watches a session. Subclasses say who may, and what they hear."""
+
+    audience: ClassVar[Audience]
+    people: ClassVar[frozenset[Role]] = frozenset({Role.LEAD, Role.PT})
+    devices: ClassVar[frozenset[str]] = frozenset()
+    # What may be changed from such a page: by people, and by the station's tablet on its own.
+    changes: ClassVar[frozenset[ChangeKind]]
+    robot_orders: ClassVar[tuple[str, ...]] = ("stop",)
+    tablet_changes: ClassVar[frozenset[ChangeKind]] = frozenset()
+    viewer: Viewer | None = None
+
+    async def opened(self) -> None:
+        """Let the right people in and begin to send."""
+        session_id = int(self.scope["url_route"]["kwargs"]["session_id"])
+        self.actor = await find_actor(self.scope)
+        if self.actor is None:
+            raise Closing(4001, "sign_in", "Sign in again, or pair the tablet again.")
+        if not self.is_welcome(self.actor) or not await may_open(self.actor, session_id):
+            raise Closing(4004, "no_session", "There is no such session for you.")
+        try:
+            self.live = live = await self.runtime.session(session_id)
+        except OwnedElsewhere as problem:
+            raise Closing(4409, "busy", str(problem)) from None
+        if isinstance(self.actor, Device):
+            live.tablets += 1
+        self.start(self._pump(live, _after(self.scope["query_string"])))
+
+    @classmethod
+    def is_welcome(cls, actor: Actor) -> bool:
+        """Whether actors of this kind may open such a page at all."""
+        if isinstance(actor, User):
+            return actor.role in cls.people
+        return isinstance(actor, Device) and actor.kind in cls.devices
+
+    async def _pump(self, live: LiveSession, after: int | None) -> None:
+        """Send a snapshot, what was missed, then events; begin anew where the page lags."""
+        while True:
+            shown, viewer = await live.join(self.audience, self.send)
+            self.viewer = viewer
+            if isinstance(self.actor, Device) or self.audience is Audience.MONITOR:
+                live.announce_presence()
+            await self.say(shown)
+            if after is not None:
+                await self._send_missed(live, viewer, after, shown["number"])
+            viewer.wake()
+            try:
+                await viewer.pump()
+            except Unseen:
+                raise Closing(
+                    4008, "unseen", "The page confirms nothing. Connect again with ?after=."
+                ) from None
+            except Lagged:
+                after = None
+            finally:
+                live.channel.viewers.discard(viewer)
+
+    async def _send_missed(self, live: LiveSession, viewer: Viewer, after: int, until: int) -> None:
+        """Send the steps after a number from the log, oldest first."""
+        plan = live.actor.fold.plan
+        while after < until:
+            steps = await read_steps(live.id, after, until)
+            if not steps:
+                return
+            entries = (history_entry(self.audience, plan, step) for step in steps)
+            texts = [to_text(entry) for entry in entries if entry is not None]
+            if texts:
+                await viewer.send_frame("steps", texts)
+            after = steps[-1].number
+
+    async def heard(self, text: str | None) -> None:
+        """Deal with a confirmation."""
+        await self.asked(read_object(text))
+
+    async def asked(self, message: Message) -> None:
+        """Deal with a confirmation or a change."""
+        match message.get("type"):
+            case "seen":
+                if self.viewer is not None:
+                    self.viewer.seen(read_whole(message, "frame", low=0))
+            case "change":
+                await self._change(message)
+            case "robot":
+                await self._order_robot(message)
+            case "remark":
+                await self._remark(message)
+            case _:
+                raise BadFrame('A page sends "seen", "change", "remark" and "robot".')
+
+    async def _change(self, message: Message) -> None:
+        mark = read_name(message, "id")
+        kind, value = read_change(message)
+        live, by = self.live, self.actor if isinstance(self.actor, User) else None
+        if live is None:
+            raise Closing(4004, "no_session", "The session is not open. Connect again.")
+        if kind not in (self.changes if by else self.tablet_changes):
+            await self._refuse(mark, "refused", "That is changed on the therapist's page.")
+            return
+        try:
+            await self.runtime.change(live.id, kind, value, by)
+        except InvalidSetting as problem:
+            await self._refuse(mark, "refused", str(problem))
+        except NotStored as problem:
+            await self._refuse(mark, "not_stored", str(problem))
+        else:
+            await self.say({"type": "done", "id": mark})
+
+    async def _remark(self, message: Message) -> None:
+        mark = read_name(message, "id")
+        what, value = read_remark(message)
+        live, by = self.live, self.actor
+        if live is None:
+            raise Closing(4004, "no_session", "The session is not open. Connect again.")
+        if self.audience is not Audience.MONITOR or not isinstance(by, User):
+            await self._refuse(mark, "refused", "That is noted on the therapist's page.")
+        elif live.actor.fold.state in ENDED:
+            await self._refuse(mark, "refused", "The session has ended.")
+        else:
+            try:
+                await live.remark(what, value, by, timezone.now())
+            except NotStored as problem:
+                await self._refuse(mark, "not_stored", str(problem))
+            else:
+                await self.say({"type": "done", "id": mark})
+
+    async def _order_robot(self, message: Message) -> None:
+        """Stop the robot, whoever asks; let it move again where a person asks."""
+        order = read_order(message, *self.robot_orders)
+        live, by = self.live, self.actor if isinstance(self.actor, User) else None
+        if live is None:
+            raise Closing(4004, "no_session", "The session is not open. Connect again.")
+        sessions = self.runtime.at_station_of(live)
+        if order == "stop":
+            device = {"device": self.actor.pk} if isinstance(self.actor, Device) else {}
+            for session in sessions:
+                session.stop_robot(by, timezone.now(), device)
+        elif by is not None:
+            self.start(_until_stored([s.arm_robot(by, timezone.now()) for s in sessions]))
+
+    async def _refuse(self, mark: str, code: str, message: str) -> None:
+        await self.say({"type": "error", "code": code, "id": mark, "message": message})
+
+    def left(self) -> None:
+        """Stop listening."""
+        live, self.live = self.live, None
+        if live is not None:
+            if self.viewer is not None:
+                live.channel.viewers.discard(self.viewer)
+            if isinstance(self.actor, Device):
+                live.tablets -= 1
+                live.announce_presence()
+
+
+class PatientConsumer(ScreenConsumer):
+    """The patient's page. Whoever walks may always rest; to go on is a person's decision."""
+
+    audience = Audience.PATIENT
+    devices = frozenset({Device.Kind.TABLET.value})
+    changes = frozenset({ChangeKind.START, ChangeKind.PAUSE, ChangeKind.RESUME, ChangeKind.FINISH})
+    tablet_changes = frozenset({ChangeKind.PAUSE})
+
+
+class MonitorConsumer(ScreenConsumer):
+    """The PT's page: sees everything and steers."""
+
+    audience = Audience.MONITOR
+    changes = frozenset(ChangeKind)
+    robot_orders = ("stop", "arm")
+
+
+async def _until_stored(futures: list[asyncio.Future[None]]) -> None:
+    """Wait for commits beside the socket: a stop that is asked for meanwhile waits for none."""
+    await asyncio.gather(*futures)
+
+
+def _after(query: bytes) -> int | None:
+    words = parse_qs(query.decode("latin-1")).get("after", [])
+    return int(words[0]) if words and re.fullmatch("[0-9]{1,18}", words[0]) else None

@@ -1,0 +1,150 @@
+"""The socket of a source: steps in, acks out."""
+
+from __future__ import annotations
+
+import time
+
+from django.utils import timezone
+
+from rehab.sessions.events import Message, source_goal_event
+from rehab.sessions.live.consumers.base import Closing
+from rehab.sessions.live.consumers.device import DeviceSocket
+from rehab.sessions.live.lateness import Lateness
+from rehab.sessions.live.messages import (
+    BadFrame,
+    Hello,
+    read_hello,
+    read_plain,
+    read_steps,
+)
+from rehab.sessions.live.past import read_step
+from rehab.sessions.live.session import LiveSession, source_phase
+from rehab.stations.models import Device
+from rehab.training.changes import ENDED, State
+from rehab.training.steps import Measurement, Side
+
+MAX_UNACKNOWLEDGED = 256
+PLAIN_HELLO = Hello(run="text", last=0, session=None, clock_s=None, speed=1.0, token=None)
+
+
+class SourceConsumer(DeviceSocket):
+    """Takes the steps of one source."""
+
+    kind = Device.Kind.SOURCE
+    slot = "source"
+    lateness: Lateness
+
+    async def heard(self, text: str | None) -> None:
+        """Deal with a frame of the protocol, or with the original's plain text."""
+        if text is not None and self.device is not None and (plain := read_plain(text)):
+            await self._heard_plain(*plain)
+        else:
+            await super().heard(text)
+
+    async def asked(self, message: Message, text: str) -> None:
+        """Deal with hello and steps."""
+        kind = message.get("type")
+        if kind == "hello":
+            await self._heard_hello(read_hello(message))
+        elif kind in ("step", "steps"):
+            await self._heard_steps(read_steps(message))
+        elif kind is not None or "token" not in message:
+            raise BadFrame('A source sends "hello", "step" and "steps".')
+
+    async def _heard_hello(self, hello: Hello) -> None:
+        self.lateness = Lateness(hello.run, time.monotonic(), hello.clock_s, hello.speed)
+        await self.greet(hello.session)
+
+    async def attached(self, live: LiveSession) -> None:
+        """Say where the session stands and which step is wanted next."""
+        await live.admission()
+        clock = live.source_clock
+        if clock is not None and clock.run == self.lateness.run and not self.lateness.is_known:
+            self.lateness = clock
+        live.source_clock = self.lateness
+        fold = live.actor.fold
+        await self.say(
+            {
+                "type": "welcome",
+                "session": live.id,
+                "state": fold.state.value,
+                "next": live.next_number,
+                "goal": fold.goal,
+                "trained_side": fold.plan.trained_side,
+                "measure": fold.plan.measure.slug,
+                "unit": fold.plan.measure.unit,
+                "phase": source_phase(live),
+            }
+        )
+        if live.committed:
+            self.acknowledge(live.committed)
+
+    async def _heard_steps(self, measurements: list[Measurement]) -> None:
+        if not self.said_hello:
+            raise BadFrame("Say hello first.", "no_hello")
+        live = self.live
+        if live is None:
+            await self._complain(
+                "no_session", "This station has no open session. Wait for welcome."
+            )
+            return
+        await live.admission()
+        now, received_at = time.monotonic(), timezone.now()
+        for measurement in measurements:
+            if measurement.number < live.next_number:
+                await self._check_same(live, measurement)
+            elif measurement.number > live.next_number:
+                raise BadFrame(
+                    f"Step {measurement.number} leaves a gap: send {live.next_number} next.", "gap"
+                )
+            elif live.actor.fold.state in ENDED:
+                raise Closing(4410, "ended", "The session has ended; it takes no more steps.")
+            elif live.actor.fold.state is State.READY:
+                await self._complain("not_running", "The session has not started. Wait for start.")
+                return
+            elif live.next_number - live.committed > MAX_UNACKNOWLEDGED:
+                raise Closing(
+                    4029, "flood", f"Wait for acks: at most {MAX_UNACKNOWLEDGED} steps may be open."
+                )
+            else:
+                late = self.lateness.is_late(measurement.time_s, now)
+                live.take(measurement, received_at, late=late)
+
+    async def _check_same(self, live: LiveSession, measurement: Measurement) -> None:
+        """Acknowledge a step that is there already; refuse another one under its number."""
+        if measurement.number > live.committed:
+            await live.settled()
+        stored = await read_step(live.id, measurement.number)
+        same = (
+            stored.time_s == measurement.time_s
+            and stored.side == measurement.side
+            and stored.value == measurement.value
+            and tuple(stored.reasons[: len(measurement.reasons)]) == measurement.reasons
+            and stored.extra == measurement.extra
+        )
+        if not same:
+            raise BadFrame(
+                f"Step {measurement.number} is stored with other content. A source that begins "
+                f"anew takes a new run and counts from {live.next_number}.",
+                "conflict",
+            )
+        self.acknowledge(live.committed)
+
+    async def _heard_plain(self, value: float | None, goal: float | None) -> None:
+        """Take the original's text: the server numbers and times the step; the PT's goal wins."""
+        if not self.said_hello:
+            await self._heard_hello(PLAIN_HELLO)
+        live = self.live
+        if live is not None:
+            await live.admission()
+        if live is None or live.actor.fold.state in (State.READY, *ENDED):
+            await self._complain("not_running", "No session is running at this station.")
+            return
+        fold = live.actor.fold
+        if goal is not None and goal != fold.goal:
+            live.channel.publish(source_goal_event(fold, goal))
+        side = Side(fold.plan.trained_side)
+        live.take(Measurement(live.next_number, time.time(), side, value), timezone.now())
+
+    async def _complain(self, code: str, message: str) -> None:
+        await self.say({"type": "error", "code": code, "message": message})

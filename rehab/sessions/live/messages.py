@@ -1,0 +1,273 @@
+"""Reads what dials in: each frame is checked whole before anything is done with it."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+from rehab.sessions.models import Remark
+from rehab.training.changes import ChangeKind
+from rehab.training.steps import InvalidMeasurement, Measurement, Side
+
+MAX_FRAME = 64 * 1024
+MAX_STEPS = 256  # in one frame
+MAX_EXTRA = 32
+ROBOT_STATES = ("idle", "performing", "stopped", "disarmed")
+GESTURE_PHASES = ("started", "ended")
+NAME = re.compile(r"[A-Za-z0-9_.:-]{1,64}")
+PLAIN = re.compile(r"\s*([^,\s]{1,40})\s*,\s*([^,\s]{1,40})\s*")
+
+
+class BadFrame(ValueError):
+    """A frame that is not the protocol; the message says what would be."""
+
+    def __init__(self, message: str, code: str = "bad_frame") -> None:
+        super().__init__(message)
+        self.code = code
+
+
+@dataclass(frozen=True, slots=True)
+class Hello:
+    """What a source says of itself."""
+
+    run: str
+    last: int
+    session: int | None
+    clock_s: float | None
+    speed: float | None
+    token: str | None
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise BadFrame(f"{name} is not JSON. Send null for a value that could not be had.")
+
+
+_decode = json.JSONDecoder(parse_constant=_refuse_constant).decode
+
+
+def read_object(text: str | None) -> dict[str, Any]:
+    """Read a frame as a JSON object with a type. Raises BadFrame."""
+    if text is None:
+        raise BadFrame("Send text frames, not binary ones.")
+    if len(text) > MAX_FRAME:
+        raise BadFrame(f"A frame has at most {MAX_FRAME} characters; send smaller ones.")
+    try:
+        message = _decode(text)
+    except BadFrame:
+        raise
+    except (ValueError, RecursionError):
+        raise BadFrame("A frame is one JSON object, as docs/protocol.md shows.") from None
+    if not isinstance(message, dict) or not isinstance(message.get("type", ""), str):
+        raise BadFrame('A frame is a JSON object with a "type".')
+    return message
+
+
+def read_hello(message: dict[str, Any]) -> Hello:
+    """Read a source's hello. Raises BadFrame."""
+    if message.get("version") != 1:
+        raise BadFrame('This server speaks version 1: send "version": 1.', "version")
+    return Hello(
+        run=read_name(message, "run"),
+        last=read_whole(message, "last", low=0),
+        session=read_whole(message, "session", low=1) if message.get("session") else None,
+        clock_s=_optional_number(message, "clock_s"),
+        speed=_read_speed(message),
+        token=message.get("token"),
+    )
+
+
+def read_steps(message: dict[str, Any]) -> list[Measurement]:
+    """Read the steps of a `step` or `steps` frame. Raises BadFrame."""
+    if message["type"] == "step":
+        return [read_step(message)]
+    steps = message.get("steps")
+    if not isinstance(steps, list) or not 1 <= len(steps) <= MAX_STEPS:
+        raise BadFrame(f'"steps" is a list of 1 to {MAX_STEPS} steps.')
+    return [read_step(step) for step in steps]
+
+
+def read_step(step: Any) -> Measurement:
+    """Read one step. Raises BadFrame."""
+    if not isinstance(step, dict):
+        raise BadFrame("A step is a JSON object.")
+    side = step.get("side")
+    if side not in ("left", "right"):
+        raise BadFrame('A step\'s "side" is "left" or "right".')
+    try:
+        return Measurement(
+            number=read_whole(step, "number", low=1),
+            time_s=read_number(step, "time_s"),
+            side=Side(side),
+            value=_optional_number(step, "value"),
+            reasons=_read_reasons(step.get("reasons", [])),
+            extra=_read_extra(step.get("extra", {})),
+        )
+    except InvalidMeasurement as problem:
+        raise BadFrame(str(problem)) from None
+
+
+def read_plain(text: str) -> tuple[float | None, float | None] | None:
+    """Read the original's text "a2, goal"; None where it is no such text.
+
+    A value that is no finite number is a missing one.
+    """
+    match = None if text.startswith("{") else PLAIN.fullmatch(text)
+    if match is None:
+        return None
+    try:
+        value, goal = (float(word) for word in match.groups())
+    except ValueError:
+        return None
+    return (value if math.isfinite(value) else None, goal if math.isfinite(goal) else None)
+
+
+def read_change(message: dict[str, Any]) -> tuple[ChangeKind, float | None]:
+    """Read what a person wants changed. Raises BadFrame."""
+    try:
+        kind = ChangeKind(message.get("kind", ""))
+    except ValueError:
+        known = ", ".join(kind.value for kind in ChangeKind)
+        raise BadFrame(f'"kind" is one of: {known}.') from None
+    return kind, _optional_number(message, "value")
+
+
+def read_name(message: dict[str, Any], name: str) -> str:
+    """Read a short name. Raises BadFrame."""
+    value = message.get(name)
+    if not isinstance(value, str) or not NAME.fullmatch(value):
+        raise BadFrame(f'"{name}" is a text of 1 to 64 letters, digits or _ . : -')
+    return value
+
+
+def read_whole(message: dict[str, Any], name: str, *, low: int) -> int:
+    """Read a whole number. Raises BadFrame."""
+    value = message.get(name)
+    if not isinstance(value, int) or isinstance(value, bool) or not low <= value < 2**31:
+        raise BadFrame(f'"{name}" is a whole number of {low} or more.')
+    return value
+
+
+def read_number(message: dict[str, Any], name: str) -> float:
+    """Read a finite number. Raises BadFrame."""
+    value = message.get(name)
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        if math.isfinite(number):
+            return number
+    raise BadFrame(f'"{name}" is a finite number.')
+
+
+def check_plain(value: Any, depth: int = 8) -> None:
+    """Refuse what could not be passed on: numbers that are not finite, nesting without end."""
+    if isinstance(value, float) and not math.isfinite(value):
+        raise BadFrame("Numbers are finite. Send null for a value that could not be had.")
+    if isinstance(value, (dict, list)):
+        if not depth:
+            raise BadFrame("Objects and lists nest at most 8 deep here.")
+        for item in value.values() if isinstance(value, dict) else value:
+            check_plain(item, depth - 1)
+
+
+BORG_MAX = 10  # CR10
+
+
+def read_remark(message: dict[str, Any]) -> tuple[Remark, float | None]:
+    """Read what a PT notes; exertion has its number. Raises BadFrame."""
+    try:
+        what = Remark(str(message.get("what")))
+    except ValueError:
+        raise BadFrame(f'"what" is one of: {", ".join(Remark)}.') from None
+    value = message.get("value")
+    if what is not Remark.BORG:
+        return what, None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= BORG_MAX:
+        raise BadFrame(f'"value" of borg is a number from 0 to {BORG_MAX}.')
+    return what, float(value)
+
+
+def read_order(message: dict[str, Any], *orders: str) -> str:
+    """Read what is to become of the robot. Raises BadFrame."""
+    order = message.get("order")
+    if order not in orders:
+        raise BadFrame(f'"order" is one of: {", ".join(orders)}. The robot is armed by a person.')
+    return str(order)
+
+
+def read_report(message: dict[str, Any]) -> dict[str, Any]:
+    """Read what a robot reports; of the kinds that pages draw, every part. Raises BadFrame."""
+    report = message.get("report")
+    if not isinstance(report, dict):
+        raise BadFrame('"report" is an object.')
+    check_plain(report)
+    match report.get("kind"):
+        case "status":
+            read_name(report, "base")
+            _read_one_of(report, "state", ROBOT_STATES)
+            _read_code(report, "reason")
+            _optional_name(report, "gesture")
+            pose = report.get("pose")
+            for part in ("x_m", "y_m", "heading_rad"):
+                read_number(pose if isinstance(pose, dict) else {}, part)
+            if report.get("battery_v") is not None:
+                read_number(report, "battery_v")
+        case "stop":
+            read_name(report, "reason")
+        case "decision":
+            for part in ("from_s", "until_s", "mean", "threshold", "activated_share"):
+                read_number(report, part)
+            read_whole(report, "steps", low=1)
+            if not isinstance(report.get("above"), bool):
+                raise BadFrame('"above" is true or false.')
+            _read_code(report, "reason")
+            _optional_name(report, "gesture")
+        case "gesture":
+            read_name(report, "name")
+            _read_one_of(report, "phase", GESTURE_PHASES)
+            _read_code(report, "outcome")
+    return report
+
+
+def _read_one_of(message: dict[str, Any], name: str, known: tuple[str, ...]) -> None:
+    if message.get(name) not in known:
+        raise BadFrame(f'"{name}" is one of: {", ".join(known)}.')
+
+
+def _read_code(message: dict[str, Any], name: str) -> None:
+    if message.get(name) != "":
+        read_name(message, name)
+
+
+def _optional_name(message: dict[str, Any], name: str) -> None:
+    if message.get(name) is not None:
+        read_name(message, name)
+
+
+def _read_speed(message: dict[str, Any]) -> float | None:
+    speed = _optional_number(message, "speed") if "speed" in message else 1.0
+    if speed is not None and speed <= 0:
+        raise BadFrame('"speed" is above 0, or null for as fast as possible.')
+    return speed
+
+
+def _optional_number(message: dict[str, Any], name: str) -> float | None:
+    return None if message.get(name) is None else read_number(message, name)
+
+
+def _read_reasons(reasons: Any) -> tuple[str, ...]:
+    if not isinstance(reasons, list) or len(reasons) > 8:
+        raise BadFrame('"reasons" is a list of up to 8 codes.')
+    return tuple(read_name({"reasons": reason}, "reasons") for reason in reasons)
+
+
+def _read_extra(extra: Any) -> dict[str, float]:
+    if not isinstance(extra, dict) or len(extra) > MAX_EXTRA:
+        raise BadFrame(f'"extra" is an object of up to {MAX_EXTRA} named numbers.')
+    for name in extra:
+        read_name({"extra": name}, "extra")
+    return {name: read_number(extra, name) for name in extra}

@@ -1,0 +1,278 @@
+"""The sessions that run in this process: starts with the server, drains and stops with it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import contextvars
+import gc
+import logging
+import sys
+import threading
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from typing import Any
+
+from asgiref.sync import sync_to_async
+from django.conf import settings
+from django.db import DatabaseError, connection
+from django.utils import timezone
+
+from rehab.people.models import User
+from rehab.sessions.events import to_text
+from rehab.sessions.live import owners, sources
+from rehab.sessions.live.actor import SessionActor
+from rehab.sessions.live.admission import find_unwelcome
+from rehab.sessions.live.children import Children
+from rehab.sessions.live.session import RECENT, LiveSession
+from rehab.sessions.live.writer import Writer
+from rehab.sessions.models import RobotEntry, SessionEvent, Step, TrainingSession
+from rehab.training.changes import ENDED, OPEN, Change, ChangeKind, State
+
+log = logging.getLogger(__name__)
+
+HEARTBEAT_S = 0.25  # to robots, which stand still after 0.65 s of silence
+SWEEP = 20  # heartbeats; then pages hear one too, and idle sessions are swept
+CHECKPOINT = 8  # heartbeats
+HEARTBEAT = to_text({"type": "heartbeat"})
+# Python's full collections take 200 ms with 2,000 sockets (stack.md, T4): make them rare.
+GC_THRESHOLDS = (50_000, 50, 100)
+# How long the event loop may keep the interpreter's lock while the writer wants it (default 5 ms).
+SWITCH_S = 0.002
+
+
+class Runtime:
+    """All live sessions of one event loop."""
+
+    def __init__(self) -> None:
+        self.loop = asyncio.get_running_loop()
+        self.sessions: dict[int, LiveSession] = {}
+        self.draining = False
+        self.writer = Writer(self._call)
+        # Told when a session opens at their station.
+        self.waiting: dict[int, set[Callable[[int], None]]] = defaultdict(set)
+        self.sockets: set[Any] = set()  # whoever must be closed when the server stops
+        self.children = Children(settings.DATA_DIR / "children.json")
+        self.address = sources.local_address(settings.HOST, settings.PORT)  # where children dial in
+        self._opening: dict[int, asyncio.Task[LiveSession]] = {}
+        self._ticker = self.loop.create_task(self._tick())
+
+    def _call(self, function: Callable[[], None]) -> None:
+        self.loop.call_soon_threadsafe(function)
+
+    async def session(self, session_id: int) -> LiveSession:
+        """Give a live session, rebuilt from its log where it is not in memory.
+
+        Raises TrainingSession.DoesNotExist and OwnedElsewhere.
+        """
+        live = self.sessions.get(session_id)
+        if live is not None:
+            live.asked_for = True
+            return live
+        if session_id not in self._opening:
+            # A context of its own: a request's ends with the request, others wait for this too.
+            self._opening[session_id] = self.loop.create_task(
+                self._open(session_id), context=contextvars.Context()
+            )
+        try:
+            return await asyncio.shield(self._opening[session_id])
+        finally:
+            task = self._opening.get(session_id)
+            if task is not None and task.done():
+                del self._opening[session_id]
+
+    async def _open(self, session_id: int) -> LiveSession:
+        actor, recent, stopped = await sync_to_async(_load)(session_id)
+        live = LiveSession(actor, self.writer, recent, self._drop, robot_stopped=stopped)
+        self.sessions[session_id] = live
+        if live.actor.fold.state in OPEN and not self.draining:
+            await sources.run_source(self.children, actor.session, self.address)
+        return live
+
+    def _drop(self, live: LiveSession, problem: Exception) -> None:
+        """Forget a session that could not be written: its log is right, its fold is not."""
+        if self.sessions.get(live.id) is not live:
+            return
+        log.error("Session %s is rebuilt from its log: %s", live.id, problem)
+        del self.sessions[live.id]
+        for peer in (live.source, live.robot):
+            if peer is not None:
+                peer.send_away(4011, "not_stored", "A step could not be stored. Connect again.")
+        for socket in list(self.sockets):
+            if getattr(socket, "live", None) is live:
+                socket.close_soon(4012)
+
+    async def change(
+        self, session_id: int, kind: ChangeKind, value: float | None, by: User | None
+    ) -> None:
+        """Start, pause, steer or end a session; committed when this returns.
+
+        Raises InvalidSetting where it is refused and NotStored where it could not be committed.
+        """
+        live = await self.session(session_id)
+        await live.admission()
+        if live.source_clock is not None and kind in (ChangeKind.START, ChangeKind.RESUME):
+            live.source_clock.slacken(time.monotonic())
+        await live.change(Change(kind, value), by, timezone.now())
+        if live.actor.fold.state not in ENDED:
+            return
+        await self.children.stop(sources.child_name(live.id))
+        if live.station_id is not None:
+            waiting = await sync_to_async(_newest_open)(live.station_id)
+            if waiting is not None:
+                self.announce(waiting, live.station_id)
+
+    def at_station_of(self, live: LiveSession) -> list[LiveSession]:
+        """Give a session and the other live ones of its station: the robot may be with them."""
+        there = self.sessions.values() if live.station_id is not None else ()
+        others = [one for one in there if one.station_id == live.station_id and one is not live]
+        return [live, *others]
+
+    def announce(self, session_id: int, station_id: int | None) -> None:
+        """Tell the devices of a station that a session is there for them."""
+        if station_id is not None:
+            for tell in list(self.waiting.get(station_id, ())):
+                tell(session_id)
+
+    async def recover(self) -> int:
+        """Pause the sessions that a process left running when it died. Give how many."""
+        left = await sync_to_async(_left_running)()
+        for session_id in left:
+            try:
+                live = await self.session(session_id)
+                if live.actor.fold.state is State.RUNNING:
+                    await live.change(Change(ChangeKind.PAUSE), None, timezone.now())
+            except Exception:  # one broken session keeps no server from starting
+                log.exception("Session %s could not be recovered", session_id)
+        return len(left)
+
+    async def _tick(self) -> None:
+        ticks = 0
+        while True:
+            await asyncio.sleep(HEARTBEAT_S)
+            ticks += 1
+            for live in list(self.sessions.values()):
+                if live.robot is not None:
+                    live.robot.tell({"type": "heartbeat", "watched": live.is_watched})
+                if ticks % SWEEP == 0:
+                    for viewer in live.channel.viewers:
+                        viewer.beat(HEARTBEAT)
+                    if live.is_idle and not live.asked_for:
+                        await self._close(live)
+                    live.asked_for = False  # whoever gets it now has until the next sweep to join
+            if ticks % SWEEP == 0:
+                await self._send_off_unwelcome()
+            if ticks % CHECKPOINT == 0:
+                await self.loop.run_in_executor(None, _checkpoint)
+
+    async def _send_off_unwelcome(self) -> None:
+        """End the sockets of devices and people that would no longer be let in."""
+        sockets = [socket for socket in self.sockets if socket.actor is not None]
+        try:
+            for index in await find_unwelcome([(one.actor, one.scope) for one in sockets]):
+                sockets[index].send_off()
+        except DatabaseError:
+            log.exception("Tokens could not be looked at")  # the next sweep will
+
+    async def _close(self, live: LiveSession) -> None:
+        """Take a session that nobody needs out of memory; its log brings it back."""
+        if live.actor.fold.state is State.RUNNING:
+            return  # its source may be back in a moment
+        self.sessions.pop(live.id, None)
+        try:
+            await sync_to_async(owners.release)(live.id, live.actor.session.epoch)
+        except DatabaseError:
+            log.exception("Session %s could not be given up", live.id)  # the heartbeat goes on
+
+    async def drain(self) -> None:
+        """Close every socket so that clients come back, commit everything, stop."""
+        self.draining = True
+        await self.children.stop_all()
+        self._ticker.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await self._ticker
+        closing = [socket.shut(4012) for socket in list(self.sockets)]
+        await asyncio.gather(*closing, return_exceptions=True)
+        await self.loop.run_in_executor(None, self.writer.close)
+        await asyncio.sleep(0)  # the writer's last reports
+        held = [(live.id, live.actor.session.epoch) for live in self.sessions.values()]
+        self.sessions.clear()
+        await sync_to_async(_release_all)(held)
+
+
+def _load(session_id: int) -> tuple[SessionActor, list[Step], bool]:
+    session = TrainingSession.everywhere.select_related("patient", "measure", "station").get(
+        pk=session_id
+    )
+    if State(session.state) in OPEN:
+        owners.claim(session)
+    steps = Step.everywhere.filter(session=session).order_by("-number")[:RECENT]
+    return SessionActor.load(session), list(reversed(steps)), _is_robot_stopped(session)
+
+
+def _is_robot_stopped(session: TrainingSession) -> bool:
+    """Say whether the last word on the station's robot, in this session or before, was stop."""
+    there = (
+        {"session": session} if session.station is None else {"session__station": session.station}
+    )
+    words = SessionEvent.everywhere.filter(kind__in=(RobotEntry.STOP, RobotEntry.ARM), **there)
+    last = words.order_by("-pk").values_list("kind", flat=True).first()
+    return last == RobotEntry.STOP
+
+
+def _newest_open(station_id: int) -> int | None:
+    there = TrainingSession.everywhere.filter(station=station_id, state__in=[*OPEN])
+    return there.order_by("-created_at", "-pk").values_list("pk", flat=True).first()
+
+
+def _checkpoint() -> None:
+    """Move SQLite's log into its file, on a connection of its own: commits go on meanwhile."""
+    if connection.vendor != "sqlite":
+        return
+    try:
+        with connection.cursor() as cursor:
+            cursor.execute("PRAGMA wal_checkpoint(PASSIVE)")
+    except DatabaseError as problem:
+        log.warning("The database's log could not be moved: %s", problem)
+    finally:
+        connection.close()
+
+
+def _left_running() -> list[int]:
+    running = TrainingSession.everywhere.filter(state=State.RUNNING.value)
+    return [
+        session.pk for session in running if not session.owner or not owners.is_alive(session.owner)
+    ]
+
+
+def _release_all(held: list[tuple[int, int]]) -> None:
+    for session_id, epoch in held:
+        owners.release(session_id, epoch)
+
+
+_current: Runtime | None = None
+_lock = threading.Lock()
+
+
+def current() -> Runtime:
+    """Give the running loop's runtime; made on first use, so that any server will do."""
+    global _current  # noqa: PLW0603 (one runtime a process is the point)
+    loop = asyncio.get_running_loop()
+    with _lock:
+        if _current is None or _current.loop is not loop:
+            _current = Runtime()
+        return _current
+
+
+def peek() -> Runtime | None:
+    """Give the process's runtime if there is one, from any thread."""
+    return _current if _current is not None and not _current.draining else None
+
+
+def tune_interpreter() -> None:
+    """Make pauses rare: of the garbage collector, and of the writer waiting for the lock."""
+    sys.setswitchinterval(SWITCH_S)
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(*GC_THRESHOLDS)

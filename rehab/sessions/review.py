@@ -1,0 +1,164 @@
+"""One session told from its log: every stride, its phases, what was done and when."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+from rehab.people.models import User
+from rehab.sessions.live.actor import read_log
+from rehab.sessions.models import Remark, RobotEntry, SessionEvent, Step, TrainingSession
+from rehab.sessions.words import say_duration, say_number, say_quantity, say_rate
+from rehab.training.changes import ChangeKind
+from rehab.training.figures import describe_session
+from rehab.training.fold import SessionFold
+from rehab.training.plans import SessionPlan
+
+# What a robot did is counted; in the list it would hide what people did.
+COUNTED = (RobotEntry.DECISION.value, RobotEntry.GESTURE.value)
+NAMES = {
+    ChangeKind.START: "Started",
+    ChangeKind.PAUSE: "Paused",
+    ChangeKind.RESUME: "Resumed",
+    ChangeKind.FINISH: "Finished",
+    ChangeKind.ABORT: "Ended early",
+    ChangeKind.GOAL: "Goal",
+    ChangeKind.GAIN: "Gain",
+    ChangeKind.PHASE: "Phase",
+    ChangeKind.ACTIVATION_THRESHOLD: "Robot threshold",
+    RobotEntry.STOP: "Robot stopped",
+    RobotEntry.ARM: "Robot armed",
+    Remark.BORG: "Exertion (Borg)",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """An event in words."""
+
+    event: SessionEvent
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Review:
+    """A session with its figures (``training.figures``), its events and the data of its chart."""
+
+    figures: dict[str, Any]
+    moments: list[Moment]
+    gestures: int
+    chart: dict[str, Any]
+
+
+def review_session(user: User, session: TrainingSession) -> Review:
+    """Tell a session. Its figures are folded from the log, its strides are the stored verdicts."""
+    plan = session.to_plan()
+    fold = SessionFold.replay(plan, read_log(session))
+    events = list(
+        SessionEvent.objects.visible_to(user)
+        .filter(session=session)
+        .select_related("by")
+        .order_by("pk")
+    )
+    moments = [
+        Moment(event, say_event(event, plan)) for event in events if event.kind not in COUNTED
+    ]
+    gestures = sum(
+        event.kind == RobotEntry.GESTURE.value and event.data.get("phase") == "started"
+        for event in events
+    )
+    return Review(describe_session(fold), moments, gestures, draw(user, session, plan, moments))
+
+
+def say_event(event: SessionEvent, plan: SessionPlan) -> str:
+    """Put an event into words: what it was, and from what to what."""
+    name = NAMES.get(event.kind, event.get_kind_display().capitalize())  # type: ignore[call-overload]
+    match event.kind:
+        case ChangeKind.GOAL:
+            old, new = event.old, say_quantity(event.value, plan.measure.unit)
+            return f"{name} {new}" if old is None else f"{name} {say_number(old)} → {new}"
+        case ChangeKind.GAIN:
+            return f"{name} {say_number(event.old)} → {say_number(event.value)}"
+        case ChangeKind.ACTIVATION_THRESHOLD:
+            return f"{name} {say_rate(event.old)} → {say_rate(event.value)}"
+        case Remark.BORG:
+            return f"{name} {say_number(event.value, 0)}"
+        case ChangeKind.PHASE:
+            return f"{name}: {plan.phases[int(event.value or 0)].name}"
+    return str(name)
+
+
+def sum_up(plan: SessionPlan, review: Review) -> list[dict[str, str]]:
+    """Give the figures above the chart: label, value, and what stands beside it."""
+    figures, target = review.figures, plan.target
+    changes = sum(moment.event.kind == ChangeKind.GOAL for moment in review.moments)
+    lost = figures["missing"] + figures["invalid"]
+    entries = [
+        (
+            "Hit rate",
+            say_rate(figures["hit_rate"]),
+            f"wanted {say_rate(target.hit_rate)}" if target.hit_rate else "",
+        ),
+        (
+            "Score",
+            say_number(figures["score"], 0),
+            "points" if plan.valence.has_points else "this type has no points",
+        ),
+        (
+            "Goal",
+            say_number(figures["goal"]),
+            plan.measure.unit + (f", changed {changes} ×" if changes else ""),
+        ),
+        (
+            "Walked",
+            say_duration(figures["active_s"]),
+            f"planned {say_duration(target.duration_s)}" if target.duration_s else "",
+        ),
+        ("Strides", say_number(figures["strides"], 0), f"{lost} do not count" if lost else ""),
+    ]
+    return [{"label": label, "value": value, "beside": beside} for label, value, beside in entries]
+
+
+def draw(
+    user: User, session: TrainingSession, plan: SessionPlan, moments: list[Moment]
+) -> dict[str, Any]:
+    """Give the chart's data: strides of the trained leg by column, phases, and what was changed.
+
+    ``shown`` is gain × value, also where no goal was known yet; ``hit`` is None where nothing was
+    judged. A stride that does not count has no value, only its reasons.
+    """
+    steps = (
+        Step.objects.visible_to(user)
+        .filter(session=session, side=session.trained_side)
+        .order_by("number")
+        .values_list("number", "valid", "value", "gain", "shown", "goal", "hit", "phase", "reasons")
+    )
+    columns: dict[str, list[Any]] = {
+        name: [] for name in ("number", "shown", "goal", "hit", "phase", "why")
+    }
+    for number, valid, value, gain, shown, goal, hit, phase, reasons in steps.iterator():
+        seen = shown if shown is not None else value * gain if valid and value is not None else None
+        row = (number, _short(seen), _short(goal), hit, phase, ", ".join(reasons))
+        for column, entry in zip(columns.values(), row, strict=True):
+            column.append(entry)
+    runs = groupby(zip(columns.pop("phase"), columns["number"], strict=True), lambda pair: pair[0])
+    phases = [(plan.phases[index], [number for _, number in run]) for index, run in runs]
+    return {
+        "unit": plan.measure.unit,
+        "strides": columns,
+        "phases": [
+            {"name": phase.name, "feedback": phase.feedback, "from": run[0], "to": run[-1]}
+            for phase, run in phases
+        ],
+        "marks": [
+            {"after": moment.event.after_number, "kind": moment.event.kind, "words": moment.words}
+            for moment in moments
+            if moment.event.kind in {"goal", "gain", "pause", "resume"}
+        ],
+    }
+
+
+def _short(value: float | None) -> float | None:
+    """Give a value to four places: more would only lengthen the page."""
+    return None if value is None else round(value, 4)

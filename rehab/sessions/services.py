@@ -1,0 +1,105 @@
+"""What people do with sessions: create them and change them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from asgiref.sync import async_to_sync
+
+from rehab.people.models import Patient, User
+from rehab.sessions.live import runtime
+from rehab.sessions.models import Measure, Protocol, TrainingSession
+from rehab.stations.models import Station
+from rehab.training.changes import ChangeKind
+from rehab.training.goals import GoalRule, Target
+from rehab.training.measures import A2, InvalidSetting
+from rehab.training.phases import Phase
+from rehab.training.plans import DEFAULT_ACTIVATION_THRESHOLD, SessionPlan
+from rehab.training.steps import Side
+from rehab.training.valences import find_valence
+
+
+def create_session(
+    patient: Patient,
+    *,
+    valence: str,
+    goal: GoalRule,
+    phases: Iterable[Phase] | None = None,
+    protocol: Protocol | None = None,
+    measure: Measure | None = None,
+    trained_side: Side | None = None,
+    target: Target | None = None,
+    activation_threshold: float = DEFAULT_ACTIVATION_THRESHOLD,
+    station: Station | None = None,
+    created_by: User | None = None,
+    source: str = "",
+    simulated: bool = False,
+    runs: Sequence[str] = (),
+) -> TrainingSession:
+    """Create a session that is ready to start, with everything it will be scored with.
+
+    Phases are given, or come from the protocol. ``runs`` are arguments of `python -m rehab.sources`
+    for a source that the server runs beside the session. Raises InvalidSetting for a plan that
+    could not be walked and CrossClinic where patient, station and the rest are not of one clinic;
+    nothing is stored then.
+    """
+    measure = measure or Measure.everywhere.get(clinic=None, slug=A2.slug)
+    if phases is None:
+        if protocol is None:
+            raise InvalidSetting("A session needs a protocol, or phases of its own.")
+        phases = protocol.to_rules()
+    side = trained_side or (Side(patient.paretic_side) if patient.paretic_side else None)
+    if side is None:
+        raise InvalidSetting(
+            f"Which leg is trained? Set the paretic side of {patient}, or choose a leg."
+        )
+    plan = SessionPlan(
+        measure=measure.to_rule(),
+        valence=find_valence(valence),
+        phases=tuple(phases),
+        trained_side=side,
+        goal=goal,
+        target=target or Target(),
+        activation_threshold=activation_threshold,
+    )
+    session = TrainingSession(
+        clinic_id=patient.clinic_id,
+        patient=patient,
+        station=station,
+        protocol=protocol,
+        measure=measure,
+        created_by=created_by,
+        valence=plan.valence.slug,
+        trained_side=side.value,
+        source=source,
+        simulated=simulated,
+        runs=list(runs),
+        plan=plan.to_json(),
+        goal=goal.value,
+    )
+    session.save()
+    live = runtime.peek()
+    if live is not None:
+        live.loop.call_soon_threadsafe(live.announce, session.pk, session.station_id)
+    return session
+
+
+def change_session(
+    session: TrainingSession, kind: ChangeKind, value: float | None = None, by: User | None = None
+) -> None:
+    """Start, pause, steer or end a session from a page; committed when this returns.
+
+    Raises InvalidSetting where the change is refused (nothing has happened then), NotStored where
+    it could not be committed, and OwnedElsewhere where another process runs the session.
+    """
+    async_to_sync(_change)(session.pk, kind, value, by)
+
+
+async def _change(session_id: int, kind: ChangeKind, value: float | None, by: User | None) -> None:
+    serves = runtime.peek() is not None  # else a command: what it starts must not outlive it
+    here = runtime.current()
+    try:
+        await here.change(session_id, kind, value, by)
+    finally:
+        if not serves:
+            await here.drain()

@@ -1,0 +1,19 @@
+"""Addresses of the pages of sessions."""
+
+from django.urls import path
+
+from rehab.sessions.views import history, monitor, setup, start, tablet, walk
+
+urlpatterns = [
+    path("start/", start.choose_patient, name="start"),
+    path("patients/new/", start.add_patient, name="new-patient"),
+    path("patients/demo/", start.add_demo, name="demo"),
+    path("patients/<int:patient_id>/", start.show_patient, name="patient"),
+    path("patients/<int:patient_id>/new/", setup.set_up, name="setup"),
+    path("patients/<int:patient_id>/sessions/", history.list_sessions, name="history"),
+    path("tablet/", tablet.show_tablet, name="tablet"),
+    path("tablet/state/", tablet.tell_tablet, name="tablet-state"),
+    path("sessions/<int:session_id>/", walk.show_walk, name="walk"),
+    path("sessions/<int:session_id>/monitor/", monitor.show_monitor, name="monitor"),
+    path("sessions/<int:session_id>/details/", history.show_session, name="session"),
+]

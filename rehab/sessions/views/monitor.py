@@ -1,0 +1,39 @@
+"""The PT's page of a running session."""
+
+from __future__ import annotations
+
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, render
+from django.views.decorators.http import require_safe
+
+from rehab.people.access import for_roles, person
+from rehab.people.roles import Role
+from rehab.sessions.live.messages import BORG_MAX
+from rehab.sessions.models import Remark, TrainingSession
+
+ICONS = {
+    Remark.REST: "rest",
+    Remark.PAIN: "pain",
+    Remark.DIZZINESS: "dizzy",
+    Remark.NEAR_FALL: "nearfall",
+    Remark.FALL: "fall",
+    Remark.HANDRAIL: "rail",
+    Remark.VERBAL_CUE: "voice",
+    Remark.BORG: "borg",
+}
+REMARKS = [
+    {"slug": what.value, "label": what.value.replace("_", " ").capitalize(), "icon": icon}
+    for what, icon in ICONS.items()
+]
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_safe
+def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
+    """Show and steer a session; everything on it comes by its socket."""
+    sessions = TrainingSession.objects.visible_to(person(request))
+    session = get_object_or_404(
+        sessions.select_related("patient", "station", "measure"), pk=session_id
+    )
+    context = {"session": session, "remarks": REMARKS, "borg": range(BORG_MAX + 1)}
+    return render(request, "sessions/monitor.html", context)

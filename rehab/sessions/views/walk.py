@@ -1,0 +1,29 @@
+"""The patient's page during a session."""
+
+from __future__ import annotations
+
+from csp.constants import SELF
+from csp.decorators import csp_replace
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.views.decorators.clickjacking import xframe_options_sameorigin
+
+from rehab.people.access import actor_of, for_roles
+from rehab.people.roles import Role
+from rehab.sessions.models import TrainingSession
+from rehab.training.changes import ENDED, State
+
+
+@for_roles(Role.LEAD, Role.PT, tablets=True)
+@xframe_options_sameorigin  # the therapist's page mirrors this one in a frame, to be looked at only
+@csp_replace({"frame-ancestors": [SELF]})  # type: ignore[arg-type]  # knows no views with arguments
+def show_walk(request: HttpRequest, session_id: int) -> HttpResponse:
+    """Show a session as the patient sees it; one that has ended shows its scores."""
+    sessions = TrainingSession.objects.visible_to(actor_of(request)).select_related("patient")
+    session = get_object_or_404(sessions, pk=session_id)
+    mirror = "mirror" in request.GET
+    if State(session.state) in ENDED and not mirror:
+        return redirect("scores", session_id=session.pk)
+    alone = not request.user.is_authenticated
+    context = {"session": session, "mirror": mirror, "tablet": alone}
+    return render(request, "sessions/walk.html", context)

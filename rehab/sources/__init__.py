@@ -1,0 +1,30 @@
+"""Where steps come from: one module each, without Django, so that a clinic machine can run them.
+
+A source gives measurements in the order walked. It scores nothing. ``client`` brings them to the
+server, ``intake`` makes strides of what labs send, ``source`` says what a source is.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rehab.sources.source import LiveSource, PlayedSource
+
+# Name: the module that has it as SOURCE, and what it is for. A module is imported when its source
+# is wanted: signals take numpy, which a simulated patient can do without.
+SOURCES: dict[str, tuple[str, str]] = {
+    "recording": ("rehab.sources.recording.source", "play a recorded session, or recorded signals"),
+    "synthetic": ("rehab.sources.synthetic.source", "simulate a patient, as strides or as signals"),
+    "rows": ("rehab.sources.rows", "lines of CSV or JSON from D-Flow, Nexus or any script"),
+    "matlab": ("rehab.sources.matlab", "the original GARRY MATLAB server"),
+    "serial_sensor": ("rehab.sources.serial_sensor", "a sensor on a serial port, as an Arduino"),
+    "lsl": ("rehab.sources.lsl", "streams of the Lab Streaming Layer"),
+}
+
+
+def load_source(name: str) -> type[PlayedSource | LiveSource]:
+    """Give a registered source."""
+    source: type[PlayedSource | LiveSource] = import_module(SOURCES[name][0]).SOURCE
+    return source

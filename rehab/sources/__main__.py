@@ -1,0 +1,253 @@
+"""`python -m rehab.sources NAME …`: runs a source that dials in to the server.
+
+Exit status: 0 all strides are stored, or the session was ended; 2 the command line, the recording
+or what comes cannot be used; 3 the server will not have this source; 130 stopped by Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import os
+import sys
+import threading
+import time
+from argparse import ArgumentParser, ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Callable, Coroutine, Sequence
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+from rehab.sources import SOURCES, load_source
+from rehab.sources.client import (
+    LiveFeed,
+    OutOfStep,
+    Player,
+    SourceClient,
+    UnsendableStride,
+)
+from rehab.sources.source import LiveSource, PlayedSource, Source, Unusable
+from rehab.training.steps import Side
+from robot.dialing import CannotDial, add_dialing_arguments, find_token, websocket_url
+from robot.link import Link, LinkRefused
+
+if TYPE_CHECKING:
+    from rehab.sources.intake import Intake
+
+SOURCE_PATH = "/ws/source/"
+STATUS_EVERY_S = 5.0
+
+DONE, UNUSABLE, REFUSED, INTERRUPTED = 0, 2, 3, 130
+
+
+def parse_speed(text: str) -> float | None:
+    """Read `max` as None and a finite number above 0 as itself."""
+    if text == "max":
+        return None
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = math.nan
+    if not 0 < speed < math.inf:
+        raise ArgumentTypeError("give max, or a number above 0 (1 for true cadence)")
+    return speed
+
+
+def parse_count(text: str) -> int:
+    """Read a whole number above 0."""
+    if not (text.isascii() and text.isdecimal() and int(text) > 0):
+        raise ArgumentTypeError("give a whole number above 0")
+    return int(text)
+
+
+def make_parser(name: str, source: type[Source]) -> ArgumentParser:
+    """Give the command line of a source."""
+    parser = ArgumentParser(
+        prog=f"python -m rehab.sources {name}",
+        description=sys.modules[source.__module__].__doc__,
+        epilog="The token may also be in the environment, as GARRY_TOKEN.",
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    source.add_arguments(parser)
+    server = parser.add_argument_group("the server, and how to walk")
+    add_dialing_arguments(server)
+    server.add_argument(
+        "--side",
+        choices=[side.value for side in Side],
+        help="the leg of strides that name none (default: the session's trained leg)",
+    )
+    server.add_argument(
+        "--session", type=parse_count, metavar="N", help="join this session, not the open one"
+    )
+    server.add_argument(
+        "--stay", action="store_true", help="go on in every later session of the station"
+    )
+    server.add_argument(
+        "--log", type=Path, metavar="FILE", help="append a JSON line for every acknowledgment"
+    )
+    if issubclass(source, PlayedSource):
+        server.add_argument(
+            "--speed",
+            type=parse_speed,
+            default=1.0,
+            metavar="max|N",
+            help="N times true cadence (default 1), or max: as fast as the server stores",
+        )
+        server.add_argument(
+            "--resume", action="store_true", help="go on behind what the session has already"
+        )
+        server.add_argument("--strides", type=parse_count, metavar="N", help="stop after so many")
+    return parser
+
+
+def make_menu() -> ArgumentParser:
+    """Give what answers to anything but the name of a source."""
+    names = "\n".join(f"  {name:14}{summary}" for name, (_, summary) in SOURCES.items())
+    parser = ArgumentParser(
+        prog="python -m rehab.sources",
+        description=f"{__doc__}\nsources, each with its own --help:\n{names}",
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("source", choices=SOURCES, metavar="NAME")
+    return parser
+
+
+def open_log(path: Path) -> TextIO:
+    """Open a file to append to. Raises Unusable."""
+    try:
+        return path.open("a", encoding="utf-8")
+    except OSError as problem:
+        raise Unusable(f"The log {path} cannot be written: {problem.strerror}.") from None
+
+
+def end_with_parent() -> None:
+    """Wait until standard input closes, as it does when the server dies, and end with it."""
+    while os.read(0, 4096):  # not sys.stdin: Python aborts where a thread holds its lock at the end
+        pass
+    os._exit(INTERRUPTED)
+
+
+def say(text: str) -> None:
+    """Print a line for whoever looks on."""
+    print(text, file=sys.stderr, flush=True)
+
+
+async def walk(
+    client: SourceClient, describe: Callable[[], str], *others: Coroutine[None, None, None]
+) -> None:
+    """Walk until that is over, with others beside, and say every few seconds how it goes.
+
+    An other that ends by itself changes nothing; one that fails ends the walk.
+    """
+
+    async def tell() -> None:
+        while True:
+            await asyncio.sleep(STATUS_EVERY_S)
+            say(describe())
+
+    walking = asyncio.create_task(client.run())
+    beside = [asyncio.create_task(work) for work in (tell(), *others)]
+    waiting = {walking, *beside}
+    try:
+        while walking in waiting:
+            done, waiting = await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
+    finally:
+        for task in (walking, *beside):
+            task.cancel()
+        await asyncio.gather(walking, *beside, return_exceptions=True)
+
+
+async def measure(source: LiveSource, intake: Intake, client: SourceClient) -> None:
+    """Walk by what a live source hands in."""
+
+    async def read() -> None:
+        await source.read(intake)
+        intake.finish()
+
+    def describe() -> str:
+        return f"{client.describe()}; {intake.describe()}"
+
+    await walk(client, describe, read(), intake.watch())
+
+
+def run(name: str, options: Namespace, stack: ExitStack) -> int:
+    """Run a source to its end and give the exit status. Raises what cannot be used."""
+    if options.stay and options.session is not None:
+        raise Unusable("--stay goes on with later sessions, --session names one: give only one.")
+    url = websocket_url(options.server, SOURCE_PATH)
+    token = find_token(options, "GARRY_TOKEN", "a source")
+    try:
+        source = load_source(name)(options, say)
+    except ValueError as problem:  # RecordingError, GaitInputError, UnsendableStride
+        raise Unusable(str(problem)) from None
+    log = stack.enter_context(open_log(options.log)) if options.log else None
+
+    def on_ack(session: int, number: int) -> None:
+        if log is not None:
+            line = {"session": session, "number": number, "time": time.time()}
+            log.write(json.dumps(line) + "\n")
+            log.flush()
+
+    def make_client(player: Player | LiveFeed) -> SourceClient:
+        return SourceClient(
+            partial(Link, url, token),
+            player,
+            session=options.session,
+            stay=options.stay,
+            on_ack=on_ack,
+            notice=say,
+        )
+
+    if isinstance(source, LiveSource):
+        # Takes numpy, which a simulated patient can do without.
+        from rehab.sources.intake import Intake
+
+        feed = LiveFeed()
+        client = make_client(feed)
+        intake = Intake(feed, source.settings, say)
+        stack.callback(intake.close)
+
+        doing = measure(source, intake, client)
+    else:
+        client = make_client(
+            Player(source.open_walk, options.speed, source.ahead, resumes=options.resume)
+        )
+        doing = walk(client, client.describe)
+    try:
+        asyncio.run(doing)
+    except KeyboardInterrupt:
+        say(f"Stopped. {client.describe()}")
+        return INTERRUPTED
+    except (LinkRefused, OutOfStep) as refusal:
+        say(f"{refusal}")
+        say(client.describe())
+        return REFUSED
+    say(f"Done: {client.acknowledged} strides acknowledged, {client.lost} not taken any more.")
+    return DONE
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the source that the command line names and give the exit status."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if not words or words[0] not in SOURCES:
+        make_menu().parse_args(words[:1])
+    name = words[0]
+    options = make_parser(name, load_source(name)).parse_args(words[1:])
+    if options.child:
+        threading.Thread(target=end_with_parent, daemon=True).start()
+    try:
+        with ExitStack() as stack:
+            return run(name, options, stack)
+    except (CannotDial, UnsendableStride, Unusable) as problem:
+        say(f"{problem}")
+        return UNUSABLE
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+if __name__ == "__main__":
+    sys.exit(main())

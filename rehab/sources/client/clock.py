@@ -1,0 +1,50 @@
+"""The clock that a played source walks by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+
+class SourceClock:
+    """Source time [s] that runs ``speed`` times as fast as ours and stands still when told to.
+
+    With ``speed`` None strides come as fast as they are taken: nothing is waited for, and the clock
+    shows what it was last set to.
+    """
+
+    def __init__(self, speed: float | None, monotonic: Callable[[], float]) -> None:
+        self.speed = speed
+        self._monotonic = monotonic
+        self._time_s = 0.0  # what it showed when it was last set, started or stopped
+        self._since_s: float | None = None  # our clock then; None while it stands
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it runs."""
+        return self._since_s is not None
+
+    @property
+    def now_s(self) -> float:
+        """What it shows [s]."""
+        if self._since_s is None or self.speed is None:
+            return self._time_s
+        return self._time_s + (self._monotonic() - self._since_s) * self.speed
+
+    def set(self, time_s: float) -> None:
+        """Let it show another time and run on, or stand, as before."""
+        self._time_s = time_s
+        if self._since_s is not None:
+            self._since_s = self._monotonic()
+
+    def run(self) -> None:
+        """Let it run on from what it shows."""
+        if self._since_s is None:
+            self._since_s = self._monotonic()
+
+    def stand(self) -> None:
+        """Let it stand still at what it shows."""
+        self._time_s, self._since_s = self.now_s, None
+
+    def wait_s(self, time_s: float) -> float:
+        """Give how long it takes a running clock to show that time, in our seconds."""
+        return 0.0 if self.speed is None else max(0.0, (time_s - self.now_s) / self.speed)

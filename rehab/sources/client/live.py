@@ -1,0 +1,112 @@
+"""Strides as they are measured: they come when they come, and cannot be asked for."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+
+from rehab.sources.client.player import KEPT_MAX
+from rehab.training.phases import make_phase
+from rehab.training.steps import Measurement, Reason, Side, add_reason
+
+
+class LiveFeed:
+    """Takes strides from a source that measures, and gives them to ``SourceClient``.
+
+    Strides of a session that runs are kept, whether or not the server can be reached. Those that
+    are walked while it is paused are kept with that reason; those before it starts, and without a
+    session, belong to none and are left out.
+
+    Attributes
+    ----------
+    phase
+        The one that the session is in, as far as is known.
+    trained_side
+        The leg that the session trains, None before there was one.
+    left_out
+        How many strides belonged to no session.
+    on_change
+        Called when there is something to send, or nothing more will come.
+    """
+
+    speed = 1.0
+
+    def __init__(self, monotonic: Callable[[], float] = time.monotonic) -> None:
+        self.phase = make_phase("training")
+        self.trained_side: Side | None = None
+        self.left_out = 0
+        self.on_change: Callable[[], None] = lambda: None
+        self._monotonic = monotonic
+        self._waiting: deque[Measurement] = deque()
+        self._is_open = False  # there is a session
+        self._has_walked = False  # it has begun
+        self._runs = False
+        self._is_finished = False
+        self._last_s: float | None = None
+        self._ahead_s: float | None = None  # the source's clock, less ours
+
+    @property
+    def clock_s(self) -> float | None:
+        """What the source's clock shows now [s]; None before the first stride.
+
+        From the stride that came quickest, so that one that is held up is known to be late.
+        """
+        return None if self._ahead_s is None else self._monotonic() + self._ahead_s
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the session runs, as far as is known."""
+        return self._runs
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the last stride has been given."""
+        return self._is_finished and not self._waiting
+
+    def begin(self, trained_side: Side, walked: int = 0) -> None:
+        """Join a session."""
+        self.end()
+        self.trained_side = trained_side
+        self._is_open = True
+
+    def end(self) -> None:
+        """Leave the session."""
+        self._waiting.clear()
+        self._is_open = self._has_walked = self._runs = False
+
+    def walk(self) -> None:
+        """The session runs."""
+        self._has_walked = self._runs = True
+
+    def stand(self) -> None:
+        """The session is paused, or has not begun."""
+        self._runs = False
+
+    def put(self, stride: Measurement) -> None:
+        """Take a stride that was measured just now."""
+        ahead_s = stride.time_s - self._monotonic()
+        went_back = self._last_s is not None and stride.time_s < self._last_s
+        if self._ahead_s is None or went_back or ahead_s > self._ahead_s:
+            self._ahead_s = ahead_s
+        self._last_s = stride.time_s
+        if not (self._is_open and self._has_walked) or len(self._waiting) >= KEPT_MAX:
+            self.left_out += 1
+            return
+        if not self._runs:
+            stride = replace(stride, reasons=add_reason(stride.reasons, Reason.PAUSED))
+        self._waiting.append(stride)
+        self.on_change()
+
+    def finish(self) -> None:
+        """Say that no more strides come."""
+        self._is_finished = True
+        self.on_change()
+
+    def poll(self, unacknowledged: int) -> Measurement | float:
+        """Give the next stride to send, or infinity for "who knows when"."""
+        if not self._waiting or unacknowledged >= KEPT_MAX:
+            return math.inf
+        return self._waiting.popleft()

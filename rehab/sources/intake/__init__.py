@@ -1,0 +1,28 @@
+"""From what a lab sends to strides: rows with named cells in, measurements out.
+
+A row is a stride (it has a value) or a sample of raw signals. ``rows`` reads the cells;
+``alignment`` brings channels of different rates to one; ``signals`` makes strides of them with
+``rehab.gait``; ``quality`` says how it goes and ``keeping`` writes the raw signals down. ``intake``
+is the door to all of it. ``lines`` and ``addresses`` are for those who get their rows as text.
+"""
+
+from rehab.sources.intake.addresses import Address, parse_address
+from rehab.sources.intake.intake import Intake
+from rehab.sources.intake.lines import LineReader
+from rehab.sources.intake.rows import BadRow, Cell
+from rehab.sources.intake.settings import IntakeSettings, add_signal_arguments
+from rehab.sources.intake.signals import SignalPath
+from rehab.sources.intake.strides import name_stride
+
+__all__ = [
+    "Address",
+    "BadRow",
+    "Cell",
+    "Intake",
+    "IntakeSettings",
+    "LineReader",
+    "SignalPath",
+    "add_signal_arguments",
+    "name_stride",
+    "parse_address",
+]

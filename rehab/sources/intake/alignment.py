@@ -1,0 +1,133 @@
+"""Channels that come at different rates, brought to the times of the force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rehab.gait.columns import REQUIRED
+
+Floats = NDArray[np.float64]
+Channel = tuple[str, str]  # side, and one of rehab.gait.columns.CHANNELS
+Samples = tuple[Floats, dict[Channel, Floats]]  # times, and as many values of each channel
+
+HOLD_S = 0.05  # between two samples nothing is known over more (gait.md 2.1)
+WAIT_S = 0.3  # by our clock, for a channel that has fallen silent
+KEEP_S = 60.0  # of samples that wait for others
+
+
+class Alignment:
+    """Gives samples in which every channel has a value at every time.
+
+    Rows that hold whole legs pass as they are. As soon as some do not, channels are interpolated
+    linearly at the times of the first force: a time is given once all channels have come past it,
+    or with NaN for those from which nothing was heard for ``WAIT_S``. Where a channel has no
+    samples within ``HOLD_S`` of each other, it is NaN. A clock that goes back begins anew.
+    """
+
+    def __init__(self) -> None:
+        self._tracks: dict[Channel, tuple[Floats, Floats]] = {}
+        self._heard_s: dict[Channel, float] = {}
+        self._grid: Channel | None = None
+        self._given_s = -np.inf
+
+    def take(
+        self, t_s: Floats, values: Mapping[Channel, Floats], there: Floats, now_s: float
+    ) -> list[Samples]:
+        """Take rows; give what can be known by now.
+
+        Parameters
+        ----------
+        t_s
+            Times [s], shape (n,).
+        values
+            Of each channel, shape (n,).
+        there
+            Whether each cell was sent at all, shape (n, channels), in the order of ``values``.
+        now_s
+            Our clock [s].
+        """
+        if not self._tracks and there.all() and _is_whole(values):
+            return [(t_s, dict(values))]
+        for place, (channel, column) in enumerate(values.items()):
+            sent = there[:, place].astype(bool)
+            if sent.any():
+                self._append(channel, t_s[sent], column[sent])
+                self._heard_s[channel] = now_s
+        for side in {side for side, _ in self._tracks}:
+            for name in REQUIRED:
+                self._tracks.setdefault((side, name), (np.empty(0), np.empty(0)))
+                self._heard_s.setdefault((side, name), now_s)
+        return self._give(now_s)
+
+    def _append(self, channel: Channel, t_s: Floats, column: Floats) -> None:
+        times, known = self._tracks.get(channel, (np.empty(0), np.empty(0)))
+        last_s = times[-1] if len(times) else -np.inf
+        is_new = t_s != last_s  # a datagram that came twice
+        t_s, column = t_s[is_new], column[is_new]
+        if not len(t_s):
+            return
+        backwards = np.flatnonzero(np.diff(t_s) <= 0)
+        if len(backwards) or not t_s[0] > last_s:
+            begin = int(backwards[-1]) + 1 if len(backwards) else 0
+            t_s, column = t_s[begin:], column[begin:]
+            self._tracks = {one: (np.empty(0), np.empty(0)) for one in self._tracks}
+            times, known = np.empty(0), np.empty(0)
+            self._given_s = -np.inf
+        self._tracks[channel] = np.concatenate((times, t_s)), np.concatenate((known, column))
+        if channel[1] == "force" and self._grid is None:
+            self._grid = channel
+
+    def _give(self, now_s: float) -> list[Samples]:
+        if self._grid is None:
+            self._forget_before(-np.inf)
+            return []
+        grid, force = self._tracks[self._grid]
+        if not len(grid):
+            return []
+        ends = {
+            channel: times[-1] if len(times) else -np.inf
+            for channel, (times, _) in self._tracks.items()
+        }
+        awaited = [end for one, end in ends.items() if now_s - self._heard_s[one] <= WAIT_S]
+        ready_s = min(awaited, default=ends[self._grid])
+        due = (grid > self._given_s) & (grid <= ready_s)
+        if not due.any():
+            return []
+        at_s = grid[due]
+        values = {
+            channel: force[due] if channel == self._grid else _interpolate(at_s, *track)
+            for channel, track in self._tracks.items()
+        }
+        self._given_s = float(at_s[-1])
+        self._forget_before(self._given_s)
+        return [(at_s, values)]
+
+    def _forget_before(self, time_s: float) -> None:
+        """Keep what later samples need: from the last one at or before that time on."""
+        for channel, (times, known) in self._tracks.items():
+            begin = max(0, int(np.searchsorted(times, time_s, "right")) - 1)
+            if len(times):
+                begin = max(begin, int(np.searchsorted(times, times[-1] - KEEP_S)))
+            self._tracks[channel] = times[begin:], known[begin:]
+
+
+def _interpolate(at_s: Floats, times: Floats, known: Floats) -> Floats:
+    """Give a channel's values at these times, NaN where there is nothing near on both sides."""
+    if not len(times):
+        return np.full(len(at_s), np.nan)
+    after = np.searchsorted(times, at_s)
+    inside = after < len(times)
+    after = np.minimum(after, len(times) - 1)
+    exact = times[after] == at_s
+    before = np.maximum(after - 1, 0)
+    near = (times[before] <= at_s) & (times[after] - times[before] <= HOLD_S)
+    found = np.where(inside & (near | exact), np.interp(at_s, times, known), np.nan)
+    return np.asarray(np.where(exact & inside, known[after], found))
+
+
+def _is_whole(values: Mapping[Channel, Floats]) -> bool:
+    sides = {side for side, _ in values}
+    return all((side, name) in values for side in sides for name in REQUIRED)

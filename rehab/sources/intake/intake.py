@@ -1,0 +1,265 @@
+"""The door through which rows of a lab become strides of a session."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import numpy as np
+
+from rehab.gait import Stride
+from rehab.gait.selfcheck import CURES
+from rehab.sources.client import LiveFeed
+from rehab.sources.intake.alignment import Alignment, Channel, Floats
+from rehab.sources.intake.keeping import Keeper
+from rehab.sources.intake.quality import Quality
+from rehab.sources.intake.rows import (
+    TIMES,
+    VALUE,
+    BadRow,
+    Cell,
+    read_number,
+    read_stride,
+    read_time,
+)
+from rehab.sources.intake.settings import IntakeSettings
+from rehab.sources.intake.signals import SignalPath
+from rehab.sources.intake.strides import name_stride
+from rehab.sources.source import Say, Unusable
+from rehab.training.steps import Measurement, Side
+
+REPEAT_S = 10.0  # before the same complaint is said again
+CURE_OF = {str(reason): text for reason, text in CURES.items()}
+
+
+class Intake:
+    """Takes rows, and puts the strides that they are or complete into a ``LiveFeed``.
+
+    Nothing that comes can stop it but raw signals of a walker whose mass is not known. What cannot
+    be read is told with its cure, at most every ten seconds, and counted.
+
+    Parameters
+    ----------
+    feed
+        Where strides go.
+    settings
+        How to read what comes.
+    say
+        Called with what somebody who looks on should know.
+    monotonic
+        Our clock [s].
+    """
+
+    def __init__(
+        self,
+        feed: LiveFeed,
+        settings: IntakeSettings,
+        say: Say,
+        monotonic: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.quality = Quality(monotonic)
+        self._feed = feed
+        self._settings = settings
+        self._say = say
+        self._monotonic = monotonic
+        self._alignment = Alignment()
+        self._signals: SignalPath | None = None
+        self._keeper = Keeper(settings.keep, say) if settings.keep else None
+        self._columns = {
+            column.name: ((side, channel), column.factor)
+            for side, leg in settings.columns.legs.items()
+            for channel, column in leg.items()
+        }
+        self._rate_hz = settings.rate_hz
+        self._problem: Unusable | None = None
+        self._troubled = asyncio.Event()
+        self._number = 0
+        self._said: dict[str, float] = {}
+        self._doubts: set[str] = set()
+
+    @property
+    def side(self) -> Side:
+        """The leg of rows that name none."""
+        return self._settings.side or self._feed.trained_side or Side.LEFT
+
+    async def wait_for_start(self) -> None:
+        """Return once the session runs."""
+        while not self._feed.is_running:  # noqa: ASYNC110 (nobody wakes us, and nothing hurries)
+            await asyncio.sleep(0.05)
+
+    async def watch(self) -> None:
+        """Raise Unusable once something came that only somebody at the machine can put right."""
+        await self._troubled.wait()
+        if self._problem is not None:
+            raise self._problem
+
+    def expect_rate(self, rate_hz: float) -> None:
+        """Say how fast samples come, where their sender tells and the command line does not."""
+        self._rate_hz = self._rate_hz or rate_hz
+
+    def take(self, rows: Iterable[Mapping[str, Cell]]) -> None:
+        """Take rows in the order in which they came."""
+        samples: list[Mapping[str, Cell]] = []
+        for row in rows:
+            if VALUE in row:
+                self._take_stride(row)
+            elif self._columns.keys() & row.keys():
+                if samples and row.keys() != samples[0].keys():
+                    self._take_samples(samples)
+                    samples = []
+                samples.append(row)
+            else:
+                names = ", ".join(list(row)[:4])
+                known = ", ".join(list(self._columns)[:3])
+                self.complain(
+                    f"A row with {names} is neither a stride nor a sample: a stride has a value, a "
+                    f"sample {known} or more. Rename them, or map them with --columns."
+                )
+        if samples:
+            self._take_samples(samples)
+
+    def complain(self, text: str) -> None:
+        """Count a row that could not be used, and say why, but not again and again."""
+        self.quality.bad_rows += 1
+        self._warn(text[-40:], text)  # the cure
+
+    def describe(self) -> str:
+        """Say in one line how it is heard, and count anew."""
+        return self.quality.describe()
+
+    def finish(self) -> None:
+        """Say that nothing more comes."""
+        if self._signals is not None:
+            self._put_strides(self._signals.finish())
+        self._feed.finish()
+
+    def close(self) -> None:
+        """End what is kept."""
+        if self._keeper is not None:
+            self._keeper.close()
+
+    # --- Strides ---
+
+    def _take_stride(self, row: Mapping[str, Cell]) -> None:
+        try:
+            stride, left_out = read_stride(row, self._number + 1, self.side, self._monotonic())
+        except BadRow as problem:
+            self.complain(str(problem))
+            return
+        if left_out:
+            self._warn(
+                f"left out {left_out}",
+                f"Left out of the strides: {', '.join(left_out)[:120]}. Up to 32 further values "
+                "can travel, numbers named with letters, digits or _ . : -",
+            )
+        self._put(stride, is_timed=any(name in row for name in TIMES))
+
+    def _put(self, stride: Measurement, *, is_timed: bool) -> None:
+        self._number += 1
+        self.quality.see_stride(stride, is_timed=is_timed)
+        for reason in stride.reasons:
+            if reason not in self._doubts:
+                self._doubts.add(reason)
+                cure = CURE_OF.get(reason, "")
+                self._say(f"A stride ({stride.side}) does not count: {reason}. {cure}".rstrip())
+        self._feed.put(stride)
+
+    def _put_strides(self, strides: Iterable[Stride]) -> None:
+        for stride in strides:
+            named = name_stride(stride, self._number + 1, self.side)
+            if named is not None:
+                self._put(named, is_timed=False)
+
+    # --- Samples ---
+
+    def _take_samples(self, rows: list[Mapping[str, Cell]]) -> None:
+        """Take rows that have the same cells."""
+        names = [name for name in rows[0] if name in self._columns]
+        time = self._settings.columns.time
+        times, cells = [], []
+        for row in rows:
+            try:
+                if time.name not in row:
+                    raise BadRow(
+                        f"Samples come without {time.name}. Send the device's own time in seconds: "
+                        "when they arrive says too little."
+                    )
+                times.append(read_time(row, time.name) * time.factor)
+                cells.append([read_number(row, name) for name in names])
+            except BadRow as problem:
+                self.complain(str(problem))
+        if cells:
+            there = np.array([[cell is not None for cell in row] for row in cells])
+            table = np.array(cells, dtype=np.float64)
+            self.take_table(",".join(names), names, np.array(times), table, there)
+
+    def take_table(
+        self,
+        stream: str,
+        names: Sequence[str],
+        t_s: Floats,
+        table: Floats,
+        there: Floats | None = None,
+    ) -> None:
+        """Take samples of a stream as a table.
+
+        Parameters
+        ----------
+        stream
+            Any name that tells it from others.
+        names
+            Of the columns; those that are mapped to no channel are left out.
+        t_s, table
+            Times [s], shape (n,), and cells, shape (n, columns).
+        there
+            Whether each cell was sent, shape (n, columns); None for all.
+        """
+        if not len(t_s):
+            return
+        self.quality.see_samples(stream, t_s)
+        known = [place for place, name in enumerate(names) if name in self._columns]
+        values: dict[Channel, Floats] = {}
+        for place in known:
+            channel, factor = self._columns[names[place]]
+            values[channel] = table[:, place] * factor
+        sent = np.ones((len(t_s), len(known))) if there is None else there[:, known]
+        for samples in self._alignment.take(t_s, values, sent, self._monotonic()):
+            self._measure(*samples)
+
+    @property
+    def forces(self) -> set[str]:
+        """Names of the columns that hold vertical forces."""
+        return {name for name, ((_, channel), _) in self._columns.items() if channel == "force"}
+
+    def knows(self, names: Iterable[str]) -> bool:
+        """Say whether rows with these cells are strides or samples."""
+        there = set(names)
+        return VALUE in there or bool(self._columns.keys() & there)
+
+    def _measure(self, t_s: Floats, values: dict[Channel, Floats]) -> None:
+        if self._keeper is not None:
+            self._keeper.write(t_s, values)
+        if self._signals is None:
+            mass_kg = self._settings.mass_kg
+            if mass_kg is None:
+                self._problem = Unusable(
+                    "Raw signals come, and the walker's body mass is not known. Give it in kg: "
+                    "--mass 75. A2 is power by mass."
+                )
+                self._troubled.set()
+                return
+            look_ahead_s = self._settings.look_ahead_s
+            self._signals = SignalPath(mass_kg, self._rate_hz, look_ahead_s, self._say)
+        self._put_strides(self._signals.take(t_s, values))
+        for finding in self._signals.check():
+            where = f" ({finding.side} leg)" if finding.side else ""
+            self._say(f"Check of the first half minute{where}: {finding.message}")
+
+    def _warn(self, kind: str, text: str) -> None:
+        now_s = self._monotonic()
+        if now_s - self._said.get(kind, -REPEAT_S) >= REPEAT_S:
+            if len(self._said) > 100:
+                self._said.clear()
+            self._said[kind] = now_s
+            self._say(text)

@@ -1,0 +1,106 @@
+"""Rows with named cells: what each of them is, and the strides among them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+
+from rehab.sources.client.outbox import MAX_EXTRA, MAX_REASONS
+from rehab.training.steps import TIME_MAX_S, Measurement, Reason, Side
+
+Cell = float | str | None
+
+NAME = re.compile(r"[A-Za-z0-9_.:-]{1,64}")
+VALUE = "value"
+TIMES = ("time_s", "time", "t")
+# Cells of a stride that are no further named values.
+_KNOWN = frozenset({VALUE, "side", "valid", "reason", "number", *TIMES})
+_SIDES = {"l": Side.LEFT, "left": Side.LEFT, "r": Side.RIGHT, "right": Side.RIGHT}
+_NO = frozenset({"0", "0.0", "false", "no"})
+
+
+class BadRow(ValueError):
+    """A row that cannot be used; the message says how to send it."""
+
+
+def read_number(cells: Mapping[str, Cell], name: str) -> float | None:
+    """Give a cell's number, None where it is blank. Raises BadRow for text."""
+    cell = cells.get(name)
+    if isinstance(cell, str):
+        raise BadRow(f"{name} is {cell[:40]!r}, which is no number. Send a number or nothing.")
+    return cell
+
+
+def read_time(cells: Mapping[str, Cell], name: str) -> float:
+    """Give a row's time [s]. Raises BadRow where there is none."""
+    time_s = read_number(cells, name)
+    if time_s is None or not -TIME_MAX_S <= time_s <= TIME_MAX_S:
+        raise BadRow(
+            f"{name} is {'missing' if time_s is None else f'{time_s:g}'}, which is no time in "
+            "seconds. Send the device's own clock, in seconds."
+        )
+    return time_s
+
+
+def read_stride(
+    cells: Mapping[str, Cell], number: int, side: Side, now_s: float
+) -> tuple[Measurement, list[str]]:
+    """Give the stride that a row tells, and the names of cells that cannot travel with it.
+
+    Parameters
+    ----------
+    cells
+        ``value``, and as far as there are any ``time_s`` [s], ``side``, ``valid``, ``reason``;
+        all others are further named values.
+    number
+        Counts the strides.
+    side, now_s
+        For rows without a side, or without a time.
+
+    Raises
+    ------
+    BadRow
+        For a row that cannot be a stride.
+    """
+    value = read_number(cells, VALUE)
+    time_name = next((name for name in TIMES if name in cells), None)
+    reasons = _read_reasons(cells)
+    left_out = []
+    extra: dict[str, float] = {}
+    for name, cell in cells.items():
+        if name in _KNOWN or cell is None:
+            continue
+        if not NAME.fullmatch(name) or isinstance(cell, str) or len(extra) >= MAX_EXTRA:
+            left_out.append(name)
+        elif math.isfinite(cell):
+            extra[name] = cell
+    stride = Measurement(
+        number=number,
+        time_s=now_s if time_name is None else read_time(cells, time_name),
+        side=_read_side(cells.get("side"), side),
+        value=None if value is None or math.isnan(value) else value,
+        reasons=reasons,
+        extra=extra,
+    )
+    return stride, left_out
+
+
+def _read_side(cell: Cell, side: Side) -> Side:
+    if cell is None:
+        return side
+    named = _SIDES.get(str(cell).lower())
+    if named is None:
+        raise BadRow(f"{str(cell)[:40]!r} is no leg. Send left or right as side.")
+    return named
+
+
+def _read_reasons(cells: Mapping[str, Cell]) -> tuple[str, ...]:
+    """Give the sender's own doubts."""
+    reasons = tuple(str(cells.get("reason") or "").split())
+    if not all(NAME.fullmatch(reason) for reason in reasons):
+        raise BadRow("A reason is a word of letters, digits or _, with blanks between several.")
+    is_doubted = str(cells.get("valid", "")).lower() in _NO
+    if is_doubted and not reasons:
+        return (Reason.FLAGGED,)
+    return reasons[:MAX_REASONS]

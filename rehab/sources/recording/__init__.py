@@ -1,0 +1,20 @@
+"""Recorded sessions: CSV files with one row a stride, in one of the layouts that are known.
+
+``csv_text`` and ``table`` know text and nothing of walking; ``layout`` says what columns can mean,
+``hebb`` and ``plain`` what they do mean; ``reading`` makes a ``recorded`` session of it all.
+docs/recordings.md describes the layouts and every error.
+"""
+
+from rehab.sources.recording.layouts import LAYOUTS
+from rehab.sources.recording.reading import parse_recording, read_recording
+from rehab.sources.recording.recorded import RecordedStride, Recording
+from rehab.sources.recording.table import RecordingError
+
+__all__ = [
+    "LAYOUTS",
+    "RecordedStride",
+    "Recording",
+    "RecordingError",
+    "parse_recording",
+    "read_recording",
+]

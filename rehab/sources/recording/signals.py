@@ -1,0 +1,56 @@
+"""Recorded signals as strides, measured by ``rehab.gait``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rehab.gait import check_signals, measure_both_legs, measure_strides
+from rehab.gait.files import find_mass, find_rate, read_signals
+from rehab.sources.intake.strides import name_stride
+from rehab.sources.recording.table import RecordingError
+from rehab.training.steps import Measurement, Side
+
+
+def measure_file(
+    path: Path,
+    columns: Sequence[str] | None,
+    mass_kg: float | None,
+    rate_hz: float | None,
+    look_ahead_s: float,
+    side: Side | None,
+) -> tuple[list[Measurement], list[str]]:
+    """Give the strides of a file in the order walked, and what its self-check found.
+
+    ``side`` picks a leg; None gives both. Raises RecordingError for a file that cannot be read and
+    GaitInputError for signals that nothing can be measured from.
+    """
+    try:
+        t_s, legs = read_signals(path, columns)
+    except OSError as problem:
+        raise RecordingError(f"{path} cannot be read: {problem.strerror}.") from None
+    rate_hz = find_rate(t_s, path) if rate_hz is None else rate_hz
+    mass_kg = find_mass(path) if mass_kg is None else mass_kg
+    if len(legs) == 2:
+        found = measure_both_legs(
+            t_s,
+            legs["left"],
+            legs["right"],
+            rate_hz=rate_hz,
+            mass_kg=mass_kg,
+            look_ahead_s=look_ahead_s,
+        )
+    else:
+        ((only, leg),) = legs.items()
+        found = measure_strides(
+            t_s, *leg, rate_hz=rate_hz, mass_kg=mass_kg, look_ahead_s=look_ahead_s, side=only
+        )
+    check = check_signals(
+        t_s, legs.get("left"), legs.get("right"), rate_hz=rate_hz, mass_kg=mass_kg
+    )
+    strides: list[Measurement] = []
+    for stride in found:
+        named = name_stride(stride, len(strides) + 1, side or Side.LEFT)
+        if named is not None and side in {None, named.side}:
+            strides.append(named)
+    return strides, [finding.message for finding in check.findings]

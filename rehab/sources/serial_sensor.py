@@ -1,0 +1,214 @@
+"""A sensor on a serial port, such as an Arduino (docs/garry_sensor/garry_sensor.ino).
+
+Two kinds of frames, each a line of ASCII with the exclusive or of all bytes between ``$`` and
+``*`` as two hexadecimal digits::
+
+    $H,left_force_n,left_moment_nm,left_angle_rad*7A      names, at the start and every second
+    $D,1234567890,412.5,33.1,0.12*11                      microseconds, then a cell for each name
+
+Microseconds may wrap around at 2³² as ``micros()`` does. An empty cell is a channel without a
+sample now. With a name ``value`` each frame is a stride.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import threading
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from rehab.sources.intake import BadRow, Cell, Intake, IntakeSettings, add_signal_arguments
+from rehab.sources.source import LiveSource, Say, Unusable
+
+BAUD = 921_600
+AGAIN_S = 1.0
+READ_S = 0.05
+WRAP_US = 2**32
+MAX_FRAME = 1024  # bytes
+_FRAME = re.compile(rb"\$([HD]),([^*$]*)\*([0-9A-Fa-f]{2})\s*")
+
+
+class Port(Protocol):
+    """What is used of a pyserial port."""
+
+    @property
+    def in_waiting(self) -> int: ...
+
+    def read(self, size: int = 1, /) -> bytes: ...
+
+    def close(self) -> None: ...
+
+
+class FrameReader:
+    """Reads frames from bytes that may begin, break off and be damaged anywhere."""
+
+    def __init__(self) -> None:
+        self.damaged = 0
+        self._cut = b""
+        self._names: list[str] = []
+        self._last_us: int | None = None
+        self._turns = 0
+
+    def read(self, data: bytes) -> list[Mapping[str, Cell]]:
+        """Give the rows of all frames that these bytes complete.
+
+        Damaged frames are counted and left out: their samples are missing, and strides that need
+        them say so. Frames before the first names are left out silently.
+        """
+        *lines, self._cut = (self._cut + data).split(b"\n")
+        if len(self._cut) > MAX_FRAME:
+            self._cut = b""
+            self.damaged += 1
+        rows = []
+        for line in lines:
+            try:
+                row = self._read_frame(line)
+            except BadRow:
+                self.damaged += 1
+            else:
+                if row is not None:
+                    rows.append(row)
+        return rows
+
+    def _read_frame(self, line: bytes) -> Mapping[str, Cell] | None:
+        frame = _FRAME.fullmatch(line)
+        if frame is None or find_checksum(line[1 : frame.start(3) - 1]) != int(frame[3], 16):
+            raise BadRow("damaged")
+        cells = frame[2].decode("ascii", "replace").split(",")
+        if frame[1] == b"H":
+            self._names = cells
+            return None
+        if not self._names:
+            return None
+        if len(cells) != len(self._names) + 1 or not cells[0].isdecimal():
+            raise BadRow("cells")
+        try:
+            numbers = [float(cell) if cell else None for cell in cells[1:]]
+        except ValueError:
+            raise BadRow("numbers") from None
+        time_s = self._unwrap(int(cells[0]) % WRAP_US) / 1e6
+        return {"time_s": time_s} | dict(zip(self._names, numbers, strict=True))
+
+    def _unwrap(self, now_us: int) -> int:
+        """Give microseconds that go on where the device's count begins again."""
+        if self._last_us is not None and self._last_us - now_us > WRAP_US // 2:
+            self._turns += 1
+        self._last_us = now_us
+        return self._turns * WRAP_US + now_us
+
+
+def find_checksum(data: bytes) -> int:
+    """Give the exclusive or of all bytes."""
+    result = 0
+    for byte in data:
+        result ^= byte
+    return result
+
+
+class SerialSensor(LiveSource):
+    """Reads a serial port in a thread of its own, and opens it anew where it was pulled out."""
+
+    @classmethod
+    def add_arguments(cls, parser: ArgumentParser) -> None:
+        """Say what its command line can hold."""
+        parser.add_argument("--port", help="such as COM3 or /dev/ttyACM0 (default: the only one)")
+        parser.add_argument("--baud", type=int, default=BAUD, help="default: %(default)s")
+        add_signal_arguments(parser)
+
+    def __init__(
+        self, options: Namespace, say: Say, open_port: Callable[[str, int], Port] | None = None
+    ) -> None:
+        """Look at the command line."""
+        self.settings = IntakeSettings.read(options)
+        self.port: str = options.port or find_port()
+        self._baud: int = options.baud
+        self._say = say
+        self._open_port = open_port or open_serial
+
+    async def read(self, intake: Intake) -> None:
+        """Take frames for as long as this runs."""
+        loop = asyncio.get_running_loop()
+        stopped = threading.Event()
+
+        def take(rows: list[Mapping[str, Cell]], damaged: int) -> None:
+            for _ in range(damaged):
+                intake.complain(
+                    f"A frame of {self.port} was damaged. Use a shorter cable, another USB port or "
+                    "the sketch's baud rate (--baud)."
+                )
+            intake.take(rows)
+
+        def tell(function: Callable[..., object], *arguments: object) -> None:
+            if not stopped.is_set():
+                loop.call_soon_threadsafe(function, *arguments)
+
+        reading = threading.Thread(
+            target=self._read_port, args=(tell, take, stopped), name="serial", daemon=True
+        )
+        reading.start()
+        try:
+            await asyncio.Event().wait()
+        finally:
+            stopped.set()
+            await asyncio.to_thread(reading.join, 2.0)
+
+    def _read_port(
+        self,
+        tell: Callable[..., None],
+        take: Callable[[list[Mapping[str, Cell]], int], None],
+        stopped: threading.Event,
+    ) -> None:
+        said = ""
+        while not stopped.is_set():
+            try:
+                port = self._open_port(self.port, self._baud)
+            except (OSError, ValueError) as problem:  # SerialException is an OSError
+                text = f"{self.port} cannot be opened ({problem})"
+                if text != said:
+                    tell(self._say, f"{text}. Plug the sensor in, or close what uses it.")
+                said = text
+                stopped.wait(AGAIN_S)
+                continue
+            said = ""
+            tell(self._say, f"Reading {self.port}.")
+            frames = FrameReader()
+            try:
+                while not stopped.is_set():
+                    data = port.read(max(1, port.in_waiting))
+                    before = frames.damaged
+                    rows = frames.read(data) if data else []
+                    if rows or frames.damaged > before:
+                        tell(take, rows, frames.damaged - before)
+            except OSError as problem:
+                tell(self._say, f"The sensor at {self.port} is gone ({problem}). Plug it in again.")
+                stopped.wait(AGAIN_S)
+            finally:
+                port.close()
+
+
+def open_serial(port: str, baud: int) -> Port:
+    """Open a port. Raises OSError or ValueError."""
+    import serial
+
+    opened: Port = serial.serial_for_url(port, baudrate=baud, timeout=READ_S)
+    return opened
+
+
+def find_port() -> str:
+    """Give the only serial port there is. Raises Unusable."""
+    from serial.tools.list_ports import comports
+
+    ports = [found for found in comports() if found.vid is not None]
+    if len(ports) == 1:
+        return str(ports[0].device)
+    there = "; ".join(f"{found.device} ({found.description})" for found in ports)
+    raise Unusable(
+        f"Several serial ports are here: {there}. Choose one with --port."
+        if ports
+        else "No sensor is plugged in by USB. Plug it in, or name its port with --port."
+    )
+
+
+SOURCE = SerialSensor

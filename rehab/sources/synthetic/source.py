@@ -1,0 +1,93 @@
+"""Simulates a patient, who walks as the session's phases ask; with --signals from raw signals."""
+
+from __future__ import annotations
+
+import math
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rehab.sources.client import Walk
+from rehab.sources.source import PlayedSource, Say
+from rehab.sources.synthetic.profiles import PROFILES
+from rehab.sources.synthetic.walker import SyntheticWalker
+from rehab.training.phases import Phase
+from rehab.training.steps import Measurement, Side
+
+if TYPE_CHECKING:
+    from rehab.sources.synthetic.streaming import SignalWalker
+
+
+class Synthetic(PlayedSource):
+    """A simulated patient. Every stride depends on the phase that the one before may have ended."""
+
+    ahead = 1
+
+    @classmethod
+    def add_arguments(cls, parser: ArgumentParser) -> None:
+        """Say what its command line can hold."""
+        parser.add_argument("--seed", type=int, default=0, help="the same seed walks the same")
+        parser.add_argument("--profile", choices=sorted(PROFILES), default="good")
+        parser.add_argument(
+            "--signals", action="store_true", help="measure the strides from simulated signals"
+        )
+        signals = parser.add_argument_group("raw signals")
+        signals.add_argument("--mass", type=float, default=75.0, metavar="KG", help="default: 75")
+        signals.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="default: 100")
+        signals.add_argument("--look-ahead", type=float, default=0.05, metavar="S")
+        signals.add_argument(
+            "--keep", type=Path, metavar="FILE", help="write the signals to a new file, here only"
+        )
+
+    def __init__(self, options: Namespace, say: Say) -> None:
+        """Look at the command line. Raises Unusable or GaitInputError."""
+        self._profile = PROFILES[options.profile]
+        self._seed: int = options.seed
+        self._side = Side(options.side) if options.side else None
+        self._open_signals = make_opener(options, say) if options.signals else None
+        self._limit: float = math.inf if options.strides is None else options.strides
+
+    def open_walk(self, trained_side: Side) -> Walk:
+        """Begin to walk."""
+        strider: SyntheticWalker | SignalWalker
+        strider = SyntheticWalker(self._profile, self._seed, self._side or trained_side)
+        if self._open_signals is not None:
+            strider = self._open_signals(strider)
+        left = self._limit
+
+        def walk(phase: Phase) -> Measurement | None:
+            nonlocal left
+            left -= 1
+            return strider.next_stride(phase) if left >= 0 else None
+
+        return walk
+
+
+def make_opener(options: Namespace, say: Say) -> Callable[[SyntheticWalker], SignalWalker]:
+    """Give how walkers get signals. Raises Unusable or GaitInputError for settings of no use."""
+    from rehab.gait import TwoLegDetector
+    from rehab.sources.intake import IntakeSettings
+    from rehab.sources.intake.keeping import Keeper
+    from rehab.sources.synthetic.signals import Sensors
+    from rehab.sources.synthetic.streaming import SignalMaker, SignalWalker
+
+    settings = IntakeSettings.read(options)
+    mass_kg, rate_hz, look_ahead_s = options.mass, options.rate, settings.look_ahead_s
+
+    def make_detector() -> TwoLegDetector:
+        return TwoLegDetector(rate_hz, mass_kg, look_ahead_s=look_ahead_s)
+
+    make_detector()
+    keep = Keeper(settings.keep, say).write if settings.keep else None
+    sensors = Sensors(rate_hz=rate_hz)
+
+    def open_signals(walker: SyntheticWalker) -> SignalWalker:
+        maker = SignalMaker(mass_kg, sensors, options.seed, walker.side)
+        detector = make_detector()
+        return SignalWalker(walker, maker, detector, *([keep] if keep else []))
+
+    return open_signals
+
+
+SOURCE = Synthetic

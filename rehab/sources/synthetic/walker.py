@@ -1,0 +1,157 @@
+"""A synthetic walker, one stride at a time.
+
+The same seed gives the same walk on every machine and Python: chance comes from
+``random.Random.random`` alone, whose sequence the standard library guarantees, and is turned into
+strides by the four operations and a square root, which IEEE 754 rounds the same everywhere;
+``exp``, ``log`` and ``pow`` are not in that class.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterator, Sequence
+
+from rehab.sources.synthetic.profiles import GOOD, WalkerProfile
+from rehab.training.phases import Phase, make_phase
+from rehab.training.steps import Measurement, Reason, Side
+
+# The lab recorded trials of at most two minutes, with 3.2-5.2 s between them (gait.md 1.3).
+TRIAL_S = 120.0
+PAUSE_MIN_S = 3.2
+PAUSE_MAX_S = 5.2
+# Strides outside of this are no walking (gait.md 2.1, point 3).
+STRIDE_MIN_S = 0.5
+STRIDE_MAX_S = 2.5
+
+
+class SyntheticWalker:
+    """Somebody who walks on and on, one stride at a time, in constant memory.
+
+    The caller says which phase each stride is walked in; the walker answers with one stride of the
+    trained leg. A change of phase, and two minutes in one, begin a new trial after a short pause.
+    """
+
+    def __init__(self, profile: WalkerProfile, seed: int, side: Side = Side.LEFT) -> None:
+        self.profile = profile
+        self.side = side
+        self._random = random.Random(seed).random  # noqa: S311 (chance for walking, not for secrets)
+        self._number = 0
+        self._time_s = 0.0
+        self._trial_end_s = 0.0
+        self._phase: Phase | None = None
+        self._slow = self._draw_normal()
+        self._drift = math.sqrt(1 - profile.slow_phi * profile.slow_phi)  # keeps its sd at 1
+        self._is_bad = False
+        self._feedback_strides = 0
+        self._unlearned = 1.0  # what of the way to the trained level is still ahead
+        self._unwashed = 1.0  # what of the after-effect washout has left
+        self._fatigue = 0.0
+
+    def next_stride(self, phase: Phase) -> Measurement:
+        """Walk one stride in a phase. ``time_s`` is the moment at which the stride ends."""
+        profile = self.profile
+        # Every stride draws the same numbers, whatever the phase: chance does not depend on rules.
+        white, drift, pace = self._draw_normal(), self._draw_normal(), self._draw_normal()
+        miss, bad, spike, factor, rest = [self._random() for _ in range(5)]
+        if phase != self._phase or self._time_s >= self._trial_end_s:
+            self._begin_trial(phase, rest)
+        self._slow = profile.slow_phi * self._slow + self._drift * drift
+        self._is_bad = bad < (profile.p_stay_bad if self._is_bad else profile.p_bad)
+        noise, slow_sd = self._spread_in(phase)
+        level = self._next_level(phase) + noise * white + slow_sd * self._slow
+        value = max(0.0, profile.baseline_w_kg * level)
+        if self._is_bad and spike < profile.p_spike:
+            value *= profile.spike_min + (profile.spike_max - profile.spike_min) * factor
+        stride_s = profile.trained_stride_s if phase.feedback else profile.stride_s
+        stride_s += profile.stride_sd_s * pace
+        self._time_s += min(max(stride_s, STRIDE_MIN_S), STRIDE_MAX_S)
+        self._number += 1
+        is_missing = miss < profile.p_missing and not self._is_bad
+        return Measurement(
+            number=self._number,
+            time_s=round(self._time_s, 3),
+            side=self.side,
+            value=None if is_missing else round(value, 4),
+            reasons=(Reason.FLAGGED,) if self._is_bad else (),
+        )
+
+    def _begin_trial(self, phase: Phase, rest: float) -> None:
+        self._phase = phase
+        if self._number:
+            self._time_s += PAUSE_MIN_S + (PAUSE_MAX_S - PAUSE_MIN_S) * rest
+        self._trial_end_s = self._time_s + TRIAL_S
+        self._fatigue *= 1 - self.profile.recovery
+
+    def _spread_in(self, phase: Phase) -> tuple[float, float]:
+        """Give the sds of the white and the slow component, as ratios to the baseline."""
+        profile = self.profile
+        if phase.kind in ("familiarization", "catch"):
+            return profile.brief_noise, profile.calm_slow_sd
+        if phase.feedback:
+            return profile.noise, profile.slow_sd
+        return profile.calm_noise, profile.calm_slow_sd
+
+    def _next_level(self, phase: Phase) -> float:
+        """Give the mean that this stride varies about, as a ratio to the baseline."""
+        profile = self.profile
+        if phase.kind == "catch":
+            return profile.catch_level
+        if not phase.feedback:
+            # In one stride, without a ramp (gait.md 1.5).
+            level = 1 + profile.after_effect * (1 - self._unlearned) * self._unwashed
+            if phase.kind == "washout":
+                self._unwashed *= 1 - 1 / profile.after_effect_strides
+            return level
+        self._feedback_strides += 1
+        self._unwashed = 1.0
+        if self._feedback_strides > profile.exploration_strides:
+            self._unlearned *= 1 - 1 / profile.learning_strides
+        self._fatigue += profile.fatigue_per_100_strides / 100
+        if phase.kind == "familiarization":
+            return profile.familiarization_level - self._fatigue
+        way = profile.trained_level - profile.exploration_level
+        return profile.exploration_level + way * (1 - self._unlearned) - self._fatigue
+
+    def _draw_normal(self) -> float:
+        """Draw from the standard normal distribution: twelve uniform numbers less their mean.
+
+        Tails end at ±6 sd. Written out, since ``sum`` rounds differently from Python 3.12 on.
+        """
+        draw = self._random
+        low = draw() + draw() + draw() + draw() + draw() + draw()
+        return low + draw() + draw() + draw() + draw() + draw() + draw() - 6.0
+
+
+# One phase of each kind that a first session needs, the last without end.
+DEFAULT_PHASES = (
+    make_phase("baseline", strides=54),
+    make_phase("familiarization", strides=30),
+    make_phase("training"),
+)
+
+
+def walk(
+    profile: WalkerProfile = GOOD,
+    seed: int = 0,
+    phases: Sequence[Phase] = DEFAULT_PHASES,
+    strides: int | None = None,
+    side: Side = Side.LEFT,
+) -> Iterator[Measurement]:
+    """Walk through phases until their last one is over or ``strides`` are walked; else forever.
+
+    Phases end as ``SessionFold`` ends them, so that both always agree on where a stride belongs.
+    """
+    walker = SyntheticWalker(profile, seed, side)
+    left = math.inf if strides is None else strides
+    last_s: float | None = None
+    for phase in phases:
+        phase_strides = 0
+        phase_s = 0.0
+        while left > 0 and not phase.is_over(phase_strides, phase_s):
+            stride = walker.next_stride(phase)
+            yield stride
+            left -= 1
+            phase_strides += 1
+            phase_s += 0.0 if last_s is None else stride.time_s - last_s
+            last_s = stride.time_s

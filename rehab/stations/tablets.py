@@ -1,0 +1,47 @@
+"""Tablets among browsers: known by a cookie that pairing gave them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from django.conf import settings
+from django.http import HttpRequest, HttpResponseBase
+
+from rehab.stations.models import Device, find_device
+
+COOKIE = "garry_tablet"
+COOKIE_AGE_S = 400 * 24 * 3600  # the longest that browsers keep one; each visit renews it
+
+
+def find_tablet(token: str | None) -> Device | None:
+    """Give the tablet that this token belongs to; None for any other device."""
+    device = find_device(token) if token and token.isascii() else None
+    return device if device is not None and device.kind == Device.Kind.TABLET else None
+
+
+def remember(response: HttpResponseBase, name: str, value: str, age_s: float) -> None:
+    """Keep a secret in the browser, out of scripts' reach."""
+    response.set_cookie(
+        name,
+        value,
+        max_age=int(age_s),
+        httponly=True,
+        samesite="Lax",
+        secure=settings.SESSION_COOKIE_SECURE,
+    )
+
+
+class TabletMiddleware:
+    """Says which paired tablet a request comes from, where it does. Keeps no state."""
+
+    def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
+        self.get_response = get_response
+
+    def __call__(self, request: HttpRequest) -> HttpResponseBase:
+        """Pass the request on."""
+        token = request.COOKIES.get(COOKIE)
+        kind, _, given = request.headers.get("Authorization", "").partition(" ")
+        if token is None and kind.lower() == "bearer":
+            token = given.strip()
+        request.tablet = find_tablet(token)  # type: ignore[attr-defined]
+        return self.get_response(request)

@@ -1,0 +1,9 @@
+"""Addresses of stations."""
+
+from django.urls import path
+
+from rehab.stations import views
+
+urlpatterns = [
+    path("tablets/pair/", views.pair, name="pair"),
+]

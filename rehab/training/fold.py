@@ -1,0 +1,219 @@
+"""A session as the fold of its log: the same steps and changes always give the same session."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from rehab.training.changes import Change, ChangeKind, Refused, State, next_state
+from rehab.training.goals import MIN_BASELINE_STRIDES
+from rehab.training.measures import InvalidSetting, check_gain
+from rehab.training.plans import SessionPlan, check_activation_threshold
+from rehab.training.scoring import RULES_VERSION, judge
+from rehab.training.steps import (
+    InvalidMeasurement,
+    Measurement,
+    Reason,
+    ScoredStep,
+    add_reason,
+    find_reasons,
+)
+from rehab.training.tallies import Tally
+
+# Strides further apart than this were not walked without a break, or a clock jumped: no more than
+# so much counts as walked. Recorded strides last 1-2 s, gaps between recorded trials 3.2-5.2 s
+# (gait.md 1.3).
+MAX_GAP_S = 10.0
+
+
+class SessionFold:
+    """Where a session stands after the steps and changes it was given, in constant memory.
+
+    ``step`` scores a measurement and moves on through the phases; ``change`` applies what a person
+    decided, effective from the next step. Neither looks at a clock.
+    """
+
+    def __init__(self, plan: SessionPlan) -> None:
+        self.plan = plan
+        self.state = State.READY
+        self.last_number = 0
+        self.last_time_s: float | None = None
+        self.active_s = 0.0
+        self.goal: float | None = plan.goal.resolve(plan.measure, None)
+        self.activation_threshold = plan.activation_threshold
+        self.trained = Tally()  # every step of the trained leg
+        self.feedback = Tally()  # those in feedback phases: what score and hit rate count
+        self.phases = tuple(Tally() for _ in plan.phases)
+        self._joined = False  # whether the time since the last step was walked
+        self._begin(0)
+
+    @classmethod
+    def replay(cls, plan: SessionPlan, log: Iterable[Measurement | Change]) -> SessionFold:
+        """Give the fold of a whole log."""
+        fold = cls(plan)
+        for entry in log:
+            if isinstance(entry, Change):
+                fold.change(entry)
+            else:
+                fold.step(entry)
+        return fold
+
+    @property
+    def score(self) -> int | None:
+        """Points of the session; None under a valence without points."""
+        return self.feedback.points if self.plan.valence.has_points else None
+
+    def tally_of(self, kind: str) -> Tally:
+        """Give the sums over all phases of one kind."""
+        total = Tally()
+        for phase, tally in zip(self.plan.phases, self.phases, strict=True):
+            if phase.kind == kind:
+                total.merge(tally)
+        return total
+
+    @property
+    def baseline_mean(self) -> float | None:
+        """Mean of the valid baseline values; None before there are enough of them."""
+        baseline = self.tally_of("baseline")
+        return baseline.mean_value if baseline.valid >= MIN_BASELINE_STRIDES else None
+
+    def step(self, measurement: Measurement) -> ScoredStep:
+        """Score one stride. Raises Refused where the session has not begun or is over.
+
+        Raises InvalidMeasurement for a number that is not the next one.
+        """
+        running = self.state is State.RUNNING
+        if not running and self.state is not State.PAUSED:
+            raise Refused(f"A session that is {self.state} takes no steps; it must be running.")
+        if measurement.number != self.last_number + 1:
+            raise InvalidMeasurement(
+                f"Step {measurement.number} does not follow step {self.last_number}; "
+                f"send {self.last_number + 1}."
+            )
+        time_s = measurement.time_s
+        elapsed_s = 0.0 if self.last_time_s is None else time_s - self.last_time_s
+        backwards = elapsed_s < 0
+        reasons = find_reasons(measurement, self.plan.measure)
+        if backwards:
+            reasons = add_reason(reasons, Reason.TIME_BACKWARDS)
+        if not running:
+            reasons = add_reason(reasons, Reason.PAUSED)
+        scored = self._score(measurement, reasons)
+        self.last_number = scored.number
+        if scored.side == self.plan.trained_side:
+            self._count(scored, running)
+        if self._joined and not backwards:
+            walked_s = min(elapsed_s, MAX_GAP_S)
+            self.active_s += walked_s
+            self.phase_s += walked_s
+        # Later steps follow a clock that was set back (a source that began anew): one step is lost.
+        self.last_time_s = time_s
+        self._joined = running and not backwards
+        if running and self.phase.is_over(self.phase_strides, self.phase_s):
+            self._move_on()
+        return scored
+
+    def _score(self, measurement: Measurement, reasons: tuple[str, ...]) -> ScoredStep:
+        plan, goal, value = self.plan, self.goal, measurement.value
+        shown = performance = hit = points = None
+        if reasons:
+            if value is not None and not math.isfinite(value):
+                value = None
+        elif value is not None and goal is not None and measurement.side == plan.trained_side:
+            shown, performance, hit = judge(plan.measure, value, self.gain, goal)
+            if self.phase.feedback:
+                points = plan.valence.points(hit)
+        return ScoredStep(
+            number=measurement.number,
+            time_s=measurement.time_s,
+            side=measurement.side,
+            value=value,
+            gain=self.gain,
+            shown=shown,
+            goal=goal,
+            performance=performance,
+            hit=hit,
+            points=points,
+            valid=not reasons,
+            reasons=reasons,
+            phase=self.phase_index,
+            extra=measurement.extra,
+            rules_version=RULES_VERSION,
+        )
+
+    def _count(self, step: ScoredStep, running: bool) -> None:
+        self.trained.add(step)
+        if running:
+            self.phases[self.phase_index].add(step)
+            if self.phase.feedback:
+                self.feedback.add(step)
+            self.phase_strides += 1
+
+    def _move_on(self) -> None:
+        """Go to the next phase, or note why that cannot be."""
+        if self.phase_index + 1 == len(self.plan.phases):
+            self.completed = True
+            return
+        try:
+            self._enter(self.phase_index + 1)
+        except InvalidSetting as problem:
+            self.obstacle = str(problem)
+
+    def _enter(self, index: int) -> None:
+        """Begin a phase. Raises InvalidSetting where its goal should be known and cannot be."""
+        kinds = [phase.kind for phase in self.plan.phases]
+        if self.goal is None and kinds[index] != "baseline" and "baseline" in kinds[:index]:
+            self.goal = self._goal_from_baseline()
+        self._begin(index)
+
+    def _begin(self, index: int) -> None:
+        self.phase_index = index
+        self.phase = self.plan.phases[index]  # the one that the next step falls in
+        self.phase_strides = 0
+        self.phase_s = 0.0
+        self.gain = self.phase.gain
+        self.obstacle = ""  # why the plan cannot go on, in words for the PT
+        self.completed = False  # the last phase has reached its limit
+
+    def _goal_from_baseline(self) -> float | None:
+        if self.baseline_mean is None:
+            raise Refused(
+                f"The goal needs {MIN_BASELINE_STRIDES} valid baseline strides and has "
+                f"{self.tally_of('baseline').valid}. Walk on, or set the goal as a value."
+            )
+        return self.plan.goal.resolve(self.plan.measure, self.baseline_mean)
+
+    def change(self, change: Change) -> None:
+        """Apply a change from the next step on.
+
+        Raises Refused where the state does not allow it and InvalidSetting for a value out of
+        bounds; the session is then as it was.
+        """
+        state = next_state(self.state, change.kind)
+        match change.kind:
+            case ChangeKind.GOAL:
+                self.goal = self.plan.measure.check_goal(_needed(change))
+                self.obstacle = ""
+            case ChangeKind.GAIN:
+                self.gain = check_gain(_needed(change))
+            case ChangeKind.ACTIVATION_THRESHOLD:
+                self.activation_threshold = check_activation_threshold(_needed(change))
+            case ChangeKind.PHASE:
+                self._enter(self._phase_index(_needed(change)))
+            case ChangeKind.PAUSE:
+                self._joined = False
+        self.state = state
+
+    def _phase_index(self, value: float) -> int:
+        if not 0 <= value < len(self.plan.phases) or value != int(value):
+            raise InvalidSetting(
+                f"This session has no phase {value:g}; its phases are numbered "
+                f"0 to {len(self.plan.phases) - 1}."
+            )
+        return int(value)
+
+
+def _needed(change: Change) -> float:
+    if change.value is None:
+        raise InvalidSetting(f"The change '{change.kind}' needs a value.")
+    return change.value

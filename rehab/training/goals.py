@@ -1,0 +1,67 @@
+"""Goals: what a step should reach, how often, for how long."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rehab.training.measures import InvalidSetting, Measure
+
+# The lab's goal is the mean of the 54-55 usable baseline strides of a session (gait.md 1.2, 1.3).
+MIN_BASELINE_STRIDES = 50
+
+
+@dataclass(frozen=True, slots=True)
+class GoalRule:
+    """Where a session's goal comes from: a value in the measure's unit, or percent of baseline.
+
+    Exactly one of the two is given. Raises InvalidSetting otherwise.
+    """
+
+    value: float | None = None
+    percent_of_baseline: float | None = None
+
+    def __post_init__(self) -> None:
+        if (self.value is None) == (self.percent_of_baseline is None):
+            raise InvalidSetting("Give a goal either as a value or as percent of baseline.")
+        percent = self.percent_of_baseline
+        if percent is not None and not 50 <= percent <= 200:
+            raise InvalidSetting(
+                f"A goal of {percent:g} % of baseline cannot be used. Give 50 to 200 %."
+            )
+
+    @property
+    def needs_baseline(self) -> bool:
+        """Whether the goal is unknown until the baseline has been walked."""
+        return self.value is None
+
+    def resolve(self, measure: Measure, baseline_mean: float | None) -> float | None:
+        """Give the goal in the measure's unit, or None while the baseline is unknown."""
+        if self.percent_of_baseline is None:
+            return None if self.value is None else measure.check_goal(self.value)
+        if baseline_mean is None:
+            return None
+        return measure.check_goal(baseline_mean * self.percent_of_baseline / 100)
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What the PT wants of the whole session: "60 % of the steps, over ten minutes"."""
+
+    hit_rate: float | None = None
+    duration_s: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.hit_rate is not None and not 0 < self.hit_rate <= 1:
+            raise InvalidSetting("The wanted hit rate lies above 0 and up to 1 (0.6 for 60 %).")
+        if self.duration_s is not None and not (
+            math.isfinite(self.duration_s) and self.duration_s > 0
+        ):
+            raise InvalidSetting("The planned duration must be more than 0 seconds.")
+
+    def is_met(self, hit_rate: float | None, active_s: float) -> bool | None:
+        """Say whether both wishes are fulfilled; None where nothing was wished for."""
+        if self.hit_rate is None and self.duration_s is None:
+            return None
+        rate_met = self.hit_rate is None or (hit_rate is not None and hit_rate >= self.hit_rate)
+        return rate_met and (self.duration_s is None or active_s >= self.duration_s)

@@ -1,0 +1,72 @@
+"""What is trained: a quantity with its unit, direction and bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+GAIN_MIN = 0.5
+GAIN_MAX = 1.5
+# Beyond any unit of gait; sums over a session stay far from where floats overflow.
+BOUND_MAX = 1e9
+
+
+class InvalidSetting(ValueError):
+    """A setting that cannot be used; the message says what would be accepted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """A quantity of a stride that can be trained.
+
+    Values lie in [value_min, value_max], goals in (goal_min, goal_max], both in ``unit``; goals lie
+    above 0, since a performance is a share of them. ``higher_is_better`` is False for quantities
+    that training should lower. Raises InvalidSetting for bounds that leave no room.
+    """
+
+    slug: str
+    name: str
+    unit: str
+    value_min: float
+    value_max: float
+    goal_min: float
+    goal_max: float
+    higher_is_better: bool = True
+
+    def __post_init__(self) -> None:
+        if not -BOUND_MAX <= self.value_min < self.value_max <= BOUND_MAX:
+            raise InvalidSetting(f"{self.name}: the smallest value must lie below the largest.")
+        if not 0 <= self.goal_min < self.goal_max <= BOUND_MAX:
+            raise InvalidSetting(f"{self.name}: goals need a range above 0.")
+
+    def check_goal(self, goal: float) -> float:
+        """Give the goal back as a number. Raises InvalidSetting outside (goal_min, goal_max]."""
+        if not self.goal_min < goal <= self.goal_max:
+            raise InvalidSetting(
+                f"A goal of {goal:g} {self.unit} cannot be used for {self.name}. "
+                f"Give one above {self.goal_min:g} and up to {self.goal_max:g} {self.unit}."
+            )
+        return float(goal)
+
+
+# Bounds: DESIGN.md section 5. Healthy A2 lies at 2-6 W/kg; recorded outliers reach 13.75 W/kg
+# (HEBB_03, force-plate faults), so 20 W/kg is a bound that only a wrong unit passes.
+A2 = Measure(
+    slug="a2",
+    name="ankle push-off power A2",
+    unit="W/kg",
+    value_min=0.0,
+    value_max=20.0,
+    goal_min=0.0,
+    goal_max=15.0,
+)
+
+MEASURES: dict[str, Measure] = {A2.slug: A2}
+
+
+def check_gain(gain: float) -> float:
+    """Give the gain back as a number. Raises InvalidSetting outside [GAIN_MIN, GAIN_MAX]."""
+    if not GAIN_MIN <= gain <= GAIN_MAX:
+        raise InvalidSetting(
+            f"A gain of {gain:g} cannot be used. Give one from {GAIN_MIN} to {GAIN_MAX}."
+        )
+    return float(gain)

@@ -1,0 +1,102 @@
+"""What a session adds up to: the figures that reports and leaderboards are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rehab.training.fold import SessionFold
+
+# Below this share of the baseline a gain is within a walker's own noise (CV 6.5-12 %, gait.md 1.4,
+# standard error of a 50-stride mean 1-2 %), and a share of it would mean nothing.
+MIN_TRAINED_GAIN = 0.03
+# A change relative to (nearly) nothing means nothing; this share of the largest value is nothing.
+MIN_BASELINE_SHARE = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """A figure of a session. ``compute`` gives None where the session has no such figure."""
+
+    slug: str
+    label: str
+    unit: str
+    compute: Callable[[SessionFold], float | None]
+    higher_is_better: bool = True
+
+
+def _score(fold: SessionFold) -> float | None:
+    return fold.score
+
+
+def _hit_rate(fold: SessionFold) -> float | None:
+    return fold.feedback.hit_rate
+
+
+def _mean_performance(fold: SessionFold) -> float | None:
+    return fold.feedback.mean_performance
+
+
+def _best_streak(fold: SessionFold) -> float | None:
+    return fold.feedback.best_streak if fold.feedback.judged else None
+
+
+def _points_per_100_steps(fold: SessionFold) -> float | None:
+    """Score for each 100 judged steps: sessions of different length compare."""
+    if fold.score is None or not fold.feedback.judged:
+        return None
+    return 100 * fold.score / fold.feedback.judged
+
+
+def _relative_change(fold: SessionFold, mean: float | None) -> float | None:
+    """Give (mean − baseline) / baseline, positive for the better direction."""
+    measure = fold.plan.measure
+    baseline = fold.baseline_mean
+    if mean is None or baseline is None or baseline <= MIN_BASELINE_SHARE * measure.value_max:
+        return None
+    change = (mean - baseline) / baseline
+    return change if measure.higher_is_better else -change
+
+
+def _improvement_over_baseline(fold: SessionFold) -> float | None:
+    """Mean value in feedback phases against the baseline mean, in percent of the latter."""
+    change = _relative_change(fold, fold.feedback.mean_value)
+    return None if change is None else 100 * change
+
+
+def _retention_in_washout(fold: SessionFold) -> float | None:
+    """Share of the training gain that the washout keeps, in percent.
+
+    (washout − baseline) / (training − baseline) of the mean values; may leave 0-100 %. None where
+    training gained less than MIN_TRAINED_GAIN of the baseline.
+    """
+    trained = _relative_change(fold, fold.feedback.mean_value)
+    kept = _relative_change(fold, fold.tally_of("washout").mean_value)
+    if trained is None or kept is None or trained < MIN_TRAINED_GAIN:
+        return None
+    return 100 * kept / trained
+
+
+METRICS: dict[str, Metric] = {
+    metric.slug: metric
+    for metric in (
+        Metric("score", "Score", "points", _score),
+        Metric("hit_rate", "Hit rate", "", _hit_rate),
+        Metric("mean_performance", "Mean performance", "", _mean_performance),
+        Metric("best_streak", "Best streak", "steps", _best_streak),
+        Metric("points_per_100_steps", "Points per 100 steps", "points", _points_per_100_steps),
+        Metric(
+            "improvement_over_baseline",
+            "Improvement over baseline",
+            "%",
+            _improvement_over_baseline,
+        ),
+        Metric("retention_in_washout", "Retention in washout", "%", _retention_in_washout),
+    )
+}
+
+
+def measure_session(fold: SessionFold) -> dict[str, float]:
+    """Give every metric that the session has."""
+    figures = {slug: metric.compute(fold) for slug, metric in METRICS.items()}
+    return {slug: figure for slug, figure in figures.items() if figure is not None}

@@ -1,0 +1,98 @@
+"""The parts of a session: what each is for, how long it lasts, whether it gives feedback."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rehab.training.measures import InvalidSetting, check_gain
+
+
+@dataclass(frozen=True, slots=True)
+class PhaseKind:
+    """What a phase is for. ``feedback`` is its default; a phase may say otherwise.
+
+    ``calm_words`` stand on the patient's screen in a phase without feedback.
+    """
+
+    slug: str
+    label: str
+    feedback: bool
+    calm_words: str = "Just keep walking."
+
+
+# The lab's protocol (HEBB_03): baseline, familiarization, training blocks with catch blocks between
+# them, washout. Retention is the same measurement on a later day.
+PHASE_KINDS: dict[str, PhaseKind] = {
+    kind.slug: kind
+    for kind in (
+        PhaseKind("baseline", "Baseline", False, "Just walk as you usually do."),
+        PhaseKind("familiarization", "Familiarization", True),
+        PhaseKind("training", "Training", True),
+        PhaseKind("catch", "Catch", False, "Just walk as you usually do."),
+        PhaseKind("washout", "Washout", False),
+        PhaseKind("retention", "Retention", False),
+    )
+}
+
+
+def find_phase_kind(slug: str) -> PhaseKind:
+    """Give the phase kind of that name. Raises InvalidSetting, naming the known ones."""
+    try:
+        return PHASE_KINDS[slug]
+    except KeyError:
+        raise InvalidSetting(
+            f"There is no phase kind {slug!r}. Known kinds: {', '.join(PHASE_KINDS)}."
+        ) from None
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """One part of a session.
+
+    It ends after ``strides`` strides of the trained leg or ``seconds`` of source time, whichever
+    comes first; with neither, when the PT moves on. Raises InvalidSetting for what cannot be
+    walked.
+    """
+
+    kind: str
+    name: str
+    feedback: bool
+    gain: float = 1.0
+    strides: int | None = None
+    seconds: float | None = None
+
+    def __post_init__(self) -> None:
+        find_phase_kind(self.kind)
+        check_gain(self.gain)
+        if self.strides is not None and self.strides < 1:
+            raise InvalidSetting(f"Phase {self.name!r} needs at least 1 stride, or no limit.")
+        if self.seconds is not None and not (math.isfinite(self.seconds) and self.seconds > 0):
+            raise InvalidSetting(f"Phase {self.name!r} needs more than 0 seconds, or no limit.")
+
+    def is_over(self, strides: int, seconds: float) -> bool:
+        """Say whether a phase that has lasted so long has reached one of its limits."""
+        return (self.strides is not None and strides >= self.strides) or (
+            self.seconds is not None and seconds >= self.seconds
+        )
+
+
+def make_phase(
+    kind: str,
+    name: str = "",
+    *,
+    feedback: bool | None = None,
+    gain: float = 1.0,
+    strides: int | None = None,
+    seconds: float | None = None,
+) -> Phase:
+    """Make a phase; name and feedback are its kind's unless given."""
+    known = find_phase_kind(kind)
+    return Phase(
+        kind=kind,
+        name=name or known.label,
+        feedback=known.feedback if feedback is None else feedback,
+        gain=gain,
+        strides=strides,
+        seconds=seconds,
+    )

@@ -1,0 +1,80 @@
+"""Everything a session is scored with, fixed when it is created and kept beside its log."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from rehab.training.goals import GoalRule, Target
+from rehab.training.measures import InvalidSetting, Measure
+from rehab.training.phases import Phase
+from rehab.training.steps import Side
+from rehab.training.valences import Band, Confetti, Cue, Valence
+
+# The paper's default (P 3.4.1): the robot answers windows of at least 90 % of the goal.
+DEFAULT_ACTIVATION_THRESHOLD = 0.90
+
+
+def check_activation_threshold(threshold: float) -> float:
+    """Give the threshold back as a number. Raises InvalidSetting outside (0, 2]."""
+    if not 0 < threshold <= 2:
+        raise InvalidSetting("The activation threshold lies above 0 and up to 2 (0.9 for 90 %).")
+    return float(threshold)
+
+
+@dataclass(frozen=True, slots=True)
+class SessionPlan:
+    """What is measured, how it is paid, in which phases, towards which goal.
+
+    Raises InvalidSetting for a plan that could not be walked: no phase, a goal outside the
+    measure's bounds, a goal from a baseline that does not come before the first feedback.
+    """
+
+    measure: Measure
+    valence: Valence
+    phases: tuple[Phase, ...]
+    trained_side: Side
+    goal: GoalRule
+    target: Target = field(default_factory=Target)
+    activation_threshold: float = DEFAULT_ACTIVATION_THRESHOLD
+
+    def __post_init__(self) -> None:
+        if not self.phases:
+            raise InvalidSetting("A session needs at least one phase.")
+        self.goal.resolve(self.measure, None)
+        check_activation_threshold(self.activation_threshold)
+        if self.goal.needs_baseline:
+            kinds = [phase.kind for phase in self.phases]
+            first_feedback = next((i for i, p in enumerate(self.phases) if p.feedback), len(kinds))
+            if "baseline" not in kinds[:first_feedback]:
+                raise InvalidSetting(
+                    "A goal in percent of baseline needs a baseline phase before the first "
+                    "feedback. Put one first, or give the goal as a value."
+                )
+
+    def to_json(self) -> dict[str, Any]:
+        """Give the plan as plain JSON data."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> SessionPlan:
+        """Rebuild a plan from ``to_json``'s data."""
+        valence = data["valence"]
+        return cls(
+            measure=Measure(**data["measure"]),
+            valence=Valence(
+                **valence
+                | {
+                    "bands": tuple(
+                        Band(**band | {"confetti": Confetti(band["confetti"])})
+                        for band in valence["bands"]
+                    ),
+                    "cue": Cue(**valence["cue"]),
+                }
+            ),
+            phases=tuple(Phase(**phase) for phase in data["phases"]),
+            trained_side=Side(data["trained_side"]),
+            goal=GoalRule(**data["goal"]),
+            target=Target(**data["target"]),
+            activation_threshold=data["activation_threshold"],
+        )

@@ -1,0 +1,78 @@
+"""Running sums over scored steps: all that figures and metrics are made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rehab.training.steps import Reason, ScoredStep
+
+
+@dataclass(slots=True)
+class Tally:
+    """Counts and sums over steps of the trained leg.
+
+    A streak is a run of hits among judged steps: an invalid stride neither breaks nor feeds it.
+
+    ``strides = valid + invalid + missing``; a missing stride had no value and no other fault.
+    ``judged`` counts valid steps that a goal was known for.
+    """
+
+    strides: int = 0
+    valid: int = 0
+    invalid: int = 0
+    missing: int = 0
+    judged: int = 0
+    hits: int = 0
+    value_sum: float = 0.0
+    performance_sum: float = 0.0
+    points: int = 0
+    streak: int = 0
+    best_streak: int = 0
+
+    def add(self, step: ScoredStep) -> None:
+        """Take one more step into account. An invalid one only adds to the counts of strides."""
+        self.strides += 1
+        if not step.valid:
+            if step.reasons == (Reason.MISSING,):
+                self.missing += 1
+            else:
+                self.invalid += 1
+            return
+        self.valid += 1
+        self.value_sum += step.value or 0.0
+        self.points += step.points or 0
+        if step.performance is None:
+            return
+        self.judged += 1
+        self.performance_sum += step.performance
+        if step.hit:
+            self.hits += 1
+            self.streak += 1
+            if self.streak > self.best_streak:
+                self.best_streak = self.streak
+        else:
+            self.streak = 0
+
+    def merge(self, other: Tally) -> None:
+        """Add the sums of another tally; streaks do not reach across."""
+        for name in ("strides", "valid", "invalid", "missing", "judged", "hits", "points"):
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        self.value_sum += other.value_sum
+        self.performance_sum += other.performance_sum
+        self.streak = other.streak
+        self.best_streak = max(self.best_streak, other.best_streak)
+
+    @property
+    def mean_value(self) -> float | None:
+        """Mean of the valid values, in the measure's unit."""
+        return self.value_sum / self.valid if self.valid else None
+
+    @property
+    def mean_performance(self) -> float | None:
+        """Mean performance of the judged steps (ratio)."""
+        return self.performance_sum / self.judged if self.judged else None
+
+    @property
+    def hit_rate(self) -> float | None:
+        """Hits among the judged steps (ratio)."""
+        return self.hits / self.judged if self.judged else None

@@ -1,0 +1,141 @@
+"""`python -m robot --base NAME …`: lets a base perform for the sessions of its station.
+
+`python -m robot gesture NAME --base NAME` plays one gesture, without a server;
+`python -m robot doctor` finds a Kobuki's port and says what is wrong on the way to it;
+`python -m robot twin` is a simulated one at a port of its own.
+
+Exit status: 0 told to end (SIGTERM; --child: standard input closed); 1 the base does not answer
+any more; 2 the command line cannot be used; 3 the server will not have this robot; 130 stopped by
+Ctrl-C. However it ends, the base stands still.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import sys
+import threading
+import time
+from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Sequence
+from functools import partial
+
+from robot import doctor, solo
+from robot.bases import BASES, BaseLost, MobileBase
+from robot.bases.twin.__main__ import main as run_twin
+from robot.dialing import CannotDial, add_dialing_arguments, find_token, websocket_url
+from robot.link import Link, LinkRefused
+from robot.worker import Worker
+
+ROBOT_PATH = "/ws/robot/"
+
+DONE, LOST, UNUSABLE, REFUSED, INTERRUPTED = 0, 1, 2, 3, 130
+
+
+class Unusable(ValueError):
+    """What was asked for cannot be done; the message says what could be."""
+
+
+def make_parser() -> ArgumentParser:
+    """Give the command line."""
+    parser = ArgumentParser(
+        prog="python -m robot",
+        description=__doc__,
+        epilog="The token may also be in the environment, as GARRY_ROBOT_TOKEN.",
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--base", required=True, choices=sorted(BASES), help="what to drive")
+    parser.add_argument(
+        "--port",
+        default="",
+        help="where a real base is: /dev/kobuki, COM3, socket://host:port (default: "
+        "GARRY_ROBOT_PORT, or a Kobuki that is plugged in)",
+    )
+    add_dialing_arguments(parser)
+    return parser
+
+
+def say(text: str) -> None:
+    """Print a line for whoever looks on."""
+    print(text, file=sys.stderr, flush=True)
+
+
+async def until_told(is_child: bool) -> None:
+    """Wait for SIGTERM, and for the end of standard input where a server supervises us."""
+    loop = asyncio.get_running_loop()
+    told = asyncio.Event()
+    with contextlib.suppress(NotImplementedError):  # Windows ends a process without a word
+        loop.add_signal_handler(signal.SIGTERM, told.set)
+
+    def read_to_the_end() -> None:
+        with contextlib.suppress(OSError):
+            while os.read(0, 1024):
+                pass
+        with contextlib.suppress(RuntimeError):  # the loop has ended before
+            loop.call_soon_threadsafe(told.set)
+
+    if is_child:
+        threading.Thread(target=read_to_the_end, daemon=True).start()
+    await told.wait()
+
+
+async def perform(url: str, token: str, base: MobileBase, is_child: bool) -> None:
+    """Let the base perform until told to end. Raises LinkRefused and BaseLost."""
+    worker = Worker(partial(Link, url, token), base, notice=say)
+    tasks = [asyncio.create_task(worker.run()), asyncio.create_task(until_told(is_child))]
+    try:
+        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            task.result()
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+def run(options: Namespace) -> int:
+    """Run a robot to its end and give the exit status. Raises what cannot be used."""
+    url = websocket_url(options.server, ROBOT_PATH)
+    token = find_token(options, "GARRY_ROBOT_TOKEN", "a robot")
+    if options.child:  # Ctrl-C reaches both of us; the server tells when to end
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    base = BASES[options.base](time.monotonic)
+    base.port = options.port
+    with base:
+        try:
+            asyncio.run(perform(url, token, base, options.child))
+        except KeyboardInterrupt:
+            say("Stopped.")
+            return INTERRUPTED
+        except LinkRefused as refusal:
+            say(f"{refusal}")
+            return REFUSED
+        except BaseLost as problem:
+            say(f"{problem}")
+            return LOST
+    return DONE
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the robot that the command line names and give the exit status."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if words[:1] == ["doctor"]:
+        return doctor.main(words[1:])
+    if words[:1] == ["gesture"]:
+        return solo.main(words[1:])
+    if words[:1] == ["twin"]:
+        return run_twin(words[1:])
+    options = make_parser().parse_args(words)
+    try:
+        return run(options)
+    except (CannotDial, Unusable) as problem:
+        say(f"{problem}")
+        return UNUSABLE
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+if __name__ == "__main__":
+    sys.exit(main())

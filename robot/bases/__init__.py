@@ -1,0 +1,17 @@
+"""The bases that can be driven: one module each."""
+
+from robot.bases.base import Abilities, BaseLost, BaseState, MobileBase, Mood, Senses, Truth
+from robot.bases.kinematic import KinematicBase
+from robot.bases.kobuki import KobukiBase
+from robot.bases.null import NullBase
+from robot.bases.twinned import TwinBase
+
+# Name: its class, made with a monotonic clock [s].
+BASES: dict[str, type[MobileBase]] = {
+    "null": NullBase,
+    "kinematic": KinematicBase,
+    "twin": TwinBase,
+    "kobuki": KobukiBase,
+}
+
+__all__ = ["BASES", "Abilities", "BaseLost", "BaseState", "MobileBase", "Mood", "Senses", "Truth"]

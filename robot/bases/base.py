@@ -1,0 +1,161 @@
+"""What every base can do. Those that drive differ in how; nothing above knows which one it is."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from types import TracebackType
+from typing import ClassVar, Self
+
+from robot.motion import Pose, Twist
+
+
+class BaseLost(RuntimeError):
+    """A base that does not answer any more; the message says what to look at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Abilities:
+    """What a base is.
+
+    Parameters
+    ----------
+    simulated
+        Nothing in it can touch anyone; only such a base may arm itself.
+    moves
+        Whether it can drive and tell where it is, as gestures need.
+    announces
+        Whether it has lights and sounds, with which it tells that it is about to move.
+    real_time
+        Whether it lives by the computer's clock, and so cannot be rehearsed with.
+    """
+
+    simulated: bool
+    moves: bool
+    announces: bool = False
+    real_time: bool = False
+
+
+class Mood(StrEnum):
+    """What a base with lights shows."""
+
+    WAITING = "waiting"  # it may not move now
+    READY = "ready"
+    MOVING = "moving"  # or about to
+    STOPPED = "stopped"  # until a person arms it
+
+
+@dataclass(frozen=True, slots=True)
+class Senses:
+    """What a base feels beside its motion. By default nothing is wrong, and nothing known.
+
+    Parameters
+    ----------
+    hazards
+        What must stop it at once and holds now, or held a moment ago, as codes: ``bump``,
+        ``cliff``, ``wheel_drop``, ``over_current``.
+    refusal
+        Why it must not move at all, as a code; empty where it may.
+    stop_pressed
+        Whether somebody presses its stop button.
+    battery_v
+        Voltage of its battery [V]; None where it has none or did not tell.
+    is_charging
+        Whether a charger is at it.
+    silent_s
+        How long it has said nothing [s].
+    slip_rad
+        Heading by its wheels minus heading by its gyro, from home [rad].
+    """
+
+    hazards: frozenset[str] = frozenset()
+    refusal: str = ""
+    stop_pressed: bool = False
+    battery_v: float | None = None
+    is_charging: bool = False
+    silent_s: float = 0.0
+    slip_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class BaseState:
+    """Where a base is, by its own odometry from home, how fast it moves, and what it feels."""
+
+    pose: Pose
+    twist: Twist
+    senses: Senses = Senses()
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """Where a simulated base really is, seen from home, and how far from it it has been [m]."""
+
+    pose: Pose
+    farthest_m: float
+
+
+class MobileBase(ABC):
+    """A base that drives and turns.
+
+    As a context manager it is opened, and left standing still however the block ends.
+    """
+
+    name: ClassVar[str]
+    abilities: ClassVar[Abilities]
+    port: str = ""  # where it hangs, for bases that hang somewhere; to be set before it is opened
+
+    @abstractmethod
+    def __init__(self, monotonic: Callable[[], float]) -> None:
+        """Make one that is not open yet, given a clock [s]."""
+
+    def __enter__(self) -> Self:
+        """Open it."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        problem: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Leave it standing still."""
+        self.stop()
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """How often something went wrong on the way to it and back, by name."""
+        return {}
+
+    @property
+    def problem(self) -> str:
+        """What keeps it from being reached, for whoever looks on; empty where nothing does."""
+        return ""
+
+    @abstractmethod
+    def drive(self, twist: Twist) -> Twist:
+        """Order a velocity, in place of the last one; give what was really ordered.
+
+        It holds for ``ORDER_HOLDS_S`` unless it is ordered again. A twist that is not finite is
+        an order to stand still. Raises BaseLost.
+        """
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Stand still at once. Never raises."""
+
+    @abstractmethod
+    def read(self) -> BaseState:
+        """Give where it is now. Raises BaseLost."""
+
+    @abstractmethod
+    def set_home(self) -> None:
+        """Begin odometry anew: this place is home. A simulation is put back to its own home."""
+
+    def truth(self) -> Truth | None:
+        """Give where it really is, where that can be known: in a simulation."""
+        return None
+
+    def show(self, mood: Mood, *, aloud: bool) -> None:  # noqa: B027 (not every base can)
+        """Show by lights, and by a sound where it is ``aloud``, what it is about. Never raises."""

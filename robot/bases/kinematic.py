@@ -1,0 +1,70 @@
+"""A simulated base on a perfect floor: it does what it is told, and its odometry is the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ClassVar
+
+from robot.bases.base import Abilities, BaseState, MobileBase, Truth
+from robot.motion import (
+    CEILING_M_S,
+    CEILING_RAD_S,
+    HOME,
+    ORDER_HOLDS_S,
+    STILL,
+    Limits,
+    Twist,
+    advance,
+)
+
+WHEELS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
+
+
+class KinematicBase(MobileBase):
+    """Moves as ``advance`` says, on a clock [s] that is a parameter."""
+
+    name: ClassVar[str] = "kinematic"
+    abilities: ClassVar[Abilities] = Abilities(simulated=True, moves=True)
+
+    def __init__(self, monotonic: Callable[[], float]) -> None:
+        self._monotonic = monotonic
+        self._pose = HOME
+        self._twist = STILL
+        self._farthest_m = 0.0
+        self._time_s = self._ordered_s = monotonic()
+
+    def drive(self, twist: Twist) -> Twist:
+        """Order a velocity; its speeds are clipped."""
+        self._move()
+        self._twist, self._ordered_s = WHEELS.clip(twist), self._time_s
+        return self._twist
+
+    def stop(self) -> None:
+        """Stand still at once."""
+        self.drive(STILL)
+
+    def read(self) -> BaseState:
+        """Give where it is now."""
+        self._move()
+        return BaseState(self._pose, self._twist)
+
+    def set_home(self) -> None:
+        """Put it back to where it began, standing still."""
+        self.stop()
+        self._pose, self._farthest_m = HOME, 0.0
+
+    def truth(self) -> Truth:
+        """Give where it is: its odometry is the truth."""
+        return Truth(self.read().pose, self._farthest_m)
+
+    def _move(self) -> None:
+        """Bring it to where it is now; no further than its last order held."""
+        now_s = self._monotonic()
+        held_until_s = self._ordered_s + ORDER_HOLDS_S
+        moved_s = min(now_s, held_until_s) - self._time_s
+        if moved_s > 0:
+            self._pose = advance(self._pose, self._twist, moved_s)
+            self._farthest_m = max(self._farthest_m, self._pose.distance_m(HOME))
+        if now_s >= held_until_s:
+            self._twist = STILL
+        self._time_s = now_s

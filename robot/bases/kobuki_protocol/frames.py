@@ -1,0 +1,126 @@
+"""Frames: found in a stream of bytes, and made.
+
+A frame is AA 55, the payload's length, the payload, and the XOR of length and payload; a payload is
+a row of sub-payloads, each its id, its length and its data, little-endian (kobuki.md 1.2). Nothing
+is escaped: AA 55 may stand anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import reduce
+from operator import xor
+from struct import Struct
+from typing import Any, Generic, TypeVar
+
+BAUD = 115200  # 8N1, no flow control (kobuki.md 1.1)
+FRAME_S = 0.02  # between two feedback frames (kobuki.md 1.3)
+
+HEADER = b"\xaa\x55"
+SHORTEST = 3  # bytes of a payload: id, length and one byte of data (kobuki.md 1.2)
+# Everything a base can say in one frame is 175 bytes (kobuki.md 1.3). A longer one is a false
+# header, and waiting for its end would hold up the true frames behind it.
+LONGEST = 192
+
+T = TypeVar("T")
+
+
+class Malformed(ValueError):
+    """A payload that is not one, though its checksum may be right."""
+
+
+def frame(payload: bytes) -> bytes:
+    """Give the frame around a payload. Raises ValueError for one that is too short or too long."""
+    if not SHORTEST <= len(payload) <= LONGEST:
+        raise ValueError(f"A payload has {SHORTEST} to {LONGEST} bytes, not {len(payload)}.")
+    body = bytes((len(payload),)) + payload
+    return HEADER + body + bytes((reduce(xor, body),))
+
+
+class FrameReader(Generic[T]):
+    """Finds frames in a stream of bytes, however it is cut up and whatever else is in it.
+
+    A frame that does not hold is searched for another one from its second byte on: the header may
+    have been false, and behind it stands a true one (kobuki.md 2.4).
+
+    Parameters
+    ----------
+    decode
+        Gives what a payload says, or raises Malformed: ``decode_feedback``, ``decode_commands``.
+
+    Attributes
+    ----------
+    frames
+        Frames that held.
+    bad_checksums, malformed
+        Those that did not, and why.
+    skipped_bytes
+        Bytes that belong to no frame that held.
+    """
+
+    def __init__(self, decode: Callable[[bytes], T]) -> None:
+        self.frames = self.bad_checksums = self.malformed = self.skipped_bytes = 0
+        self._decode = decode
+        self._buffer = bytearray()
+
+    def feed(self, data: bytes) -> list[T]:
+        """Take the next bytes; give what the frames say that are whole now."""
+        buffer, found, at = self._buffer, [], 0
+        buffer += data
+        while True:
+            start = buffer.find(HEADER, at)
+            if start < 0:
+                start = len(buffer) - buffer.endswith(HEADER[:1], at)
+            self.skipped_bytes += start - at
+            at = start
+            if len(buffer) < at + 3:
+                break
+            end = at + buffer[at + 2] + 4
+            if SHORTEST <= end - at - 4 <= LONGEST:
+                if len(buffer) < end:
+                    break
+                try:
+                    found.append(self._open(bytes(buffer[at + 2 : end])))
+                except Malformed:
+                    pass
+                else:
+                    at = end
+                    continue
+            self.skipped_bytes += 1
+            at += 1
+        del buffer[:at]
+        return found
+
+    def _open(self, body: bytes) -> T:
+        """Give what a frame says, from its length to its checksum. Raises Malformed."""
+        if reduce(xor, body):
+            self.bad_checksums += 1
+            raise Malformed("The checksum is wrong.")
+        try:
+            said = self._decode(body[1:-1])
+        except Malformed:
+            self.malformed += 1
+            raise
+        self.frames += 1
+        return said
+
+
+def sub_payload(number: int, data: bytes) -> bytes:
+    return bytes((number, len(data))) + data
+
+
+def split(payload: bytes) -> Iterator[tuple[int, bytes]]:
+    """Give id and data of each sub-payload. Raises Malformed where they do not fill it exactly."""
+    at, end = 0, len(payload)
+    while at < end:
+        if at + 2 > end or at + 2 + payload[at + 1] > end:
+            raise Malformed("A sub-payload is longer than its frame.")
+        begin = at + 2
+        number, at = payload[at], begin + payload[at + 1]
+        yield number, payload[begin:at]
+
+
+def unpack(layout: Struct, number: int, data: bytes) -> tuple[Any, ...]:
+    if len(data) != layout.size:
+        raise Malformed(f"Sub-payload {number} has {layout.size} bytes, not {len(data)}.")
+    return layout.unpack(data)

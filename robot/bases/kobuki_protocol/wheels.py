@@ -1,0 +1,72 @@
+"""Wheels of a Kobuki: what a twist is in its orders, and what its orders are in wheel speeds."""
+
+from __future__ import annotations
+
+import math
+
+from robot.bases.kobuki_protocol.commands import BaseControl
+from robot.motion import STILL, Twist
+
+# kobuki.md 1.7: between the wheels [m], and one tick of an encoder [m].
+WHEELBASE_M = 0.23
+TICK_M = 8.5292090497737556558e-5
+# Neither wheel goes faster [m/s] (kobuki.md 1.9).
+WHEEL_MAX_M_S = 0.70
+
+HALF_MM = 1000 * WHEELBASE_M / 2
+RADIUS_MAX_MM = 32767
+ON_THE_SPOT = 1  # the radius that says so
+
+STOP = BaseControl(0, 0)
+
+
+def slow_to_wheels(twist: Twist) -> Twist:
+    """Give a twist on the same curve of which no wheel is too fast; what is not finite is still.
+
+    Clipping one of the two speeds would make it another curve (kobuki.md 1.5, c).
+    """
+    if not twist.is_finite:
+        return STILL
+    outer_m_s = abs(twist.v_m_s) + abs(twist.w_rad_s) * WHEELBASE_M / 2
+    too_fast = max(outer_m_s / WHEEL_MAX_M_S, 1.0)
+    return Twist(twist.v_m_s / too_fast, twist.w_rad_s / too_fast)
+
+
+def control_of(twist: Twist) -> BaseControl:
+    """Give the order that comes nearest to a twist; one that is not finite is an order to stand.
+
+    Notes
+    -----
+    The outer wheel's speed carries the sign of v, and the radius that of the turn
+    (kobuki.md 1.5). Four things differ from the reference driver, each as the reference text
+    proposes: curves too wide for the radius are driven straight, or on the widest, whichever is
+    nearer; numbers are rounded, not truncated; too fast a twist keeps its curve; NaN and infinity
+    never reach the wheels.
+    """
+    twist = slow_to_wheels(twist)
+    v_mm_s, w_rad_s = 1000 * twist.v_m_s, twist.w_rad_s
+    if abs(w_rad_s) * 2 * RADIUS_MAX_MM < abs(v_mm_s) or w_rad_s == 0:
+        return BaseControl(round(v_mm_s), 0)
+    # A radius that rounds to -1, 0 or 1 would be read as another curve.
+    if abs(v_mm_s) < 1.5 * abs(w_rad_s):
+        return BaseControl(round(HALF_MM * w_rad_s), ON_THE_SPOT)
+    outer_mm_s = math.copysign(abs(v_mm_s) + HALF_MM * abs(w_rad_s), v_mm_s)
+    radius_mm = max(-RADIUS_MAX_MM, min(RADIUS_MAX_MM, round(v_mm_s / w_rad_s)))
+    return BaseControl(round(outer_mm_s), radius_mm)
+
+
+def twist_of(control: BaseControl) -> Twist:
+    """Give the twist that an order means, as the firmware reads it (kobuki.md 1.5)."""
+    speed, radius = control
+    if radius == 0:
+        return Twist(speed / 1000, 0.0)
+    if radius == ON_THE_SPOT:
+        return Twist(0.0, speed / HALF_MM)
+    w_rad_s = speed / (radius + math.copysign(HALF_MM, radius))
+    return Twist(w_rad_s * radius / 1000, w_rad_s)
+
+
+def wheel_speeds(twist: Twist) -> tuple[float, float]:
+    """Give the speeds of the left and the right wheel [m/s]."""
+    turning_m_s = twist.w_rad_s * WHEELBASE_M / 2
+    return twist.v_m_s - turning_m_s, twist.v_m_s + turning_m_s

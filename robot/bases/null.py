@@ -1,0 +1,33 @@
+"""No base at all: decisions are made and told, nothing moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ClassVar
+
+from robot.bases.base import Abilities, BaseState, MobileBase
+from robot.motion import HOME, STILL, Twist
+
+
+class NullBase(MobileBase):
+    """Stays at home, whatever it is told."""
+
+    name: ClassVar[str] = "null"
+    abilities: ClassVar[Abilities] = Abilities(simulated=True, moves=False)
+
+    def __init__(self, _monotonic: Callable[[], float]) -> None:
+        pass
+
+    def drive(self, twist: Twist) -> Twist:
+        """Order nothing."""
+        return STILL
+
+    def stop(self) -> None:
+        """Stand still, as ever."""
+
+    def read(self) -> BaseState:
+        """Give home."""
+        return BaseState(HOME, STILL)
+
+    def set_home(self) -> None:
+        """Stay at home."""

@@ -1,0 +1,172 @@
+"""`python -m robot twin`: a simulated Kobuki at a port of its own, which it prints first.
+
+Whatever drives a real Kobuki drives it: the same bytes at the same pace. Standard input takes
+orders to the twin itself, a JSON line each, and standard output answers each with one:
+
+    {"do": "set", "name": "bumper", "value": 2, "for_s": 0.5}   a fault; for_s may be left out
+    {"do": "stall", "for_s": 0.2}          the line holds everything back
+    {"do": "vanish", "for_s": 1}           the port is not there
+    {"do": "power_cycle", "for_s": 1}      it is off, then all counters begin at 0
+    {"do": "wall", "ahead_m": 0.3}         something to bump into (physics only)
+    {"do": "edge", "ahead_m": 0.3}         something to fall from (physics only)
+    {"do": "carry_home"}                   as a person would, to where it began
+    {"do": "look"}                         the truth, and the setpoints since the last look
+
+It ends at SIGTERM or Ctrl-C; with --child, also when standard input closes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import queue
+import random
+import signal
+import sys
+import threading
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
+from collections.abc import Callable, Sequence
+from dataclasses import fields
+from pathlib import Path
+
+from robot.bases.kobuki_protocol import FRAME_S, Version
+from robot.bases.twin.bodies import Body, KinematicBody
+from robot.bases.twin.faults import BadFault, Faults
+from robot.bases.twin.firmware import FIRMWARE, Firmware
+from robot.bases.twin.lines import Line, PtyLine, SocketLine
+from robot.bases.twin.process import Twin
+
+
+def make_body(name: str, notice: Callable[[str], None]) -> Body:
+    """Give a body by its name, ``bullet`` or ``kinematic``; ``auto`` takes physics if it can.
+
+    Raises ImportError where physics was asked for by name and is not there.
+    """
+    if name != "kinematic":
+        try:
+            from robot.bases.twin.bullet import BulletBody
+
+            return BulletBody(FRAME_S)
+        except ImportError:
+            if name == "bullet":
+                raise
+            notice(
+                "pybullet is not installed: the twin rolls as arithmetic says, and touches "
+                "nothing. Cure: pip install 'garry[twin]' (CPython 3.11 on Linux x86_64)."
+            )
+    return KinematicBody(FRAME_S)
+
+
+def say(text: str) -> None:
+    """Print a line for whoever looks on."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def read_version(text: str) -> Version:
+    """Read a version, such as 1.1.4. Raises ValueError."""
+    major, minor, patch = map(int, text.split("."))
+    if not all(0 <= part <= 255 for part in (major, minor, patch)):
+        raise ValueError(text)
+    return Version(major, minor, patch)
+
+
+def make_parser() -> ArgumentParser:
+    """Give the command line."""
+    parser = ArgumentParser(
+        prog="python -m robot twin",
+        description=__doc__,
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--line",
+        choices=["pty", "socket"],
+        default="pty" if hasattr(os, "openpty") else "socket",
+        help="what its port is (default: a pseudo-terminal where there are any)",
+    )
+    parser.add_argument("--socket-port", type=int, default=0, metavar="N", help="of --line socket")
+    parser.add_argument("--body", choices=["auto", "bullet", "kinematic"], default="auto")
+    parser.add_argument("--firmware", type=read_version, default=FIRMWARE, metavar="1.2.0")
+    parser.add_argument(
+        "--watchdog-s",
+        type=float,
+        metavar="S",
+        help="stop after so long without a setpoint (default: never, as a real one)",
+    )
+    parser.add_argument("--seed", type=int, help="of the line's faults")
+    parser.add_argument("--child", action="store_true", help="end when standard input closes")
+    faults = parser.add_argument_group("faults from the beginning")
+    for fault in fields(Faults):
+        kind = type(fault.default)
+        faults.add_argument(
+            f"--{fault.name.replace('_', '-')}", type=kind, default=fault.default, metavar="N"
+        )
+    return parser
+
+
+def keep_to_ourselves() -> int:
+    """Give standard output's file for the port and the answers alone; then import pybullet.
+
+    It prints past Python: when it was built on importing, and more on ending.
+    """
+    answers, errors = os.dup(1), os.dup(2)
+    with Path(os.devnull).open("w") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
+    with contextlib.suppress(ImportError):
+        import pybullet  # noqa: F401
+    os.dup2(errors, 2)
+    os.close(errors)
+    return answers
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the twin of the command line until told to end, and give the exit status."""
+    parser = make_parser()
+    options = parser.parse_args(arguments)
+    faults = Faults()
+    try:
+        for fault in fields(Faults):
+            faults.change(fault.name, getattr(options, fault.name))
+    except BadFault as problem:
+        parser.error(str(problem))
+    answers = keep_to_ourselves()
+
+    def answer(text: str) -> None:
+        os.write(answers, text.encode() + b"\n")
+
+    try:
+        body = make_body(options.body, say)
+    except ImportError as problem:
+        parser.error(f"{problem}. Cure: --body kinematic, or pip install 'garry[twin]'.")
+    chance = random.Random(options.seed)  # noqa: S311 (nothing here is a secret)
+    firmware = Firmware(body, faults, options.firmware, options.watchdog_s, chance=chance)
+    port: Line = PtyLine() if options.line == "pty" else SocketLine(options.socket_port)
+    over = threading.Event()
+    for name in ("SIGTERM", "SIGINT"):
+        signal.signal(getattr(signal, name), lambda *_: over.set())
+    orders: queue.Queue[str] = queue.Queue()
+
+    def read_orders() -> None:
+        # Not by sys.stdin: its lock, held by a thread that waits, would break our ending.
+        rest = b""
+        with contextlib.suppress(OSError):
+            while data := os.read(0, 65536):
+                *lines, rest = (rest + data).split(b"\n")
+                for line in lines:
+                    orders.put(line.decode(errors="replace"))
+        if options.child:
+            over.set()
+
+    threading.Thread(target=read_orders, daemon=True).start()
+    try:
+        answer(port.name)
+        Twin(firmware, port).run(orders, answer, over.is_set)
+    except BrokenPipeError:
+        pass  # whoever listened to the answers is gone
+    finally:
+        port.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

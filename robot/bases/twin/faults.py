@@ -1,0 +1,99 @@
+"""What can go wrong with a base and with the line to it."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import dataclass
+from typing import Any
+
+
+class BadFault(ValueError):
+    """A fault that there is not, or that cannot be so large."""
+
+
+@dataclass
+class Faults:
+    """Faults that hold now; each may be changed while the twin runs.
+
+    Parameters
+    ----------
+    bumper, cliff, wheel_drop, over_current, buttons
+        Bits that are set whatever the body touches, as in ``CoreSensors``.
+    charger
+        As in ``CoreSensors``.
+    battery_v
+        Voltage of the battery [V]; 16.7 is full (kobuki.md 1.3).
+    left_scale, right_scale
+        How much larger than it believes the wheels are: 1.02 rolls 2 % too far, either way.
+    drift_deg_min
+        How far the gyro turns by itself [°/min].
+    drop, flip, duplicate
+        How probable it is that a byte of either direction is lost, has a bit flipped, comes twice.
+    false_header
+        How probable it is that AA 55 comes before a frame.
+    """
+
+    bumper: int = 0
+    cliff: int = 0
+    wheel_drop: int = 0
+    over_current: int = 0
+    buttons: int = 0
+    charger: int = 0
+    battery_v: float = 16.7
+    left_scale: float = 1.0
+    right_scale: float = 1.0
+    drift_deg_min: float = 0.0
+    drop: float = 0.0
+    flip: float = 0.0
+    duplicate: float = 0.0
+    false_header: float = 0.0
+
+    def change(self, name: str, value: Any) -> Any:
+        """Set a fault and give what it was. Raises BadFault."""
+        if name not in LIMITS:
+            raise BadFault(f"{name} is no fault. There are: {', '.join(LIMITS)}.")
+        least, most = LIMITS[name]
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not is_number or not math.isfinite(value) or not least <= value <= most:
+            raise BadFault(f"{name} is a number from {least:g} to {most:g}.")
+        was = getattr(self, name)
+        if isinstance(was, int) and value != int(value):
+            raise BadFault(f"{name} is a whole number.")
+        setattr(self, name, type(was)(value))
+        return was
+
+    def damage(self, data: bytes, chance: random.Random) -> bytes:
+        """Give what arrives of bytes that were sent."""
+        if self.false_header and chance.random() < self.false_header:
+            data = b"\xaa\x55" + data
+        if not self.drop and not self.flip and not self.duplicate:
+            return data
+        arrived = bytearray()
+        for byte in data:
+            if chance.random() < self.drop:
+                continue
+            flipped = chance.random() < self.flip
+            arrived.append(byte ^ (1 << chance.randrange(8)) if flipped else byte)
+            if chance.random() < self.duplicate:
+                arrived.append(arrived[-1])
+        return bytes(arrived)
+
+
+# Name: least and largest value.
+LIMITS: dict[str, tuple[float, float]] = {
+    "bumper": (0, 7),
+    "cliff": (0, 7),
+    "wheel_drop": (0, 3),
+    "over_current": (0, 3),
+    "buttons": (0, 7),
+    "charger": (0, 22),
+    "battery_v": (0, 25.5),
+    "left_scale": (0.5, 1.5),
+    "right_scale": (0.5, 1.5),
+    "drift_deg_min": (-600, 600),
+    "drop": (0, 1),
+    "flip": (0, 1),
+    "duplicate": (0, 1),
+    "false_header": (0, 1),
+}

@@ -1,0 +1,237 @@
+"""The firmware of the twin: takes a Kobuki's commands and says what a Kobuki would."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections import deque
+from typing import NamedTuple
+
+from robot.bases.kobuki_protocol import (
+    FRAME_S,
+    STOP,
+    TICK_M,
+    WHEEL_MAX_M_S,
+    BaseControl,
+    CliffRaw,
+    Command,
+    ControllerInfo,
+    CoreSensors,
+    DockIr,
+    Extra,
+    Feedback,
+    FrameReader,
+    GetGain,
+    GpInput,
+    GpOutput,
+    GyroRaw,
+    Inertia,
+    MotorCurrent,
+    Output,
+    RequestExtra,
+    SetGain,
+    Side,
+    Sound,
+    SoundSequence,
+    Udid,
+    Version,
+    decode_commands,
+    encode_feedback,
+    twist_of,
+    wheel_speeds,
+)
+from robot.bases.twin.bodies import Body
+from robot.bases.twin.faults import Faults
+
+# The newest firmware there is, and the common hardware (kobuki.md 1.10).
+FIRMWARE = Version(1, 2, 0)
+HARDWARE = Version(1, 0, 4)
+LONG_VERSIONS = Version(1, 1, 2)  # from here on in four bytes
+GAINS = Version(1, 2, 0)  # from here on they can be set and asked for
+UDID = Udid(0x47415252, 0x59, 0x5457494E)
+
+CLIFF_M = 0.05  # floor that is further away than this is a cliff (kobuki.md 1.8)
+GYRO_MAX_DEG_S = 250.0  # (kobuki.md 1.7)
+GYRO_DIGIT_DEG_S = 0.00875  # (kobuki.md 1.3)
+# A wheel draws 3 A, where the motor is switched off, at its largest torque; in 10 mA (kobuki.md
+# 1.3, 1.6, 2.1). That it grows in proportion is our own.
+CURRENT_N_M = 300.0
+ORDERS_KEPT = 1024
+NO_DOCK, NO_INPUT = DockIr(), GpInput()
+
+
+class Order(NamedTuple):
+    """A setpoint that came in, and when [s]."""
+
+    at_s: float
+    control: BaseControl
+
+
+class Firmware:
+    """One base that is switched on.
+
+    Parameters
+    ----------
+    body
+        What it moves.
+    faults
+        What is wrong with it now.
+    version
+        What it says it is. Before 1.1.2 it says so in two bytes, before 1.2.0 it has no gains.
+    watchdog_s
+        After so long without a setpoint it stops. None, as a real one, for which no watchdog is
+        documented (kobuki.md 1.6).
+    chance
+        Of the line's faults.
+
+    Attributes
+    ----------
+    orders
+        The latest setpoints that came in.
+    output
+        The word of its outputs; all power rails are on at first.
+    sounds
+        How many it was asked for.
+    reader
+        Counts what came in damaged.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        faults: Faults,
+        version: Version = FIRMWARE,
+        watchdog_s: float | None = None,
+        *,
+        chance: random.Random,
+    ) -> None:
+        self.body, self.faults, self.version = body, faults, version
+        self.watchdog_s = watchdog_s
+        self.orders: deque[Order] = deque(maxlen=ORDERS_KEPT)
+        self._chance = chance
+        self.switch_on()
+
+    def switch_on(self) -> None:
+        """Begin as after its power was off: all counters at 0, standing still."""
+        self.reader = FrameReader(decode_commands)
+        self.control, self._ordered_s = STOP, -math.inf
+        self.output, self.sounds = int(Output.POWER), 0
+        self._frames = 0
+        self._gains = ControllerInfo()
+        self._asked: set[str] = set()
+        self._rolled_was_m = self.body.rolled_m
+        self._counted = [0.0, 0.0]  # ticks, with what is not yet a whole one
+        self._heading_from_rad = self.body.pose.heading_rad
+        self._drifted_deg = 0.0
+
+    def take(self, data: bytes, now_s: float) -> None:
+        """Take bytes of the driver, as they arrive through the line."""
+        for commands in self.reader.feed(self.faults.damage(data, self._chance)):
+            for command in commands:
+                self._obey(command, now_s)
+
+    def step(self, now_s: float) -> bytes:
+        """Live for one frame's time; give the frame, as it arrives at the driver."""
+        if self.watchdog_s is not None and now_s - self._ordered_s > self.watchdog_s:
+            self.control = STOP
+        faults, (left_m_s, right_m_s) = self.faults, self.wheels_m_s
+        self.body.roll(left_m_s * faults.left_scale, right_m_s * faults.right_scale)
+        self._count(faults.left_scale, faults.right_scale)
+        self._frames += 1
+        self._drifted_deg += faults.drift_deg_min / 60 * FRAME_S
+        short = self.version < LONG_VERSIONS
+        frame = encode_feedback(self._feedback(left_m_s, right_m_s), short_versions=short)
+        return faults.damage(frame, self._chance)
+
+    @property
+    def wheels_m_s(self) -> tuple[float, float]:
+        """Speeds that the wheels are held at, left and right [m/s]; none is above its largest."""
+        left_m_s, right_m_s = wheel_speeds(twist_of(self.control))
+        too_fast = max(abs(left_m_s) / WHEEL_MAX_M_S, abs(right_m_s) / WHEEL_MAX_M_S, 1.0)
+        return left_m_s / too_fast, right_m_s / too_fast
+
+    def carry_home(self) -> None:
+        """Carry the body to where it began, unnoticed by the gyro."""
+        turned_rad = self.body.pose.heading_rad - self._heading_from_rad
+        self.body.carry_home()
+        self._heading_from_rad = self.body.pose.heading_rad - turned_rad
+
+    def _obey(self, command: Command, now_s: float) -> None:
+        match command:
+            case BaseControl():
+                self.control, self._ordered_s = command, now_s
+                self.orders.append(Order(now_s, command))
+            case RequestExtra(flags):
+                names = {"hardware": Extra.HARDWARE, "firmware": Extra.FIRMWARE, "udid": Extra.UDID}
+                self._asked |= {name for name, flag in names.items() if flags & flag}
+            case GpOutput(word):
+                self.output = word
+            case SetGain(kind, p, i, d) if self.version >= GAINS:
+                self._gains = ControllerInfo(kind, p, i, d)
+            case GetGain() if self.version >= GAINS:
+                self._asked.add("controller")
+            case Sound() | SoundSequence():
+                self.sounds += 1
+
+    def _feedback(self, left_m_s: float, right_m_s: float) -> Feedback:
+        faults, touch, number = self.faults, self.body.touch(), self._frames
+        turned_deg = math.degrees(self.body.pose.heading_rad - self._heading_from_rad)
+        rate_deg_s = math.degrees(self.body.turn_rad_s) + faults.drift_deg_min / 60
+        rate_deg_s = max(-GYRO_MAX_DEG_S, min(GYRO_MAX_DEG_S, rate_deg_s))
+        angle = math.remainder(100 * (turned_deg + self._drifted_deg), 36_000)
+        left_n_m, right_n_m = touch.torque_n_m
+        sample = (0, 0, round(rate_deg_s / GYRO_DIGIT_DEG_S))
+        asked, self._asked = self._asked, set()
+        return Feedback(
+            core=CoreSensors(
+                time_ms=number * round(1000 * FRAME_S) % 65536,
+                bumper=touch.bumper | faults.bumper,
+                wheel_drop=touch.wheel_drop | faults.wheel_drop,
+                cliff=_cliff(touch.floor_m) | faults.cliff,
+                left_ticks=round(self._counted[0]) % 65536,
+                right_ticks=round(self._counted[1]) % 65536,
+                left_pwm=round(127 * left_m_s / WHEEL_MAX_M_S),
+                right_pwm=round(127 * right_m_s / WHEEL_MAX_M_S),
+                buttons=faults.buttons,
+                charger=faults.charger,
+                battery=round(10 * faults.battery_v),
+                over_current=faults.over_current,
+            ),
+            dock=NO_DOCK,
+            inertia=Inertia(round(angle), round(100 * rate_deg_s)),
+            cliff=CliffRaw(*map(_voltage, touch.floor_m)),
+            current=MotorCurrent(_current(left_n_m), _current(right_n_m)),
+            # A sensor of 100 Hz on a link of 50: two samples, or three (kobuki.md 1.3, 5.1).
+            gyro=GyroRaw((5 * number - 4) // 2 % 256, (sample,) * (2 + number % 2)),
+            gp=NO_INPUT,
+            hardware=HARDWARE if "hardware" in asked else None,
+            firmware=self.version if "firmware" in asked else None,
+            udid=UDID if "udid" in asked else None,
+            controller=self._gains if "controller" in asked else None,
+        )
+
+    def _count(self, *scales: float) -> None:
+        """Count on. A wheel that is larger than believed counts less for the same way."""
+        now_m, was_m = self.body.rolled_m, self._rolled_was_m
+        for wheel, scale in enumerate(scales):
+            self._counted[wheel] += (now_m[wheel] - was_m[wheel]) / scale / TICK_M
+        self._rolled_was_m = now_m
+
+
+def _cliff(floor_m: tuple[float, float, float]) -> int:
+    right_m, center_m, left_m = floor_m
+    cliff = Side.RIGHT if right_m > CLIFF_M else 0
+    if center_m > CLIFF_M:
+        cliff |= Side.CENTER
+    if left_m > CLIFF_M:
+        cliff |= Side.LEFT
+    return cliff
+
+
+def _voltage(away_m: float) -> int:
+    """Give a floor sensor's reading: falling with distance, as its kind does; the curve is ours."""
+    return min(4095, round(0.056 / (away_m + 0.005) / 3.3 * 4095))
+
+
+def _current(torque_n_m: float) -> int:
+    return min(255, round(CURRENT_N_M * abs(torque_n_m)))

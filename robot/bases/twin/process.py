@@ -1,0 +1,175 @@
+"""A twin that lives by the clock: 50 frames a second, and what is done to it meanwhile."""
+
+from __future__ import annotations
+
+import json
+import math
+import queue
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+from robot.bases.kobuki_protocol import FRAME_S
+from robot.bases.twin.faults import BadFault
+from robot.bases.twin.firmware import Firmware
+from robot.bases.twin.lines import Line
+from robot.motion import HOME
+
+HELD_BYTES = 4096  # of a stalled line, as many as a pty keeps; the oldest are lost
+LATE_S = 0.1  # behind its time by more than this it lets the time go, instead of catching up
+LONGEST_S = 3600.0
+
+
+class Twin:
+    """One simulated base at its port, and what is done to it.
+
+    Parameters
+    ----------
+    firmware
+        The base.
+    line
+        Its port.
+    """
+
+    def __init__(self, firmware: Firmware, line: Line) -> None:
+        self.firmware, self.line = firmware, line
+        self.frames = 0
+        self.farthest_m = 0.0  # from home, since the last look
+        self.latest_s = 0.0  # a frame over its time, since the last look
+        # What is to be undone, and when; a newer order of the same kind takes its place.
+        self._later: dict[str, tuple[float, Callable[[], object]]] = {}
+        self._stalled_until_s = self._off_until_s = -math.inf
+        self._held = b""
+        self._looked_s = -math.inf
+
+    def listen(self, now_s: float) -> None:
+        """Take what the driver has sent, at a time [s]."""
+        if now_s < self._stalled_until_s:
+            return
+        data = self.line.read()
+        if data and now_s >= self._off_until_s:
+            self.firmware.take(data, now_s)
+
+    def live(self, now_s: float) -> None:
+        """Live for one frame's time and say so, at a time [s]."""
+        for kind in [kind for kind, (at_s, _) in self._later.items() if at_s <= now_s]:
+            self._later.pop(kind)[1]()
+        self.listen(now_s)
+        if now_s < self._off_until_s:
+            self.firmware.body.roll(0.0, 0.0)
+            return
+        self._held += self.firmware.step(now_s)
+        self.frames += 1
+        self.farthest_m = max(self.farthest_m, self.firmware.body.pose.distance_m(HOME))
+        if now_s >= self._stalled_until_s:
+            self.line.write(self._held)
+            self._held = b""
+        self._held = self._held[-HELD_BYTES:]
+
+    def do(self, order: Mapping[str, Any], now_s: float) -> dict[str, Any]:
+        """Do something to it, at a time [s], and give the answer. Raises BadFault."""
+        match order:
+            case {"do": "set", "name": str(name), "value": value}:
+                for_s = _seconds(order) if "for_s" in order else None
+                was = self.firmware.faults.change(name, value)
+                undo: Callable[[], object] = partial(self.firmware.faults.change, name, was)
+                _, undo = self._later.pop(name, (now_s, undo))
+                if for_s is not None:
+                    self._later[name] = (now_s + for_s, undo)
+            case {"do": "stall"}:
+                self._stalled_until_s = now_s + _seconds(order)
+            case {"do": "vanish"}:
+                back_s = now_s + _seconds(order)
+                self.line.pull_out()
+                self._later["vanish"] = (back_s, self.line.plug_in)
+            case {"do": "power_cycle"}:
+                self._off_until_s = now_s + _seconds(order)
+                self.firmware.switch_on()
+                self._later["power_cycle"] = (self._off_until_s, self.firmware.switch_on)
+            case {"do": "wall" | "edge" as what}:
+                body = self.firmware.body
+                put = body.put_wall if what == "wall" else body.put_edge
+                try:
+                    put(_number(order, "ahead_m", 0.0, 5.0))
+                except NotImplementedError as problem:
+                    raise BadFault(str(problem)) from None
+            case {"do": "carry_home"}:
+                self.firmware.carry_home()
+                self.farthest_m = 0.0
+            case {"do": "look"}:
+                return self._look(now_s)
+            case _:
+                raise BadFault("What can be done to a twin: see python -m robot twin --help.")
+        return {"done": order["do"]}
+
+    def run(
+        self,
+        orders: queue.Queue[str],
+        answer: Callable[[str], None],
+        is_over: Callable[[], bool],
+        monotonic: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Live by the clock until it is over."""
+        next_s = monotonic()
+        while not is_over():
+            now_s = monotonic()
+            while now_s < next_s:
+                if now_s < self._stalled_until_s:
+                    sleep(next_s - now_s)
+                else:
+                    self.line.wait(next_s - now_s)
+                now_s = monotonic()
+                self.listen(now_s)
+            self.latest_s = max(self.latest_s, now_s - next_s)
+            next_s = next_s + FRAME_S if now_s - next_s < LATE_S else now_s + FRAME_S
+            while not orders.empty():
+                answer(self._answer(orders.get(), now_s))
+            self.live(now_s)
+
+    def _answer(self, line: str, now_s: float) -> str:
+        try:
+            order = json.loads(line)
+            if not isinstance(order, dict):
+                raise BadFault('An order is {"do": …}.')
+            return json.dumps(self.do(order, now_s))
+        except (ValueError, RecursionError) as problem:  # BadFault and what is no JSON
+            return json.dumps({"error": str(problem)})
+
+    def _look(self, now_s: float) -> dict[str, Any]:
+        firmware = self.firmware
+        pose, control, reader = firmware.body.pose, firmware.control, firmware.reader
+        seen = {
+            "at_s": now_s,
+            "body": type(firmware.body).__name__,
+            "pose": {"x_m": pose.x_m, "y_m": pose.y_m, "heading_rad": pose.heading_rad},
+            "farthest_m": self.farthest_m,
+            "rolled_m": firmware.body.rolled_m,
+            "wheels_m_s": firmware.wheels_m_s,
+            "setpoint": control,
+            "orders": [
+                (order.at_s, *order.control)
+                for order in firmware.orders
+                if order.at_s > self._looked_s
+            ],
+            "output": firmware.output,
+            "sounds": firmware.sounds,
+            "frames": self.frames,
+            "latest_s": self.latest_s,
+            "commands": reader.frames,
+            "bad_commands": reader.bad_checksums + reader.malformed,
+        }
+        self._looked_s, self.farthest_m, self.latest_s = now_s, 0.0, 0.0
+        return seen
+
+
+def _number(order: Mapping[str, Any], name: str, least: float, most: float) -> float:
+    value = order.get(name)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
+        raise BadFault(f"{name} is a number from {least:g} to {most:g}.")
+    return float(value)
+
+
+def _seconds(order: Mapping[str, Any]) -> float:
+    return _number(order, "for_s", 0.0, LONGEST_S)

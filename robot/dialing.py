@@ -1,0 +1,89 @@
+"""Where the server is and what opens it: an address and a token, as a command line gives them."""
+
+from __future__ import annotations
+
+import os
+from argparse import ArgumentParser, Namespace, _ArgumentGroup
+from pathlib import Path
+from urllib.parse import urlsplit, urlunsplit
+
+
+class CannotDial(ValueError):
+    """An address or a token that cannot be one; the message says what would be."""
+
+
+def websocket_url(server: str, path: str) -> str:
+    """Give the address of one of a server's sockets.
+
+    Parameters
+    ----------
+    server
+        ``http(s)://host:port`` as in a browser, or ``ws(s)://…``; may have a path before ours.
+    path
+        The socket's own path, such as ``/ws/source/``.
+
+    Raises
+    ------
+    CannotDial
+        For anything else.
+    """
+    try:
+        parts = urlsplit(server.strip())
+        scheme = {"http": "ws", "https": "wss", "ws": "ws", "wss": "wss"}[parts.scheme]
+        is_server = bool(parts.hostname) and parts.port != 0
+    except (KeyError, ValueError):
+        is_server = False
+    if not is_server or parts.query or parts.fragment or parts.username is not None:
+        raise CannotDial(
+            f"{server!r} is no server address. Write it as http://127.0.0.1:8000, or https://… for "
+            "a hosted server."
+        )
+    return urlunsplit((scheme, parts.netloc, parts.path.rstrip("/") + path, "", ""))
+
+
+def check_token(token: str) -> str:
+    """Give a token without the blanks around it. Raises CannotDial for what cannot be one."""
+    token = token.strip()
+    if not token or not token.isascii() or not token.isprintable() or " " in token:
+        raise CannotDial(
+            "That is no token. Copy it from the admin page that showed it, as a whole."
+        )
+    return token
+
+
+def add_dialing_arguments(parser: ArgumentParser | _ArgumentGroup) -> None:
+    """Let a command line name the server, the token, and that a server supervises us."""
+    parser.add_argument(
+        "--server",
+        default=os.environ.get("GARRY_SERVER", "http://127.0.0.1:8000"),
+        metavar="URL",
+        help="address of the server (default: GARRY_SERVER, or http://127.0.0.1:8000)",
+    )
+    token = parser.add_mutually_exclusive_group()
+    token.add_argument("--token", help="the device's token; others may see it in a process list")
+    token.add_argument("--token-file", type=Path, metavar="FILE", help="or a file that holds it")
+    parser.add_argument(
+        "--child", action="store_true", help="end when standard input closes, as the server's child"
+    )
+
+
+def find_token(options: Namespace, variable: str, whose: str) -> str:
+    """Give the token of the command line, of its file or of an environment variable.
+
+    Raises CannotDial where there is none, or what there is cannot be one; ``whose`` says who needs
+    it, as in "a robot".
+    """
+    if options.token_file is not None:
+        try:
+            return check_token(options.token_file.read_text("utf-8"))
+        except (OSError, UnicodeDecodeError) as problem:
+            raise CannotDial(
+                f"The token file {options.token_file} cannot be read: {problem}."
+            ) from None
+    token = options.token or os.environ.get(variable, "")
+    if not token:
+        raise CannotDial(
+            f"{whose.capitalize()} needs the token of its device: --token-file FILE, --token "
+            f"TOKEN, or {variable} in the environment. Make one in the admin (Devices)."
+        )
+    return check_token(token)

@@ -1,0 +1,86 @@
+"""`python -m robot doctor`: finds a Kobuki's port and says what is wrong on the way to it."""
+
+from __future__ import annotations
+
+import sys
+import time
+from argparse import ArgumentParser
+from collections.abc import Iterator, Sequence
+
+from robot.bases.kobuki import KobukiBase
+from robot.safety import BASE_SILENT_S, BATTERY_LOW_V, BATTERY_WARN_V
+from robot.usb import Finding, find_port, list_ports, look_at_port
+
+LISTEN_S = 0.5
+FRAMES_PER_S = 45.0  # a base says 50; fewer are lost on the way
+
+CURES = {
+    "bump": "Something presses its bumper. Make room around it.",
+    "cliff": "Its floor sensors see no floor. Put it down; wipe the sensors below it.",
+    "wheel_drop": "A wheel hangs in the air. Put it down.",
+    "over_current": "A wheel is blocked. Switch it off and look at the wheels.",
+    "firmware_unknown": "It does not tell its firmware. Switch it off and on.",
+    "firmware_refused": "Its firmware is not of version 1. Update it (1.2.0) before it drives.",
+}
+
+
+def listen(port: str) -> Iterator[Finding]:
+    """Open a port for a second, with the wheels standing, and say what the base tells."""
+    base = KobukiBase(time.monotonic)
+    base.port = port
+    with base:
+        frames, until_s = base.frames, time.monotonic() + LISTEN_S
+        while time.monotonic() < until_s:
+            base.stop()
+            time.sleep(0.02)
+        frames = base.frames - frames
+        problem, state, counters = base.problem, base.read(), base.counters
+        firmware = base.firmware
+    senses = state.senses
+    if problem:
+        yield Finding(f"{port} cannot be opened: {problem}", _cure_opening(problem))
+        return
+    if senses.silent_s > BASE_SILENT_S:
+        yield Finding(
+            f"{port} is open, and nothing that a Kobuki would say comes from it.",
+            "Switch the base on. If it is on: this is another device's port, or the cable only "
+            "charges.",
+        )
+        return
+    per_s = frames / LISTEN_S
+    yield Finding(
+        f"It tells {per_s:.0f} times a second how it is.",
+        "" if per_s >= FRAMES_PER_S else "Take another USB port or cable; look at the latency.",
+    )
+    bad = counters["bad_checksums"] + counters["malformed"]
+    yield Finding(f"{bad} damaged frames.", "Take another cable." if bad > 1 else "")
+    yield Finding(f"Firmware {firmware or 'unknown'}.", CURES.get(senses.refusal, ""))
+    volts = senses.battery_v or 0.0
+    cure = "" if volts >= BATTERY_WARN_V else f"Charge it: below {BATTERY_LOW_V} V it stays still."
+    yield Finding(f"Battery {volts:.1f} V{', charging' * senses.is_charging}.", cure)
+    for hazard in sorted(senses.hazards):
+        yield Finding(f"It feels: {hazard}.", CURES.get(hazard, ""))
+
+
+def _cure_opening(problem: str) -> str:
+    words = problem.lower()
+    if "exclusively lock" in words or "busy" in words or "access is denied" in words:
+        return "Another program has it. Stop that: one GARRY for each base."
+    if "permission" in words:
+        return "See above: your account may not use it."
+    return "Plug the base in, switch it on, and check the name of the port."
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Look, and print what was found. Give 0 where nothing is wrong, else 1."""
+    parser = ArgumentParser(prog="python -m robot doctor", description=__doc__)
+    parser.add_argument("--port", help="instead of the one that is found")
+    port = parser.parse_args(arguments).port or find_port()
+    wrong = 0
+    for look in (look_at_port(port, list_ports()), listen(port)):
+        for finding in look:
+            wrong += bool(finding.cure)
+            cure = f"\n      Cure: {finding.cure}" if finding.cure else ""
+            sys.stdout.write(f"{'  !!' if cure else '  ok'}  {finding.what}{cure}\n")
+            sys.stdout.flush()
+    return 1 if wrong else 0

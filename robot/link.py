@@ -1,0 +1,324 @@
+"""The websocket by which robots and sources dial in to the server, and dial in again.
+
+::
+
+    async with Link(url, token, greet=lambda: {"type": "hello", …}) as link:
+        async for message in link:  # goes on over every reconnection; each begins with the greeting
+            …
+            await link.send({"type": "report", …})
+
+docs/protocol.md is the contract; the close codes here are its table.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import random
+import ssl
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+from urllib.parse import urlsplit
+
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
+
+MAX_FRAME_BYTES = 64 * 1024
+
+Message = dict[str, Any]
+
+UNAUTHORIZED = 4001
+NO_SESSION = 4004
+REPLACED = 4009
+NOT_STORED = 4011
+TOO_MANY = 4029
+NOT_PROTOCOL = 4400
+TAKEN = 4409
+ENDED = 4410
+
+# Close code: what to do, for a server that does not say it itself. Dialing in again as it is would
+# not help; after 4009 it would throw the newer socket out, which would dial in again, and so on.
+REFUSALS: dict[int, str] = {
+    UNAUTHORIZED: "The token is missing, wrong or revoked. Make a new one for this device in the "
+    "admin.",
+    NO_SESSION: "There is no such session for this device. Check the address and the station.",
+    REPLACED: "Another program dialed in with the same token. Stop one of them, or give each its "
+    "own device.",
+    NOT_PROTOCOL: "The server does not understand this client. Use the version that fits the "
+    "server.",
+    TAKEN: "The session has another source or robot. Stop that one first.",
+    ENDED: "The session has ended.",
+}
+# After these the server, or what we send, is in trouble that a quick return would make worse.
+_TROUBLE = frozenset({NOT_STORED, TOO_MANY, 1002, 1003, 1007, 1009})
+
+# Handshakes that are refused by a status instead of a close code.
+_STATUS_CODES = {401: UNAUTHORIZED, 403: UNAUTHORIZED, 404: NO_SESSION}
+_PASSING_STATUSES = frozenset({408, 425, 429})
+
+
+class LinkRefused(Exception):
+    """The server will not have this client as it is; the message says what to do.
+
+    ``code`` is a close code of docs/protocol.md.
+    """
+
+    def __init__(self, code: int, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class FrameTooLarge(ValueError):
+    """A message of more than 64 KiB."""
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """How long a link waits [s].
+
+    A half-open link is noticed after at most ``ping_every_s + pong_within_s + close_within_s``.
+    """
+
+    retry_first_s: float = 0.2
+    retry_longest_s: float = 5.0
+    connect_within_s: float = 5.0
+    ping_every_s: float = 4.0
+    pong_within_s: float = 4.0
+    close_within_s: float = 1.0
+
+
+class BackOff:
+    """The pauses [s] between attempts: each twice as long as the one before, up to a longest.
+
+    ``jitter`` gives numbers in [0, 1) and shortens a pause by up to half of it, so that a thousand
+    clients of a server that restarts do not come back at once.
+    """
+
+    def __init__(self, first_s: float, longest_s: float, jitter: Callable[[], float]) -> None:
+        self._first_s = self._pause_s = first_s
+        self._longest_s = longest_s
+        self._jitter = jitter
+
+    def next_s(self) -> float:
+        """Give the pause before the next attempt [s]."""
+        pause_s = self._pause_s
+        self._pause_s = min(2 * pause_s, self._longest_s)
+        return pause_s * (1 - self._jitter() / 2)
+
+    def reset(self) -> None:
+        """Begin again with the shortest pause."""
+        self._pause_s = self._first_s
+
+
+def _ignore_loss(_reason: str, _pause_s: float) -> None:
+    """Say nothing of a loss."""
+
+
+class Link:
+    """A connection to the server that comes back by itself. Iterating gives the server's messages.
+
+    Parameters
+    ----------
+    url
+        The socket's address, see ``dialing.websocket_url``.
+    token
+        The device's token.
+    greet
+        Gives the first message of each connection, asked anew for each.
+    on_lost
+        Called with a reason and the pause before the next attempt [s], each time a connection is
+        lost and each time none comes about. A robot stops here.
+    timing, jitter, sleep
+        How long to wait; where chance comes from, in [0, 1); how to pause between attempts.
+
+    Iterating raises ``LinkRefused`` where dialing in again as it is would not help, and ends after
+    ``close``. One task iterates; any may send.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        token: str,
+        greet: Callable[[], Message],
+        *,
+        on_lost: Callable[[str, float], None] = _ignore_loss,
+        timing: Timing = Timing(),
+        jitter: Callable[[], float] = random.random,
+        sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
+    ) -> None:
+        self.url = url
+        self._token = token
+        self._greet = greet
+        self._on_lost = on_lost
+        self._timing = timing
+        self._sleep = sleep
+        self._back_off = BackOff(timing.retry_first_s, timing.retry_longest_s, jitter)
+        self._socket: ClientConnection | None = None
+        self._is_closed = False
+        self._was_welcome = False  # ever: a server that once was there is worth waiting for
+        self._was_heard = False  # on this connection
+        self._error = ""  # the last one that the server sent on this connection
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there is a connection, as far as is known."""
+        return self._socket is not None
+
+    async def __aenter__(self) -> Self:
+        """Give the link; iterating connects it."""
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        problem: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close it."""
+        await self.close()
+
+    def __aiter__(self) -> Self:
+        """Give the link itself."""
+        return self
+
+    async def __anext__(self) -> Message:
+        """Give the server's next message, connecting first where there is no connection."""
+        while not self._is_closed:
+            try:
+                if self._socket is None:
+                    await self._connect()
+                else:
+                    return self._read(await self._socket.recv())
+            except ConnectionClosed as closed:
+                self._socket = None
+                if not self._is_closed:
+                    await self._pause(self._explain(closed))
+            except (OSError, WebSocketException) as problem:
+                await self._pause(self._explain_failure(problem))
+        raise StopAsyncIteration
+
+    async def send(self, message: Message) -> bool:
+        """Send a message; False where there is no connection, since nothing is kept here.
+
+        True does not mean that it arrived. Raises FrameTooLarge, and ValueError for a number that
+        is not finite.
+        """
+        text = json.dumps(message, separators=(",", ":"), allow_nan=False)
+        if len(text) > MAX_FRAME_BYTES:  # json writes ASCII: a character is a byte
+            raise FrameTooLarge(f"A frame has at most {MAX_FRAME_BYTES} bytes, not {len(text)}.")
+        socket = self._socket
+        if socket is None:
+            return False
+        try:
+            async with asyncio.timeout(self._timing.pong_within_s):
+                await socket.send(text)
+        except TimeoutError:
+            # Pings wait for room in the buffer as well and would never time out.
+            socket.transport.abort()
+        except ConnectionClosed:
+            pass
+        else:
+            return True
+        return False
+
+    def hang_up(self) -> None:
+        """Abandon the connection, with all that is still on its way; iterating dials in anew.
+
+        For whoever misses signs of life that come more often than pings.
+        """
+        socket, self._socket = self._socket, None
+        if socket is not None:
+            socket.transport.abort()
+
+    async def close(self) -> None:
+        """Close the connection and end the iteration."""
+        self._is_closed = True
+        socket, self._socket = self._socket, None
+        if socket is not None:
+            await socket.close()
+
+    async def _connect(self) -> None:
+        timing = self._timing
+        loopback = urlsplit(self.url).hostname in {"localhost", "127.0.0.1", "::1"}
+        socket = await connect(
+            self.url,
+            additional_headers={"Authorization": f"Bearer {self._token}"},
+            user_agent_header="GARRY",
+            compression=None,  # frames are small; packing them would only cost time
+            proxy=None if loopback else True,
+            max_size=MAX_FRAME_BYTES,
+            open_timeout=timing.connect_within_s,
+            ping_interval=timing.ping_every_s,
+            ping_timeout=timing.pong_within_s,
+            close_timeout=timing.close_within_s,
+        )
+        self._error, self._was_heard = "", False
+        # A server that refuses us may have closed already: then its reason is still to be read.
+        with suppress(ConnectionClosed):
+            await socket.send(json.dumps(self._greet(), allow_nan=False))
+        if self._is_closed:
+            await socket.close()
+        else:
+            self._socket = socket
+
+    def _read(self, text: str | bytes) -> Message:
+        """Give a frame's message. Raises LinkRefused for what no server of ours would send."""
+        try:
+            message = json.loads(text)
+            kind = message["type"]
+        except (ValueError, TypeError, KeyError, RecursionError):
+            raise LinkRefused(
+                NOT_PROTOCOL, f"What answers at {self.url} is no GARRY server. Check the address."
+            ) from None
+        if kind == "error":
+            self._error = str(message.get("message", ""))
+        else:
+            self._was_welcome = self._was_heard = True
+            self._error = ""
+        return dict(message)
+
+    async def _pause(self, reason: str) -> None:
+        pause_s = self._back_off.next_s()
+        self._on_lost(reason, pause_s)
+        await self._sleep(pause_s)
+
+    def _explain(self, closed: ConnectionClosed) -> str:
+        """Say why a connection ended. Raises LinkRefused where it need not be tried again."""
+        code = 1006 if closed.rcvd is None else closed.rcvd.code
+        said = self._error or ("" if closed.rcvd is None else closed.rcvd.reason)
+        if code in REFUSALS:
+            raise LinkRefused(code, said or REFUSALS[code]) from closed
+        if self._was_heard and code not in _TROUBLE:
+            self._back_off.reset()
+        if closed.rcvd is None:
+            silent = closed.sent is not None and closed.sent.code == 1011
+            return "The server does not answer" if silent else "The connection broke"
+        return f"The server closed the connection ({code}{': ' if said else ''}{said})"
+
+    def _explain_failure(self, problem: OSError | WebSocketException) -> str:
+        """Say why no connection came about. Raises LinkRefused where none ever will."""
+        if isinstance(problem, ssl.SSLCertVerificationError):
+            raise LinkRefused(
+                NOT_PROTOCOL,
+                f"The certificate of {self.url} cannot be trusted ({problem.verify_message}). "
+                "Check the address, this computer's date, and the server's certificate.",
+            )
+        if isinstance(problem, InvalidStatus):
+            status = problem.response.status_code
+            code = _STATUS_CODES.get(status, NOT_PROTOCOL)
+            fatal = status < 500 and status not in _PASSING_STATUSES
+            # A proxy may answer 404 while the server behind it restarts, but nobody else gives 401.
+            if fatal and (code == UNAUTHORIZED or not self._was_welcome):
+                cure = REFUSALS[code] if status in _STATUS_CODES else "Check the address."
+                raise LinkRefused(code, f"{self.url} answers with HTTP {status}. {cure}")
+            return f"The server answers with HTTP {status}"
+        if isinstance(problem.__cause__, EOFError):
+            return "The connection broke"
+        if isinstance(problem, TimeoutError):
+            return f"No answer from {self.url}"
+        if isinstance(problem, OSError):
+            return f"No server at {self.url} ({problem.strerror or problem})"
+        return f"What answers at {self.url} is no websocket ({problem})"

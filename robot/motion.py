@@ -1,0 +1,203 @@
+"""Speeds, poses and limits of a base that drives and turns, and how it moves if nothing slips.
+
+Right-handed, as ROS has it: x ahead, y to the left, headings and turns counter-clockwise.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+# Longer than this between two orders [s], a limiter counts no more: what hung may not lurch
+# (kobuki.md 5.2, rule 4).
+LONGEST_STEP_S = 0.1
+
+# A base stands still by itself when its last order is older than this [s]: it may have no firmware
+# watchdog, and whoever gave the order may hang (kobuki.md 1.6 and 5.2, rule 1).
+ORDER_HOLDS_S = 0.25
+
+# No limits may be set above these: a base of 7 kg stops within 9 cm from 0.2 m/s, and a Kobuki's
+# gyro is calibrated up to 1.75 rad/s (kobuki.md 1.7, 4, 5.3).
+CEILING_M_S = 0.30
+CEILING_RAD_S = 1.8
+
+
+@dataclass(frozen=True, slots=True)
+class Twist:
+    """A velocity: ``v_m_s`` ahead [m/s] and ``w_rad_s`` counter-clockwise [rad/s]."""
+
+    v_m_s: float = 0.0
+    w_rad_s: float = 0.0
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it moves nothing."""
+        return self.v_m_s == 0 and self.w_rad_s == 0
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether both numbers are."""
+        return math.isfinite(self.v_m_s) and math.isfinite(self.w_rad_s)
+
+
+STILL = Twist()
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """A place [m] and a heading [rad]. Headings add up over full turns, and never jump."""
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    heading_rad: float = 0.0
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether all three numbers are."""
+        return all(map(math.isfinite, (self.x_m, self.y_m, self.heading_rad)))
+
+    def distance_m(self, other: Pose) -> float:
+        """Give how far apart two places are [m]."""
+        return math.hypot(other.x_m - self.x_m, other.y_m - self.y_m)
+
+    def turn_rad(self, other: Pose) -> float:
+        """Give how far apart two headings are [rad], 0 to π: full turns do not count."""
+        return abs(wrap(other.heading_rad - self.heading_rad))
+
+
+HOME = Pose()
+
+
+def wrap(angle_rad: float) -> float:
+    """Give the same direction [rad] within ±π."""
+    return math.remainder(angle_rad, math.tau)
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How fast a base may go, and how quickly it may change that.
+
+    Parameters
+    ----------
+    v_m_s, w_rad_s
+        Largest speeds [m/s, rad/s]. Default: the original's 0.2 m/s; 1.5 rad/s, within what a
+        Kobuki's gyro is calibrated for (the original's 1.8 is not).
+    speed_up_m_s2, slow_down_m_s2
+        Largest changes of ``v`` [m/s²]. Default: a Kobuki's smoother and driver.
+    speed_up_rad_s2, slow_down_rad_s2
+        Largest changes of ``w`` [rad/s²]. Default: the same.
+
+    Raises
+    ------
+    ValueError
+        For numbers that are not above 0, and for speeds above the ceilings.
+
+    Notes
+    -----
+    Sources of the defaults: kobuki.md 1.9 and 5.3. Slowing down may be quicker than speeding up, so
+    that a base that was told to stop does.
+    """
+
+    v_m_s: float = 0.20
+    w_rad_s: float = 1.5
+    speed_up_m_s2: float = 0.3
+    slow_down_m_s2: float = 0.5
+    speed_up_rad_s2: float = 2.5
+    slow_down_rad_s2: float = 3.5
+
+    def __post_init__(self) -> None:
+        straight = (self.speed_up_m_s2, self.slow_down_m_s2)
+        turning = (self.speed_up_rad_s2, self.slow_down_rad_s2)
+        if not all(0 < rate < math.inf for rate in (*straight, *turning)):
+            raise ValueError("Accelerations are finite numbers above 0.")
+        if not (0 < self.v_m_s <= CEILING_M_S and 0 < self.w_rad_s <= CEILING_RAD_S):
+            raise ValueError(
+                f"Speeds lie above 0 and up to {CEILING_M_S:g} m/s and {CEILING_RAD_S:g} rad/s."
+            )
+
+    def scaled(self, share: float) -> Limits:
+        """Give limits of which speeds and accelerations are this share, above 0 and up to 1."""
+        if not 0 < share <= 1:
+            raise ValueError("A share of the limits lies above 0 and up to 1.")
+        return replace(
+            self, **{name: getattr(self, name) * share for name in Limits.__dataclass_fields__}
+        )
+
+    def clip(self, twist: Twist) -> Twist:
+        """Give a twist within the speeds, on the same curve; what is not finite becomes still."""
+        if not twist.is_finite:
+            return STILL
+        too_fast = max(abs(twist.v_m_s) / self.v_m_s, abs(twist.w_rad_s) / self.w_rad_s, 1.0)
+        return Twist(twist.v_m_s / too_fast, twist.w_rad_s / too_fast)
+
+    def approach(self, now: Twist, wanted: Twist, elapsed_s: float) -> Twist:
+        """Give what may be ordered next, on the way from one twist to another.
+
+        Parameters
+        ----------
+        now
+            What was ordered last.
+        wanted
+            What is wanted; clipped first.
+        elapsed_s
+            Time since the last order [s]; counted from 0 to ``LONGEST_STEP_S``.
+        """
+        elapsed_s = min(max(elapsed_s, 0.0), LONGEST_STEP_S) if math.isfinite(elapsed_s) else 0.0
+        wanted = self.clip(wanted)
+        return Twist(
+            _ramp(
+                now.v_m_s,
+                wanted.v_m_s,
+                self.speed_up_m_s2 * elapsed_s,
+                self.slow_down_m_s2 * elapsed_s,
+            ),
+            _ramp(
+                now.w_rad_s,
+                wanted.w_rad_s,
+                self.speed_up_rad_s2 * elapsed_s,
+                self.slow_down_rad_s2 * elapsed_s,
+            ),
+        )
+
+
+DEFAULT_LIMITS = Limits()
+
+
+def _ramp(now: float, wanted: float, more: float, less: float) -> float:
+    """Give the speed that is nearest to the wanted one: at most so much more, or so much less.
+
+    A speed that turns round comes to 0 first, and speeds up from there in the next order.
+    """
+    if now * wanted < 0:
+        wanted = 0.0
+    if abs(wanted) >= abs(now):
+        return math.copysign(min(abs(wanted), abs(now) + more), wanted)
+    return math.copysign(max(abs(wanted), abs(now) - less), now)
+
+
+def advance(pose: Pose, twist: Twist, elapsed_s: float) -> Pose:
+    """Give where a base is after a time at one twist, if nothing slips: on an exact arc."""
+    turn_rad = twist.w_rad_s * elapsed_s
+    # The chord of the arc: its length is that of the arc times sin(half)/half, along the mean
+    # heading.
+    half_rad = turn_rad / 2
+    straight = math.sin(half_rad) / half_rad if abs(half_rad) > 1e-9 else 1.0
+    chord_m = twist.v_m_s * elapsed_s * straight
+    along_rad = pose.heading_rad + half_rad
+    return Pose(
+        pose.x_m + chord_m * math.cos(along_rad),
+        pose.y_m + chord_m * math.sin(along_rad),
+        pose.heading_rad + turn_rad,
+    )
+
+
+def least_time_s(distance: float, speed: float, speed_up: float, slow_down: float) -> float:
+    """Give the shortest time [s] from rest to rest over a distance, at a trapezoidal speed.
+
+    Units fit each other: m, m/s and m/s², or rad, rad/s and rad/s².
+    """
+    distance = abs(distance)
+    ramps = speed * speed / 2 * (1 / speed_up + 1 / slow_down)
+    if distance >= ramps:
+        return speed / speed_up + speed / slow_down + (distance - ramps) / speed
+    return math.sqrt(2 * distance * (1 / speed_up + 1 / slow_down))

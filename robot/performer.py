@@ -1,0 +1,314 @@
+"""What a robot does with what it hears. Time is told to it, so that hours can pass in a second.
+
+It moves only while all of this holds: the server was heard within ``SILENCE_S``, the session runs,
+and safety.py sees nothing against it. Anything else ends the gesture, and no gesture is made up for
+later.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from typing import Any
+
+from robot.activation import (
+    PERFORMANCE_MAX,
+    TIME_MAX_S,
+    Activation,
+    BadMessage,
+    Cue,
+    Decision,
+    read_number,
+)
+from robot.bases import BaseState, MobileBase, Mood
+from robot.gestures import GESTURES, ORIGINALS, Gesture
+from robot.motion import DEFAULT_LIMITS, Limits
+from robot.player import BAD_ODOMETRY, OUT_OF_TIME, Player
+from robot.reports import Report, decision_report, gesture_report, status_report, stop_report
+from robot.safety import ANNOUNCE_S, AWAY, QUIET, STALLED, STOPPED, Safety
+
+Message = Mapping[str, Any]
+
+TICK_S = 0.02  # between two orders to a base: 50 Hz, as often as a Kobuki tells where it is
+
+# Without a sign of life for so long [s] the base stands still. The server gives one every 0.25 s,
+# and one may come 0.4 s late; what nobody hears should move no longer than 0.75 s, and the order to
+# stand still takes up to 0.05 s to the wheels.
+SILENCE_S = 0.65
+
+STATUS_MOVING_S = 0.25
+STATUS_IDLE_S = 1.0
+REPORTS_KEPT = 64  # while nobody fetches them the oldest are dropped: what is past is past
+
+# Codes: why a robot does not move, and how a gesture ended; safety.py has more.
+NO_LINK = "no_link"
+NO_SESSION = "no_session"
+NOT_RUNNING = "not_running"
+CANNOT_MOVE = "base_cannot_move"
+UNKNOWN_GESTURE = "unknown_gesture"
+REPLACED = "replaced"  # a welcome to another session
+
+
+class Performer:
+    """One robot: hears messages, decides, moves its base, and has reports to send.
+
+    Parameters
+    ----------
+    base
+        An open base; nothing else may order it.
+    limits
+        Speeds and accelerations of every gesture.
+    gestures
+        The gestures that a cue may name.
+
+    Attributes
+    ----------
+    reports
+        What is to be sent, oldest first; whoever sends takes them from the left.
+    bad_messages, last_bad
+        How many messages were not the protocol, and what was wrong with the last one.
+    """
+
+    def __init__(
+        self,
+        base: MobileBase,
+        limits: Limits = DEFAULT_LIMITS,
+        gestures: Mapping[str, Gesture] = GESTURES | ORIGINALS,
+    ) -> None:
+        self.base = base
+        self.player = Player(limits)
+        self.gestures = gestures
+        self.activation = Activation(Cue())
+        self.reports: deque[Report] = deque(maxlen=REPORTS_KEPT)
+        self.bad_messages = 0
+        self.last_bad = ""
+        self.safety = Safety(base.abilities)
+        self._session: int | None = None
+        self._is_welcome = False  # on this connection; nothing before it counts
+        self._is_running = False
+        self._heard_s = 0.0
+        self._told_s: float | None = None  # the last status
+        self._told: tuple[str, str] | None = None
+        self._mood: Mood | None = None
+
+    @property
+    def is_linked(self) -> bool:
+        """Whether the server has welcomed it and is heard."""
+        return self._is_welcome
+
+    def hear(self, message: Message, now_s: float) -> None:
+        """Take a message of the server. What is not the protocol is counted and has no effect."""
+        try:
+            self._take(message, now_s)
+        except BadMessage as problem:
+            self.bad(str(problem))
+
+    def bad(self, problem: str) -> None:
+        """Count something that was not the protocol."""
+        self.bad_messages += 1
+        self.last_bad = problem
+
+    def lose(self, reason: str) -> None:
+        """Stand still at once: the server is not heard any more. A real base is disarmed."""
+        self._is_welcome = self._is_running = False
+        self._told_s = None
+        self.safety.lose()
+        self._stand_still(reason)
+        self.activation.forget()
+
+    def tick(self, now_s: float) -> None:
+        """Order what is to be ordered now; to be called 50 times a second. Raises BaseLost."""
+        # Without a session it does not move, and nobody gives signs of life.
+        if self._session is not None and self._is_welcome and now_s - self._heard_s > SILENCE_S:
+            self.lose(NO_LINK)
+        state, player = self.base.read(), self.player
+        found = self.safety.watch(now_s, state, player.twist, performing=player.is_busy)
+        if found:
+            self._stop_itself(found)
+        was = player.gesture
+        self.base.drive(player.step(now_s, state.pose))
+        if was is not None and not player.is_busy:
+            self._tell_gesture(was, "ended", player.outcome)
+            if player.outcome in (OUT_OF_TIME, BAD_ODOMETRY):
+                # What did not get there is held or blocked, and would be again in a moment.
+                self.safety.fail(STALLED, now_s)
+                self._stop_itself(STALLED)
+        self._show(state)
+        self._tell_status(now_s, state)
+
+    def _take(self, message: Message, now_s: float) -> None:
+        kind = message.get("type")
+        if kind == "welcome":
+            self._join(message)
+        elif kind == "stop":  # whenever it comes, from whichever connection
+            self._stop()
+        elif not self._is_welcome:
+            return  # left over from a connection that was lost
+        self._heard_s = now_s
+        match kind:
+            case "welcome" | "stop" | "error":
+                pass
+            case "heartbeat":
+                self._follow_watch(message, self.safety.is_watched)
+            case "step":
+                self._walk(message, now_s)
+            case "state":
+                self._follow_state(message)
+            case "cue":
+                self.activation.follow(Cue.read(message.get("cue")))
+            case "arm":
+                self._arm(now_s)
+            case _:
+                raise BadMessage("A robot hears welcome, step, state, cue, stop, arm, heartbeat.")
+
+    def _join(self, message: Message) -> None:
+        session = message.get("session")
+        if session is None:
+            self._is_running = False
+        elif isinstance(session, int) and not isinstance(session, bool):
+            cue, state = Cue.read(message.get("cue")), message.get("state")
+            if not isinstance(state, str) or not isinstance(message.get("stopped", False), bool):
+                raise BadMessage("A welcome says in which state the session is.")
+            if session != self._session:
+                self.activation = Activation(cue)
+                self.reports.clear()
+            self.activation.follow(cue)
+            self.activation.forget()
+            self._is_running = state == "running"
+            self._follow_watch(message, False)
+            if message.get("stopped", False):
+                self._stop()
+        else:
+            raise BadMessage('"session" is a number, or null.')
+        if session != self._session or not self._is_running:
+            self.player.stop(REPLACED)
+        self._session, self._is_welcome = session, True
+
+    def _follow_state(self, message: Message) -> None:
+        state = message.get("state")
+        if not isinstance(state, str):
+            raise BadMessage('"state" is a text.')
+        self._is_running = state == "running"
+        if not self._is_running:
+            self.player.stop(state[:16])
+            self.activation.forget()
+
+    def _follow_watch(self, message: Message, otherwise: bool) -> None:
+        watched = message.get("watched", otherwise)
+        if not isinstance(watched, bool):
+            raise BadMessage('"watched" is true or false.')
+        self.safety.is_watched = watched
+
+    def _stand_still(self, reason: str) -> None:
+        gesture = self.player.gesture
+        self.player.halt(reason)
+        self.base.stop()
+        if gesture is not None:
+            self._tell_gesture(gesture, "ended", self.player.outcome)
+
+    def _stop(self) -> None:
+        """Follow a person's stop."""
+        self.safety.stop(STOPPED)
+        self._stand_still(STOPPED)
+
+    def _stop_itself(self, reason: str) -> None:
+        """Stand still for a reason of its own, and have it stay so."""
+        self._stand_still(reason)
+        self.reports.append(stop_report(reason))
+
+    def _arm(self, now_s: float) -> None:
+        """Let it move again, from where it stands: that is home now."""
+        problem = self.safety.arm(now_s, self.base.read())
+        if problem:
+            self._stop_itself(problem)
+        elif not self.player.is_busy:
+            self.base.set_home()
+
+    def _walk(self, message: Message, now_s: float) -> None:
+        time_s = read_number(message, "time_s", -TIME_MAX_S, TIME_MAX_S)
+        performance = read_number(message, "performance", -PERFORMANCE_MAX, PERFORMANCE_MAX)
+        if not self._is_running:
+            return
+        decision = self.activation.add(time_s, performance)
+        if decision is not None:
+            self._answer(decision, now_s)
+
+    def _answer(self, decision: Decision, now_s: float) -> None:
+        """Report a decision, and start the gesture that follows from it."""
+        state, cue = self.base.read(), self.activation.cue
+        name = cue.gesture(decision.above)
+        reason = self.activation.obstacle(decision, performing=self.player.is_busy)
+        reason = reason or self._obstacle(name, state)
+        gesture = None if reason or name is None else self.gestures[name]
+        told = None if gesture is None else gesture.name
+        self.reports.append(decision_report(decision, told, reason, self.activation.share))
+        if gesture is not None:
+            after_s = ANNOUNCE_S if self.base.abilities.announces else 0.0
+            pose = self.base.read().pose  # a simulated base may have been put back
+            self.player.start(gesture.scaled(cue.intensity), now_s, pose, after_s)
+            self.safety.begin(now_s, state)
+            self.activation.started(decision)
+            self._tell_gesture(gesture, "started", "")
+
+    def _obstacle(self, name: str | None, state: BaseState) -> str:
+        """Say what else keeps the base from performing; nothing where it may."""
+        if name not in self.gestures:
+            return UNKNOWN_GESTURE
+        if not self.base.abilities.moves:
+            return CANNOT_MOVE
+        if reason := self.safety.obstacle(state):
+            return reason
+        if not self.safety.is_at_home(state):
+            if not self.base.abilities.simulated:
+                return AWAY
+            self.base.set_home()  # as a person would carry it back
+        return ""
+
+    def _state(self, there: BaseState) -> tuple[str, str]:
+        """Give the robot's state and why it would not perform now."""
+        reason = self.safety.obstacle(there)
+        if self.safety.latch:
+            return "stopped", reason
+        if not self.safety.is_armed:
+            return "disarmed", reason
+        if self.player.is_busy:
+            return "performing", ""
+        if self._session is None:
+            return "idle", NO_SESSION
+        return "idle", reason if self._is_running else NOT_RUNNING
+
+    def _show(self, there: BaseState) -> None:
+        """Tell by the base's lights what it is about; sounds only where they are wanted."""
+        match self._state(there):
+            case "stopped", _:
+                mood = Mood.STOPPED
+            case "performing", _:
+                mood = Mood.MOVING
+            case "idle", "":
+                mood = Mood.READY
+            case _:
+                mood = Mood.WAITING
+        if mood is not self._mood:
+            self._mood = mood
+            is_loud = self.activation.cue.intensity > QUIET
+            self.base.show(mood, aloud=is_loud and mood in (Mood.MOVING, Mood.STOPPED))
+
+    def _tell_status(self, now_s: float, there: BaseState) -> None:
+        """Report the status where it has changed, and every so often, to a server that hears it."""
+        if not self._is_welcome:
+            return
+        state = self._state(there)
+        every_s = STATUS_MOVING_S if self.player.is_busy else STATUS_IDLE_S
+        due = self._told_s is None or not 0 <= now_s - self._told_s < every_s
+        if not due and state == self._told:
+            return
+        self._told_s, self._told = now_s, state
+        gesture = self.player.gesture
+        name = None if gesture is None else gesture.name
+        base, counters = self.base, {"refused_arms": self.safety.refused_arms, **self.base.counters}
+        self.reports.append(
+            status_report(base.name, *state, name, there, self.bad_messages, counters)
+        )
+
+    def _tell_gesture(self, gesture: Gesture, phase: str, outcome: str) -> None:
+        self.reports.append(gesture_report(gesture.name, phase, outcome))

@@ -1,0 +1,218 @@
+"""Whether a robot may move, and what stops it. Time is a parameter; nothing here asks or waits.
+
+There are two kinds of no. A *latch* stops the base at once and holds until a person arms it again:
+what the base felt, what it did that nobody ordered, a person's stop. An *obstacle* keeps the next
+gesture from starting as long as it lasts. Numbers without a source of their own are those of
+kobuki.md 5.2 and 5.3; no standard gives any for a base of this size (kobuki.md 4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from robot.bases.base import Abilities, BaseState
+from robot.gestures import TETHER_M
+from robot.motion import HOME, ORDER_HOLDS_S, Twist
+
+# Light and sound come so long before a gesture [s]: a sudden motion may startle whoever walks.
+ANNOUNCE_S = 0.5
+QUIET = 0.5  # a cue of this intensity or less is performed without sounds (our choice)
+
+# Nothing heard of the base for so long [s]. The reference takes 0.1 s (kobuki.md 1.6); twice that
+# forgives a busy computer (largest gap measured: 0.03 s) and keeps the whole within 0.35 s.
+BASE_SILENT_S = 0.2
+# A computer that hung for so long [s] while the base was to move: the base has stopped by itself,
+# and what was interrupted does not go on by itself (rule 2, ISO 13850).
+LAPSED_S = ORDER_HOLDS_S
+
+# A wheel that moves so much otherwise than ordered [m/s], for so long [s]: held, lifted or pushed.
+ASTRAY_M_S = 0.1
+ASTRAY_S = 0.5
+HALF_TRACK_M = 0.115  # from a Kobuki's middle to a wheel (kobuki.md 1.7)
+SLIP_RAD = 0.175  # 10°: wheels and gyro disagree about a gesture's turns
+
+# Of four lithium cells [V] (kobuki.md 1.9 and 3). A battery that was low has to come back to WARN:
+# at rest it recovers by itself, and would be low again with the next gesture.
+BATTERY_WARN_V = 14.0
+BATTERY_LOW_V = 13.5
+BATTERY_EMPTY_V = 13.2
+EMPTY_S = 1.0  # a voltage dips when wheels start (our choice)
+
+# Further from home than this [m, rad] a gesture is refused, not corrected for.
+AT_HOME_M = 0.05
+AT_HOME_RAD = 0.087  # 5°
+
+# An arming so soon after the robot stopped itself [s] was given before anyone could look (our
+# choice; people react to what they see after 0.2 s and more).
+SEEN_S = 1.0
+
+# Latches; those that a base feels have its own codes.
+STOPPED = "stopped"  # by a person
+BUTTON = "button"  # by a person, at the base
+BASE_SILENT = "base_silent"
+LAPSED = "order_lapsed"
+TETHER = "tether"
+STALLED = "stalled"
+SLIPPED = "slipped"
+BATTERY_EMPTY = "battery_empty"
+
+# Obstacles.
+DISARMED = "disarmed"  # a real base that no person has armed since it was connected
+UNWATCHED = "unwatched"  # a real base, and no PT's page is open
+CHARGING = "charging"
+BATTERY_LOW = "battery_low"
+AWAY = "away_from_home"
+
+
+class Safety:
+    """Says whether one base may move.
+
+    Parameters
+    ----------
+    abilities
+        Of the base. A simulated one arms itself and needs nobody to watch.
+
+    Attributes
+    ----------
+    latch
+        What stopped it, as a code; empty where nothing did. The first cause stays.
+    is_armed
+        Whether a person lets it move, as far as that is up to people.
+    is_watched
+        Whether a PT's page is open.
+    refused_arms
+        How many armings could not be followed.
+    """
+
+    def __init__(self, abilities: Abilities) -> None:
+        self._abilities = abilities
+        self.latch = ""
+        self.is_armed = abilities.simulated
+        self.is_watched = False
+        self.refused_arms = 0
+        self._felt_s: float | None = None  # when the robot itself stopped; None for a person's stop
+        self._looked_s: float | None = None
+        self._since: dict[str, float] = {}  # when what holds now began
+        self._slip_rad = 0.0  # when the gesture began
+        self._is_low = False
+
+    def stop(self, reason: str) -> None:
+        """Take a person's stop. More of them change nothing."""
+        self.latch = self.latch or reason
+        self._felt_s = None
+
+    def fail(self, reason: str, now_s: float) -> None:
+        """Latch for a reason that the robot itself found."""
+        if not self.latch:
+            self.latch, self._felt_s = reason, now_s
+
+    def lose(self) -> None:
+        """Forget what the server said: a real base has to be armed anew."""
+        self.is_armed, self.is_watched = self._abilities.simulated, False
+
+    def arm(self, now_s: float, state: BaseState) -> str:
+        """Take a person's word that it may move; give why that cannot be, or nothing.
+
+        What stopped it has to be over. A gesture that was stopped is not taken up again.
+        """
+        reason = self._unfit(state)
+        if not reason and self._felt_s is not None and now_s - self._felt_s < SEEN_S:
+            reason = self.latch
+        if reason:
+            self.refused_arms += 1
+            self.fail(reason, now_s)
+            return reason
+        self.latch, self._felt_s, self.is_armed = "", None, True
+        self._since.clear()
+        return ""
+
+    def begin(self, now_s: float, state: BaseState) -> None:
+        """Note that a gesture begins here and now."""
+        self._looked_s, self._slip_rad = now_s, state.senses.slip_rad
+
+    def watch(self, now_s: float, state: BaseState, ordered: Twist, *, performing: bool) -> str:
+        """Look at the base; give the code of what must stop it now, or nothing.
+
+        Parameters
+        ----------
+        now_s
+            The time [s]; to be called some 50 times a second.
+        state
+            What the base says.
+        ordered
+            What it was ordered last.
+        performing
+            Whether a gesture is played, its announcement included.
+        """
+        elapsed_s = 0.0 if self._looked_s is None else now_s - self._looked_s
+        self._looked_s = now_s
+        found = next(self._dangers(now_s, state, ordered, performing, elapsed_s), "")
+        if self.latch or not (found == BUTTON or self.is_armed):
+            return ""
+        if found:
+            self.fail(found, now_s)
+        return found
+
+    def obstacle(self, state: BaseState) -> str:
+        """Say why no gesture may start now; nothing where one may."""
+        senses, is_real = state.senses, not self._abilities.simulated
+        if self.latch:
+            return self.latch
+        if reason := self._unfit(state):
+            return reason
+        if not self.is_armed:
+            return DISARMED
+        if senses.is_charging:
+            return CHARGING
+        if self._is_battery_low(senses.battery_v):
+            return BATTERY_LOW
+        if is_real and not self.is_watched:
+            return UNWATCHED
+        return ""
+
+    @staticmethod
+    def is_at_home(state: BaseState) -> bool:
+        """Whether it stands where gestures begin."""
+        pose = state.pose
+        return pose.distance_m(HOME) <= AT_HOME_M and pose.turn_rad(HOME) <= AT_HOME_RAD
+
+    def _unfit(self, state: BaseState) -> str:
+        """Say what keeps the base itself from moving."""
+        senses = state.senses
+        if senses.silent_s > BASE_SILENT_S:
+            return BASE_SILENT
+        if senses.stop_pressed:
+            return BUTTON
+        return senses.refusal or min(senses.hazards, default="")
+
+    def _dangers(
+        self, now_s: float, state: BaseState, ordered: Twist, performing: bool, elapsed_s: float
+    ) -> Iterator[str]:
+        """Give the codes of all that is wrong, the plainest first."""
+        if reason := self._unfit(state):
+            yield reason
+        if performing and elapsed_s > LAPSED_S:
+            yield LAPSED
+        if state.pose.distance_m(HOME) > TETHER_M:
+            yield TETHER
+        astray_m_s = abs(ordered.v_m_s - state.twist.v_m_s)
+        astray_m_s += HALF_TRACK_M * abs(ordered.w_rad_s - state.twist.w_rad_s)
+        if self._has_held(STALLED, performing and astray_m_s > ASTRAY_M_S, now_s, ASTRAY_S):
+            yield STALLED
+        if performing and abs(state.senses.slip_rad - self._slip_rad) > SLIP_RAD:
+            yield SLIPPED
+        battery_v = state.senses.battery_v
+        is_empty = battery_v is not None and battery_v < BATTERY_EMPTY_V
+        if self._has_held(BATTERY_EMPTY, is_empty, now_s, EMPTY_S):
+            yield BATTERY_EMPTY
+
+    def _has_held(self, code: str, holds: bool, now_s: float, for_s: float) -> bool:
+        if not holds:
+            self._since.pop(code, None)
+            return False
+        return now_s - self._since.setdefault(code, now_s) >= for_s
+
+    def _is_battery_low(self, battery_v: float | None) -> bool:
+        if battery_v is not None:
+            self._is_low = battery_v < (BATTERY_WARN_V if self._is_low else BATTERY_LOW_V)
+        return self._is_low

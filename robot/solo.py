@@ -1,0 +1,139 @@
+"""`python -m robot gesture NAME --base BASE`: plays a gesture without a server.
+
+For trying a base and its place. Whoever types it arms a real base by that: stand at its switch.
+Exit status: 0 it was played; 1 it ended otherwise, or the base does not answer; 130 Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from robot.bases import BASES, BaseLost, MobileBase, Mood
+from robot.gestures import GESTURES, ORIGINALS, Gesture
+from robot.motion import DEFAULT_LIMITS, HOME
+from robot.player import DONE, Player
+from robot.safety import ANNOUNCE_S, AWAY, Safety
+
+TICK_S = 0.02
+REST_S = 0.3  # until wheels, odometry and truth have come to rest
+
+
+class VirtualClock:
+    """A clock that passes as fast as one waits."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def monotonic(self) -> float:
+        """Give the time [s]."""
+        return self.now_s
+
+    def sleep(self, span_s: float) -> None:
+        """Let time pass [s]."""
+        self.now_s += span_s
+
+
+def play(
+    gesture: Gesture,
+    base: MobileBase,
+    monotonic: Callable[[], float],
+    sleep: Callable[[float], object],
+) -> dict[str, Any]:
+    """Play a gesture on an open base from where it stands, under the same safety as in a session.
+
+    Gives the outcome, how long it took [s], where odometry says it is, and where it is in truth,
+    which only a simulation knows.
+    """
+    player, safety = Player(DEFAULT_LIMITS), Safety(base.abilities)
+    safety.is_watched = True
+    state, began_s = base.read(), monotonic()
+    outcome = safety.arm(began_s, state) or safety.obstacle(state)
+    if not outcome and not safety.is_at_home(state):
+        outcome = AWAY
+    if not outcome:
+        base.show(Mood.MOVING, aloud=True)
+        player.start(gesture, began_s, state.pose, ANNOUNCE_S if base.abilities.announces else 0.0)
+        safety.begin(began_s, state)
+    farthest_m = 0.0
+    while player.is_busy:
+        state, now_s = base.read(), monotonic()
+        farthest_m = max(farthest_m, state.pose.distance_m(HOME))
+        found = safety.watch(now_s, state, player.twist, performing=True)
+        if found:
+            player.halt(found)
+            base.stop()
+        else:
+            base.drive(player.step(now_s, state.pose))
+        sleep(TICK_S)
+    took_s = monotonic() - began_s
+    outcome = outcome or player.outcome
+    base.show(Mood.READY if outcome == DONE else Mood.STOPPED, aloud=outcome != DONE)
+    for _ in range(round(REST_S / TICK_S)):
+        base.stop()
+        sleep(TICK_S)
+    truth = base.truth()
+    return {
+        "gesture": gesture.name,
+        "base": base.name,
+        "outcome": outcome,
+        "took_s": round(took_s, 3),
+        "pose": asdict(base.read().pose),
+        "farthest_m": farthest_m,
+        "true_pose": None if truth is None else asdict(truth.pose),
+        "true_farthest_m": None if truth is None else truth.farthest_m,
+    }
+
+
+def describe(played: dict[str, Any]) -> str:
+    """Say it to people."""
+    pose = played["true_pose"] or played["pose"]
+    where = f"x {1000 * pose['x_m']:.0f} mm, y {1000 * pose['y_m']:.0f} mm"
+    return f"{played['gesture']}: {played['outcome']} after {played['took_s']:.1f} s, at {where}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Play the gesture of the command line, and give the exit status."""
+    parser = ArgumentParser(
+        prog="python -m robot gesture",
+        description=__doc__,
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("name", choices=sorted(GESTURES | ORIGINALS))
+    moving = sorted(name for name, base in BASES.items() if base.abilities.moves)
+    parser.add_argument("--base", choices=moving, required=True)
+    parser.add_argument("--port", default="", help="of a real base; see python -m robot --help")
+    parser.add_argument("--times", type=int, default=1, metavar="N", help="so often, in a row")
+    parser.add_argument("--json", action="store_true", help="print a JSON line each")
+    options = parser.parse_args(arguments)
+    clock = VirtualClock()
+    is_real = BASES[options.base].abilities.real_time
+    monotonic, sleep = (time.monotonic, time.sleep) if is_real else (clock.monotonic, clock.sleep)
+    base = BASES[options.base](monotonic)
+    base.port = options.port
+    outcome = DONE
+    try:
+        with base:
+            for _ in range(options.times):
+                played = play((GESTURES | ORIGINALS)[options.name], base, monotonic, sleep)
+                text = json.dumps(played) if options.json else describe(played)
+                sys.stdout.write(f"{text}\n")
+                sys.stdout.flush()
+                outcome = played["outcome"]
+                if outcome != DONE:
+                    break
+    except BaseLost as problem:
+        sys.stderr.write(f"{problem}\n")
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    return 0 if outcome == DONE else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

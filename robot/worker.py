@@ -1,0 +1,125 @@
+"""The robot's side of the link: hears the server, keeps the base driven, sends reports."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable, Coroutine
+from typing import Any
+
+from robot.bases import MobileBase
+from robot.link import NOT_PROTOCOL, Link, LinkRefused, Message
+from robot.motion import DEFAULT_LIMITS, Limits
+from robot.performer import NO_LINK, TICK_S, Performer
+
+
+class Worker:
+    """Lets a base perform for the sessions of its station.
+
+    Parameters
+    ----------
+    dial
+        Makes the link, given ``greet`` and ``on_lost`` by name.
+    base
+        An open base.
+    limits
+        Speeds and accelerations of every gesture.
+    notice
+        Called with what somebody who looks on should know.
+    monotonic, sleep
+        Our clock [s], and how to wait by it.
+    """
+
+    def __init__(
+        self,
+        dial: Callable[..., Link],
+        base: MobileBase,
+        *,
+        limits: Limits = DEFAULT_LIMITS,
+        notice: Callable[[str], None] = lambda _text: None,
+        monotonic: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
+    ) -> None:
+        self.performer = Performer(base, limits)
+        self._link = dial(greet=self._greet, on_lost=self._lose)
+        self._base = base
+        self._notice = notice
+        self._monotonic = monotonic
+        self._sleep = sleep
+        self._reported = asyncio.Event()
+
+    async def run(self) -> None:
+        """Perform until cancelled. The base stands still afterwards, however it ends.
+
+        Raises LinkRefused where the server will not have this robot, and BaseLost.
+        """
+        work: list[Coroutine[Any, Any, None]] = [self._listen(), self._drive(), self._report()]
+        tasks = [asyncio.create_task(one) for one in work]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
+        finally:
+            self._base.stop()
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            await self._link.close()
+
+    def _greet(self) -> Message:
+        return {"type": "hello", "version": 1, "base": self._base.name}
+
+    def _lose(self, reason: str, pause_s: float) -> None:
+        self.performer.lose(NO_LINK)
+        self._notice(f"{reason}; standing still, dialing in again in {pause_s:.1f} s.")
+
+    async def _listen(self) -> None:
+        while True:
+            try:
+                async for message in self._link:
+                    self._hear(message)
+                return
+            except LinkRefused as refusal:
+                # One broken frame of a server that has welcomed us does not end the work.
+                if refusal.code != NOT_PROTOCOL or not self.performer.is_linked:
+                    raise
+                self.performer.bad(str(refusal))
+
+    def _hear(self, message: Message) -> None:
+        was_linked, bad = self.performer.is_linked, self.performer.bad_messages
+        self.performer.hear(message, self._monotonic())
+        if self.performer.is_linked and not was_linked:
+            self._notice(f"Joined session {message.get('session')}.")
+        if self.performer.bad_messages > bad:
+            self._notice(f"A message was not understood: {self.performer.last_bad}")
+        self._reported.set()
+
+    async def _drive(self) -> None:
+        problem = ""
+        while True:
+            if problem != self._base.problem:
+                problem = self._base.problem
+                self._notice(problem or "The base answers.")
+            was_linked = self.performer.is_linked
+            self.performer.tick(self._monotonic())
+            if was_linked and not self.performer.is_linked:
+                # What is still on its way would come too late.
+                self._notice("The server is silent; standing still, dialing in again.")
+                self._link.hang_up()
+            if self.performer.reports:
+                self._reported.set()
+            await self._sleep(TICK_S)
+
+    async def _report(self) -> None:
+        reports = self.performer.reports
+        while True:
+            await self._reported.wait()
+            self._reported.clear()
+            while reports:
+                report = reports[0]
+                sent = await self._link.send({"type": "report", "report": report})
+                # How a gesture ended is told as soon as the link is back; where the base was, not.
+                if not sent and report["kind"] != "status":
+                    break
+                if reports and reports[0] is report:
+                    reports.popleft()

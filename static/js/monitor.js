@@ -1,0 +1,246 @@
+// The PT's page: shows what the server says, and asks it for changes. It computes no score.
+import { connect } from "garry/live";
+import { drawStrip, drawTwenty, drawRing } from "garry/plots";
+import { RobotPanel } from "garry/robot";
+
+const root = document.getElementById("monitor");
+const slots = new Map([...document.querySelectorAll("[data-show]")].map((slot) => [slot.dataset.show, slot]));
+const KEPT = 400; // strides on the strip
+const GAINS = [0.85, 0.9, 0.95, 1];
+
+let session = null; // the last snapshot, brought up to date by events
+let strides = [];
+let marks = []; // goal changes and remarks, each after a stride
+let last = null;
+
+const robot = new RobotPanel(document.querySelector(".robot"), show, (order) => live.say({ type: "robot", order }));
+const live = connect(root.dataset.socket, {
+  onSnapshot(snapshot) {
+    session = snapshot;
+    strides = snapshot.steps.slice(-KEPT);
+    marks = snapshot.marks;
+    last ??= strides.at(-1) ?? null;
+    robot.begin(snapshot);
+    draw();
+  },
+  onSteps(steps) {
+    const known = new Set(strides.map(({ number }) => number));
+    strides = [...strides, ...steps.filter(({ number }) => !known.has(number))].sort((a, b) => a.number - b.number).slice(-KEPT);
+    draw();
+  },
+  onEvent(event) {
+    take(event);
+    if (!drawing) drawing = requestAnimationFrame(draw);
+  },
+  onLink(state, why) {
+    const note = document.querySelector(".link");
+    note.hidden = state === "open";
+    note.textContent = state === "lost" ? "No connection to the server. What the patient walks is stored; this page comes back by itself." : why;
+    if (state === "closed" && session && ["finished", "aborted"].includes(session.state)) location.assign(root.dataset.details);
+  },
+});
+let drawing = 0;
+
+function take(event) {
+  switch (event.kind) {
+    case "step":
+      Object.assign(session, pick(event, ["active_s", "phase_s", "phase_strides"]));
+      session.number = event.number;
+      if (event.side !== session.trained_side) break;
+      Object.assign(session, pick(event, ["hit_rate", "hits", "judged", "score"]));
+      strides.push(event);
+      if (strides.length > KEPT) strides.shift();
+      if (event.live) last = event;
+      break;
+    case "state":
+      session.state = event.state;
+      break;
+    case "phase":
+      Object.assign(session, pick(event, ["phase", "goal", "gain", "obstacle", "active_s", "phase_s", "phase_strides"]));
+      break;
+    case "goal":
+      session.goal = event.goal;
+      marks.push({ after: session.number, kind: "goal", value: event.goal });
+      break;
+    case "gain":
+      session.gain = event.gain;
+      break;
+    case "activation_threshold":
+      session.activation_threshold = event.value;
+      break;
+    case "presence":
+      session.presence = event.presence;
+      break;
+    case "remark":
+      marks.push({ after: event.number, kind: event.what, value: event.value });
+      tell(`Noted: ${event.what.replace("_", " ")}${event.value === null ? "" : ` ${event.value}`}`);
+      break;
+    case "source_goal":
+      tell(`The sensor’s own goal is ${event.goal}; yours counts.`);
+      break;
+    default:
+      robot.take(event);
+  }
+}
+
+function pick(from, names) {
+  return Object.fromEntries(names.filter((name) => from[name] !== undefined).map((name) => [name, from[name]]));
+}
+
+function show(name, text) {
+  const slot = slots.get(name);
+  if (slot && slot.textContent !== text) slot.textContent = text;
+}
+
+const percent = (share) => `${Math.round(100 * share)} %`;
+const minutes = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
+
+function draw() {
+  drawing = 0;
+  if (!session) return;
+  const planned = session.target.duration_s;
+  show("clock", minutes(session.active_s));
+  const over = session.completed || (planned && session.active_s >= planned);
+  show("planned", over ? "planned time reached" : planned ? `of ${minutes(planned)}` : "walked");
+  document.querySelector(".end").classList.toggle("over", Boolean(over));
+  drawPhases();
+  drawLast();
+  drawPresence();
+  drawControls();
+  const judged = strides.filter(({ performance }) => performance !== null).slice(-20);
+  show("of-twenty", judged.length ? `${judged.filter(({ hit }) => hit).length} of ${judged.length} hit` : "");
+  drawStrip(document.getElementById("strip"), strides, marks);
+  drawTwenty(document.getElementById("twenty"), strides.slice(-20));
+  drawRing(document.getElementById("ring"), session.hit_rate, session.target.hit_rate);
+  show("wanted", session.target.hit_rate ? `Wanted ${percent(session.target.hit_rate)}` : "No rate set");
+  show("judged", session.judged === undefined ? "" : `${session.hits} of ${session.judged} strides`);
+  robot.draw();
+}
+
+function drawPhases() {
+  const list = document.querySelector(".phases"), now = session.phase.index;
+  if (list.children.length !== session.phases.length) {
+    list.replaceChildren(...session.phases.map(({ name }) => Object.assign(document.createElement("li"), { textContent: name })));
+  }
+  [...list.children].forEach((item, index) => {
+    item.className = index < now ? "was" : index === now ? "is" : "";
+    if (index === now) item.setAttribute("aria-current", "step");
+    else item.removeAttribute("aria-current");
+  });
+}
+
+function drawLast() {
+  const goal = session.goal === null ? null : session.goal.toFixed(2);
+  show("goal-line", goal ? `goal ${goal} ${session.unit}` : (session.obstacle ?? "The goal follows from the baseline."));
+  if (!last) return;
+  const valid = last.performance !== null && last.performance !== undefined;
+  const { value, gain } = last;
+  show("number", `no. ${last.number}`);
+  show("performance", valid ? percent(last.performance) : "—");
+  // What the patient sees is gain × value, and the goal is compared with that.
+  const scaled = gain && gain !== 1 ? ` × ${gain.toFixed(2)} = ${(gain * value).toFixed(2)}` : "";
+  show("value", value === null || value === undefined ? "" : `${value.toFixed(2)}${scaled} ${session.unit}`);
+  const points = last.points ? `, ${last.points > 0 ? "+" : "−"}${Math.abs(last.points)}` : "";
+  const why = last.valid ? `${session.phase.name}: no goal yet` : `does not count: ${(last.reasons ?? []).join(", ") || "no value"}`;
+  show("verdict", valid ? (last.hit ? "hit" : "below") + points : why);
+  const dot = document.querySelector(".verdict .dot");
+  dot.hidden = !valid;
+  dot.classList.toggle("miss", !last.hit);
+}
+
+function drawPresence() {
+  const { source, robot: base, tablets } = session.presence;
+  const words = { source: source ? "connected" : "not connected", robot: base ? "connected" : "none", tablets: tablets ? "connected" : "this page’s mirror" };
+  const there = { source, robot: base, tablets: tablets > 0 };
+  for (const row of document.querySelectorAll("[data-presence]")) {
+    row.classList.toggle("there", there[row.dataset.presence]);
+    row.querySelector("small").textContent = words[row.dataset.presence];
+  }
+}
+
+const MAIN = {
+  ready: ["start", "Start", "play"],
+  running: ["pause", "Pause", "pause"],
+  paused: ["resume", "Go on", "play"],
+};
+
+function drawControls() {
+  show("goal", session.goal === null ? "–" : session.goal.toFixed(2));
+  show("threshold", percent(session.activation_threshold));
+  const gains = document.querySelector("[data-gains]");
+  const wanted = [...new Set([...GAINS, session.gain])].sort((a, b) => a - b);
+  if (gains.dataset.of !== wanted.join()) {
+    gains.dataset.of = wanted.join();
+    gains.replaceChildren(...wanted.map((gain) => Object.assign(document.createElement("button"), { textContent: gain.toFixed(2), value: gain })));
+  }
+  for (const button of gains.children) button.classList.toggle("on", Number(button.value) === session.gain);
+  const next = session.phases[session.phase.index + 1];
+  show("next-phase", next ? `Go to ${next.name}` : "No further phase");
+  document.querySelector("[data-next-phase]").disabled = !next;
+  const main = document.querySelector("[data-main]"), [kind, words, icon] = MAIN[session.state] ?? [];
+  main.disabled = !kind;
+  if (main.value !== (kind ?? "")) {
+    main.value = kind ?? "";
+    main.innerHTML = kind ? `<svg class="ic" aria-hidden="true"><use href="${document.body.dataset.icons}#${icon}"></use></svg><span>${words}</span>` : "Ended";
+  }
+  document.querySelector("[data-end]").disabled = !kind;
+  if (!kind) location.assign(root.dataset.details);
+}
+
+function tell(words) {
+  const note = document.querySelector(".said");
+  note.textContent = words;
+  clearTimeout(tell.timer);
+  tell.timer = setTimeout(() => (note.textContent = ""), 8_000);
+}
+
+function change(kind, value) {
+  live.change(kind, value).catch((problem) => tell(problem.message));
+}
+
+function note(what, value) {
+  live.ask({ type: "remark", what, value }).catch((problem) => tell(problem.message));
+}
+
+// Before the baseline is complete a goal can be set from what has been walked so far.
+function setFirstGoal() {
+  const values = strides.filter(({ valid, value }) => valid && value > 0).map(({ value }) => value);
+  if (values.length < 5) tell("The goal follows from the baseline. Walk five steps to set one from them.");
+  else change("goal", Number((values.reduce((sum, value) => sum + value, 0) / values.length).toFixed(2)));
+}
+
+// About 2.5 % of the goal, in steps that are easy to say.
+function goalStep(goal) {
+  const size = 10 ** Math.floor(Math.log10(goal / 40));
+  return [1, 2, 5, 10].map((n) => n * size).find((step) => step >= goal / 40);
+}
+
+document.addEventListener("click", (event) => {
+  const button = event.target.closest("button");
+  if (!button || !session) return;
+  const { goal, threshold, nextPhase, main, end, robot: order, remark } = button.dataset;
+  if (goal !== undefined && session.goal !== null) {
+    const step = goalStep(session.goal);
+    change("goal", Number((Math.round(session.goal / step + Number(goal)) * step).toFixed(4)));
+  } else if (goal !== undefined) setFirstGoal();
+  else if (threshold !== undefined) change("activation_threshold", Number((session.activation_threshold + Number(threshold)).toFixed(2)));
+  else if (nextPhase !== undefined) change("phase", session.phase.index + 1);
+  else if (main !== undefined) change(button.value);
+  else if (end !== undefined) document.getElementById("sure").showModal();
+  else if (order !== undefined) robot.order(order);
+  else if (remark === "borg") document.getElementById("exertion").showModal();
+  else if (remark !== undefined) note(remark);
+  else if (button.parentElement.dataset.gains !== undefined) change("gain", Number(button.value));
+});
+
+document.getElementById("exertion").addEventListener("close", ({ target }) => {
+  if (target.returnValue) note("borg", Number(target.returnValue));
+  target.returnValue = "";
+});
+
+addEventListener("resize", () => session && draw());
+
+document.getElementById("sure").addEventListener("close", ({ target }) => {
+  if (target.returnValue === "end") change(session.state === "ready" ? "abort" : "finish");
+  target.returnValue = "";
+});

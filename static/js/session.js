@@ -1,0 +1,151 @@
+// One session: every stride against the goal, phases behind it, what was changed above it.
+import { color, draw, paths } from "garry/chart";
+
+const read = document.getElementById("session");
+const { strides, phases, marks: changes, unit } = read ? JSON.parse(read.textContent) : {};
+const ROOM_PX = 2; // a stride; with less they are drawn smaller
+
+function pick(wanted) {
+  return strides.shown.map((shown, i) => (shown !== null && wanted(strides.hit[i]) ? shown : null));
+}
+
+function verdict(index) {
+  if (strides.shown[index] === null) return `does not count (${strides.why[index] || "no value"})`;
+  if (strides.hit[index] === null) return "no goal yet";
+  return strides.hit[index] ? "hit" : "below the goal";
+}
+
+function figure(value) {
+  return value === null ? "–" : `${value.toFixed(2)} ${unit}`;
+}
+
+function readOut(index) {
+  if (index === null || index === undefined) return;
+  const goal = strides.goal[index] === null ? "" : `, goal ${figure(strides.goal[index])}`;
+  document.querySelector(".readout").textContent =
+    `Stride ${strides.number[index]}: ${figure(strides.shown[index])}${goal}, ${verdict(index)}`;
+}
+
+function points(size, width, stroke, fill) {
+  return { paths: () => null, points: { show: true, size, width, stroke, fill, space: 0 } };
+}
+
+function drawPhases(marks) {
+  const { ctx, box } = marks;
+  for (const phase of phases) {
+    const left = Math.max(box.left, marks.x(phase.from - 0.5));
+    const right = Math.min(box.left + box.width, marks.x(phase.to + 0.5));
+    if (right <= left) continue;
+    ctx.fillStyle = color(phase.feedback ? "card" : "well");
+    ctx.fillRect(left, box.top, right - left, box.height);
+    marks.line(left, box.top - 44 * marks.unit, left, box.top + box.height, color("border"), 1);
+    if (marks.widthOf(phase.name) < right - left - 12 * marks.unit) {
+      const fill = color("text");
+      const from = { align: "left", weight: 700, fill };
+      marks.text(phase.name, left + 7 * marks.unit, box.top - 30 * marks.unit, from);
+    }
+  }
+}
+
+function drawChanges(marks) {
+  const { box, unit: pixel } = marks;
+  let free = box.left; // labels never run into each other
+  for (const change of changes) {
+    const x = marks.x(change.after + 0.5);
+    if (x < box.left || x > box.left + box.width) continue;
+    const isGoal = change.kind === "goal";
+    const paint = color(isGoal ? "c-goal" : "c-third");
+    marks.line(x, box.top - 8 * pixel, x, box.top + box.height, paint, isGoal ? 2 : 1.5, isGoal ? [] : [5, 4]);
+    const wide = marks.widthOf(change.words, 13);
+    const start = Math.min(x, box.left + box.width - wide);
+    if (start < free) continue;
+    marks.text(change.words, start, box.top - 11 * pixel, { size: 13, weight: 700, align: "left", fill: paint });
+    free = start + wide + 10 * pixel;
+  }
+}
+
+function drawGaps(marks) {
+  const bottom = marks.box.top + marks.box.height;
+  strides.shown.forEach((shown, index) => {
+    if (shown !== null) return;
+    const x = marks.x(strides.number[index]);
+    if (x >= marks.box.left && x <= marks.box.left + marks.box.width) {
+      marks.line(x, bottom - 12 * marks.unit, x, bottom, color("c-gap"), 2);
+    }
+  });
+}
+
+function drawStrides(element) {
+  const seen = [...strides.shown, ...strides.goal].filter((value) => value !== null);
+  const top = Math.max(...seen, 0.001) * 1.06;
+  const isDense = element.clientWidth / strides.number.length < ROOM_PX;
+  const [size, width] = isDense ? [5, 1.5] : [8, 2];
+  draw(element, {
+    data: [
+      strides.number,
+      pick((hit) => hit === null),
+      pick((hit) => hit === false),
+      pick((hit) => hit === true),
+      strides.goal,
+    ],
+    series: [
+      { paths: () => null, points: { show: false } },
+      points(size, width, color("c-miss"), color("card")),
+      points(size, width, color("c-hit"), color("c-hit")),
+      { stroke: color("c-goal"), width: 2.5, paths: paths.stepped({ align: 1 }), points: { show: false } },
+    ],
+    scales: { x: { time: false }, y: { range: () => [0, top] } },
+    padding: [56, 26, 0, 0],
+    cursor: { y: false, points: { show: false }, drag: { x: true, y: false } },
+    under: drawPhases,
+    paint: (marks) => {
+      strides.shown.forEach((shown, index) => {
+        if (shown === null || strides.hit[index] !== null) return;
+        const x = marks.x(strides.number[index]);
+        if (x >= marks.box.left && x <= marks.box.left + marks.box.width) {
+          marks.square(strides.number[index], shown, size / 2.6, color("c-third"));
+        }
+      });
+      drawGaps(marks);
+      drawChanges(marks);
+    },
+    onCursor: readOut,
+    yAxis: { values: (_, ticks) => ticks.map((tick) => tick.toFixed(1)), label: unit, labelSize: 22, space: 44 },
+    xAxis: { space: 70 },
+  });
+}
+
+function cell(tag, words) {
+  const made = document.createElement(tag);
+  made.textContent = words;
+  return made;
+}
+
+// Thousands of rows are only made for whoever opens them.
+function tabulate(place) {
+  const table = document.createElement("table");
+  const head = table.createTHead().insertRow();
+  for (const name of ["Stride", `Shown, ${unit}`, `Goal, ${unit}`, "Verdict"]) {
+    const title = cell("th", name);
+    title.scope = "col";
+    head.append(title);
+  }
+  const body = table.createTBody();
+  strides.number.forEach((number, index) => {
+    const row = body.insertRow();
+    const title = cell("th", number);
+    title.scope = "row";
+    const value = (column) => strides[column][index]?.toFixed(2) ?? "–";
+    row.append(title, cell("td", value("shown")), cell("td", value("goal")), cell("td", verdict(index)));
+  });
+  place.append(table);
+}
+
+if (strides) {
+  drawStrides(document.querySelector(".chart"));
+  const details = document.querySelector("details");
+  const place = details.querySelector(".strides");
+  details.addEventListener("toggle", () => {
+    if (details.open && !place.hasChildNodes()) tabulate(place);
+  });
+}

@@ -1,0 +1,72 @@
+// The page's buttons: start, pause, go on, end (asked twice) and the robot's stop.
+
+const GUARD_MS = 700; // a question that just appeared takes no answer: a second tap is no yes
+const NOTE_MS = 6_000;
+
+export function createControls(body, live, ask) {
+  const note = body.querySelector(".note");
+  const robot = body.querySelector(".robot");
+  const label = robot.textContent;
+  let hiding, resetting;
+  let [said, stopped] = ["", false];
+
+  function tell(message) {
+    note.textContent = message;
+    note.hidden = false;
+    clearTimeout(hiding);
+    hiding = setTimeout(() => (note.hidden = true), NOTE_MS);
+  }
+
+  async function change(button) {
+    button.disabled = true;
+    try {
+      await live.change(button.dataset.change);
+    } catch (problem) {
+      tell(problem.message);
+    }
+    button.disabled = false;
+  }
+
+  function question(asked) {
+    ask(asked);
+    const yes = body.querySelector("[data-change=finish]");
+    yes.disabled = asked;
+    if (asked) setTimeout(() => (yes.disabled = false), GUARD_MS);
+  }
+
+  // Says at once that the tap was heard; that the robot is stopped is the server's word.
+  function stopRobot() {
+    const sent = live.say({ type: "robot", order: "stop" });
+    if (!sent) tell("No connection. Use the robot's own button.");
+    answer(sent ? "Stop sent" : "Not sent");
+    clearTimeout(resetting);
+    resetting = setTimeout(() => answer(""), NOTE_MS);
+  }
+
+  function answer(words) {
+    said = words;
+    drawRobot();
+  }
+
+  function drawRobot() {
+    const words = stopped ? "Robot stopped" : said || label;
+    if (robot.textContent !== words) robot.textContent = words;
+    robot.toggleAttribute("data-said", words !== label);
+  }
+
+  body.addEventListener("click", ({ target }) => {
+    const button = target.closest("button");
+    if (!button) return;
+    if (button === robot) stopRobot();
+    else if (button.dataset.change) change(button);
+    else if (button.dataset.ask !== undefined) question(button.dataset.ask === "end");
+    else if (button.dataset.reload !== undefined) location.reload();
+  });
+  body.addEventListener("contextmenu", (event) => event.preventDefault()); // of a long press
+
+  return function showRobot({ presence, robot_stopped }) {
+    stopped = robot_stopped;
+    robot.hidden = !presence.robot;
+    drawRobot();
+  };
+}

@@ -1,0 +1,46 @@
+"""Twenty times each, mid-gesture: how long until the base's setpoint is zero."""
+
+import random
+import statistics
+
+import pytest
+
+from tests.robot_room import robot_room
+from tests.robot_stops import LINK_S, STOPS, kill_server
+
+ROUNDS = 20
+
+
+def tell(name, limit_s, took_s):
+    took_ms = sorted(1000 * one for one in took_s)
+    print(
+        f"{name:24} limit {1000 * limit_s:4.0f} ms   median {statistics.median(took_ms):5.0f}   "
+        f"largest {took_ms[-1]:5.0f}   n {len(took_ms)}"
+    )
+    assert took_ms[0] > 0
+    assert took_ms[-1] <= 1000 * limit_s
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory):
+    with robot_room(tmp_path_factory.mktemp("room")) as room:
+        yield room
+
+
+@pytest.mark.parametrize("name", STOPS)
+def test_the_base_stands_still(room, name):
+    limit_s, deed = STOPS[name]
+    took_s = []
+    for _ in range(ROUNDS):
+        room.perform(random.uniform(0, 0.5))
+        took_s.append(deed(room))
+    tell(name, limit_s, took_s)
+
+
+def test_a_server_that_is_killed(tmp_path):
+    took_s = []
+    for number in range(ROUNDS):
+        with robot_room(tmp_path / str(number)) as room:
+            room.perform(random.uniform(0, 0.5))
+            took_s.append(kill_server(room))
+    tell("SIGKILL of the server", LINK_S, took_s)

@@ -1,0 +1,339 @@
+"""The scores page: places, what is on a board and what is not, ten thousand sessions."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import pytest
+from django.db import connection
+from django.test import Client
+from django.test.utils import CaptureQueriesContext
+from django.urls import reverse
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rehab.boards.ranking import SHOWN, By, Figures, cut, rank, ranking_of
+from rehab.people.models import Patient
+from rehab.people.roles import Role
+from rehab.sessions.models import SessionMetric, TrainingSession
+from rehab.training.changes import ChangeKind
+from rehab.training.phases import make_phase
+from rehab.training.valences import VALENCES
+from tests.walks import HIT, MISS, strides, walk
+from tests.world import World, build_world
+
+pytestmark = pytest.mark.django_db
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A row as it stands on the page."""
+
+    session: int
+    rank: str | None
+    value: str
+    you: bool
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+@pytest.fixture
+def patient(world) -> Patient:
+    return Patient.everywhere.create(
+        clinic=world.clinic, code="B-1", nickname="Rosa", paretic_side="left"
+    )
+
+
+@pytest.fixture
+def client(world) -> Client:
+    client = Client()
+    client.force_login(world.people[Role.PT])
+    return client
+
+
+def url_of(session: TrainingSession) -> str:
+    return reverse("scores", kwargs={"session_id": session.pk})
+
+
+def read(page: str, board: str) -> list[Seen]:
+    """Read a board's rows from the page as a patient would."""
+    part = page.split(f'id="board-{board}"')[1].split("</section>", maxsplit=1)[0]
+    rows = []
+    for item in re.findall(
+        r"<li(?: class=\"you\").*?</li>|<li data-session.*?</li>", part, re.DOTALL
+    ):
+        rank = re.search(r'class="rank">(\d+)\.<', item)
+        value = re.search(r'class="value">(.*?)</span>', item, re.DOTALL)[1]
+        words = re.sub(r"<[^>]+>", "", value).replace("\N{NO-BREAK SPACE}", " ")
+        rows.append(
+            Seen(
+                session=int(re.search(r'data-session="(\d+)"', item)[1]),
+                rank=rank[1] if rank else None,
+                value=" ".join(words.split()),
+                you="You" in item and 'aria-current="true"' in item,
+            )
+        )
+    return rows
+
+
+def test_points_rank_the_sessions_of_one_type_and_ties_share_a_rank(client, patient):
+    sessions = [walk(patient, "positive", strides(hits, 2)) for hits in (3, 9, 5, 9, 5, 1)]
+    walk(patient, "binary", strides(50, 0))
+    rows = read(client.get(url_of(sessions[4])).content.decode(), "same")
+    points = {session.pk: hits for session, hits in zip(sessions, (3, 9, 5, 9, 5, 1), strict=True)}
+    assert [row.value for row in rows] == ["9", "9", "5", "5", "3", "1"]
+    for row in rows:
+        assert row.value == str(points[row.session])
+        better = sum(other > points[row.session] for other in points.values())
+        assert row.rank == str(better + 1)
+        assert row.you == (row.session == sessions[4].pk)
+
+
+def test_binary_points_may_be_negative(client, patient):
+    walk(patient, "binary", strides(9, 2))
+    last = walk(patient, "binary", strides(2, 7))
+    rows = read(client.get(url_of(last)).content.decode(), "same")
+    assert [(row.rank, row.value, row.you) for row in rows] == [
+        ("1", "7", False),
+        ("2", "−5", True),
+    ]
+
+
+def test_hit_rates_rank_the_sessions_of_all_types(client, patient):
+    walked = [("positive", 6, 4), ("negative", 9, 1), ("explicit", 3, 7), ("binary", 12, 8)]
+    sessions = {walk(patient, v, strides(h, m)).pk: h / (h + m) for v, h, m in walked}
+    last = walk(patient, "positive", strides(5, 5))
+    sessions[last.pk] = 0.5
+    page = client.get(url_of(last)).content.decode()
+    rows = read(page, "all")
+    assert [(row.rank, row.value) for row in rows] == [
+        ("1", "90 %"),
+        ("2", "60 %"),
+        ("2", "60 %"),
+        ("4", "50 %"),
+        ("5", "30 %"),
+    ]
+    assert all(f"{sessions[row.session]:.0%}" == row.value.replace(" ", "") for row in rows)
+    assert [row.session for row in rows if row.you] == [last.pk]
+    assert [row.you for row in read(page, "same")].count(True) == 1
+
+
+def test_explicit_feedback_ranks_by_hit_rate_and_shows_no_points(client, patient):
+    walk(patient, "explicit", strides(8, 2))
+    walk(patient, "positive", strides(1, 9))
+    last = walk(patient, "explicit", strides(5, 5))
+    page = client.get(url_of(last)).content.decode()
+    assert [row.value for row in read(page, "same")] == ["80 %", "50 %"]
+    assert "points" not in page.lower()
+
+
+def test_negative_points_are_told_as_kept_without_rank_or_minus(client, patient):
+    walk(patient, "negative", strides(288, 12))
+    walk(patient, "negative", strides(5, 0))
+    last = walk(patient, "negative", strides(70, 30))
+    page = client.get(url_of(last)).content.decode()
+    rows = read(page, "same")
+    assert [row.value for row in rows] == ["kept 288 of 300", "kept 70 of 100", "kept 5 of 5"]
+    assert {row.rank for row in rows} == {None}
+    assert "−" not in page
+    assert [row.you for row in rows] == [False, True, False]
+
+
+def test_the_page_does_not_name_its_feedback_type(client, patient):
+    for valence in VALENCES.values():
+        page = client.get(url_of(walk(patient, valence.slug, strides(3, 2)))).content.decode()
+        words = re.sub(r"<[^>]+>", " ", page.split("<body")[1])
+        assert not any(other.label in words for other in VALENCES.values())
+
+
+def test_only_finished_sessions_with_judged_steps_are_on_a_board(client, patient):
+    good = walk(patient, "positive", strides(3, 2))
+    aborted = walk(patient, "positive", strides(9, 0), end=ChangeKind.ABORT)
+    SessionMetric.everywhere.create(session=aborted, slug="hit_rate", value=1.0)
+    walk(patient, "positive", strides(9, 0), end=None)
+    walk(patient, "positive", [HIT, MISS], phases=(make_phase("washout"),))
+    walk(patient, "positive", [None, None])
+    page = client.get(url_of(good)).content.decode()
+    assert [row.session for row in read(page, "same")] == [good.pk]
+    assert [row.session for row in read(page, "all")] == [good.pk]
+
+
+@pytest.mark.parametrize(
+    ("walked", "end"),
+    [([HIT, MISS], ChangeKind.ABORT), ([None], ChangeKind.FINISH), ([], ChangeKind.FINISH)],
+    ids=["aborted", "nothing valid", "nothing walked"],
+)
+def test_a_session_without_a_score_says_so_and_shows_the_others(client, patient, walked, end):
+    good = walk(patient, "positive", strides(3, 2))
+    page = client.get(url_of(walk(patient, "positive", walked, end=end))).content.decode()
+    assert "This session has no score." in page
+    rows = read(page, "same")
+    assert [(row.session, row.you) for row in rows] == [(good.pk, False)]
+
+
+def test_the_first_session_that_ever_ended_without_a_score(client, patient):
+    page = client.get(url_of(walk(patient, "negative", [None]))).content.decode()
+    assert page.count("No scores yet") == 2
+
+
+@pytest.mark.parametrize("pause", [[], [ChangeKind.PAUSE]], ids=["running", "paused"])
+def test_a_session_that_is_open_leads_to_its_page(client, patient, pause):
+    from rehab.training.changes import Change
+
+    session = walk(patient, "positive", [HIT, *map(Change, pause)], end=None)
+    answer = client.get(url_of(session))
+    assert answer.status_code == 302
+    assert answer.url == reverse("walk", kwargs={"session_id": session.pk})
+
+
+def test_simulated_and_walked_sessions_never_share_a_board(client, patient):
+    walked = walk(patient, "positive", strides(3, 2))
+    simulated = walk(patient, "positive", strides(90, 0), simulated=True)
+    page = client.get(url_of(walked)).content.decode()
+    assert [row.session for row in read(page, "all")] == [walked.pk]
+    assert "Simulated" not in page
+    page = client.get(url_of(simulated)).content.decode()
+    assert [row.session for row in read(page, "all")] == [simulated.pk]
+    assert "Simulated" in page
+
+
+def test_only_the_patients_own_sessions_are_shown(world, client, patient):
+    last = walk(patient, "positive", strides(3, 2))
+    walk(world.patient, "positive", strides(9, 0))
+    page = client.get(url_of(last)).content.decode()
+    assert [row.session for row in read(page, "all")] == [last.pk]
+    assert reverse("patient", kwargs={"patient_id": patient.pk}) in page
+
+
+def test_nobody_else_opens_it(world, patient):
+    session = walk(patient, "positive", strides(3, 2))
+    other = build_world("birch")
+    for person, status in (
+        (world.people[Role.RESEARCHER], 403),
+        (other.people[Role.PT], 404),
+        (other.people[Role.LEAD], 404),
+        (world.people[Role.LEAD], 200),
+    ):
+        client = Client()
+        client.force_login(person)
+        assert client.get(url_of(session)).status_code == status
+    assert Client().get(url_of(session)).status_code == 302
+    assert client.post(url_of(session)).status_code == 405
+
+
+# --- the rules alone ------------------------------------------------------------------------------
+
+
+@given(st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)).filter(any), max_size=30))
+def test_every_place_is_one_more_than_the_better_ones(walked):
+    figures = [
+        Figures(pk, "positive", hits / (hits + misses), hits, hits if not misses else 0)
+        for pk, (hits, misses) in enumerate(walked)
+    ]
+    lost = [
+        Figures(pk, "negative", hits / (hits + misses), -misses, hits if not misses else 0)
+        for pk, (hits, misses) in enumerate(walked)
+    ]
+    percent = [round(100 * hits / (hits + misses)) for hits, misses in walked]
+    points = [hits for hits, _ in walked]
+    for by, given_figures, truth in (
+        (By.RATE, figures, percent),
+        (By.POINTS, figures, points),
+        (By.KEPT, lost, points),
+    ):
+        entries = rank(given_figures, by)
+        assert sorted(entry.session_id for entry in entries) == list(range(len(walked)))
+        assert [entry.place for entry in entries] == list(range(1, len(walked) + 1))
+        assert [entry.rank for entry in entries] == sorted(entry.rank for entry in entries)
+        for entry in entries:
+            assert entry.value == truth[entry.session_id]
+            assert entry.rank == 1 + sum(other > entry.value for other in truth)
+            if by is By.KEPT:
+                assert entry.stake == sum(walked[entry.session_id])
+
+
+def test_what_could_be_lost_follows_the_price_of_a_miss():
+    assert Figures(1, "negative", 0.96, -36, 9).stake(3) == 900
+    assert Figures(1, "negative", 1.0, 0, 50).stake(3) == 150
+    assert Figures(1, "negative", 0.0, -30, 0).stake(3) == 30
+
+
+def test_a_valence_is_ranked_by_what_it_pays():
+    ways = {slug: ranking_of(valence) for slug, valence in VALENCES.items()}
+    assert ways == {
+        "positive": By.POINTS,
+        "negative": By.KEPT,
+        "binary": By.POINTS,
+        "explicit": By.RATE,
+    }
+
+
+@pytest.mark.parametrize("mine", [0, 5, 12, 40, 190, 199])
+def test_a_long_board_keeps_the_best_and_those_around(mine):
+    entries = rank([Figures(pk, "", (200 - pk) / 200, 200 - pk, 0) for pk in range(200)], By.POINTS)
+    shown = [entry.session_id for entry in cut(entries, mine)]
+    assert len(shown) <= SHOWN
+    assert shown == sorted(set(shown))
+    assert set(range(10)) | set(range(max(0, mine - 15), min(200, mine + 16))) == set(shown) | set(
+        range(10)
+    )
+
+
+# --- ten thousand sessions ------------------------------------------------------------------------
+
+
+@pytest.fixture
+def crowd(world, patient) -> TrainingSession:
+    """A clinic with 10,000 finished sessions of 100 patients; the patient has 100 of them."""
+    last = walk(patient, "positive", strides(30, 70))
+    others = Patient.everywhere.bulk_create(
+        Patient(clinic=world.clinic, code=f"C-{i}", nickname=f"C {i}") for i in range(99)
+    )
+    walkers = [patient, *others]
+    copied = {
+        field.attname: getattr(last, field.attname)
+        for field in TrainingSession._meta.concrete_fields
+        if field.attname not in {"id", "patient_id"}
+    }
+    made = TrainingSession.everywhere.bulk_create(
+        (TrainingSession(**copied, patient=walkers[i % 100]) for i in range(10_000)), 500
+    )
+    SessionMetric.everywhere.bulk_create(
+        (
+            SessionMetric(session=session, slug=slug, value=value)
+            for i, session in enumerate(made)
+            for slug, value in (("score", i % 977), ("hit_rate", (i % 89) / 100))
+        ),
+        5000,
+    )
+    return last
+
+
+def test_among_ten_thousand_sessions_only_the_patients_rows_are_read(client, crowd):
+    url = url_of(crowd)
+    client.get(url)
+    with CaptureQueriesContext(
+        connection,
+    ) as asked:
+        page = client.get(url).content.decode()
+    assert len(asked) == 5  # browser session, account, session, figures, facts of what is shown
+    rows = read(page, "same")
+    assert len(rows) <= SHOWN
+    assert [row.session for row in rows if row.you] == [crowd.pk]
+    better = TrainingSession.everywhere.filter(
+        patient=crowd.patient, metrics__slug="score", metrics__value__gt=30
+    ).count()
+    assert next(row for row in rows if row.you).rank == str(better + 1)
+    if connection.vendor == "sqlite":
+        for query in asked.captured_queries[2:]:
+            with connection.cursor() as cursor:
+                cursor.execute(f"EXPLAIN QUERY PLAN {query['sql']}")
+                plan = "; ".join(row[3] for row in cursor.fetchall())
+            assert "SCAN" not in plan, plan
+            if "rehab_sessionmetric" in query["sql"]:
+                assert "(patient_id=?)" in plan
+                assert "(session_id=? AND slug=?)" in plan

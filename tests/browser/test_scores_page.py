@@ -1,0 +1,184 @@
+"""The scores page in Chromium: the newest score is found, marked, and can be read at 1.5 m."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browsers import SIZES, chromium
+from tests.servers import ROOT, Server, clean_environment, serve
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+SEED = """
+from django.utils import timezone
+from rehab.people.first_start import first_clinic
+from rehab.people.models import Patient
+from tests.walks import strides, walk
+rosa = Patient.everywhere.create(
+    clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"
+)
+for index in range(14):
+    walk(rosa, "positive", strides(10 + index, 10), days_ago=20 - index, now=timezone.now())
+walk(rosa, "binary", strides(30, 3), days_ago=2, now=timezone.now())
+print(walk(rosa, "positive", strides(13, 10), now=timezone.now()).pk)
+print(walk(rosa, "negative", strides(12, 3), now=timezone.now()).pk)
+"""
+BLUE = "rgb(10, 63, 168)"
+TABLETS = ("tablet-portrait", "tablet-landscape")
+
+# Every visible text of the page: its words, size, and contrast with what is painted behind it.
+READ_TEXTS = """() => {
+  const channel = (c) => (c /= 255) <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
+  const light = ([r, g, b]) => 0.2126 * channel(r) + 0.7152 * channel(g) + 0.0722 * channel(b);
+  const numbers = (color) => color.match(/[\\d.]+/g).map(Number);
+  const behind = (element) => {
+    for (let node = element; node; node = node.parentElement) {
+      const color = numbers(getComputedStyle(node).backgroundColor);
+      if (color.length < 4 || color[3] === 1) return color;
+    }
+    return [255, 255, 255];
+  };
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  const texts = [];
+  while (walker.nextNode()) {
+    const element = walker.currentNode.parentElement;
+    const words = walker.currentNode.textContent.trim();
+    if (!words || !element.checkVisibility() || element.closest("[aria-hidden=true]")) continue;
+    const style = getComputedStyle(element);
+    const [a, b] = [light(numbers(style.color)), light(behind(element))];
+    const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    texts.push({ words, size: parseFloat(style.fontSize), contrast });
+  }
+  return texts;
+}"""
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory) -> Iterator[Server]:
+    with serve(tmp_path_factory.mktemp("data")) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def sessions(server) -> tuple[str, str]:
+    """The newest positive and the newest negative session."""
+    done = subprocess.run(
+        [sys.executable, "manage.py", "shell", "-v0", "-c", SEED],
+        cwd=ROOT,
+        env=clean_environment(server.folder, server.port),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    positive, negative = done.stdout.split()
+    return positive, negative
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as running:
+        yield running
+
+
+@contextmanager
+def tablet(browser: Browser, server: Server, size: str, *, still: bool = False) -> Iterator[Page]:
+    """Give a page of a signed-in tablet that is only tapped. Complaints fail."""
+    width, height = SIZES[size]
+    context = browser.new_context(
+        base_url=server.url,
+        viewport={"width": width, "height": height},
+        has_touch=True,
+        reduced_motion="reduce" if still else "no-preference",
+    )
+    page = context.new_page()
+    page.goto("/admin/")
+    page.fill("#id_username", "pt")
+    page.fill("#id_password", server.password)
+    page.click("[type=submit]")
+    complaints: list[str] = []
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+    yield page
+    context.close()
+    assert complaints == []
+
+
+def is_in_view(page: Page, board: str) -> bool:
+    """Say whether the marked row lies whole within the board that is shown."""
+    inside: bool = page.evaluate(
+        """(board) => {
+          const place = document.getElementById(board).getBoundingClientRect();
+          const row = document.querySelector(`#${board} .you`).getBoundingClientRect();
+          return row.height > 0 && row.top >= place.top - 1 && row.bottom <= place.bottom + 1;
+        }""",
+        board,
+    )
+    return inside
+
+
+@pytest.mark.parametrize("size", TABLETS)
+def test_the_list_glides_to_the_newest_score_which_then_stands_out(server, sessions, browser, size):
+    with tablet(browser, server, size) as page:
+        page.goto(f"/sessions/{sessions[0]}/scores/")
+        board = page.locator("#board-same")
+        expect(board).to_have_class("board points gliding")
+        assert not is_in_view(page, "board-same")
+        expect(board).to_have_class("board points", timeout=6000)
+        assert is_in_view(page, "board-same")
+        row = board.locator(".you")
+        expect(row).to_have_css("background-color", BLUE)
+        expect(row).to_contain_text("You today")
+        expect(row.locator(".marker")).to_be_visible()
+        expect(row.locator(".value")).to_have_text("13")
+        expect(row).to_have_attribute("aria-current", "true")
+        sizes = board.locator(".value").evaluate_all(
+            "all => all.map((one) => parseFloat(getComputedStyle(one).fontSize))"
+        )
+        assert max(sizes) >= 1.5 * sorted(sizes)[-2]
+        assert board.locator(".you").count() == 1
+
+
+@pytest.mark.parametrize("size", TABLETS)
+def test_tabs_switch_by_tap_and_stay_at_the_newest_score(server, sessions, browser, size):
+    with tablet(browser, server, size, still=True) as page:
+        page.goto(f"/sessions/{sessions[0]}/scores/")
+        expect(page.get_by_role("heading")).to_have_text("Your points")
+        page.get_by_role("tab", name="All types").tap()
+        expect(page.get_by_role("heading")).to_have_text("Your steps at the goal")
+        expect(page.locator("#board-same")).to_be_hidden()
+        expect(page.get_by_role("tab", name="All types")).to_have_attribute("aria-selected", "true")
+        assert is_in_view(page, "board-all")
+        expect(page.locator("#board-all .you .value")).to_have_text("57\N{NO-BREAK SPACE}%")
+        page.get_by_role("tab", name="This type").tap()
+        assert is_in_view(page, "board-same")
+        page.get_by_role("link", name="Continue").tap()
+        page.wait_for_url("**/patients/*/")
+
+
+def test_with_reduced_motion_the_score_is_there_at_once(server, sessions, browser):
+    with tablet(browser, server, "tablet-portrait", still=True) as page:
+        page.goto(f"/sessions/{sessions[0]}/scores/")
+        assert page.locator(".gliding").count() == 0
+        assert is_in_view(page, "board-same")
+        expect(page.locator("#board-same .you")).to_have_css("background-color", BLUE)
+
+
+@pytest.mark.parametrize("size", TABLETS)
+@pytest.mark.parametrize("which", [0, 1], ids=["positive", "negative"])
+def test_everything_can_be_read_at_arms_length_and_more(server, sessions, browser, size, which):
+    with tablet(browser, server, size, still=True) as page:
+        page.goto(f"/sessions/{sessions[which]}/scores/")
+        texts = page.evaluate(READ_TEXTS)
+        assert len(texts) > 5
+        for text in texts:
+            assert text["size"] >= 32, text
+            assert text["contrast"] >= 7, text
+        for control in page.locator("button:visible, a:visible").all():
+            assert control.bounding_box()["height"] >= 72
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")

@@ -1,0 +1,83 @@
+"""Raw signals, one command, and the patient sees the strides that are measured from them."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sqlite3
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from tests.browsers import SIZES, chromium
+from tests.servers import ROOT, Server, serve
+from tests.walk_seed import make_walks
+
+pytestmark = pytest.mark.browser
+
+STRIDES = 24
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with serve(tmp_path_factory.mktemp("data")) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as running:
+        yield running
+
+
+def steps_of(server: Server, session: int) -> list[sqlite3.Row]:
+    database = sqlite3.connect(server.folder / "garry.sqlite3")
+    database.row_factory = sqlite3.Row
+    try:
+        words = "SELECT * FROM rehab_step WHERE session_id = ?"
+        return database.execute(words, (session,)).fetchall()
+    finally:
+        database.close()
+
+
+def test_a_session_from_raw_signals_on_the_tablet(server: Server, browser: Browser) -> None:
+    (walk,) = make_walks(server, {"valence": "explicit", "goal": 3.0})
+    width, height = SIZES["tablet-landscape"]
+    context = browser.new_context(
+        base_url=server.url, viewport={"width": width, "height": height}, has_touch=True
+    )
+    context.set_default_timeout(30_000)
+    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
+    page = context.new_page()
+    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
+    page.goto(walk.path)
+    command = f"-m rehab.sources synthetic --signals --speed 20 --strides {STRIDES} --seed 5"
+    source = subprocess.Popen(
+        [sys.executable, *command.split(), "--server", server.url],
+        cwd=ROOT,
+        env=os.environ | {"GARRY_TOKEN": walk.source},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        page.tap("[data-change=start]")
+        page.wait_for_function("() => document.body.dataset.step >= 20")
+        _, said = source.communicate(timeout=30)
+    finally:
+        source.kill()
+        source.wait()
+    assert f"{STRIDES} strides acknowledged" in said
+    # Explicit feedback shows what was measured.
+    expect(page.locator("body")).to_contain_text(re.compile(r"in W/kg\s*\d\.\d\d\s*Step \d+"))
+    text = page.locator("body").text_content() or ""
+    value, number = re.search(r"in W/kg\s*(\d\.\d\d)\s*Step (\d+)", text).groups()
+    stored = {step["number"]: step for step in steps_of(server, walk.session)}
+    assert stored[int(number)]["side"] == "left"
+    assert f"{stored[int(number)]['value']:.2f}" == value
+    assert sum(bool(step["valid"]) for step in stored.values()) > STRIDES // 2
+    assert 0.5 < json.loads(stored[int(number)]["extra"])["stance_s"] < 0.9
+    context.close()

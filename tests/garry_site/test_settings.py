@@ -1,0 +1,115 @@
+"""Every misconfiguration has an id, a sentence and a cure."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from django.core.checks import CheckMessage, run_checks
+
+ROOT = Path(__file__).parents[2]
+HOSTED = {
+    "GARRY_HOSTED": "1",
+    "GARRY_SECRET_KEY": "k" * 25 + "0123456789" * 5,
+    "GARRY_ALLOWED_HOSTS": "garry.example",
+    "GARRY_DATABASE_URL": "postgres://garry@127.0.0.1/garry",
+    "GARRY_REDIS_URL": "redis://127.0.0.1:6379/0",
+}
+
+
+def check(tmp_path: Path, *arguments: str, **variables: str) -> tuple[int, str]:
+    """Run `manage.py check` as an operator would, with nothing but these variables."""
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("GARRY_")}
+    result = subprocess.run(
+        [sys.executable, "manage.py", "check", *arguments],
+        cwd=ROOT,
+        env=clean | {"GARRY_DATA_DIR": str(tmp_path)} | variables,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    return result.returncode, result.stdout + result.stderr
+
+
+def test_one_machine_needs_no_setting(tmp_path):
+    code, said = check(tmp_path, "--fail-level", "ERROR")
+    assert code == 0, said
+    assert (tmp_path / "secret_key").stat().st_mode & 0o777 == 0o600
+
+
+def test_the_hosted_settings_pass_the_deployment_checks(tmp_path):
+    code, said = check(tmp_path, "--deploy", "--fail-level", "WARNING", **HOSTED)
+    assert code == 0, said
+
+
+@pytest.mark.parametrize(
+    ("variables", "said"),
+    [
+        ({"GARRY_SECRET_KEY": ""}, "garry.E001"),
+        ({"GARRY_DEBUG": "1"}, "garry.E002"),
+        ({"GARRY_ALLOWED_HOSTS": ""}, "garry.E003"),
+        ({"GARRY_ALLOWED_HOSTS": "*"}, "garry.E003"),
+        ({"GARRY_DATABASE_URL": "sqlite:////tmp/garry-never.sqlite3"}, "garry.E004"),
+        ({"GARRY_REDIS_URL": ""}, "garry.E005"),
+        ({"GARRY_PROT": "8001"}, "garry.W008"),
+        ({"GARRY_PORT": "eighty"}, "whole number from 1 to 65535"),
+        ({"GARRY_HOSTED": "maybe"}, "neither yes nor no"),
+        ({"GARRY_TIME_ZONE": "Mars/Base"}, "no time zone"),
+        ({"GARRY_LOG_LEVEL": "LOUD"}, "GARRY_LOG_LEVEL must be"),
+        ({"GARRY_DATABASE_URL": "nonsense"}, "GARRY_DATABASE_URL"),
+    ],
+)
+def test_a_wrong_hosted_setting_is_named_with_its_cure(tmp_path, variables, said):
+    code, output = check(tmp_path, "--deploy", "--fail-level", "WARNING", **HOSTED | variables)
+    assert code != 0
+    assert said in output
+
+
+def ids(messages: list[CheckMessage]) -> set[str | None]:
+    return {message.id for message in messages if str(message.id).startswith("garry.")}
+
+
+def test_a_data_folder_that_cannot_be_written_is_named(settings, tmp_path):
+    settings.DATA_DIR = tmp_path / "absent"
+    assert "garry.E006" in ids(run_checks())
+
+
+def test_missing_browser_libraries_are_named(settings, tmp_path):
+    settings.BROWSER_LIBRARIES = {"uplot": tmp_path / "absent"}
+    assert "garry.W007" in ids(run_checks())
+
+
+def test_a_server_that_answers_to_every_name_is_named(settings):
+    settings.ALLOWED_HOSTS = ["*"]
+    assert "garry.W003" in ids(run_checks())
+
+
+def test_sqlite_that_may_lose_steps_is_named(settings, monkeypatch):
+    database = settings.DATABASES["default"]
+    monkeypatch.setitem(database, "ENGINE", "django.db.backends.sqlite3")
+    monkeypatch.setitem(database, "OPTIONS", {"init_command": "PRAGMA synchronous=OFF;"})
+    assert "garry.E009" in ids(run_checks())
+
+
+def test_an_order_of_applications_that_hides_our_commands_is_named(settings):
+    apps = list(settings.INSTALLED_APPS)
+    apps.remove("rehab")
+    settings.INSTALLED_APPS = [*apps, "rehab"]
+    assert "garry.E010" in ids(run_checks())
+
+
+@pytest.mark.django_db
+def test_sqlite_writes_each_commit_through_to_the_disk():
+    from django.db import connection
+
+    if connection.vendor != "sqlite":
+        pytest.skip("SQLite's own setting")
+    with connection.cursor() as cursor:
+        found = {}
+        for pragma in ("journal_mode", "synchronous", "foreign_keys"):
+            cursor.execute(f"PRAGMA {pragma}")
+            found[pragma] = cursor.fetchone()[0]
+    assert found == {"journal_mode": "wal", "synchronous": 2, "foreign_keys": 1}

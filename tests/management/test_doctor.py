@@ -1,0 +1,78 @@
+"""`doctor` says what is well, and names a cure for what is not."""
+
+from __future__ import annotations
+
+import json
+from io import StringIO
+
+import pytest
+from django.core.management import call_command
+
+from rehab.sessions.models import TrainingSession
+from tests.world import build_world
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture(autouse=True)
+def well_set_up(settings, tmp_path):
+    settings.DATA_DIR = tmp_path
+    for name in settings.BROWSER_LIBRARIES:
+        (tmp_path / name).mkdir()
+    settings.BROWSER_LIBRARIES = {name: tmp_path / name for name in settings.BROWSER_LIBRARIES}
+
+
+def ask() -> tuple[int, str]:
+    out = StringIO()
+    try:
+        call_command("doctor", stdout=out)
+    except SystemExit as ended:
+        return int(str(ended.code)), out.getvalue()
+    return 0, out.getvalue()
+
+
+def test_a_sound_installation_is_well():
+    build_world("amber")
+    status, said = ask()
+    assert status == 0, said
+    assert "1 valid, 1 never used" in said
+
+
+def test_sessions_that_a_dead_process_left_are_named():
+    world = build_world("amber")
+    TrainingSession.everywhere.filter(pk=world.session.pk).update(state="running", owner="x|1|0")
+    TrainingSession.everywhere.filter(pk=world.session.pk).update(owner="")
+    status, said = ask()
+    assert status == 1
+    assert f"1 left running by a process that is gone: {world.session.pk}" in said
+    assert "Start the server" in said
+
+
+def test_a_failing_child_is_named_with_its_last_words(tmp_path):
+    child = {"name": "robot", "state": "failed", "restarts": 4, "last_words": ["no port"]}
+    (tmp_path / "children.json").write_text(json.dumps({"server": 1, "children": [child]}))
+    status, said = ask()
+    assert status == 1
+    assert "robot: failed, restarted 4 times" in said
+    assert "Its last words: no port" in said
+
+
+def test_missing_files_are_named(settings, tmp_path):
+    settings.BROWSER_LIBRARIES = {"uplot": tmp_path / "absent"}
+    status, said = ask()
+    assert status == 1
+    assert "missing: uplot" in said
+    assert "make setup" in said
+
+
+def test_a_redis_that_does_not_answer_is_named(settings):
+    settings.REDIS_URL = "redis://127.0.0.1:1/0"
+    settings.CHANNEL_LAYERS = {
+        "default": {
+            "BACKEND": "channels_redis.pubsub.RedisPubSubChannelLayer",
+            "CONFIG": {"hosts": [settings.REDIS_URL]},
+        }
+    }
+    status, said = ask()
+    assert status == 1
+    assert "Check GARRY_REDIS_URL" in said

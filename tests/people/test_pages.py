@@ -1,0 +1,157 @@
+"""What people find on the pages: the front page, the admin of each role."""
+
+import re
+
+import pytest
+from django.test import Client
+
+from rehab.people.models import Clinic, Patient, User
+from rehab.people.roles import Role
+from rehab.stations.models import Device, Station, find_device
+from tests.world import World, build_world
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+def signed_in(world: World, role: Role) -> Client:
+    client = Client()
+    client.force_login(world.people[role])
+    return client
+
+
+def test_the_front_page_says_what_can_be_done(client):
+    page = client.get("/").content.decode()
+    for words in ("Positive", "Negative", "Binary", "Explicit", "runsession", "Sign in"):
+        assert words in page
+
+
+def test_the_sign_of_life_reaches_the_database(client, django_assert_num_queries):
+    with django_assert_num_queries(1):
+        assert client.get("/healthz").content == b"ok\n"
+
+
+def test_pages_allow_no_foreign_script(client):
+    policy = client.get("/").headers["Content-Security-Policy"]
+    assert "default-src 'self'" in policy
+    assert "unsafe" not in policy
+
+
+def test_a_therapist_reads_date_start_duration_score_type_and_goal(world):
+    row = signed_in(world, Role.PT).get("/admin/rehab/trainingsession/").content.decode()
+    cells = dict(re.findall(r'class="field-(\w+)[^"]*">(?:<a[^>]*>)?([^<]*)', row))
+    assert cells["date"] == "Nov. 21, 2026"
+    assert cells["start_time"] == "10:00:00"
+    assert cells["duration"] == "0:10"
+    assert cells["valence"] == "Positive"
+    assert cells["goal_value"] == "1.00 m"
+    assert cells["score"] == "6"
+    assert cells["hit_rate"] == "67%"
+
+
+def test_a_therapist_cannot_edit_the_log(world):
+    client = signed_in(world, Role.PT)
+    for name in ("trainingsession", "step", "sessionevent", "sessionmetric"):
+        assert client.get(f"/admin/rehab/{name}/add/").status_code == 403
+        row = next(row for kind, row in world.rows.items() if kind.__name__.lower() == name)
+        url = f"/admin/rehab/{name}/{row.pk}/"
+        assert client.get(f"{url}change/").status_code == 200
+        assert client.post(f"{url}change/", {"value": 1}).status_code == 403
+        assert client.post(f"{url}delete/", {"post": "yes"}).status_code == 403
+
+
+def test_a_researcher_finds_sessions_by_pseudonym_and_no_other_way(world):
+    client = signed_in(world, Role.RESEARCHER)
+    url = "/admin/rehab/trainingsession/"
+    assert world.patient.pseudonym in client.get(url).content.decode()
+    detail = client.get(f"{url}{world.session.pk}/change/").content.decode()
+    assert world.patient.pseudonym in detail
+    assert world.patient.nickname not in detail
+    hidden = client.get(url, {"q": world.patient.nickname}).content.decode()
+    assert "0 sessions" in hidden
+    assert client.get(url, {"patient__nickname__startswith": "zq"}).status_code == 400
+
+
+def test_a_new_patient_belongs_to_the_therapists_clinic(world):
+    form = {"code": "K7-204", "nickname": "Rosa", "paretic_side": "left", "language": "es"}
+    signed_in(world, Role.PT).post("/admin/rehab/patient/add/", form)
+    assert Patient.everywhere.get(code="K7-204").clinic == world.clinic
+
+
+def test_a_code_that_is_taken_is_refused_in_words(world):
+    form = {"code": world.patient.code, "nickname": "Rosa", "language": "en"}
+    page = signed_in(world, Role.PT).post("/admin/rehab/patient/add/", form)
+    assert page.status_code == 200
+    assert "already exists" in page.content.decode()
+
+
+def test_a_form_refuses_a_station_of_another_clinic(world):
+    birch = build_world("birch")
+    form = {"station": birch.rows[Station].pk, "kind": "source", "name": "Stray"}
+    page = signed_in(world, Role.LEAD).post("/admin/rehab/device/add/", form)
+    assert "Select a valid choice" in page.content.decode()
+    assert not Device.everywhere.filter(name="Stray").exists()
+
+
+def test_a_new_devices_token_is_shown_once_and_opens_until_revoked(world):
+    client = signed_in(world, Role.LEAD)
+    form = {"station": world.rows[Station].pk, "kind": "source", "name": "Treadmill"}
+    page = client.post("/admin/rehab/device/add/", form, follow=True).content.decode()
+    token = re.search(r"one time only: (\S+?)<", page).group(1)
+    device = Device.everywhere.get(name="Treadmill")
+    assert find_device(token) == device
+    assert token not in client.get("/admin/rehab/device/").content.decode()
+    assert token not in device.token_hash
+    client.post("/admin/rehab/device/", {"action": "revoke_tokens", "_selected_action": device.pk})
+    assert find_device(token) is None
+
+
+def test_a_lead_makes_accounts_of_the_own_clinic_and_never_a_host(world):
+    client = signed_in(world, Role.LEAD)
+    form = {
+        "username": "new-pt",
+        "usable_password": "true",
+        "password1": "walk well 2026",
+        "password2": "walk well 2026",
+        "role": "host",
+    }
+    page = client.post("/admin/rehab/user/add/", form)
+    assert "Select a valid choice" in page.content.decode()
+    client.post("/admin/rehab/user/add/", form | {"role": "pt"})
+    account = User.everywhere.get(username="new-pt")
+    assert (account.clinic, account.role) == (world.clinic, Role.PT)
+
+
+def test_a_host_makes_clinics_and_their_leads(world):
+    client = Client()
+    client.force_login(User.everywhere.create_user("host", role=Role.HOST))
+    client.post("/admin/rehab/clinic/add/", {"name": "Oak", "language": "en", "time_zone": "UTC"})
+    oak = Clinic.everywhere.get(name="Oak")
+    form = {
+        "username": "oak-lead",
+        "usable_password": "true",
+        "password1": "walk well 2026",
+        "password2": "walk well 2026",
+        "role": "lead",
+        "clinic": oak.pk,
+    }
+    client.post("/admin/rehab/user/add/", form)
+    assert User.everywhere.get(username="oak-lead").clinic == oak
+    page = client.post("/admin/rehab/user/add/", form | {"username": "x", "clinic": ""})
+    assert "every other role needs one" in page.content.decode()
+
+
+def test_shared_rows_are_the_hosts_to_change(world):
+    from rehab.sessions.models import Measure, Protocol
+
+    client = signed_in(world, Role.LEAD)
+    for model in (Measure, Protocol):
+        shared = model.everywhere.filter(clinic=None).first()
+        url = f"/admin/rehab/{model._meta.model_name}/{shared.pk}/"
+        assert client.get(f"{url}change/").status_code == 200
+        assert client.post(f"{url}change/", {"name": "mine"}).status_code == 403
+        assert client.post(f"{url}delete/", {"post": "yes"}).status_code == 403

@@ -1,0 +1,177 @@
+"""Windows and decisions against an oracle that shares nothing with them but the rule."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robot.activation import (
+    LATE,
+    NO_GESTURE,
+    PERFORMING,
+    RESTING,
+    Activation,
+    BadMessage,
+    Cue,
+    Decision,
+)
+
+CUE = Cue(above="celebrate", below="droop")
+
+steps = st.lists(
+    st.tuples(st.integers(0, 3000), st.integers(0, 300)), max_size=80
+)  # hundredths of a second since the step before, percent of the goal
+
+
+def recompute(times_s, performances, threshold=0.9, window_s=5.0):
+    """Sort all steps into windows first, then decide. A last, open window has no decision."""
+    windows: dict[int, list[tuple[float, float]]] = {}
+    for time_s, performance in zip(times_s, performances, strict=True):
+        number = math.floor((time_s - times_s[0]) / window_s)
+        windows.setdefault(number, []).append((time_s, performance))
+    numbers = sorted(windows)
+    decisions = []
+    for number, following in pairwise(numbers):
+        values = [performance for _, performance in windows[number]]
+        if len(values) >= 2:
+            mean = sum(values) / len(values)
+            until_s = times_s[0] + number * window_s + window_s
+            late = windows[following][0][0] - until_s > window_s
+            decisions.append((number, len(values), mean, mean >= threshold, late))
+    return decisions
+
+
+@given(steps, st.floats(-1000, 1000))
+def test_windows_are_those_of_the_oracle(walk, first_s):
+    times_s, performances, time_s = [], [], first_s
+    for gap, percent in walk:
+        time_s += gap / 100
+        times_s.append(time_s)
+        performances.append(percent / 100)
+    activation, found = Activation(CUE), []
+    for at_s, performance in zip(times_s, performances, strict=True):
+        decision = activation.add(at_s, performance)
+        if decision is not None:
+            number = round((decision.from_s - times_s[0]) / 5)
+            assert decision.until_s == pytest.approx(decision.from_s + 5)
+            found.append((number, decision.steps, decision.mean, decision.above, decision.is_late))
+    expected = recompute(times_s, performances) if walk else []
+    assert found == expected
+    above = sum(decision[3] for decision in expected)
+    assert activation.share == (above / len(expected) if expected else None)
+
+
+def close(activation, time_s=5.0):
+    """Add a step and expect the window to end."""
+    decision = activation.add(time_s, 1.0)
+    assert decision is not None
+    return decision
+
+
+def test_the_threshold_itself_is_above():
+    activation = Activation(CUE)
+    activation.add(0, 0.75)
+    activation.add(1, 1.05)
+    decision = close(activation)
+    assert decision == Decision(0, 5, 5, 2, 0.9, 0.9, True)
+    assert activation.cue.gesture(decision.above) == "celebrate"
+
+
+def test_one_step_decides_nothing():
+    activation = Activation(CUE)
+    activation.add(0, 1.0)
+    assert activation.add(6, 1.0) is None
+    assert activation.share is None
+
+
+def test_a_threshold_counts_from_the_open_window_on():
+    activation = Activation(CUE)
+    activation.add(0, 0.8)
+    activation.add(1, 0.8)
+    activation.follow(Cue(above="celebrate", threshold=0.7))
+    assert close(activation).above
+    assert activation.share == 1
+
+
+def test_another_length_of_windows_begins_anew():
+    activation = Activation(CUE)
+    activation.add(0, 0.8)
+    activation.add(1, 0.8)
+    activation.follow(Cue(window_s=2))
+    assert activation.add(5, 1) is None
+    activation.add(6, 1)
+    assert activation.add(7, 1) == Decision(5, 7, 7, 2, 1, 0.9, True)
+
+
+def test_a_clock_that_was_set_back_begins_anew():
+    activation = Activation(CUE)
+    for time_s in (100, 101, 102):
+        activation.add(time_s, 0.5)
+    assert activation.add(3, 1.0) is None
+    assert activation.add(4, 1.0) is None
+    assert close(activation, 8.5) == Decision(3, 8, 8.5, 2, 1.0, 0.9, True)
+
+
+def test_rest_counts_from_the_start_of_the_last_gesture():
+    activation = Activation(CUE)
+    first = Decision(0, 5, 5.5, 4, 1.0, 0.9, True)
+    assert activation.obstacle(first, performing=False) == ""
+    activation.started(first)
+    soon, later = replace(first, at_s=10.4, until_s=10), replace(first, at_s=10.5, until_s=10)
+    assert activation.obstacle(soon, performing=False) == RESTING
+    assert activation.obstacle(later, performing=True) == PERFORMING
+    assert activation.obstacle(later, performing=False) == ""
+    activation.add(20, 1)
+    activation.add(3, 1)  # the source's clock was set back
+    assert activation.obstacle(replace(first, at_s=7.9), performing=False) == RESTING
+    assert activation.obstacle(replace(first, at_s=8.0), performing=False) == ""
+
+
+def test_nobody_answers_a_window_of_long_ago():
+    activation = Activation(CUE)
+    activation.add(0, 1)
+    activation.add(1, 1)
+    decision = close(activation, 11)
+    assert decision.is_late
+    assert activation.obstacle(decision, performing=False) == LATE
+
+
+def test_no_gesture_where_the_order_names_none():
+    decision = Decision(0, 5, 5, 4, 1.0, 0.9, True)
+    assert Activation(Cue(below="droop")).obstacle(decision, performing=False) == NO_GESTURE
+
+
+GOOD = {"above": "a", "below": None, "threshold": 0.9, "window_s": 5, "rest_s": 5, "intensity": 1}
+
+
+def test_an_order_is_read():
+    assert Cue.read(GOOD) == Cue(above="a")
+
+
+@pytest.mark.parametrize(
+    "cue",
+    [
+        None,
+        [],
+        {},
+        GOOD | {"above": 1},
+        GOOD | {"above": ""},
+        GOOD | {"below": "x" * 65},
+        GOOD | {"threshold": math.nan},
+        GOOD | {"threshold": "0.9"},
+        GOOD | {"threshold": True},
+        GOOD | {"window_s": 0},
+        GOOD | {"window_s": 1e400},
+        GOOD | {"rest_s": -1},
+        GOOD | {"intensity": 0.05},
+        GOOD | {"intensity": 2},
+        GOOD | {"intensity": 10**400},
+    ],
+    ids=str,
+)
+def test_what_is_no_order(cue):
+    with pytest.raises(BadMessage):
+        Cue.read(cue)

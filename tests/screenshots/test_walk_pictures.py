@@ -1,0 +1,118 @@
+"""Pictures of the patient's page in every state at every size."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, ViewportSize
+from websockets.sync.client import connect
+
+from tests.browsers import SIZES, chromium
+from tests.servers import ROOT, Server, serve
+from tests.walk_seed import Walk, feet_of, make_walks
+
+pytestmark = pytest.mark.browser
+
+FOLDER = ROOT / "screenshots"
+PAST = (0.82, 0.91, 0.97, 1.06, 0.94, 1.03, 1.1, None, 1.01, 0.89, 1.05, 1.13, 0.52)
+CROSSFADE_MS = 900
+BURST_MS = 450
+
+
+class Screens:
+    """A session's page on screens of every size at once."""
+
+    def __init__(self, pages: dict[str, Page]) -> None:
+        self.pages = pages
+        self.complaints: list[str] = []
+        for page in pages.values():
+            page.on("pageerror", lambda error: self.complaints.append(str(error)))
+
+    def show(self, walk: Walk) -> None:
+        """Open a session."""
+        for page in self.pages.values():
+            page.goto(walk.path)
+
+    def tap(self, button: str) -> None:
+        """Tap a button on the first screen."""
+        next(iter(self.pages.values())).click(button)
+
+    def take(self, name: str, look: str, after_ms: int = CROSSFADE_MS) -> None:
+        """Take a picture of each screen, once all look as they should."""
+        for page in self.pages.values():
+            page.wait_for_selector(f"[data-look={look}]")
+        next(iter(self.pages.values())).wait_for_timeout(after_ms)
+        for size, page in self.pages.items():
+            page.screenshot(path=FOLDER / f"walk-{name}-{size}.png")
+            wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
+            assert wide <= 0, f"{name} scrolls sideways by {wide} px at {size}"
+        assert self.complaints == []
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    with serve(tmp_path / "data") as running:
+        yield running
+
+
+@pytest.fixture
+def stack() -> Iterator[ExitStack]:
+    with ExitStack() as running:
+        yield running
+
+
+def test_pictures_of_a_walk(server: Server, stack: ExitStack) -> None:
+    FOLDER.mkdir(exist_ok=True)
+    valences = ("positive", "negative", "binary", "explicit")
+    catch = {"phases": [{"kind": "catch", "seconds": 60}]}
+    *walks, calm = make_walks(server, *({"valence": valence} for valence in valences), catch)
+    browser = stack.enter_context(chromium())
+    pages = {}
+    for name, (width, height) in SIZES.items():
+        size = ViewportSize(width=width, height=height)
+        context = browser.new_context(base_url=server.url, viewport=size)
+        context.add_cookies([{"name": "sessionid", "value": calm.cookie, "url": server.url}])
+        pages[name] = context.new_page()
+    screens = Screens(pages)
+    for valence, walk in zip(valences, walks, strict=True):
+        screens.show(walk)
+        if valence == "positive":
+            screens.take("ready", "ready")
+        screens.tap("text=Start")
+        if valence == "positive":
+            screens.take("waiting", "waiting")
+        with feet_of(server, walk) as feet:
+            if valence == "positive":
+                screens.take("begin", "begin")
+            feet.walk(*PAST)
+            screens.take(f"{valence}-low", "feedback")
+            feet.walk(1.12)
+            screens.take(f"{valence}-hit", "feedback", BURST_MS)
+            feet.walk(0.83)
+            screens.take(f"{valence}-miss", "feedback")
+            if valence != "positive":
+                continue
+            feet.walk(None)
+            screens.take("missing", "feedback")
+            feet.walk(1.56)
+            screens.take("sparkle", "feedback", 2 * CROSSFADE_MS)
+        screens.take("lost", "lost")
+        screens.tap("button.pause")
+        screens.take("paused", "paused")
+        for page in pages.values():
+            page.click("text=End")
+        screens.take("ask", "ask")
+    screens.show(calm)
+    screens.tap("text=Start")
+    url = f"ws://127.0.0.1:{server.port}/ws/robot/"
+    header = {"Authorization": f"Bearer {calm.robot}"}
+    with feet_of(server, calm) as feet, connect(url, additional_headers=header) as robot:
+        robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
+        feet.walk(*[1.0] * 12)
+        screens.take("calm-with-robot", "calm")
+        screens.tap("text=Stop robot")
+        screens.take("robot-stop", "calm")

@@ -1,0 +1,132 @@
+"""A runtime for each test, drained and looked over when the test has ended."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import threading
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from typing import Any
+
+import pytest
+from asgiref.sync import sync_to_async
+from django.db import connections
+
+from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live import writer as writers
+from rehab.sessions.models import Step, TrainingSession
+from tests.sessions.live.callers import Caller, Place, build_place, change, open_session
+
+
+class Stall:
+    """Holds the writer's commits up, so that a test can look at what is not committed."""
+
+    def __init__(self) -> None:
+        self._open = threading.Event()
+        self._open.set()
+
+    def begin(self) -> None:
+        """Let no commit happen."""
+        self._open.clear()
+
+    def end(self) -> None:
+        """Let them happen."""
+        self._open.set()
+
+    def wait(self) -> None:
+        """Wait until commits may happen (in the writer's thread)."""
+        assert self._open.wait(10)
+
+
+@pytest.fixture
+async def live_path(
+    transactional_db: None, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> AsyncIterator[None]:
+    """Run what the test dials in to; nothing of it is left afterwards, nothing failed unseen."""
+    monkeypatch.setattr(runtimes, "_current", None)
+    Caller.open_ones.clear()
+    threads = set(threading.enumerate())
+    tasks = asyncio.all_tasks()
+    yield
+    for caller in list(Caller.open_ones):
+        await caller.hang_up()
+    if (runtime := runtimes._current) is not None:
+        await runtime.drain()
+        runtimes._current = None
+    await sync_to_async(connections.close_all)()
+    connections.close_all()
+    await asyncio.sleep(0)
+    assert asyncio.all_tasks() - tasks == {asyncio.current_task()}
+    writing = [t for t in set(threading.enumerate()) - threads if t.name == "garry-writer"]
+    assert not writing
+    failures = [r for r in caplog.get_records("call") if r.getMessage() == "A socket failed"]
+    assert not failures, failures[0].exc_info
+
+
+@pytest.fixture
+def stall(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stall]:
+    """Give the hand on the writer."""
+    hold, commit = Stall(), writers.commit
+
+    def commit_when_open(jobs: Any) -> None:
+        hold.wait()
+        commit(jobs)
+
+    monkeypatch.setattr(writers, "commit", commit_when_open)
+    yield hold
+    hold.end()
+
+
+@pytest.fixture
+async def place(live_path: None) -> Place:
+    """Give a station in a clinic."""
+    return await sync_to_async(build_place)("elm", spares=1)
+
+
+@pytest.fixture
+async def elsewhere(place: Place) -> Place:
+    """Give a station in another clinic."""
+    return await sync_to_async(build_place)("oak")
+
+
+OpenSession = Callable[..., Awaitable[TrainingSession]]
+
+
+@pytest.fixture
+def ready(live_path: None) -> OpenSession:
+    """Give a function that makes a session that is ready."""
+    return sync_to_async(open_session)
+
+
+@pytest.fixture
+def begun(ready: OpenSession) -> OpenSession:
+    """Give a function that makes a session that runs."""
+
+    async def begin(*args: Any, **options: Any) -> TrainingSession:
+        session = await ready(*args, **options)
+        await change(session, "start")
+        return session
+
+    return begin
+
+
+@pytest.fixture(autouse=True)
+def quiet(caplog: pytest.LogCaptureFixture) -> None:
+    """Keep the log for a look at it."""
+    caplog.set_level(logging.INFO)
+
+
+@pytest.fixture
+async def bystander(place, elsewhere, begun):
+    """Another session that goes on whatever happens in this test."""
+    session = await begun(elsewhere)
+    source = await elsewhere.source().dial()
+    await source.hello()
+    tablet = elsewhere.tablet(session)
+    await tablet.watch()
+    await source.walk(4.0)
+    yield session
+    await source.walk(4.0, 2.0)
+    await tablet.until_step(3)
+    assert tablet.last("step")["score"] == 1
+    assert await Step.everywhere.filter(session=session).acount() == 3

@@ -1,0 +1,397 @@
+"""Whatever frames come in: an error with a cure to the sender, the right code, no harm to others."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from rehab.sessions.live.consumers import base
+from rehab.sessions.live.messages import MAX_FRAME
+from rehab.sessions.models import Step, TrainingSession
+from tests.sessions.live.callers import (
+    Caller,
+    Message,
+    MonitorPage,
+    PatientPage,
+    Place,
+    RobotCaller,
+    SourceCaller,
+    a_step,
+    change,
+    numbers,
+    sign_in,
+)
+
+# --- frames that are not the protocol -------------------------------------------------------------
+
+BAD_FRAMES: dict[str, Any] = {
+    "too_large": '{"type": "step", "x": "' + "x" * MAX_FRAME + '"}',
+    "binary": b'{"type": "step"}',
+    "empty": "",
+    "no_json": "hello?",
+    "half_json": '{"type": "step"',
+    "array": [1, 2],
+    "number": "7",
+    "null": "null",
+    "text": '"step"',
+    "type_number": {"type": 7},
+    "type_null": {"type": None},
+    "no_type": {"number": 1},
+    "unknown_type": {"type": "stride"},
+    "seen": {"type": "seen", "frame": 1},
+    "second_hello": {"type": "hello", "version": 1, "run": "r", "last": 0},
+    "deep_array": "[" * (MAX_FRAME // 2) + "]" * (MAX_FRAME // 2),
+    "deep_extra": '{"type":"step","extra":' + '{"a":' * 9000 + "1" + "}" * 9001,
+    "surrogates": '{"type": "\\ud800"}',
+    "long_int": '{"type": "step", "number": ' + "9" * 5000 + "}",
+    "steps_object": {"type": "steps", "steps": {}},
+    "steps_empty": {"type": "steps", "steps": []},
+    "steps_missing": {"type": "steps"},
+    "steps_many": {"type": "steps", "steps": [a_step(n) for n in range(1, 258)]},
+    "steps_of_lists": {"type": "steps", "steps": [[1]]},
+    "nan_literal": '{"type":"step","number":2,"time_s":1,"side":"left","value":NaN}',
+    "infinity_literal": '{"type":"step","number":2,"time_s":1,"side":"left","value":Infinity}',
+    "minus_infinity": '{"type":"step","number":2,"time_s":-Infinity,"side":"left","value":1}',
+    "overflow": '{"type":"step","number":2,"time_s":1,"side":"left","value":1e999}',
+    "huge_value": a_step(2, 10**400),
+    "huge_time": a_step(2, time_s=10**400),
+    "time_in_ms": a_step(2, time_s=1.7e12),
+    "huge_number": a_step(2) | {"number": 10**400},
+    "number_beyond_the_column": a_step(2) | {"number": 2**31},
+    "number_bool": a_step(2) | {"number": True},
+    "number_float": a_step(2) | {"number": 2.0},
+    "number_text": a_step(2) | {"number": "2"},
+    "number_zero": a_step(2) | {"number": 0},
+    "number_negative": a_step(2) | {"number": -1},
+    "time_bool": a_step(2, time_s=True),
+    "time_null": a_step(2, time_s=None),
+    "time_missing": {"type": "step", "number": 2, "side": "left", "value": 4.0},
+    "value_bool": a_step(2, True),
+    "value_text": a_step(2, "4.0"),
+    "value_list": a_step(2, [4.0]),
+    "side_paretic": a_step(2, side="paretic"),
+    "side_list": a_step(2, side=["left"]),
+    "reasons_text": a_step(2, reasons="slip"),
+    "reasons_many": a_step(2, reasons=["slip"] * 9),
+    "reasons_of_numbers": a_step(2, reasons=[1]),
+    "reasons_with_spaces": a_step(2, reasons=["it slipped"]),
+    "extra_list": a_step(2, extra=[1]),
+    "extra_text": a_step(2, extra={"a": "b"}),
+    "extra_bool": a_step(2, extra={"a": True}),
+    "extra_nested": a_step(2, extra={"a": {"b": 1}}),
+    "extra_many": a_step(2, extra={f"n{i}": i for i in range(33)}),
+    "extra_name": a_step(2, extra={"x" * 65: 1}),
+    "plain_words": "four, three",
+    "plain_one_number": "4.0",
+    "plain_three_numbers": "4, 3, 2",
+}
+
+
+async def test_frames_that_are_not_the_protocol(place, begun, bystander):
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    await source.walk(4.0)
+    for name, bad in BAD_FRAMES.items():
+        await source.say(bad)
+        code, error = await source.sent_away()
+        assert code == 4400, name
+        assert len(error["message"]) > 20, name
+        source = await place.source().dial()
+        assert (await source.hello())["next"] == 2, name
+    assert await numbers(session) == [1]
+    await source.walk(4.0)
+
+
+BAD_HELLOS: list[Message] = [
+    {"version": 2},
+    {"version": None},
+    {"version": "1"},
+    {"run": ""},
+    {"run": "x" * 65},
+    {"run": "two words"},
+    {"run": 1},
+    {"last": -1},
+    {"last": None},
+    {"last": True},
+    {"last": 1.5},
+    {"last": 10**400},
+    {"session": "7"},
+    {"session": True},
+    {"session": -1},
+    {"session": 10**400},
+    {"clock_s": "now"},
+    {"clock_s": 10**400},
+    {"clock_s": True},
+    {"speed": "fast"},
+    {"speed": 0},
+    {"speed": -1},
+    {"speed": False},
+]
+
+
+async def test_hellos_that_are_not_the_protocol(place, begun, bystander):
+    await begun(place)
+    for bad in BAD_HELLOS:
+        source = await place.source().dial()
+        await source.say({"type": "hello", "version": 1, "run": "r", "last": 0} | bad)
+        code, error = await source.sent_away()
+        assert code == 4400, bad
+        assert len(error["message"]) > 15, bad
+
+
+async def test_steps_before_hello(place, begun):
+    await begun(place)
+    source = await place.source().dial()
+    await source.say(a_step(1))
+    code, error = await source.sent_away()
+    assert (code, error["code"]) == (4400, "no_hello")
+
+
+async def test_what_is_no_hello_of_a_robot(place, begun, bystander):
+    await begun(place)
+    frames: tuple[Any, ...] = (
+        {"type": "hello"},
+        {"type": "hello", "base": 1},
+        {"type": "step"},
+        {},
+        [],
+        b"x",
+        "no",
+        {"type": "report", "report": []},
+        {"type": "report", "report": {"x": "x" * 9000}},
+        '{"type": "report", "report": {"x": 1e999}}',
+        '{"type": "report", "report": {"x": NaN}}',
+        '{"type": "report", "report": {"x": ' + "[" * 900 + "]" * 900 + "}}",
+    )
+    for bad in frames:
+        robot = await place.robot().dial()
+        await robot.say(bad)
+        code, error = await robot.sent_away()
+        assert code == 4400, bad
+        assert len(error["message"]) > 15, bad
+
+
+async def test_a_robots_bad_report_does_not_reach_the_monitor(place, begun):
+    session = await begun(place)
+    monitor = place.monitor(session)
+    await monitor.watch()
+    for bad in ("1e999", "[" * 900 + "]" * 900):
+        robot = await place.robot().dial()
+        await robot.hello()
+        await robot.say('{"type": "report", "report": {"x": ' + bad + "}}")
+        assert (await robot.sent_away())[0] == 4400
+    robot = await place.robot().dial()
+    await robot.hello()
+    await robot.say({"type": "report", "report": {"pose": [0, 1, 0.5], "word": "ok"}})
+    report = await monitor.until(lambda event: event["kind"] == "robot")
+    assert report["report"] == {"pose": [0, 1, 0.5], "word": "ok"}
+
+
+async def test_what_pages_may_not_say(place, begun, bystander):
+    session = await begun(place)
+    frames: tuple[Any, ...] = (
+        {"type": "step"},
+        {"type": "seen"},
+        {"type": "seen", "frame": True},
+        {"type": "seen", "frame": -1},
+        {"type": "seen", "frame": "1"},
+        "x",
+        b"x",
+        [],
+    )
+    for bad in frames:
+        for page in (place.tablet(session), place.monitor(session)):
+            await page.watch()
+            await page.say(bad)
+            code, error = await page.sent_away()
+            assert code == 4400, bad
+            assert len(error["message"]) > 15, bad
+    tablet = place.tablet(session)
+    await tablet.watch()
+    for kind in ("start", "resume", "finish", "abort", "goal"):
+        value = {"value": 5} if kind == "goal" else {}
+        await tablet.say({"type": "change", "kind": kind, "id": kind, **value})
+        refusal = await tablet.hear("error")
+        assert (refusal["code"], refusal["id"]) == ("refused", kind)
+    await tablet.say({"type": "change", "kind": "pause", "id": "p"})
+    assert (await tablet.hear("done"))["id"] == "p"
+    await change(session, "resume")
+    changes: tuple[Message, ...] = (
+        {"kind": "goal", "value": 4},
+        {"kind": "goal", "value": True, "id": "x"},
+        {"kind": "goal", "value": "4", "id": "x"},
+        {"kind": "goal", "value": 10**400, "id": "x"},
+        {"kind": "dance", "id": "x"},
+        {"kind": ["goal"], "id": "x"},
+        {"kind": None, "id": "x"},
+        {"kind": "goal", "value": 4, "id": "two words"},
+    )
+    for bad in changes:
+        monitor = place.monitor(session)
+        await monitor.watch()
+        await monitor.say({"type": "change", **bad})
+        code, error = await monitor.sent_away()
+        assert code == 4400, bad
+    assert (await TrainingSession.everywhere.aget(pk=session.pk)).goal == 3.0
+
+
+async def test_changes_that_cannot_be_are_refused_in_words(place, begun):
+    session = await begun(place)
+    monitor = place.monitor(session)
+    await monitor.watch()
+    for kind, value, words in (
+        ("goal", 0, "above 0"),
+        ("goal", None, "needs a value"),
+        ("gain", 9, "0.5 to 1.5"),
+        ("phase", 1, "no phase 1"),
+        ("phase", 1e300, "no phase"),
+        ("activation_threshold", -1, "above 0"),
+        ("resume", None, "must be paused"),
+        ("start", None, "must be ready"),
+    ):
+        answer = await monitor.change(kind, value)
+        assert (answer["type"], answer["code"]) == ("error", "refused"), kind
+        assert words in answer["message"]
+    assert (await monitor.change("pause"))["type"] == "done"
+    assert monitor.code is None
+
+
+# --- too much, too little -------------------------------------------------------------------------
+
+
+async def test_a_flood_of_frames(place, begun, bystander, monkeypatch):
+    monkeypatch.setattr(base, "FRAME_BURST", 50.0)
+    monkeypatch.setattr(base, "FRAMES_PER_S", 1.0)
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    await source.walk(4.0)
+    for _ in range(60):
+        await source.say(a_step(1))
+    code, error = await source.sent_away()
+    assert (code, error["code"]) == (4029, "flood")
+    assert "frames a second" in error["message"]
+    assert await numbers(session) == [1]
+
+
+async def test_a_flood_of_unacknowledged_steps(place, begun, bystander, stall):
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    stall.begin()
+    await source.say({"type": "steps", "steps": [a_step(n) for n in range(1, 257)]})
+    assert await source.overhear() == []
+    await source.say(a_step(257))
+    code, error = await source.sent_away()
+    assert (code, error["code"]) == (4029, "flood")
+    assert "256" in error["message"]
+    stall.end()
+    again = await place.source().dial()
+    await again.hello()
+    await again.acked(256)
+    assert await numbers(session) == list(range(1, 257))
+
+
+async def test_silence_after_the_connection(place, monkeypatch, bystander):
+    monkeypatch.setattr(base.Socket, "first_frame_s", 0.01)
+    for caller in (SourceCaller(), place.source(), RobotCaller(), place.robot()):
+        await caller.dial()
+        code, error = await caller.sent_away()
+        assert (code, error["code"]) == (4400, "silent")
+        assert "hello" in error["message"]
+
+
+async def test_hello_ends_the_wait_for_it(place, begun, monkeypatch):
+    monkeypatch.setattr(base.Socket, "first_frame_s", 0.02)
+    await begun(place)
+    source, robot = await place.source().dial(), await place.robot().dial()
+    await source.hello()
+    await robot.hello()
+    await asyncio.sleep(0.04)
+    await source.walk(4.0)
+    await robot.hear("step")
+
+
+async def test_an_unknown_address(live_path):
+    for path in (
+        "/",
+        "/ws/",
+        "/ws/source",
+        "/ws/sources/",
+        "/ws/session/x/patient/",
+        "/ws/session/-1/patient/",
+        "/ws/session/" + "9" * 5000 + "/patient/",
+        "/ws/session/1/",
+        "/ws/source/%00/",
+    ):
+        caller = await Caller(path).dial()
+        code, error = await caller.sent_away()
+        assert (code, error["code"]) == (4004, "no_address"), path
+        assert "protocol.md" in error["message"]
+
+
+async def test_a_session_that_does_not_exist(place):
+    for number in (0, 999_999, 10**30):
+        for page in (
+            MonitorPage(number, user=place.pt),
+            PatientPage(number, token=place.tokens["tablet"]),
+        ):
+            await page.dial()
+            assert (await page.sent_away())[0] == 4004
+
+
+# --- strange headers and addresses ----------------------------------------------------------------
+
+
+async def test_a_strange_place_to_go_on_from(place, begun):
+    session = await begun(place)
+    for after in ("", "x", "-1", "1.5", "%00", "9" * 30, "9" * 5000, "²", "1&after=2"):
+        tablet = place.tablet(session, f"?after={after}")
+        assert (await tablet.watch())["number"] == 0
+
+
+async def test_a_strange_origin(place, begun):
+    session = await begun(place)
+    for origin in ("http://[", "null", "", "//", "http://[::1", "é", "http://a:b@"):
+        page = MonitorPage(session.pk, user=place.pt, origin=origin)
+        await page.dial()
+        assert (await page.sent_away())[0] == 4001, origin
+
+
+async def test_strange_cookies_beside_ours(place, begun):
+    session = await begun(place)
+    ours = f"sessionid={sign_in(place.pt)}".encode()
+    for cookie in (b"a/b=1; ", b"=; ", b"\xff=\xff; ", b'"; ', b"a[b]=1; "):
+        await MonitorPage(session.pk, headers=[(b"cookie", cookie + ours)]).watch()
+
+
+async def test_a_strange_authorization(place, begun):
+    session = await begun(place)
+    for kind in (b"Basic eDp5", b"Bearer", b"Bearer ", b"", b"\xff\xff"):
+        page = PatientPage(session.pk, headers=[(b"authorization", kind)])
+        await page.dial()
+        assert (await page.sent_away())[0] == 4001, kind
+
+
+async def test_pages_whose_session_fails_are_told_to_come_back(place: Place, begun, bystander):
+    """A number that was written behind the server's back: the session is rebuilt from its log."""
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    tablet, robot = place.tablet(session), await place.robot().dial()
+    await tablet.watch()
+    await robot.hello()
+    await source.walk(4.0)
+    first = await Step.everywhere.aget(session=session)
+    first.pk, first.number, first.value = None, 2, 9.0
+    await first.asave(force_insert=True)
+    await source.say(a_step(2, 4.0))
+    code, error = await source.sent_away()
+    assert (code, error["code"]) == (4011, "not_stored")
+    assert (await tablet.sent_away())[0] == 4012
+    assert (await robot.sent_away())[0] in (4011, 4012)
+    again = await place.source().dial()
+    assert (await again.hello())["next"] == 3
+    await again.walk(4.0)
+    assert await numbers(session) == [1, 2, 3]

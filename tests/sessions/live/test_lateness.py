@@ -1,0 +1,103 @@
+"""Steps that were held up on their way are stored and counted, and never shown as live."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from rehab.sessions.live.consumers import source as source_module
+from rehab.sessions.live.lateness import LATE_S, Lateness
+from rehab.sessions.models import Step
+from tests.sessions.live.callers import a_step
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0, 2.0, 10.0])
+def test_lateness_is_told_by_the_clock_in_hello(speed):
+    lateness = Lateness("r", 100.0, clock_s=50.0, speed=speed)
+    slack = LATE_S * max(1.0, speed)
+    assert not lateness.is_late(50.0, 100.0)
+    assert not lateness.is_late(50.0 + 10 * speed, 110.0)
+    assert not lateness.is_late(50.0 - slack, 100.0)
+    assert lateness.is_late(50.0 - slack - 0.01, 100.0)
+    assert lateness.is_late(50.0, 100.0 + slack / speed + 0.1)
+
+
+def test_nothing_is_late_at_full_speed():
+    lateness = Lateness("r", 100.0, clock_s=50.0, speed=None)
+    assert not lateness.is_late(-1e9, 1e9)
+
+
+def test_without_a_clock_the_quickest_step_stands_for_a_fresh_one():
+    lateness = Lateness("r", 0.0, clock_s=None, speed=1.0)
+    assert not lateness.is_late(7.0, 3.0)
+    assert not lateness.is_late(8.0, 9.0)
+    assert lateness.is_late(9.0, 10.1)
+    assert not lateness.is_late(20.0, 10.2)
+    assert lateness.is_late(20.0, 15.3)
+
+
+def test_a_clock_that_was_told_late_is_corrected_by_a_quicker_step():
+    lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0)
+    assert not lateness.is_late(3.0, 0.0)
+    assert lateness.is_late(3.0, 5.1)
+
+
+def test_a_clock_that_stood_still_with_the_session_makes_nothing_late():
+    lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0)
+    assert not lateness.is_late(1.0, 1.0)
+    lateness.slacken(31.0)  # the session goes on after half a minute
+    assert not lateness.is_late(2.0, 32.0)
+    assert lateness.is_late(3.0, 38.1)  # and what is late from then on is late
+
+
+def test_a_pause_excuses_no_more_than_itself():
+    lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0)
+    lateness.slacken(10.0)
+    assert lateness.is_late(1.0, 80.0)
+
+
+def test_late_steps_tell_nothing_of_the_clock():
+    lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0)
+    assert [lateness.is_late(t, 60.0) for t in (1.0, 2.0, 54.0)] == [True, True, True]
+    assert not lateness.is_late(56.0, 60.0)
+
+
+@pytest.mark.parametrize("tells_its_clock", [True, False])
+async def test_steps_resent_after_a_minute_offline(place, begun, monkeypatch, tells_its_clock):
+    now = SimpleNamespace(s=1000.0)
+    clock = SimpleNamespace(monotonic=lambda: now.s, time=lambda: now.s)
+    monkeypatch.setattr(source_module, "time", clock)
+    session = await begun(place)
+    tablet, monitor, robot = place.tablet(session), place.monitor(session), place.robot()
+    await tablet.watch()
+    await monitor.watch()
+    await (await robot.dial()).hello()
+    source = await place.source().dial()
+    await source.hello(**({"clock_s": 0.0} if tells_its_clock else {}))
+    for number in range(1, 4):
+        now.s = 1000.0 + number
+        await source.walk(4.0, time_s=float(number))
+    await source.hang_up()
+    now.s += 60.0  # the source walks on alone
+    again = await place.source().dial()
+    told = {"clock_s": 63.0} if tells_its_clock else {}
+    assert (await again.hello(last=63, **told))["next"] == 4
+    await again.say(
+        {"type": "steps", "steps": [a_step(n, 4.0, time_s=float(n)) for n in range(4, 64)]}
+    )
+    await again.acked(63)
+    again.number = 63
+    now.s += 1.0
+    await again.walk(4.0, time_s=64.0)
+    await tablet.until_step(64)
+    await monitor.until_step(64)
+    fresh = [1, 2, 3, *range(58, 65)]  # those of the last five seconds are fresh
+    for page in (tablet, monitor):
+        steps = [event for event in page.events if event["kind"] == "step"]
+        assert [event["number"] for event in steps] == list(range(1, 65))
+        assert [event["number"] for event in steps if event["live"]] == fresh
+    assert tablet.last("step")["score"] == 64
+    await robot.overhear()
+    assert [m["number"] for m in robot.heard if m["type"] == "step"] == fresh
+    assert await Step.everywhere.filter(session=session, hit=True).acount() == 64

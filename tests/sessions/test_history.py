@@ -1,0 +1,391 @@
+"""Past sessions and one in detail: what stands there equals the log."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import statistics
+from datetime import UTC, date, datetime
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+from django.utils import timezone
+
+from rehab.people.models import Patient
+from rehab.people.roles import Role
+from rehab.sessions.models import RobotEntry, SessionEvent, Step
+from rehab.sessions.trend import SESSIONS, read_trend
+from rehab.sessions.words import at_clinic, say_day, say_duration, say_number, say_rate
+from rehab.training.changes import Change, ChangeKind
+from rehab.training.phases import make_phase
+from tests.walks import GOAL, HIT, MISS, RIGHT, Walked, strides, walk
+from tests.world import World, build_world
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+@pytest.fixture
+def patient(world) -> Patient:
+    return Patient.everywhere.create(
+        clinic=world.clinic, code="B-1", nickname="Rosa", paretic_side="left"
+    )
+
+
+@pytest.fixture
+def client(world) -> Client:
+    return client_of(world, Role.PT)
+
+
+def client_of(world: World, role: Role) -> Client:
+    client = Client()
+    client.force_login(world.people[role])
+    return client
+
+
+def history(client: Client, patient: Patient, asked: str = "") -> str:
+    url = reverse("history", kwargs={"patient_id": patient.pk})
+    return plain(client.get(url + asked).content.decode())
+
+
+def detail(client: Client, session) -> str:
+    return plain(client.get(reverse("session", kwargs={"session_id": session.pk})).content.decode())
+
+
+def plain(page: str) -> str:
+    return page.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def items(page: str) -> list[str]:
+    """Give the words of each session in the list, markup left out."""
+    return [words(item) for item in re.findall(r'<a class="item".*?</a>', page, re.DOTALL)]
+
+
+def words(markup: str) -> str:
+    return html.unescape(" ".join(re.sub(r"<[^>]+>", " ", markup).split()))
+
+
+def read_json(page: str, name: str):
+    return json.loads(re.search(rf'<script id="{name}"[^>]*>(.*?)</script>', page, re.DOTALL)[1])
+
+
+# --- the list -------------------------------------------------------------------------------------
+
+
+def test_the_list_tells_type_date_duration_score_hit_rate_and_goal(client, patient):
+    year = f", {date(2026, 11, 1).year}" if timezone.now().year != 2026 else ""
+    walk(patient, "negative", strides(45, 46), days_ago=3)
+    walk(patient, "explicit", strides(3, 1), days_ago=2)
+    walk(patient, "positive", strides(1, 1), days_ago=1, end=ChangeKind.ABORT)
+    walk(patient, "binary", [], end=None, simulated=True)
+    listed = items(history(client, patient))
+    assert f"Nov 18{year} 10:00" in listed[3]
+    assert "Negative · goal 2.00 · 2 min 49 % −46 points" in listed[3]
+    assert f"Nov 19{year} 10:00 Explicit · goal 2.00 · 3 s 75 % hits" in listed[2]
+    assert "ended early" in listed[1]
+    assert "– hits" in listed[1]
+    assert "running simulated" in listed[0]
+
+
+def test_chips_count_each_type_and_filter_by_it(client, patient):
+    sessions = {v: walk(patient, v, strides(3, 2)) for v in ("positive", "negative", "binary")}
+    walk(patient, "positive", strides(4, 2))
+    page = history(client, patient)
+    chips = words(re.search(r'<nav class="chips".*?</nav>', page, re.DOTALL)[0])
+    assert chips == "All 4 Positive 2 Negative 1 Binary 1 Explicit 0"
+    page = history(client, patient, "?type=binary")
+    assert len(items(page)) == 1
+    assert reverse("session", kwargs={"session_id": sessions["binary"].pk}) in page
+    assert "No sessions yet" in history(client, patient, "?type=explicit")
+    assert len(items(history(client, patient, "?type=nonsense"))) == 4
+
+
+def test_a_new_patient_has_no_sessions_yet(client, patient):
+    assert "What Rosa walks will stand here." in history(client, patient)
+
+
+def test_many_sessions_come_in_pages_at_the_same_cost(client, patient, django_assert_num_queries):
+    for index in range(23):
+        walk(patient, "positive", strides(3, 2), days_ago=index)
+    url = reverse("history", kwargs={"patient_id": patient.pk})
+    with django_assert_num_queries(10):
+        first = client.get(url).content.decode()
+    with django_assert_num_queries(10):
+        second = client.get(f"{url}?page=2").content.decode()
+    assert len(items(first)) == 20
+    assert len(items(second)) == 3
+    assert "1 of 2" in first
+    assert len(items(client.get(f"{url}?page=99").content.decode())) == 3
+
+
+def test_the_trend_equals_the_stored_strides(world, client, patient):
+    phases = (
+        make_phase("baseline", strides=4),
+        make_phase("training", strides=4),
+        make_phase("catch", strides=2),
+        make_phase("training", "Training 85 %", gain=0.85),
+    )
+    walked: list[Walked] = [
+        1.0,
+        1.5,
+        None,
+        2.0,
+        3.0,
+        1.0,
+        (RIGHT, 9.0),
+        2.5,
+        2.0,
+        8.0,
+        8.0,
+        4.0,
+        2.2,
+    ]
+    session = walk(patient, "positive", walked, phases=phases, wanted=0.6)
+    (point,) = read_trend(world.people[Role.PT], type(session).everywhere.filter(pk=session.pk))
+    steps = Step.everywhere.filter(session=session, side="left", valid=True)
+    trained = [step.value for step in steps if step.phase in {1, 3}]
+    before = [step.value for step in steps if step.phase == 0]
+    assert point.walked.count == len(trained) == 6
+    assert point.walked.mean == pytest.approx(statistics.mean(trained))
+    assert point.walked.deviation == pytest.approx(statistics.pstdev(trained))
+    assert point.baseline.mean == pytest.approx(statistics.mean(before)) == 1.5
+    assert point.gain == pytest.approx(statistics.mean(trained) / 1.5 - 1)
+    chart = read_json(history(client, patient), "trend")
+    assert chart["hits"]["wanted"] == [60.0]
+    judged = [step.hit for step in steps if step.phase in {1, 3}]
+    assert chart["hits"]["hit"] == [round(100 * sum(judged) / len(judged), 1)]
+    assert chart["values"]["mean"] == [round(statistics.mean(trained), 3)]
+    assert chart["values"]["goal"] == [GOAL]
+    assert chart["values"]["unit"] == "W/kg"
+
+
+def test_the_trend_has_the_newest_sessions_oldest_first(world, patient):
+    for index in range(SESSIONS + 3):
+        walk(patient, "positive", strides(index % 5 + 1, 2), days_ago=index)
+    walk(patient, "positive", strides(9, 0), end=ChangeKind.ABORT)
+    trend = read_trend(world.people[Role.PT], patient.sessions.all())
+    dates = [point.session.created_at for point in trend]
+    assert len(trend) == SESSIONS
+    assert dates == sorted(dates)
+    newest = patient.sessions.filter(state="finished").order_by("-created_at").first()
+    assert trend[-1].session == newest
+
+
+def test_what_was_walked_and_what_was_simulated_share_no_figure(client, patient):
+    walk(patient, "positive", strides(9, 0), simulated=True)
+    page = history(client, patient)
+    assert "Simulated: nobody walked these" in page
+    assert read_json(page, "trend")["hits"]["hit"] == [100.0]
+    walk(patient, "positive", strides(5, 5))
+    page = history(client, patient)
+    assert "nobody walked these" not in page
+    assert read_json(page, "trend")["hits"]["hit"] == [50.0]
+    assert "simulated" in items(page)[1]
+    assert "1 session<" in page
+
+
+# --- one session ----------------------------------------------------------------------------------
+
+
+def test_the_chart_holds_every_stride_of_the_trained_leg(client, patient):
+    phases = (make_phase("baseline", strides=3), make_phase("training", gain=0.85))
+    walked: list[Walked] = [
+        2.1,
+        1.9,
+        None,
+        2.4,
+        (RIGHT, 7.0),
+        2.3,
+        Change(ChangeKind.GOAL, 1.5),
+        2.3,
+        99.0,
+    ]
+    session = walk(patient, "positive", walked, phases=phases)
+    chart = read_json(detail(client, session), "session")
+    stored = list(Step.everywhere.filter(session=session, side="left").order_by("number"))
+    columns = chart["strides"]
+    assert columns["number"] == [step.number for step in stored] == [1, 2, 3, 4, 6, 7, 8]
+    assert columns["hit"] == [step.hit for step in stored]
+    assert columns["goal"] == [2, 2, 2, 2, 2, 1.5, 1.5]
+    expected = [2.1, 1.9, None, 0.85 * 2.4, 0.85 * 2.3, 0.85 * 2.3, None]
+    assert columns["shown"] == [value if value is None else round(value, 4) for value in expected]
+    assert columns["why"][2] == "missing"
+    assert columns["why"][6] == "out_of_bounds"
+    assert [(phase["name"], phase["from"], phase["to"]) for phase in chart["phases"]] == [
+        ("Baseline", 1, 3),
+        ("Training", 4, 8),
+    ]
+    assert chart["marks"] == [
+        {"after": 6, "kind": "goal", "words": "Goal 2.00 → 1.50\N{NO-BREAK SPACE}W/kg"}
+    ]
+
+
+def test_strides_before_the_goal_is_known_are_drawn_unjudged(client, world, patient):
+    from rehab.sessions.live.actor import SessionActor
+    from rehab.sessions.services import create_session
+    from rehab.training.goals import GoalRule
+    from rehab.training.steps import Measurement, Side
+    from tests.world import NOW, store
+
+    session = create_session(
+        patient,
+        valence="binary",
+        goal=GoalRule(percent_of_baseline=100),
+        phases=(make_phase("baseline", strides=60), make_phase("training")),
+    )
+    actor = SessionActor(session)
+    rows = [*actor.change(Change(ChangeKind.START), None, NOW)]
+    rows += [actor.take(Measurement(n, n, Side.LEFT, 2.0), NOW) for n in range(1, 63)]
+    store(actor, rows)
+    columns = read_json(detail(client, session), "session")["strides"]
+    assert columns["hit"] == [None] * 60 + [True] * 2
+    assert columns["shown"] == [2.0] * 62
+    assert columns["goal"] == [None] * 60 + [2.0] * 2
+
+
+def test_phases_and_events_are_told(client, patient):
+    phases = (make_phase("baseline", strides=2), make_phase("training"))
+    walked: list[Walked] = [
+        1.0,
+        3.0,
+        HIT,
+        Change(ChangeKind.GOAL, 2.4),
+        HIT,
+        MISS,
+        Change(ChangeKind.PAUSE),
+        HIT,
+        Change(ChangeKind.RESUME),
+        MISS,
+        Change(ChangeKind.ACTIVATION_THRESHOLD, 0.8),
+        Change(ChangeKind.GAIN, 0.85),
+        Change(ChangeKind.PHASE, 0),
+        None,
+    ]
+    session = walk(patient, "positive", walked, phases=phases)
+    page = detail(client, session)
+    rows = [words(row) for row in re.findall(r"<tr>.*?</tr>", page, re.DOTALL)]
+    assert "Baseline no 1.00 3 2 1 50 % 2.00 100 %" in rows
+    of_goal = (2.5 / 2.0 + 2.5 / 2.4 + 1.5 / 2.4 + 1.5 / 2.4) / 4
+    assert f"Training yes 1.00 4 4 2 50 % 2.00 {100 * of_goal:.0f} %" in rows
+    told = [words(item) for item in re.findall(r"<li class=\"\w+\"><time.*?</li>", page, re.DOTALL)]
+    assert [line.split(" ", 1)[1] for line in told] == [
+        "Started",
+        "Goal 2.00 → 2.40 W/kg after stride 3",
+        "Paused after stride 5",
+        "Resumed after stride 6",
+        "Robot threshold 90 % → 80 % after stride 7",
+        "Gain 1.00 → 0.85 after stride 7",
+        "Phase: Baseline after stride 7",
+        "Finished after stride 8",
+    ]
+    figures = words(re.search(r'<ul class="figures">.*?</ul>', page, re.DOTALL)[0])
+    assert "Hit rate 50 %" in figures
+    assert "Score 2 points" in figures
+    assert "Goal 2.40 W/kg, changed 1 ×" in figures
+    assert "Strides 8 2 do not count" in figures
+
+
+def test_explicit_feedback_has_no_score(client, patient):
+    page = detail(client, walk(patient, "explicit", strides(3, 1)))
+    assert "Score – this type has no points" in words(page)
+
+
+def test_a_robots_gestures_are_counted_and_its_stop_is_listed(client, patient):
+    session = walk(patient, "positive", strides(3, 1))
+    gesture = [(RobotEntry.GESTURE, {"phase": "started"}), (RobotEntry.GESTURE, {"phase": "ended"})]
+    for kind, data in [(RobotEntry.DECISION, {})] * 3 + gesture * 2 + [(RobotEntry.STOP, {})]:
+        SessionEvent.everywhere.create(
+            session=session, after_number=2, kind=kind.value, at=session.started_at, data=data
+        )
+    page = words(detail(client, session))
+    assert "2 gestures of the robot" in page
+    assert "Robot stopped after stride 2" in page
+    assert "decision" not in page
+
+
+@pytest.mark.parametrize(
+    ("end", "said", "link"),
+    [
+        (None, "Running", "monitor"),
+        (ChangeKind.ABORT, "Ended early", "scores"),
+        (ChangeKind.FINISH, "", "scores"),
+    ],
+)
+def test_every_state_can_be_looked_at(client, patient, end, said, link):
+    session = walk(patient, "positive", strides(3, 1), end=end)
+    page = detail(client, session)
+    assert said in page
+    assert reverse(link, kwargs={"session_id": session.pk}) in page
+
+
+def test_a_session_without_a_stride_says_so(client, patient):
+    page = detail(client, walk(patient, "positive", []))
+    assert "No stride has come." in page
+
+
+def test_thousands_of_strides_are_told_by_few_queries(client, patient, django_assert_num_queries):
+    session = walk(patient, "binary", strides(2000, 1000))
+    with django_assert_num_queries(7):
+        page = client.get(reverse("session", kwargs={"session_id": session.pk})).content.decode()
+    assert len(read_json(page, "session")["strides"]["number"]) == 3000
+    assert len(page) < 150_000
+
+
+def test_who_may_look(world, patient):
+    session = walk(patient, "positive", strides(3, 1), simulated=True)
+    other = build_world("birch")
+    past, one = (
+        reverse("history", kwargs={"patient_id": patient.pk}),
+        reverse("session", kwargs={"session_id": session.pk}),
+    )
+    for place, role, answers in (
+        (world, Role.PT, (200, 200)),
+        (world, Role.LEAD, (200, 200)),
+        (world, Role.RESEARCHER, (403, 200)),
+        (other, Role.PT, (404, 404)),
+        (other, Role.RESEARCHER, (403, 404)),
+    ):
+        client = client_of(place, role)
+        assert (client.get(past).status_code, client.get(one).status_code) == answers
+    page = detail(client_of(world, Role.RESEARCHER), session)
+    assert patient.pseudonym in page
+    assert patient.nickname not in page
+    assert past not in page
+    assert "Simulated" in page
+    assert Client().get(one).status_code == 302
+
+
+# --- words ----------------------------------------------------------------------------------------
+
+
+def test_figures_are_written_the_same_everywhere():
+    assert [plain(say_rate(rate)) for rate in (0.712, 0, 1, -0.02, None)] == [
+        "71 %",
+        "0 %",
+        "100 %",
+        "−2 %",
+        "–",
+    ]
+    assert [say_number(value, 0) for value in (1234.4, -5, -0.2)] == ["1,234", "−5", "0"]
+    assert [plain(say_duration(s)) for s in (0, 59.4, 59.6, 1234)] == [
+        "0 s",
+        "59 s",
+        "1 min",
+        "21 min",
+    ]
+
+
+def test_days_follow_the_clinics_own_clock(world):
+    late = datetime(2026, 11, 20, 23, 30, tzinfo=UTC)
+    world.clinic.time_zone = "Europe/Madrid"
+    there = at_clinic(late, world.clinic).date()
+    assert there == date(2026, 11, 21)
+    assert say_day(there, date(2026, 11, 21)) == "today"
+    assert say_day(there, date(2026, 11, 25)) == "Nov 21"
+    assert say_day(there, date(2027, 1, 2)) == "Nov 21, 2026"

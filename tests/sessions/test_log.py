@@ -1,0 +1,258 @@
+"""The log is the truth: what was committed rebuilds the session, and nothing else counts."""
+
+from __future__ import annotations
+
+import dataclasses
+from datetime import datetime, timedelta
+from typing import Any
+
+import pytest
+from django.db import IntegrityError
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rehab.people.models import Clinic, Patient
+from rehab.people.scope import CrossClinic
+from rehab.sessions.live.actor import SessionActor, StepRow
+from rehab.sessions.live.writer import STEP_COLUMNS
+from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
+from rehab.sessions.services import create_session
+from rehab.stations.models import Station
+from rehab.training.changes import Change, ChangeKind, Refused
+from rehab.training.goals import GoalRule
+from rehab.training.measures import InvalidSetting
+from rehab.training.metrics import measure_session
+from rehab.training.phases import make_phase
+from rehab.training.steps import Measurement, Side
+from tests.world import NOW, store
+
+pytestmark = pytest.mark.django_db
+
+TRAINING = (make_phase("training"),)
+
+
+@pytest.fixture
+def patient() -> Patient:
+    clinic = Clinic.everywhere.create(name="Elm")
+    return Patient.everywhere.create(clinic=clinic, code="7", nickname="Rosa", paretic_side="left")
+
+
+def begin(patient: Patient, valence: str = "binary", **settings: Any) -> SessionActor:
+    defaults: dict[str, Any] = {"goal": GoalRule(value=3.0), "phases": TRAINING}
+    actor = SessionActor(create_session(patient, valence=valence, **defaults | settings))
+    change(actor, ChangeKind.START)
+    return actor
+
+
+def change(
+    actor: SessionActor, kind: ChangeKind, value: float | None = None, at: datetime = NOW
+) -> None:
+    store(actor, actor.change(Change(kind, value), None, at))
+
+
+def walk(actor: SessionActor, *values: float | None, reasons: tuple[str, ...] = ()) -> None:
+    first = actor.fold.last_number + 1
+    strides = [
+        Measurement(first + i, (first + i) * 1.1, Side.LEFT, value, reasons, {"step_length_m": 0.5})
+        for i, value in enumerate(values)
+    ]
+    store(actor, [actor.take(stride, NOW) for stride in strides])
+
+
+def reread(actor: SessionActor) -> TrainingSession:
+    return TrainingSession.everywhere.get(pk=actor.session.pk)
+
+
+def test_every_field_of_a_step_is_kept(patient):
+    actor = begin(patient, phases=(make_phase("training", gain=0.85),))
+    walk(actor, 4.0)
+    step = Step.everywhere.get()
+    kept = {field.name: getattr(step, field.name) for field in Step._meta.concrete_fields}
+    del kept["id"]
+    assert kept == {
+        "session": actor.session,
+        "number": 1,
+        "time_s": 1.1,
+        "received_at": NOW,
+        "side": "left",
+        "value": 4.0,
+        "gain": 0.85,
+        "shown": 3.4,
+        "goal": 3.0,
+        "performance": pytest.approx(3.4 / 3),
+        "hit": True,
+        "points": 1,
+        "valid": True,
+        "reasons": [],
+        "phase": 0,
+        "rules_version": 1,
+        "extra": {"step_length_m": 0.5},
+    }
+
+
+def test_the_writer_writes_every_column_of_a_step():
+    columns = {field.column for field in Step._meta.concrete_fields}
+    assert set(STEP_COLUMNS) == columns - {"id"}
+
+
+def test_date_start_duration_score_type_and_goal_are_there_to_read(patient):
+    actor = begin(patient, "positive")
+    walk(actor, 4.0, 2.0, 3.0, None)
+    change(actor, ChangeKind.FINISH, at=NOW + timedelta(minutes=1))
+    session = reread(actor)
+    assert session.started_at == NOW
+    assert session.ended_at == NOW + timedelta(minutes=1)
+    assert session.active_s == pytest.approx(3.3)
+    assert (session.valence, session.goal, session.state) == ("positive", 3.0, "finished")
+    figures = dict(SessionMetric.everywhere.values_list("slug", "value"))
+    assert figures["score"] == 2
+    assert figures["hit_rate"] == pytest.approx(2 / 3)
+
+
+def test_explicit_feedback_has_no_score(patient):
+    actor = begin(patient, "explicit")
+    walk(actor, 4.0, 2.0)
+    change(actor, ChangeKind.FINISH)
+    assert not SessionMetric.everywhere.filter(slug="score").exists()
+    assert SessionMetric.everywhere.get(slug="hit_rate").value == 0.5
+
+
+def test_events_say_who_changed_what_after_which_step(patient):
+    actor = begin(patient)
+    walk(actor, 4.0, 4.0)
+    change(actor, ChangeKind.GOAL, 3.5)
+    walk(actor, 3.2)
+    event = SessionEvent.everywhere.get(kind="goal")
+    assert (event.after_number, event.old, event.value) == (2, 3.0, 3.5)
+    assert list(Step.everywhere.order_by("number").values_list("goal", "hit")) == [
+        (3.0, True),
+        (3.0, True),
+        (3.5, False),
+    ]
+
+
+def test_a_refused_change_leaves_no_trace(patient):
+    actor = begin(patient)
+    with pytest.raises(InvalidSetting, match="15"):
+        change(actor, ChangeKind.GOAL, 99.0)
+    with pytest.raises(Refused):
+        change(actor, ChangeKind.RESUME)
+    assert list(SessionEvent.everywhere.values_list("kind", flat=True)) == ["start"]
+
+
+def test_a_number_that_is_taken_writes_nothing_of_its_batch(patient):
+    actor = begin(patient)
+    walk(actor, 4.0)
+    again = actor.take(Measurement(2, 2.2, Side.LEFT, 4.0), NOW)
+    taken = again._replace(step=dataclasses.replace(again.step, number=1))
+    with pytest.raises(IntegrityError):
+        store(actor, [again, taken])
+    assert Step.everywhere.count() == 1
+
+
+def fold_state(actor: SessionActor) -> dict[str, Any]:
+    state: dict[str, Any] = dict(vars(actor.fold))
+    for name in ("trained", "feedback"):
+        state[name] = dataclasses.asdict(state[name])
+    state["phases"] = [dataclasses.asdict(tally) for tally in state["phases"]]
+    return state
+
+
+actions = st.lists(
+    st.one_of(
+        st.lists(
+            st.sampled_from([None, -1.0, 2.0, 3.0, 4.5, 25.0, float("inf")]), min_size=1, max_size=4
+        ),
+        st.sampled_from(
+            [
+                (ChangeKind.PAUSE, None),
+                (ChangeKind.RESUME, None),
+                (ChangeKind.GOAL, 2.5),
+                (ChangeKind.GAIN, 0.85),
+                (ChangeKind.PHASE, 0),
+                (ChangeKind.PHASE, 2),
+                (ChangeKind.ACTIVATION_THRESHOLD, 0.8),
+            ]
+        ),
+    ),
+    max_size=12,
+)
+
+
+@settings(
+    max_examples=40,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+@given(actions=actions)
+def test_folding_the_log_rebuilds_the_actor_exactly(patient, actions):
+    phases = (
+        make_phase("training", strides=3),
+        make_phase("catch", seconds=4.0),
+        make_phase("training", gain=0.9),
+    )
+    actor = begin(patient, phases=phases)
+    for action in actions:
+        if isinstance(action, list):
+            walk(actor, *action, reasons=("flagged",) if len(action) == 3 else ())
+        else:
+            try:
+                change(actor, *action)
+            except InvalidSetting:
+                continue
+    rebuilt = SessionActor.load(reread(actor))
+    assert fold_state(rebuilt) == fold_state(actor)
+    assert measure_session(rebuilt.fold) == measure_session(actor.fold)
+    session = reread(actor)
+    assert (session.state, session.goal) == (actor.fold.state, actor.fold.goal)
+    stored = Step.everywhere.filter(session=session)
+    points = sum(step.points or 0 for step in stored)
+    assert points == (actor.fold.score or 0)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"valence": "kind"}, "Known valences: positive"),
+        ({"goal": GoalRule(value=0.0)}, "above 0 and up to 15"),
+        ({"goal": GoalRule(value=float("nan"))}, "above 0 and up to 15"),
+        ({"phases": ()}, "at least one phase"),
+        ({"goal": GoalRule(percent_of_baseline=100)}, "needs a baseline phase"),
+        ({"phases": None}, "needs a protocol"),
+    ],
+)
+def test_a_session_that_could_not_be_walked_is_not_created(patient, settings, message):
+    with pytest.raises(InvalidSetting, match=message):
+        begin(patient, **settings)
+    assert not TrainingSession.everywhere.exists()
+
+
+def test_a_gain_out_of_bounds_is_refused():
+    with pytest.raises(InvalidSetting, match="0.5 to 1.5"):
+        make_phase("training", gain=0.4)
+
+
+def test_which_leg_is_trained_must_be_known(patient):
+    patient.paretic_side = ""
+    with pytest.raises(InvalidSetting, match="Which leg"):
+        begin(patient)
+
+
+def test_a_session_stays_within_one_clinic(patient):
+    elsewhere = Clinic.everywhere.create(name="Oak")
+    station = Station.everywhere.create(clinic=elsewhere, name="Belt 1")
+    with pytest.raises(CrossClinic, match="same clinic"):
+        begin(patient, station=station)
+    assert not TrainingSession.everywhere.exists()
+
+
+def test_steps_without_values_come_back_from_the_log_as_they_were(patient):
+    actor = begin(patient)
+    walk(actor, float("nan"), None, 99.0)
+    assert [step.reasons for step in Step.everywhere.order_by("number")] == [
+        ["not_finite"],
+        ["missing"],
+        ["out_of_bounds"],
+    ]
+    assert Step.everywhere.get(number=1).value is None
+    assert isinstance(actor.take(Measurement(4, 9.0, Side.RIGHT, 3.0), NOW), StepRow)

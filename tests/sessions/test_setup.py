@@ -1,0 +1,213 @@
+"""How a session is set up: nothing to type, and whatever cannot be walked is refused in words."""
+
+from __future__ import annotations
+
+import pytest
+from django.test import Client
+
+from rehab.people.models import Patient
+from rehab.people.roles import Role
+from rehab.sessions.models import Protocol, TrainingSession
+from rehab.sessions.services import change_session
+from rehab.stations.models import Station
+from rehab.training.changes import ChangeKind
+from tests.world import World, build_world
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+@pytest.fixture
+def pt(world: World) -> Client:
+    client = Client()
+    client.force_login(world.people[Role.PT])
+    return client
+
+
+@pytest.fixture
+def patient(world: World) -> Patient:
+    return Patient.everywhere.create(
+        clinic=world.clinic, code="K7-204", nickname="Rosa", paretic_side="left"
+    )
+
+
+@pytest.fixture
+def station(world: World) -> Station:
+    return Station.everywhere.create(clinic=world.clinic, name="Free")
+
+
+def choices(place: Station, protocol: str = "Training only", **others: object) -> dict[str, object]:
+    rule = Protocol.everywhere.get(name=protocol, clinic=None)
+    return {
+        "valence": "negative",
+        "goal_by": "value",
+        "goal_value": "4.05",
+        "goal_percent": "110",
+        "wanted_hits": "65",
+        "minutes": "12",
+        "protocol": rule.pk,
+        "station": place.pk,
+        "source": "live",
+        "trained_side": "right",
+        **others,
+    }
+
+
+def newest() -> TrainingSession:
+    return TrainingSession.everywhere.order_by("pk").last()
+
+
+def test_every_choice_reaches_the_plan(pt, patient, station, world):
+    answer = pt.post(f"/patients/{patient.pk}/new/", choices(station))
+    session = newest()
+    assert answer.headers["Location"] == f"/sessions/{session.pk}/"
+    plan = session.to_plan()
+    assert (session.patient, session.station, session.created_by) == (
+        patient,
+        station,
+        world.people[Role.PT],
+    )
+    assert (plan.valence.slug, plan.goal.value, plan.trained_side) == ("negative", 4.05, "right")
+    assert (plan.target.hit_rate, plan.target.duration_s) == (0.65, 720)
+    assert [phase.kind for phase in plan.phases] == ["training"]
+    assert (session.runs, session.simulated) == ([], False)
+
+
+def test_the_therapist_may_go_on_at_the_own_page(pt, patient, station):
+    answer = pt.post(f"/patients/{patient.pk}/new/", choices(station, then="monitor"))
+    assert answer.headers["Location"] == f"/sessions/{newest().pk}/monitor/"
+
+
+def test_a_goal_in_percent_waits_for_its_baseline(pt, patient, station):
+    url = f"/patients/{patient.pk}/new/"
+    page = pt.post(url, choices(station, goal_by="percent"))
+    assert page.status_code == 200
+    assert "needs a baseline phase" in page.content.decode()
+    pt.post(url, choices(station, "Baseline, training, washout", goal_by="percent"))
+    assert newest().to_plan().goal.percent_of_baseline == 110
+    assert newest().goal is None
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "words"),
+    [
+        ("goal_value", "0", "greater than or equal to 0.05"),
+        ("goal_value", "16", "less than or equal to 15"),
+        ("goal_value", "nan", "Goal value: Enter a number"),
+        ("goal_value", "", "either as a value or as percent"),
+        ("wanted_hits", "101", "less than or equal to 100"),
+        ("minutes", "-1", "greater than or equal to 1"),
+        ("valence", "kind", "Select a valid choice"),
+        ("source", "recording ../../etc/passwd", "Select a valid choice"),
+        ("station", "999999", "Select a valid choice"),
+    ],
+)
+def test_what_cannot_be_walked_is_refused_in_words(pt, patient, station, field, value, words):
+    before = TrainingSession.everywhere.count()
+    page = pt.post(f"/patients/{patient.pk}/new/", choices(station) | {field: value})
+    assert page.status_code == 200
+    assert words in page.content.decode()
+    assert TrainingSession.everywhere.count() == before
+
+
+def test_a_station_or_protocol_of_another_clinic_cannot_be_chosen(pt, patient, station):
+    birch = build_world("birch")
+    for field, model in (("station", Station), ("protocol", Protocol)):
+        page = pt.post(
+            f"/patients/{patient.pk}/new/",
+            choices(station) | {field: birch.rows[model].pk},
+        )
+        assert "Select a valid choice" in page.content.decode()
+
+
+@pytest.mark.django_db(transaction=True)  # the writer has its own connection
+def test_nobody_begins_where_somebody_else_may_be_walking(pt, patient, station, world):
+    pt.post(f"/patients/{patient.pk}/new/", choices(station))
+    walking = newest()
+    other = Patient.everywhere.create(clinic=world.clinic, code="K8", nickname="Joon")
+    page = pt.post(f"/patients/{other.pk}/new/", choices(station)).content.decode()
+    assert "still has an open session of Rosa (K7-204)" in page
+    assert newest() == walking
+    change_session(walking, ChangeKind.ABORT)
+    pt.post(f"/patients/{other.pk}/new/", choices(station))
+    assert newest().patient == other
+
+
+@pytest.mark.django_db(transaction=True)  # the writer has its own connection
+def test_like_last_time_offers_what_the_last_session_was(pt, patient, station):
+    pt.post(f"/patients/{patient.pk}/new/", choices(station, source="synthetic poor"))
+    session = newest()
+    assert session.runs[:3] == ["synthetic", "--profile", "poor"]
+    assert session.simulated
+    change_session(session, ChangeKind.START)
+    change_session(session, ChangeKind.GOAL, 4.2)
+    change_session(session, ChangeKind.FINISH)
+    page = pt.get(f"/patients/{patient.pk}/")
+    last = page.context["last"]
+    assert (last["valence"], last["goal_value"], last["source"]) == (
+        "negative",
+        4.2,
+        "live",  # one trial with a simulator makes nobody a simulated patient
+    )
+    assert "Like last time" in page.content.decode()
+    hidden = {field.name: field.value() for field in page.context["form"]}
+    pt.post(f"/patients/{patient.pk}/new/", hidden)
+    again = newest()
+    assert again.pk != session.pk
+    assert again.to_plan().goal.value == 4.2
+    assert again.plan | {"goal": None} == session.plan | {"goal": None}
+
+
+def test_recordings_of_this_machine_can_be_chosen_and_are_looked_at(
+    pt, patient, station, settings, tmp_path
+):
+    settings.DATA_DIR = tmp_path
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    (folder / "broken.csv").write_text("not,a\nwalk,at all\n")
+    url = f"/patients/{patient.pk}/new/"
+    page = pt.post(url, choices(station, source="recording broken.csv")).content.decode()
+    assert "broken.csv" in page
+    assert "layouts" in page.lower()
+    (folder / "walk.csv").write_text("time_s,side,value\n1.0,left,4.0\n2.1,left,3.9\n")
+    pt.post(url, choices(station, source="recording walk.csv"))
+    assert newest().runs == ["recording", str(folder / "walk.csv")]
+    settings.HOSTED = True  # there a folder would belong to no clinic
+    assert "walk.csv" not in pt.get(url).content.decode()
+
+
+def test_a_new_patient_and_a_code_that_is_taken(pt, patient, world):
+    form = {"nickname": "Ann", "code": "K7-9", "paretic_side": "right"}
+    answer = pt.post("/patients/new/", form)
+    ann = Patient.everywhere.get(code="K7-9")
+    assert ann.clinic == world.clinic
+    assert answer.headers["Location"] == f"/patients/{ann.pk}/new/"
+    page = pt.post("/patients/new/", form).content.decode()
+    assert "Code K7-9 already exists: it is Ann&#x27;s." in page
+    assert Patient.everywhere.filter(code="K7-9").count() == 1
+
+
+def test_a_protocol_that_ends_by_itself_says_how_long_it_takes(pt, patient, station):
+    page = pt.get(f"/patients/{patient.pk}/new/")
+    assert page.context["form"]["minutes"].value() == 13  # 54 strides, 600 s and 120 s
+    by_name = {row.name: row.pk for row in Protocol.everywhere.filter(clinic=None)}
+    lengths = page.context["lengths"]
+    assert lengths[by_name["Training only"]] is None
+    assert lengths[by_name["Baseline, training, washout"]] == 13
+
+
+def test_the_demo_is_one_simulated_patient(pt, world):
+    places = {pt.post("/patients/demo/").headers["Location"] for _ in range(2)}
+    (demo,) = Patient.everywhere.filter(clinic=world.clinic, code="demo")
+    assert demo.simulated
+    assert places == {f"/patients/{demo.pk}/"}
+
+
+def test_patients_are_found_by_name_or_code(pt, patient):
+    for words in ("ros", "K7-2"):
+        assert "Rosa" in pt.get("/start/", {"q": words}).content.decode()
+    assert "Nobody is called" in pt.get("/start/", {"q": "xyz"}).content.decode()

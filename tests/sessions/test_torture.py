@@ -1,0 +1,22 @@
+"""kill -9 at any moment loses nothing acknowledged, and no viewer notices more than a pause."""
+
+import asyncio
+import os
+import time
+
+import pytest
+
+from tests.torture import Torture
+
+
+@pytest.mark.slow
+def test_three_kills_lose_nothing(tmp_path, capsys):
+    seed = int(os.environ.get("GARRY_TEST_SEED", time.time_ns() % 1_000_000))
+    with capsys.disabled():
+        print(f"\ntorture: GARRY_TEST_SEED={seed}")
+    torture = Torture(tmp_path, seed)
+    ended = asyncio.run(torture.run(sessions=8, rounds=3))
+    assert torture.find_faults(ended) == []
+    assert sum(walk.acknowledged for walk in torture.walks) > 100
+    assert all(log["paused"] == log["resumed"] == 3 for log in ended["log"].values())
+    assert all(log["valid"] for log in ended["log"].values())

@@ -1,0 +1,293 @@
+"""Raw signals as labs send them, good and bad: an A2 that is right, or an invalid stride."""
+
+import numpy as np
+import pytest
+
+from rehab.gait import LegSamples, measure_both_legs
+from rehab.gait.columns import LAYOUTS, read_column_map
+from rehab.gait.files import read_signals
+from rehab.sources.client import LiveFeed
+from rehab.sources.intake import Intake, IntakeSettings
+from rehab.sources.synthetic.signals import Sensors, make_signals
+from rehab.sources.synthetic.walker import walk
+from rehab.training.steps import Side
+
+MASS = 75.0
+NAMES = [column.name for leg in LAYOUTS["garry"].legs.values() for column in leg.values()][:3]
+NAMES += [name.replace("left", "right") for name in NAMES]
+
+
+class Time:
+    now_s = 1000.0
+
+    def __call__(self):
+        return self.now_s
+
+
+class Desk:
+    """An intake with all that went in and came out."""
+
+    def __init__(self, **settings) -> None:
+        self.time = Time()
+        self.said: list[str] = []
+        self.feed = LiveFeed(self.time)
+        self.feed.begin(Side.LEFT)
+        self.feed.walk()
+        how = IntakeSettings(**{"mass_kg": MASS} | settings)
+        self.intake = Intake(self.feed, how, self.said.append, self.time)
+
+    def send(self, rows, chunk=20):
+        for start in range(0, len(rows), chunk):
+            self.intake.take(rows[start : start + chunk])
+
+    def strides(self):
+        found = []
+        while not isinstance(stride := self.feed.poll(0), float):
+            found.append(stride)
+        return found
+
+
+@pytest.fixture(scope="module")
+def made():
+    return make_signals(list(walk(seed=4, strides=30)), MASS, Sensors(rate_hz=200), seed=4)
+
+
+@pytest.fixture
+def table(made):
+    legs = (made.left, made.right)
+    columns = [c for leg in legs for c in (leg.force_n, leg.moment_nm, leg.angle_rad)]
+    return np.column_stack([made.t_s, *columns])
+
+
+def rows_of(table, names=NAMES):
+    return [dict(zip(["time_s", *names], row, strict=True)) for row in table.tolist()]
+
+
+def measure(made, rate_hz=200.0):
+    left, right = (
+        LegSamples(leg.force_n, leg.moment_nm, leg.angle_rad) for leg in (made.left, made.right)
+    )
+    return measure_both_legs(made.t_s, left, right, rate_hz=rate_hz, mass_kg=MASS)
+
+
+def same(stride, other):
+    return stride.value == pytest.approx(other.a2_w_kg, rel=0.02)
+
+
+@pytest.mark.parametrize("chunk", [1, 20, 1000])
+def test_strides_are_those_of_the_recording(made, table, chunk):
+    desk = Desk()
+    desk.send(rows_of(table), chunk)
+    desk.intake.finish()
+    found = desk.strides()
+
+    expected = measure(made)
+    assert [(m.side, m.time_s) for m in found] == [(s.side, s.terminal_contact_s) for s in expected]
+    assert [m.value for m in found] == [s.a2_w_kg for s in expected]
+    assert [m.reasons for m in found] == [s.reasons for s in expected]
+    assert {"stance_s", "swing_s", "step_s", "weight_ratio"} <= found[10].extra.keys()
+
+
+def test_channels_of_different_rates_meet(made, table):
+    """Force at 200 Hz, moment and angle at 100 Hz in rows of their own, which come later."""
+    desk = Desk()
+    forces, others = [0, 1, 4], [0, 2, 3, 5, 6]
+    rows = []
+    for start in range(0, len(table), 20):
+        part = table[start : start + 20]
+        rows += rows_of(part[:, forces], [NAMES[0], NAMES[3]])
+        rows += rows_of(part[::2, others], [NAMES[1], NAMES[2], NAMES[4], NAMES[5]])
+    desk.send(rows)
+    desk.intake.finish()
+    found = [m for m in desk.strides() if not m.reasons]
+
+    expected = {s.terminal_contact_s: s for s in measure(made) if s.valid}
+    paired = [(m, expected[m.time_s]) for m in found if m.time_s in expected]
+    assert len(paired) >= len(expected) - 3
+    assert all(same(m, s) for m, s in paired)
+
+
+def test_a_channel_that_falls_silent_is_waited_for_and_then_missing(made, table):
+    desk = Desk()
+    for start in range(0, len(table), 20):
+        part = table[start : start + 20]
+        desk.time.now_s += 0.1
+        desk.intake.take(rows_of(part[:, [0, 1, 4]], [NAMES[0], NAMES[3]]))
+        names = NAMES[1:3] + NAMES[4:]
+        kept = [0, 2, 3, 5, 6]
+        if not 10 < start / 200 < 15:
+            desk.intake.take(rows_of(part[:, kept], names))
+    desk.intake.finish()
+    found = desk.strides()
+
+    silent = [m for m in found if 11 < m.time_s < 14.8]
+    assert len(silent) >= 6
+    assert all("moment_lost" in m.reasons for m in silent)
+    assert [m for m in found if m.time_s > 18 and not m.reasons]
+
+
+def test_blank_cells_are_no_samples(made, table):
+    rows = rows_of(table)
+    for number, row in enumerate(rows):
+        if number % 2:
+            row |= {name: None for name in NAMES if "force" not in name}
+    desk = Desk()
+    desk.send(rows)
+    desk.intake.finish()
+
+    valid = [m for m in desk.strides() if not m.reasons]
+    assert len(valid) >= sum(s.valid for s in measure(made)) - 3
+
+
+def spoil(table, rows, columns, change):
+    table = table.copy()
+    first, last = np.searchsorted(table[:, 0], rows)
+    table[first:last, columns] = change(table[first:last, columns])
+    return table
+
+
+def set_clock(table, by_s):
+    return table + np.array([by_s, 0, 0, 0, 0, 0, 0])
+
+
+FAULTS = {
+    "gap": lambda t: np.delete(t, slice(2000, 2060), axis=0),
+    "clock set back": lambda t: np.vstack((t[:2000], set_clock(t[2000:], -5.0))),
+    "clock set forward": lambda t: np.vstack((t[:2000], set_clock(t[2000:], 500.0))),
+    "every datagram twice": lambda t: np.repeat(t, 2, axis=0),
+    "datagrams out of order": lambda t: np.vstack((t[:2000], t[2100:2200], t[2000:2100], t[2200:])),
+    "dropped moment": lambda t: spoil(t, (10, 14), 2, lambda v: v * np.nan),
+    "frozen angle": lambda t: spoil(t, (10, 14), 3, lambda v: v * 0 + 0.1),
+    "force in kN": lambda t: spoil(t, (0, 99), 1, lambda v: v / 1000),
+    "moment in Nmm": lambda t: spoil(t, (0, 99), 2, lambda v: v * 1000),
+    "angle in degrees": lambda t: spoil(t, (0, 99), 3, np.degrees),
+    "moment turned": lambda t: spoil(t, (0, 99), 2, lambda v: -v),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_no_fault_shows_a_wrong_a2(made, table, fault):
+    desk = Desk()
+    desk.send(rows_of(FAULTS[fault](table)))
+    desk.intake.finish()
+    found = desk.strides()
+
+    expected = [s for s in measure(made) if s.valid]
+    truth = np.array([s.terminal_contact_s for s in expected])
+    set_by = {"clock set back": -5.0, "clock set forward": 500.0}.get(fault, 0.0)
+    jump_s = made.t_s[2000]
+    times = [stride.time_s for stride in found]
+    jump = next((i for i in range(1, len(times)) if not 0 <= times[i] - times[i - 1] < 9), 0)
+    for place, stride in enumerate(found):
+        if stride.reasons or stride.value is None:
+            continue
+        time_s = stride.time_s - (set_by if set_by and place >= jump else 0.0)
+        nearest = int(np.abs(truth - time_s).argmin())
+        assert abs(truth[nearest] - time_s) < 0.02, (time_s, jump_s)
+        assert stride.value == pytest.approx(expected[nearest].a2_w_kg, rel=0.06)
+    is_left_lost = fault in {"force in kN", "moment in Nmm", "angle in degrees", "moment turned"}
+    if is_left_lost:
+        assert not [m for m in found if m.side == Side.LEFT and not m.reasons]
+    else:
+        assert len([m for m in found if not m.reasons]) >= (0 if "twice" in fault else 40)
+    assert fault in {"every datagram twice", "force in kN"} or any(m.reasons for m in found)
+
+
+@pytest.mark.parametrize(
+    ("rows", "cure"),
+    [
+        ([{"time_s": 1.0, "Fz": 2.0}], "--columns"),
+        ([{"left_force_n": 1.0, "left_moment_nm": 1.0, "left_angle_rad": 1.0}], "time_s"),
+        ([{"time_s": 1.0, "left_force_n": "high"}], "no number"),
+        ([{"time_s": 1.7e12, "value": 3.0}], "in seconds"),
+        ([{"value": 3.0, "side": "up"}], "left or right"),
+        ([{"value": "good"}], "no number"),
+        ([{"value": 3.0, "reason": "too{bad}"}], "A reason is a word"),
+    ],
+)
+def test_rows_of_no_use_are_told_with_the_cure(rows, cure):
+    desk = Desk()
+    desk.send(rows * 50)
+
+    assert desk.strides() == []
+    assert len(desk.said) == 1  # not fifty times
+    assert cure in desk.said[0]
+    assert "50 rows not understood" in desk.intake.describe()
+
+
+def test_milliseconds_are_noticed(table):
+    desk = Desk()
+    desk.send(rows_of(table * [1000, *[1] * 6]))
+
+    assert desk.strides() == []
+    assert any("milliseconds" in text and "t*0.001" in text for text in desk.said)
+
+
+def test_units_and_signs_can_be_mapped(made, table):
+    words = ["time=ms*0.001"]
+    for side in ("left", "right"):
+        words += [f"{side}.force={side}_Fz*1000", f"{side}.moment={side}_M*-1"]
+        words += [f"{side}.angle={side}_deg*0.017453292519943295"]
+    names = [f"{side}_{name}" for side in ("left", "right") for name in ("Fz", "M", "deg")]
+    sent = table * [1000, *[0.001, -1, 180 / np.pi] * 2]
+    desk = Desk(columns=read_column_map(words))
+    desk.send([dict(zip(["ms", *names], row, strict=True)) for row in sent.tolist()])
+    desk.intake.finish()
+
+    valid = [m.value for m in desk.strides() if not m.reasons]
+    assert valid == pytest.approx([s.a2_w_kg for s in measure(made) if s.valid], rel=1e-6)
+
+
+async def test_no_body_mass_is_refused_with_the_cure(table):
+    desk = Desk(mass_kg=None)
+    desk.send(rows_of(table[:300]))
+
+    with pytest.raises(ValueError, match="--mass 75"):
+        await desk.intake.watch()
+    assert desk.strides() == []
+
+
+def test_what_is_kept_is_measured_alike(made, table, tmp_path):
+    path = tmp_path / "kept.csv"
+    desk = Desk(keep=path)
+    desk.send(rows_of(table))
+    desk.intake.finish()
+    desk.intake.close()
+
+    t_s, legs = read_signals(path)
+    again = measure_both_legs(t_s, legs["left"], legs["right"], rate_hz=200, mass_kg=MASS)
+    live = [m.value for m in desk.strides() if not m.reasons]
+    assert [s.a2_w_kg for s in again if s.valid] == pytest.approx(live, rel=1e-4)
+
+
+def test_the_quality_line(table):
+    desk = Desk()
+    desk.intake.describe()
+    rows = rows_of(np.delete(table, slice(1000, 1060), axis=0))
+    desk.send(rows[:2000])
+    desk.time.now_s += 10
+    line = desk.intake.describe()
+
+    assert "200 samples/s, 1 gaps, lag" in line
+    assert "last stride" in line
+    assert "10.0 s ago" in line
+    desk.time.now_s += 5
+    assert "no samples now" in desk.intake.describe()
+
+
+def test_the_check_of_the_first_half_minute_is_told(made, table):
+    desk = Desk(mass_kg=60.0)
+    desk.send(rows_of(table))
+
+    assert any("Check the body mass" in text for text in desk.said)
+
+
+def test_extra_values_travel_as_far_as_they_can():
+    desk = Desk()
+    row = {"time_s": 5.0, "value": 3.5, "side": "R", "symmetry": 0.03, "belt speed": 1.0}
+    desk.send([row | {"note": "tired", "nothing": None, "endless": float("inf")}])
+    (stride,) = desk.strides()
+
+    assert stride.extra == {"symmetry": 0.03}
+    assert (stride.side, stride.value, stride.time_s) == (Side.RIGHT, 3.5, 5.0)
+    assert "belt speed, note" in desk.said[0]

@@ -1,0 +1,149 @@
+"""A tablet comes to a station by a code; from then on sessions appear on it by themselves."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+import pytest
+from django.core.cache import cache
+from django.test import Client
+from django.utils import timezone
+
+from rehab.people.models import UNAMBIGUOUS
+from rehab.people.roles import Role
+from rehab.stations import pairing, tablets
+from rehab.stations.models import Device, Pairing, Station
+from tests.world import World, build_world
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture(autouse=True)
+def fresh_cache():
+    cache.clear()
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+@pytest.fixture
+def pt(world: World) -> Client:
+    client = Client()
+    client.force_login(world.people[Role.PT])
+    return client
+
+
+@pytest.fixture
+def station(world: World) -> Station:
+    return Station.everywhere.create(clinic=world.clinic, name="Bay 4")
+
+
+def shown_code(tablet: Client) -> str:
+    code: str = tablet.get("/tablet/").context["code"]
+    return code
+
+
+def paired(tablet: Client, pt: Client, station: Station) -> Device:
+    pt.post("/tablets/pair/", {"code": shown_code(tablet), "station": station.pk})
+    tablet.get("/tablet/state/")
+    return Device.everywhere.get(station=station, kind="tablet")
+
+
+def test_a_tablet_shows_one_code_until_it_is_let_in(pt, station):
+    tablet = Client()
+    code = shown_code(tablet)
+    assert len(code) == 6
+    assert set(code) <= set(UNAMBIGUOUS)
+    assert shown_code(tablet) == code  # also after a reload
+    assert shown_code(Client()) != code
+    assert tablet.get("/tablet/state/").json() == {"paired": False, "go": ""}
+    answer = pt.post("/tablets/pair/", {"code": code.lower(), "station": station.pk})
+    assert answer.headers["Location"] == "/start/"
+    assert tablet.get("/tablet/state/").json() == {"paired": True, "go": "/tablet/"}
+    cookie = tablet.cookies[tablets.COOKIE]
+    assert cookie["httponly"]
+    assert cookie["samesite"] == "Lax"
+    device = Device.everywhere.get(station=station)
+    assert cookie.value not in device.token_hash
+    assert "Bay 4" in tablet.get("/tablet/").content.decode()
+    assert not Pairing.everywhere.filter(code=code).exists()
+
+
+def test_a_code_opens_once_and_for_five_minutes(pt, station):
+    tablet = Client()
+    code = shown_code(tablet)
+    Pairing.everywhere.update(expires_at=timezone.now() - timedelta(seconds=1))
+    page = pt.post("/tablets/pair/", {"code": code, "station": station.pk}).content.decode()
+    assert "No tablet shows this code now" in page
+    assert tablet.get("/tablet/state/").json()["go"] == "/tablet/"
+    new = shown_code(tablet)
+    assert new != code
+    for expected in (302, 200):
+        answer = pt.post("/tablets/pair/", {"code": new, "station": station.pk})
+        assert answer.status_code == expected
+    assert Device.everywhere.filter(station=station).count() == 1
+
+
+def test_the_token_is_given_to_the_tablet_that_showed_the_code_and_once(pt, station):
+    tablet, thief = Client(), Client()
+    code = shown_code(tablet)
+    shown_code(thief)
+    pt.post("/tablets/pair/", {"code": code, "station": station.pk})
+    assert not thief.get("/tablet/state/").json()["paired"]
+    copy = Client()
+    copy.cookies["garry_pairing"] = tablet.cookies["garry_pairing"].value
+    assert tablet.get("/tablet/state/").json()["paired"]
+    assert not copy.get("/tablet/state/").json()["paired"]
+
+
+def test_wrong_codes_are_few(pt, station):
+    for _ in range(pairing.TRIES):
+        page = pt.post("/tablets/pair/", {"code": "XXXXXX", "station": station.pk})
+        assert "No tablet shows this code" in page.content.decode()
+    code = shown_code(Client())
+    page = pt.post("/tablets/pair/", {"code": code, "station": station.pk}).content.decode()
+    assert "Too many wrong codes" in page
+    assert not Device.everywhere.filter(station=station).exists()
+
+
+def test_a_flood_of_strangers_ends_somewhere(monkeypatch):
+    monkeypatch.setattr(pairing, "MOST_OPEN", 3)
+    pages = [Client().get("/tablet/") for _ in range(4)]
+    assert [page.status_code for page in pages] == [200, 200, 200, 503]
+    assert "Try again in five minutes" in pages[-1].content.decode()
+
+
+def test_nobody_pairs_to_a_station_of_another_clinic(pt):
+    birch = build_world("birch")
+    form = {"code": shown_code(Client()), "station": birch.rows[Station].pk}
+    assert "Choose a station" in pt.post("/tablets/pair/", form).content.decode()
+
+
+def test_a_session_of_its_station_appears_and_no_other(world, pt, station):
+    tablet = Client()
+    paired(tablet, pt, station)
+    assert tablet.get("/tablet/state/").json() == {"paired": True, "go": ""}
+    session = world.session
+    assert tablet.get(f"/sessions/{session.pk}/").status_code == 404  # of another station
+    type(session).everywhere.filter(pk=session.pk).update(station=station, state="ready")
+    there = f"/sessions/{session.pk}/"
+    assert tablet.get("/tablet/state/").json()["go"] == there
+    assert tablet.get("/tablet/").headers["Location"] == there
+    page = tablet.get(there).content.decode()
+    assert world.patient.nickname in page
+    assert 'class="walk alone"' in page
+    type(session).everywhere.filter(pk=session.pk).update(state="finished")
+    assert tablet.get(there).headers["Location"] == f"{there}scores/"
+    scores = tablet.get(f"{there}scores/").content.decode()
+    assert 'href="/tablet/"' in scores
+    for elsewhere in ("/start/", f"{there}monitor/", f"/patients/{world.patient.pk}/"):
+        assert tablet.get(elsewhere).headers["Location"].startswith("/admin/login/")
+
+
+def test_a_revoked_tablet_shows_a_code_again(pt, station):
+    tablet = Client()
+    device = paired(tablet, pt, station)
+    Device.everywhere.filter(pk=device.pk).update(revoked_at=timezone.now())
+    assert len(shown_code(tablet)) == 6

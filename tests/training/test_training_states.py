@@ -1,0 +1,109 @@
+"""The states of a session: every change in every state."""
+
+from __future__ import annotations
+
+import copy
+import math
+
+import pytest
+
+from rehab.training.changes import Change, ChangeKind, Refused, State, next_state
+from rehab.training.fold import SessionFold
+from rehab.training.measures import InvalidSetting
+from rehab.training.phases import make_phase
+from tests.training.training_sessions import make_plan, step_at, walk
+
+K, S = ChangeKind, State
+
+WAY_TO = {
+    S.READY: (),
+    S.RUNNING: (K.START,),
+    S.PAUSED: (K.START, K.PAUSE),
+    S.FINISHED: (K.START, K.FINISH),
+    S.ABORTED: (K.ABORT,),
+}
+LEADS_TO = {
+    (K.START, S.READY): S.RUNNING,
+    (K.PAUSE, S.RUNNING): S.PAUSED,
+    (K.RESUME, S.PAUSED): S.RUNNING,
+    (K.FINISH, S.RUNNING): S.FINISHED,
+    (K.FINISH, S.PAUSED): S.FINISHED,
+    **{(K.ABORT, state): S.ABORTED for state in (S.READY, S.RUNNING, S.PAUSED)},
+    **{
+        (kind, state): state
+        for kind in (K.GOAL, K.GAIN, K.PHASE, K.ACTIVATION_THRESHOLD)
+        for state in (S.READY, S.RUNNING, S.PAUSED)
+    },
+}
+VALUES = {K.GOAL: 3.0, K.GAIN: 0.9, K.PHASE: 1.0, K.ACTIVATION_THRESHOLD: 1.2}
+
+
+def session_in(state: State) -> SessionFold:
+    plan = make_plan(make_phase("training"), make_phase("washout"))
+    return SessionFold.replay(plan, [Change(kind) for kind in WAY_TO[state]])
+
+
+@pytest.mark.parametrize("state", State)
+@pytest.mark.parametrize("kind", ChangeKind)
+def test_a_change_leads_on_or_is_refused_in_words(kind: ChangeKind, state: State) -> None:
+    fold = session_in(state)
+    before = copy.deepcopy(vars(fold))
+    change = Change(kind, VALUES.get(kind))
+    if (kind, state) in LEADS_TO:
+        fold.change(change)
+        assert fold.state is LEADS_TO[kind, state] is next_state(state, kind)
+    else:
+        with pytest.raises(Refused, match=f"that is {state} cannot .* '{kind}'; it must be "):
+            fold.change(change)
+        assert vars(fold) == before
+
+
+@pytest.mark.parametrize("state", State)
+def test_steps_come_only_while_running_or_paused(state: State) -> None:
+    fold = session_in(state)
+    if state in (S.RUNNING, S.PAUSED):
+        assert step_at(fold, 1.0).valid == (state is S.RUNNING)
+    else:
+        before = copy.deepcopy(vars(fold))
+        with pytest.raises(Refused, match=f"that is {state} takes no steps; it must be running"):
+            step_at(fold, 1.0)
+        assert vars(fold) == before
+
+
+@pytest.mark.parametrize("kind", VALUES)
+def test_a_change_that_needs_a_value_says_so(kind: ChangeKind) -> None:
+    with pytest.raises(InvalidSetting, match=f"'{kind}' needs a value"):
+        session_in(S.RUNNING).change(Change(kind))
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "cure"),
+    [
+        (K.GOAL, 0.0, "above 0 and up to 15 W/kg"),
+        (K.GOAL, math.nan, "above 0 and up to 15 W/kg"),
+        (K.GAIN, 2.0, "0.5 to 1.5"),
+        (K.ACTIVATION_THRESHOLD, 90.0, "0.9 for 90 %"),
+        *((K.PHASE, value, "0 to 1") for value in (-1, 0.5, 2, 1e308, math.nan, math.inf)),
+    ],
+)
+def test_a_value_out_of_bounds_is_refused_with_the_cure(
+    kind: ChangeKind, value: float, cure: str
+) -> None:
+    fold = session_in(S.RUNNING)
+    before = copy.deepcopy(vars(fold))
+    with pytest.raises(InvalidSetting, match=cure):
+        fold.change(Change(kind, value))
+    assert vars(fold) == before
+
+
+def test_a_change_holds_from_the_next_step_on() -> None:
+    fold = session_in(S.RUNNING)
+    (before,) = walk(fold, [4.0])
+    fold.change(Change(K.GOAL, 5.0))
+    fold.change(Change(K.GAIN, 1.5))
+    fold.change(Change(K.ACTIVATION_THRESHOLD, 1.1))
+    (after,) = walk(fold, [4.0])
+    assert (before.goal, before.gain, before.hit) == (4.0, 1.0, True)
+    assert (after.goal, after.gain, after.shown, after.performance) == (5.0, 1.5, 6.0, 1.2)
+    assert fold.score == 2
+    assert fold.activation_threshold == 1.1

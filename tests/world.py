@@ -1,0 +1,186 @@
+"""A small world to test in: clinics with one row of every model, each row marked as theirs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any
+
+from django.apps import apps
+from django.contrib.auth.models import AnonymousUser
+from django.db.models import Model
+
+from rehab.boards.models import Leaderboard
+from rehab.people.models import Clinic, Patient, User
+from rehab.people.roles import Role
+from rehab.sessions.live.actor import Row, SessionActor
+from rehab.sessions.live.writer import Job, commit
+from rehab.sessions.models import (
+    Measure,
+    Protocol,
+    ProtocolPhase,
+    SessionEvent,
+    SessionMetric,
+    Step,
+    TrainingSession,
+)
+from rehab.sessions.services import create_session
+from rehab.stations.models import Device, Pairing, Station
+from rehab.training.changes import Change, ChangeKind
+from rehab.training.goals import GoalRule
+from rehab.training.steps import Measurement, Side
+
+NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
+
+
+def mark(clinic: str, model: type[Model]) -> str:
+    """Give the text that marks a clinic's rows of a model, and stands nowhere else."""
+    return f"zq{clinic}{model.__name__.lower()}qz"
+
+
+@dataclass
+class World:
+    """One clinic and everything in it."""
+
+    name: str
+    clinic: Clinic
+    people: dict[Role, User]
+    device: Device
+    token: str
+    rows: dict[type[Model], Any] = field(default_factory=dict)
+
+    @property
+    def patient(self) -> Patient:
+        """The clinic's patient."""
+        patient: Patient = self.rows[Patient]
+        return patient
+
+    @property
+    def session(self) -> TrainingSession:
+        """The clinic's finished session."""
+        session: TrainingSession = self.rows[TrainingSession]
+        return session
+
+
+def scoped_models() -> list[type[Any]]:
+    """Give every model of the app, found by itself."""
+    return list(apps.get_app_config("rehab").get_models())
+
+
+def store(actor: SessionActor, rows: list[Row]) -> None:
+    """Commit rows of a session here and now, without the live path's threads."""
+    commit(
+        [Job(actor, actor.session.pk, actor.session.epoch, rows, actor.summary(), lambda _: None)]
+    )
+
+
+def build_world(name: str) -> World:
+    """Build a clinic with people of every role and one row of every model."""
+    clinic = Clinic.everywhere.create(name=mark(name, Clinic))
+    people = {
+        role: User.everywhere.create_user(
+            f"{mark(name, User)}-{role.value}",
+            role=role,
+            clinic=clinic,
+        )
+        for role in (Role.LEAD, Role.PT, Role.RESEARCHER)
+    }
+    station = Station.everywhere.create(clinic=clinic, name=mark(name, Station))
+    device = Device(
+        clinic=clinic, station=station, kind=Device.Kind.SOURCE, name=mark(name, Device)
+    )
+    token = device.new_token()
+    device.save()
+    measure = Measure.everywhere.create(
+        clinic=clinic,
+        slug=f"m-{name}",
+        name=mark(name, Measure),
+        unit="m",
+        value_min=0,
+        value_max=2,
+        goal_min=0,
+        goal_max=2,
+    )
+    protocol = Protocol.everywhere.create(
+        clinic=clinic, name=mark(name, Protocol), description=mark(name, Protocol)
+    )
+    phase = ProtocolPhase.everywhere.create(
+        protocol=protocol,
+        position=1,
+        kind="training",
+        name=mark(name, ProtocolPhase),
+        feedback=True,
+    )
+    patient = Patient.everywhere.create(
+        clinic=clinic,
+        code=mark(name, Patient),
+        nickname=mark(name, Patient),
+        paretic_side="left",
+    )
+    session = create_session(
+        patient,
+        valence="positive",
+        goal=GoalRule(value=1.0),
+        protocol=protocol,
+        measure=measure,
+        station=station,
+        created_by=people[Role.PT],
+        source=mark(name, TrainingSession),
+    )
+    actor = SessionActor(session)
+    store(actor, actor.change(Change(ChangeKind.START), people[Role.PT], NOW))
+    for number in range(1, 11):
+        reasons = (mark(name, Step),) if number == 3 else ()
+        value = 0.5 + number / 10
+        stride = Measurement(number, number * 1.1, Side.LEFT, value, reasons)
+        store(actor, [actor.take(stride, NOW)])
+    store(actor, actor.change(Change(ChangeKind.FINISH), people[Role.PT], NOW))
+    board = Leaderboard.everywhere.create(clinic=clinic, name=mark(name, Leaderboard))
+    world = World(name, clinic, people, device, token)
+    for row in (
+        clinic,
+        people[Role.PT],
+        station,
+        device,
+        measure,
+        protocol,
+        phase,
+        patient,
+        session,
+        Step.everywhere.get(session=session, number=3),
+        SessionEvent.everywhere.filter(session=session).first(),
+        SessionMetric.everywhere.filter(session=session).first(),
+        board,
+        Pairing.everywhere.create(
+            code=f"P{clinic.pk}",
+            secret_hash=f"pairing-{name}",
+            expires_at=NOW,
+            device=device,
+        ),
+    ):
+        world.rows[type(row)] = row
+    return world
+
+
+@dataclass(frozen=True)
+class Actor:
+    """Someone who tries: a person, a device or a stranger."""
+
+    label: str
+    subject: Any
+    clinic: str | None = None
+    role: str = "stranger"
+
+
+def all_actors(*worlds: World) -> list[Actor]:
+    """Give every role of every clinic, a host, a stranger, and an account that is switched off."""
+    host = User.everywhere.create_user("host", role=Role.HOST)
+    actors = [Actor("stranger", AnonymousUser()), Actor("host", host, None, "host")]
+    for world in worlds:
+        actors += [
+            Actor(f"{role.value} of {world.name}", person, world.name, role.value)
+            for role, person in world.people.items()
+        ]
+        actors.append(Actor(f"device of {world.name}", world.device, world.name, "device"))
+    off = User.everywhere.create_user("off", role=Role.PT, clinic=worlds[0].clinic, is_active=False)
+    return [*actors, Actor("switched off", off)]
