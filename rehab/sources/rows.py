@@ -82,8 +82,10 @@ class Rows(LiveSource):
             stack.callback(transport.close)
             return Address(kind, *transport.get_extra_info("sockname")[:2])
         if kind == "tcp":
+            senders: set[asyncio.StreamWriter] = set()
 
             async def take_tcp(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+                senders.add(writer)
                 try:
                     peer = _name(writer.get_extra_info("peername"))
                     if not self._take_place(peer):
@@ -94,11 +96,16 @@ class Rows(LiveSource):
                 except OSError:
                     pass
                 finally:
+                    senders.discard(writer)
                     writer.close()
 
-            server = await stack.enter_async_context(
-                await asyncio.start_server(take_tcp, host, port)
-            )
+            def hang_up() -> None:  # a server's own wait_closed waits for its clients to go
+                server.close()
+                for sender in senders:
+                    sender.close()
+
+            server = await asyncio.start_server(take_tcp, host, port)
+            stack.callback(hang_up)
             return Address(kind, *server.sockets[0].getsockname()[:2])
 
         async def take_ws(socket: ServerConnection) -> None:

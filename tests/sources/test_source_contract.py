@@ -154,20 +154,21 @@ async def test_strides_of_a_pause_do_not_count_and_those_before_the_start_are_no
     garry.state = "ready"
     async with serve_garry(garry), lab.open():
         source = lab.make()
-        async with running(source, garry, lab.said):
+        async with running(source, garry, lab.said) as (client, _):
             await until_joined(garry)
             if lab.name != "matlab":  # which is not asked before the start
                 await lab.send(source, [1.0, 1.1])
                 await asyncio.sleep(0.3)
             await garry.change("start")
+            await until(lambda: "running" in client.describe())
             await lab.send(source, [3.0])
             await until(lambda: len(garry.log) == 1)
             await garry.change("pause")
-            await asyncio.sleep(0.05)
+            await until(lambda: "paused" in client.describe())
             await lab.send(source, [3.1])
             await until(lambda: len(garry.log) == 2)
             await garry.change("resume")
-            await asyncio.sleep(0.05)
+            await until(lambda: "running" in client.describe())
             await lab.send(source, [3.2])
             await until(lambda: len(garry.log) == 3)
 
