@@ -27,8 +27,8 @@ quiet = out=$$($(1) 2>&1) || { printf '%s\n' "$$out" >&2; exit 1; }
 help: ## Say what can be made
 	awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
 
-run: $(VENV)/.server $(VENV)/.twin $(LIBRARIES) ## Serve at 127.0.0.1:8000 (GARRY_PORT=…, GARRY_ROBOT=none|kinematic)
-	exec $(PYTHON) manage.py serve --robot $${GARRY_ROBOT:-kinematic}
+run: $(VENV)/.server $(VENV)/.twin $(LIBRARIES) ## Serve at 127.0.0.1:8000 (GARRY_PORT=…, GARRY_ROBOT=twin|kinematic|none)
+	exec $(PYTHON) manage.py serve --robot $${GARRY_ROBOT:-twin}
 
 test: test-main test-postgres test-pure ## Run all tests, also on PostgreSQL and a newer Python if there
 

@@ -11,6 +11,7 @@ import sys
 import time
 from typing import Any
 
+import psutil
 import pytest
 from django.core.management import CommandError, call_command
 from websockets.asyncio.client import connect
@@ -78,12 +79,10 @@ def wait_for_child(folder) -> dict[str, Any]:
     raise AssertionError("no robot was started")
 
 
-def is_alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return True
+def family(pid: int) -> list[psutil.Process]:
+    """Give the robot's process and all that it has started: its port, its twin."""
+    robot = psutil.Process(pid)
+    return [robot, *robot.children(recursive=True)]
 
 
 async def perform(url: str, cookie: str, token: str) -> list[dict[str, Any]]:
@@ -126,15 +125,17 @@ async def perform(url: str, cookie: str, token: str) -> list[dict[str, Any]]:
 
 def test_the_robot_answers_stops_and_leaves_with_the_server(tmp_path):
     cookie, source = python(tmp_path, 'KINDS = ["source"]\n' + PREPARE).split()
-    with serve(tmp_path, "--robot", "kinematic") as server:
+    with serve(tmp_path, "--robot", "twin") as server:
         robot = wait_for_child(tmp_path)
         assert robot["name"] == "robot"
         assert max(map(len, robot["command"][1:])) < 40  # no token for all to see
         url = server.url.replace("http", "ws")
         reports = asyncio.run(perform(url, cookie, source))
+        started = family(robot["pid"])
+        assert len(started) == 3
         os.kill(server.process.pid, signal.SIGINT)
         assert server.process.wait(15) == 0
-    assert not is_alive(robot["pid"])
+    assert psutil.wait_procs(started, 0)[1] == []
     ended = [report for report in reports if report.get("phase") == "ended"]
     assert ended[0]["outcome"] == "done"
     poses = [report["pose"]["x_m"] for report in reports if report["kind"] == "status"]
@@ -147,14 +148,11 @@ def test_the_robot_answers_stops_and_leaves_with_the_server(tmp_path):
 
 
 def test_a_killed_server_leaves_no_robot(tmp_path):
-    with serve(tmp_path, "--robot", "kinematic") as server:
+    with serve(tmp_path, "--robot", "twin") as server:
         robot = wait_for_child(tmp_path)
+        started = family(robot["pid"])
         server.process.kill()
-        for _ in range(100):
-            if not is_alive(robot["pid"]):
-                break
-            time.sleep(0.05)
-    assert not is_alive(robot["pid"])
+        assert psutil.wait_procs(started, 5)[1] == []
 
 
 def test_a_station_with_a_robot_of_its_own_gets_no_other(tmp_path):

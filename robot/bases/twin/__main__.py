@@ -26,15 +26,19 @@ import sys
 import threading
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import fields
+from importlib.util import find_spec
 from pathlib import Path
 
 from robot.bases.kobuki_protocol import FRAME_S, Version
 from robot.bases.twin.bodies import Body, KinematicBody
+from robot.bases.twin.camera import Camera
 from robot.bases.twin.faults import BadFault, Faults
 from robot.bases.twin.firmware import FIRMWARE, Firmware
 from robot.bases.twin.lines import Line, PtyLine, SocketLine
 from robot.bases.twin.process import Twin
+from robot.bases.twin.quiet import keep_to_ourselves
 
 
 def make_body(name: str, notice: Callable[[str], None]) -> Body:
@@ -93,6 +97,12 @@ def make_parser() -> ArgumentParser:
         help="stop after so long without a setpoint (default: never, as a real one)",
     )
     parser.add_argument("--seed", type=int, help="of the line's faults")
+    parser.add_argument(
+        "--camera",
+        type=Path,
+        metavar="FILE",
+        help="keep a picture of it there (PNG, five a second at most; needs pybullet)",
+    )
     parser.add_argument("--child", action="store_true", help="end when standard input closes")
     faults = parser.add_argument_group("faults from the beginning")
     for fault in fields(Faults):
@@ -103,26 +113,14 @@ def make_parser() -> ArgumentParser:
     return parser
 
 
-def keep_to_ourselves() -> int:
-    """Give standard output's file for the port and the answers alone; then import pybullet.
-
-    It prints past Python: when it was built on importing, and more on ending.
-    """
-    answers, errors = os.dup(1), os.dup(2)
-    with Path(os.devnull).open("w") as nowhere:
-        os.dup2(nowhere.fileno(), 1)
-        os.dup2(nowhere.fileno(), 2)
-    with contextlib.suppress(ImportError):
-        import pybullet  # noqa: F401
-    os.dup2(errors, 2)
-    os.close(errors)
-    return answers
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the twin of the command line until told to end, and give the exit status."""
     parser = make_parser()
     options = parser.parse_args(arguments)
+    if options.camera and not find_spec("pybullet"):
+        parser.error("--camera needs pybullet. Cure: pip install 'garry[twin]', or do without.")
+    if options.camera and not options.camera.parent.is_dir():
+        parser.error(f"--camera: there is no folder {options.camera.parent}. Make it first.")
     faults = Faults()
     try:
         for fault in fields(Faults):
@@ -158,9 +156,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             over.set()
 
     threading.Thread(target=read_orders, daemon=True).start()
+    camera: AbstractContextManager[object] = nullcontext()
+    if options.camera:
+        camera = Camera(options.camera, lambda: body.pose)
     try:
         answer(port.name)
-        Twin(firmware, port).run(orders, answer, over.is_set)
+        with camera:
+            Twin(firmware, port).run(orders, answer, over.is_set)
     except BrokenPipeError:
         pass  # whoever listened to the answers is gone
     finally:
