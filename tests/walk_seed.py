@@ -1,7 +1,7 @@
 """Puts sessions to walk into a server's database: `python -m tests.walk_seed JSON` prints them.
 
-JSON is a list of sessions: {"valence", "name", "phases": [{"kind", …}], "goal", "minutes"}, where
-anything may be left out. Each gets a station of its own with tokens for its devices.
+JSON is a list of sessions: {"valence", "name", "phases": [{"kind", …}], "goal", "minutes", "screen":
+{"screen_side", …}}, where anything may be left out. Each gets a station of its own with tokens for its devices.
 """
 
 from __future__ import annotations
@@ -120,7 +120,11 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
         name = f"{count}-{index}"
         station = Station.everywhere.create(clinic=clinic, name=name)
         patient = Patient.everywhere.create(
-            clinic=clinic, code=name, nickname=wish.get("name", "Rosa"), paretic_side="left"
+            clinic=clinic,
+            code=name,
+            nickname=wish.get("name", "Rosa"),
+            paretic_side="left",
+            **wish.get("screen", {}),
         )
         tokens = {}
         for kind in Device.Kind.values:

@@ -112,6 +112,14 @@ def new_pseudonym() -> str:
     return "P-" + "".join(secrets.choice(UNAMBIGUOUS) for _ in range(8))
 
 
+class ScreenSide(models.TextChoices):
+    """Where the patient's page has the thermometer; for neglect and lost fields of vision."""
+
+    RIGHT = "right", "on the right (usual)"
+    LEFT = "left", "on the left"
+    CENTER = "center", "all of it in the middle, smaller"
+
+
 class Patient(ClinicRow):
     """Someone who walks. The clinic's code and a nickname, never a full name."""
 
@@ -134,6 +142,18 @@ class Patient(ClinicRow):
     )
     paretic_side = models.CharField(max_length=8, choices=SIDES, blank=True)
     language = models.CharField(max_length=8, choices=LANGUAGES, default="en")
+    screen_side = models.CharField(
+        "thermometer", max_length=8, choices=ScreenSide.choices, default=ScreenSide.RIGHT
+    )
+    screen_still = models.BooleanField(
+        "calm page", default=False, help_text="No confetti, and nothing moves but the level."
+    )
+    screen_sounds = models.BooleanField(
+        "sounds",
+        default=False,
+        help_text="A soft tone a step, the higher the better; a second one for points. "
+        "The patient can mute it on the page.",
+    )
     simulated = models.BooleanField(default=False, editable=False)
     created_at = models.DateTimeField(auto_now_add=True)
 

@@ -57,6 +57,15 @@ class PatientForm(forms.ModelForm):
         return code
 
 
+class ScreenForm(forms.ModelForm):
+    """How the patient's page looks and sounds for this patient."""
+
+    class Meta:
+        model = Patient
+        fields: ClassVar = ["screen_side", "screen_still", "screen_sounds"]
+        widgets: ClassVar = {"screen_side": forms.RadioSelect}
+
+
 def list_recordings() -> list[Path]:
     """Give the recordings on this machine. None on a hosted server: they belong to no clinic."""
     folder: Path = settings.DATA_DIR / "recordings"

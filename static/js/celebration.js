@@ -1,6 +1,7 @@
 // Confetti: one burst at a time, behind everything, so only ever in the sky.
 
 import { create } from "canvas-confetti";
+import { isStill } from "garry/walk/motion";
 
 const REST_MS = 3_000;
 const PIECES = { little: 26, much: 44, most: 64 };
@@ -15,14 +16,13 @@ const LASTS_TICKS = 84; // 1.4 s at 60 frames a second
 export function createCelebration(canvas) {
   // Not in a worker: the library starts one from a blob, which our content policy refuses.
   const burst = create(canvas, { resize: true, useWorker: false });
-  const calm = matchMedia("(prefers-reduced-motion: reduce)");
   let last = -REST_MS;
 
   // Sets as much free as the step's band says, in the theme's colors, but nothing within 3 s of the
   // last. Says whether it did.
   return function celebrate(amount) {
     const now = performance.now();
-    if (!PIECES[amount] || calm.matches || document.hidden || now - last < REST_MS) return false;
+    if (!PIECES[amount] || isStill() || document.hidden || now - last < REST_MS) return false;
     const colors = getComputedStyle(document.body).getPropertyValue("--confetti").trim();
     if (!colors) return false;
     last = now;

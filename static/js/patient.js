@@ -1,12 +1,13 @@
 // The patient's page: what the socket says goes into the session, and once a frame onto the screen.
 
-import { keepAwake } from "garry/walk/awake";
+import { fillScreen, keepAwake } from "garry/walk/awake";
 import { createCelebration } from "garry/celebration";
 import { createControls } from "garry/walk/controls";
 import { createFeedback } from "garry/walk/feedback";
 import { connect } from "garry/live";
 import { createScene } from "garry/scene";
 import { apply, begin, look } from "garry/walk/model";
+import { createSounds } from "garry/walk/sounds";
 
 const PATIENCE_MS = 2_000; // a shorter break of the connection is not worth a word
 const STILL_MS = 10_000; // after so long without a step the last one is no longer shown as now
@@ -17,6 +18,7 @@ const { body } = document;
 const mirrored = body.classList.contains("mirrored"); // in a frame on the therapist's page
 const scene = createScene(body.querySelector(".scene"));
 const celebrate = createCelebration(body.querySelector(".confetti"));
+const sound = mirrored ? () => {} : createSounds(body.querySelector(".sound"));
 const drawFeedback = createFeedback(body);
 const page = { link: "", asking: false, still: false };
 let session, why, waiting, breaking, drawing, leaving;
@@ -29,7 +31,10 @@ const live = connect(body.dataset.socket, {
   },
   onEvent(event) {
     apply(session, event);
-    if (event.kind === "step" && event.live && !document.hidden) confetti = event.confetti;
+    if (event.kind === "step" && event.live && !document.hidden) {
+      confetti = event.confetti;
+      sound(event);
+    }
     if (RESTLESS.has(event.kind)) redraw();
     else rest();
   },
@@ -85,3 +90,4 @@ function draw() {
 
 redraw();
 if (!mirrored) keepAwake();
+if (body.classList.contains("alone")) fillScreen();

@@ -2,7 +2,9 @@
 
 import math
 from dataclasses import replace
+from functools import reduce
 from itertools import pairwise
+from operator import add
 
 import pytest
 from hypothesis import given
@@ -37,7 +39,8 @@ def recompute(times_s, performances, threshold=0.9, window_s=5.0):
     for number, following in pairwise(numbers):
         values = [performance for _, performance in windows[number]]
         if len(values) >= 2:
-            mean = sum(values) / len(values)
+            # Since Python 3.12 sum() rounds otherwise than one addition after the other.
+            mean = reduce(add, values) / len(values)
             until_s = times_s[0] + number * window_s + window_s
             late = windows[following][0][0] - until_s > window_s
             decisions.append((number, len(values), mean, mean >= threshold, late))

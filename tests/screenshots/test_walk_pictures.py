@@ -69,7 +69,9 @@ def test_pictures_of_a_walk(server: Server, stack: ExitStack) -> None:
     FOLDER.mkdir(exist_ok=True)
     valences = ("positive", "negative", "binary", "explicit")
     catch = {"phases": [{"kind": "catch", "seconds": 60}]}
-    *walks, calm = make_walks(server, *({"valence": valence} for valence in valences), catch)
+    sides = [{"screen": {"screen_side": side, "screen_sounds": True}} for side in ("left", "center")]
+    wanted = [*({"valence": valence} for valence in valences), *sides, catch]
+    *walks, left, center, calm = make_walks(server, *wanted)
     browser = stack.enter_context(chromium())
     pages = {}
     for name, (width, height) in SIZES.items():
@@ -106,6 +108,12 @@ def test_pictures_of_a_walk(server: Server, stack: ExitStack) -> None:
         for page in pages.values():
             page.click("text=End")
         screens.take("ask", "ask")
+    for side, walk in {"left": left, "center": center}.items():
+        screens.show(walk)
+        screens.tap("text=Start")
+        with feet_of(server, walk) as feet:
+            feet.walk(*PAST, 1.12)
+            screens.take(f"side-{side}", "feedback", BURST_MS)
     screens.show(calm)
     screens.tap("text=Start")
     url = f"ws://127.0.0.1:{server.port}/ws/robot/"

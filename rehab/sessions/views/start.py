@@ -10,7 +10,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 from rehab.people.access import clinic_of, for_roles, person
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.forms import PatientForm, SessionForm, like_last_time
+from rehab.sessions.forms import PatientForm, ScreenForm, SessionForm, like_last_time
 from rehab.sessions.models import TrainingSession
 from rehab.stations.builtin import first_station
 from rehab.training.changes import OPEN
@@ -81,6 +81,18 @@ def add_patient(request: HttpRequest) -> HttpResponse:
     if request.method == "POST" and form.is_valid():
         return redirect("setup", patient_id=form.save().pk)
     return render(request, "sessions/patient_form.html", {"form": form})
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_http_methods(["GET", "HEAD", "POST"])
+def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
+    """Fit the patient's page to this patient's eyes and ears."""
+    patient = get_object_or_404(patients_of(person(request)), pk=patient_id)
+    form = ScreenForm(request.POST or None, instance=patient)
+    if request.method == "POST" and form.is_valid():
+        form.save()
+        return redirect("patient", patient_id=patient.pk)
+    return render(request, "sessions/screen_form.html", {"form": form, "patient": patient})
 
 
 @for_roles(Role.LEAD, Role.PT)

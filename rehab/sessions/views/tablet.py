@@ -5,6 +5,7 @@ from __future__ import annotations
 import segno
 from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import redirect, render
+from django.templatetags.static import static
 from django.urls import reverse
 from django.utils import timezone
 from django.views.decorators.cache import never_cache
@@ -54,6 +55,25 @@ def _show_code(request: HttpRequest, code: str) -> HttpResponse:
     drawing = segno.make(place, micro=False).svg_inline(omitsize=True, border=2)
     context = {"code": code, "qr": drawing, "place": request.build_absolute_uri(reverse("pair"))}
     return render(request, "sessions/tablet.html", context)
+
+
+@public
+@require_safe
+def describe_app(request: HttpRequest) -> JsonResponse:
+    """Let the tablet's browser install its page as an app that fills the screen."""
+    mark = {"src": static("img/mark.svg"), "type": "image/svg+xml", "sizes": "any"}
+    app = {
+        "name": "GARRY tablet",
+        "short_name": "GARRY",
+        "id": reverse("tablet"),
+        "start_url": reverse("tablet"),
+        "scope": "/",
+        "display": "fullscreen",
+        "background_color": "#E6F0E7",
+        "theme_color": "#E6F0E7",
+        "icons": [mark],
+    }
+    return JsonResponse(app, content_type="application/manifest+json")
 
 
 @public

@@ -5,3 +5,9 @@ export async function keepAwake() {
   document.addEventListener("visibilitychange", hold);
   await hold();
 }
+
+// A paired tablet fills its screen from the first touch on; as an installed app it does so by itself.
+export function fillScreen() {
+  const fill = () => document.fullscreenElement ?? document.documentElement.requestFullscreen?.().catch(() => {});
+  document.addEventListener("pointerup", fill);
+}

@@ -1,5 +1,6 @@
 // The latest strides on the thermometer's own scale: a disc at or above the goal, a ring below, a gap
 // where nothing was measured. The newest is larger and points to the level.
+import { isStill } from "garry/walk/motion";
 
 const SHOWN = 14;
 const FLOOR = 0.5; // lower ones sit here, so that they never run into the number
@@ -8,7 +9,6 @@ const SHIFT = { duration: 260, easing: "cubic-bezier(.2, .8, .2, 1)" };
 export function createDots(svg) {
   const [trace, halo, lead, group] = [".trace", ".halo", ".lead", ".dots"].map((name) => svg.querySelector(name));
   const strides = svg.querySelector(".strides");
-  const calm = matchMedia("(prefers-reduced-motion: reduce)");
   const dots = Array.from({ length: SHOWN }, (_, i) => {
     const dot = group.appendChild(document.createElementNS(svg.namespaceURI, "circle"));
     dot.setAttribute("r", i === SHOWN - 1 ? 17 : 11);
@@ -44,7 +44,7 @@ export function createDots(svg) {
     halo.setAttribute("d", line);
     const last = recent.at(-1);
     if ((last?.performance ?? null) === null) lead.setAttribute("d", "");
-    if (newest !== undefined && last && last.number > newest && !calm.matches) {
+    if (newest !== undefined && last && last.number > newest && !isStill()) {
       strides.animate([{ transform: `translateX(${place.step}px)` }, { transform: "none" }], SHIFT);
     }
     newest = last?.number ?? 0;

@@ -1,5 +1,6 @@
 // A step in words, emblem and number, and everything else the page says. Draws only what has changed.
 
+import { isStill } from "garry/walk/motion";
 import { count, partLeft, signed, spoken, timeLeft, wordsFor } from "garry/walk/words";
 
 const ROLL = { duration: 300, easing: "cubic-bezier(.2, .8, .2, 1)" };
@@ -21,7 +22,6 @@ export function createFeedback(body) {
   const signs = emblem.querySelectorAll("text");
   const beads = run.querySelectorAll("i");
   const name = find("header b").textContent.trim();
-  const calm = matchMedia("(prefers-reduced-motion: reduce)");
   const sizes = new Map(); // of phrases that were measured before
   let drawn = -1;
   find(".gain path").setAttribute("d", `M${rosette}Z`);
@@ -62,7 +62,7 @@ export function createFeedback(body) {
     const sign = step?.points ? signed(step.points) : "";
     emblem.dataset.long = Math.min(sign.length, 4);
     for (const element of signs) set(element, sign);
-    if (step && step.number !== drawn && !calm.matches) emblem.animate([{ transform: "scale(.92)" }, { transform: "none" }], SWAP);
+    if (step && step.number !== drawn && !isStill()) emblem.animate([{ transform: "scale(.92)" }, { transform: "none" }], SWAP);
     drawn = step?.number ?? -1;
     set(said, step ? spoken(step, session) : "");
   }
@@ -71,7 +71,7 @@ export function createFeedback(body) {
     set(label, has_points ? "Points" : `This step, in ${unit}`);
     const text = has_points ? count(score) : typeof last?.shown === "number" ? last.shown.toFixed(2) : "—";
     const before = Number(key.textContent.replace("−", "-"));
-    if (set(key, text) && has_points && !calm.matches) {
+    if (set(key, text) && has_points && !isStill()) {
       key.animate([{ transform: `translateY(${score > before ? 8 : -8}%)` }, { transform: "none" }], ROLL);
     }
     key.dataset.long = Math.min(text.length, 6);
