@@ -17,6 +17,7 @@ from rehab.people.models import SIDES, Patient, User
 from rehab.sessions.models import Protocol, TrainingSession
 from rehab.sessions.services import create_session
 from rehab.sources.recording import RecordingError, read_recording
+from rehab.sources.recording.source import holds_signals
 from rehab.sources.synthetic import PROFILES
 from rehab.stations.models import Station
 from rehab.training.changes import OPEN
@@ -35,7 +36,7 @@ TRAINING_ONLY, WITH_BASELINE = "Training only", "Baseline, training, washout"
 
 
 class PatientForm(forms.ModelForm):
-    """A new patient of the PT's clinic."""
+    """A patient of the PT's clinic, new or to be mended."""
 
     class Meta:
         model = Patient
@@ -51,7 +52,7 @@ class PatientForm(forms.ModelForm):
     def clean_code(self) -> str:
         """Refuse a code that is taken, and say by whom."""
         code: str = self.cleaned_data["code"]
-        others = Patient.objects.visible_to(self._by).filter(code=code)
+        others = Patient.objects.visible_to(self._by).filter(code=code).exclude(pk=self.instance.pk)
         if (other := others.first()) is not None:
             raise ValidationError(f"Code {code} already exists: it is {other.nickname}'s.")
         return code
@@ -133,8 +134,16 @@ class SessionForm(forms.Form):
         source: str = self.cleaned_data["source"]
         kind, _, name = source.partition(" ")
         if kind == "recording":
+            file = settings.DATA_DIR / "recordings" / name
+            if holds_signals(file):
+                if self.patient.body_mass_kg is None:
+                    raise ValidationError(
+                        f"{name} holds raw signals, and A2 is power per kilogram: give "
+                        f"{self.patient.nickname}'s body mass first."
+                    )
+                return source
             try:
-                read_recording(settings.DATA_DIR / "recordings" / name)
+                read_recording(file)
             except RecordingError as problem:
                 raise ValidationError(str(problem)) from problem
         return source
@@ -161,7 +170,7 @@ class SessionForm(forms.Form):
             created_by=self.by,
             source=dict(list_sources()).get(data["source"], ""),
             simulated=kind == "synthetic",
-            runs=_arguments(kind, name),
+            runs=_arguments(kind, name, self.patient),
         )
 
     def create(self) -> TrainingSession | None:
@@ -175,13 +184,15 @@ class SessionForm(forms.Form):
             return None
 
 
-def _arguments(kind: str, name: str) -> list[str]:
+def _arguments(kind: str, name: str, patient: Patient) -> list[str]:
     """Give what the server runs as `python -m rehab.sources` for a choice of ``list_sources``."""
     match kind:
         case "synthetic":
             return ["synthetic", "--profile", name, "--seed", str(secrets.randbelow(2**31))]
         case "recording":
-            return ["recording", str(settings.DATA_DIR / "recordings" / name)]
+            file = settings.DATA_DIR / "recordings" / name
+            mass = ["--mass", str(patient.body_mass_kg)] if holds_signals(file) else []
+            return ["recording", str(file), *mass]
     return []
 
 

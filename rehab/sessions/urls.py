@@ -9,6 +9,7 @@ urlpatterns = [
     path("patients/new/", start.add_patient, name="new-patient"),
     path("patients/demo/", start.add_demo, name="demo"),
     path("patients/<int:patient_id>/", start.show_patient, name="patient"),
+    path("patients/<int:patient_id>/details/", start.mend_patient, name="mend-patient"),
     path("patients/<int:patient_id>/screen/", start.set_screen, name="screen"),
     path("patients/<int:patient_id>/new/", setup.set_up, name="setup"),
     path("patients/<int:patient_id>/sessions/", history.list_sessions, name="history"),

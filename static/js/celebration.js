@@ -18,9 +18,11 @@ export function createCelebration(canvas) {
   const burst = create(canvas, { resize: true, useWorker: false });
   let last = -REST_MS;
 
+  const clear = () => burst.reset();
+
   // Sets as much free as the step's band says, in the theme's colors, but nothing within 3 s of the
   // last. Says whether it did.
-  return function celebrate(amount) {
+  function celebrate(amount) {
     const now = performance.now();
     if (!PIECES[amount] || isStill() || document.hidden || now - last < REST_MS) return false;
     const colors = getComputedStyle(document.body).getPropertyValue("--confetti").trim();
@@ -35,5 +37,7 @@ export function createCelebration(canvas) {
     burst({ ...common, origin: { x: -0.02, y }, angle: 14 });
     burst({ ...common, origin: { x: 1.02, y }, angle: 166 });
     return true;
-  };
+  }
+
+  return { celebrate, clear };
 }

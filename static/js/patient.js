@@ -17,7 +17,7 @@ const RESTLESS = new Set(["presence", "robot_stopped"]); // events that say noth
 const { body } = document;
 const mirrored = body.classList.contains("mirrored"); // in a frame on the therapist's page
 const scene = createScene(body.querySelector(".scene"));
-const celebrate = createCelebration(body.querySelector(".confetti"));
+const { celebrate, clear } = createCelebration(body.querySelector(".confetti"));
 const sound = mirrored ? () => {} : createSounds(body.querySelector(".sound"));
 const drawFeedback = createFeedback(body);
 const page = { link: "", asking: false, still: false };
@@ -82,7 +82,7 @@ function draw() {
     const { last, steps } = session;
     scene.show({ performance: last?.kind === "missing" ? null : last?.performance, hit: last?.hit ?? false, strides: steps });
     celebrate(confetti);
-  }
+  } else clear();
   confetti = "none";
   if (session) body.dataset.step = session.number;
   if (now === "ended" && !mirrored) leaving ??= setTimeout(() => location.replace(body.dataset.scores), LEAVE_MS);

@@ -366,7 +366,7 @@ def test_confetti_rests_three_seconds_and_heeds_who_wants_no_motion(server, brow
         fired = page.evaluate(
             """async () => {
               const { createCelebration } = await import("garry/celebration");
-              const celebrate = createCelebration(document.querySelector(".confetti"));
+              const { celebrate } = createCelebration(document.querySelector(".confetti"));
               return ["none", "much", "most"].map(celebrate);
             }"""
         )

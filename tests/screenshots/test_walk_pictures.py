@@ -69,7 +69,9 @@ def test_pictures_of_a_walk(server: Server, stack: ExitStack) -> None:
     FOLDER.mkdir(exist_ok=True)
     valences = ("positive", "negative", "binary", "explicit")
     catch = {"phases": [{"kind": "catch", "seconds": 60}]}
-    sides = [{"screen": {"screen_side": side, "screen_sounds": True}} for side in ("left", "center")]
+    sides = [
+        {"screen": {"screen_side": side, "screen_sounds": True}} for side in ("left", "center")
+    ]
     wanted = [*({"valence": valence} for valence in valences), *sides, catch]
     *walks, left, center, calm = make_walks(server, *wanted)
     browser = stack.enter_context(chromium())

@@ -180,6 +180,47 @@ def test_recordings_of_this_machine_can_be_chosen_and_are_looked_at(
     assert "walk.csv" not in pt.get(url).content.decode()
 
 
+def test_recorded_signals_can_be_chosen_once_the_body_mass_is_known(
+    pt, patient, station, tmp_path, settings
+):
+    settings.DATA_DIR = tmp_path
+    file = tmp_path / "recordings" / "lab.csv"
+    file.parent.mkdir()
+    file.write_text("time_s,left_force_n,left_moment_nm,left_angle_rad\n0,0,0,0\n")
+    url = f"/patients/{patient.pk}/new/"
+    signals = choices(station, source="recording lab.csv")
+    assert "give Rosa&#x27;s body mass first" in pt.post(url, signals).content.decode()
+    assert TrainingSession.everywhere.count() == 1  # the world's own
+    details = {"nickname": "Rosa", "code": "K7-204", "paretic_side": "left", "body_mass_kg": "71.5"}
+    answer = pt.post(f"/patients/{patient.pk}/details/", details)
+    assert answer.url == f"/patients/{patient.pk}/"
+    pt.post(url, signals)
+    assert newest().runs == ["recording", str(file), "--mass", "71.5"]
+
+
+def test_a_patients_details_can_be_mended_but_not_into_somebody_elses(pt, patient, world):
+    url = f"/patients/{patient.pk}/details/"
+    other = Patient.everywhere.create(clinic=world.clinic, code="K9", nickname="Anton")
+    details = {"nickname": "Rosa", "code": "K9", "paretic_side": "right", "body_mass_kg": ""}
+    assert "it is Anton&#x27;s" in pt.post(url, details).content.decode()
+    pt.post(url, details | {"code": "K7-205"})
+    patient.refresh_from_db()
+    assert (patient.code, patient.paretic_side) == ("K7-205", "right")
+    other.refresh_from_db()
+    assert other.code == "K9"
+
+
+def test_a_patients_screen_is_kept(pt, patient):
+    url = f"/patients/{patient.pk}/screen/"
+    assert "Rosa’s screen" in pt.get(url).content.decode()
+    answer = pt.post(url, {"screen_side": "left", "screen_still": "on"})
+    assert answer.url == f"/patients/{patient.pk}/"
+    patient.refresh_from_db()
+    kept = (patient.screen_side, patient.screen_still, patient.screen_sounds)
+    assert kept == ("left", True, False)
+    assert "Select a valid choice" in pt.post(url, {"screen_side": "up"}).content.decode()
+
+
 def test_a_new_patient_and_a_code_that_is_taken(pt, patient, world):
     form = {"nickname": "Ann", "code": "K7-9", "paretic_side": "right"}
     answer = pt.post("/patients/new/", form)

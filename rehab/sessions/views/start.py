@@ -85,6 +85,20 @@ def add_patient(request: HttpRequest) -> HttpResponse:
 
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
+def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
+    """Mend what was written of a patient."""
+    user = person(request)
+    patient = get_object_or_404(patients_of(user), pk=patient_id)
+    form = PatientForm(request.POST or None, by=user, instance=patient)
+    if request.method == "POST" and form.is_valid():
+        form.save()
+        return redirect("patient", patient_id=patient.pk)
+    context = {"form": form, "patient": Patient.objects.visible_to(user).get(pk=patient_id)}
+    return render(request, "sessions/patient_form.html", context)
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_http_methods(["GET", "HEAD", "POST"])
 def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Fit the patient's page to this patient's eyes and ears."""
     patient = get_object_or_404(patients_of(person(request)), pk=patient_id)

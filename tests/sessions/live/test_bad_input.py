@@ -1,4 +1,4 @@
-"""Whatever frames come in: an error with a cure to the sender, the right code, no harm to others."""
+"""Whatever frames come: an error with a cure to the sender, the right code, no harm to others."""
 
 from __future__ import annotations
 
