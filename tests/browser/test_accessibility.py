@@ -1,0 +1,158 @@
+"""axe-core finds nothing to complain of on any page; patients' pages have the higher contrast."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page
+
+from tests.browsers import SIZES, chromium
+from tests.servers import ROOT, Server, clean_environment, serve
+from tests.walk_seed import Walk, feet_of, make_walks
+
+pytestmark = pytest.mark.browser
+
+AXE = ROOT / "node_modules" / "axe-core" / "axe.min.js"
+STANDARDS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+# WCAG 1.4.6: 7:1, for whoever reads from a treadmill.
+ENHANCED = {"color-contrast-enhanced": {"enabled": True}}
+CHECK = """async ([rules, standards]) => {
+  const { violations } = await axe.run(document, { runOnly: standards, rules });
+  const tell = ({ id, help, nodes }) =>
+    [`${id}: ${help}`, ...nodes.map(({ target, html }) => `  ${target.join(" ")} ${html}`)];
+  return violations.flatMap(tell).join("\\n");
+}"""
+WALKED = """
+from django.utils import timezone
+from rehab.people.first_start import first_clinic
+from rehab.people.models import Patient
+from tests.walks import visit
+rosa = Patient.everywhere.create(
+    clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"
+)
+for number, valence in enumerate(["positive", "negative", "explicit"], start=1):
+    visit(rosa, valence, number, 9 - 3 * number, 360, timezone.now())
+print(rosa.pk, *rosa.sessions.order_by("pk").values_list("pk", flat=True))
+"""
+PT_PAGES = [
+    "/start/",
+    "/patients/{patient}/",
+    "/patients/new/",
+    "/patients/{patient}/new/",
+    "/patients/{patient}/details/",
+    "/patients/{patient}/screen/",
+    "/patients/{patient}/sessions/",
+    "/sessions/{session}/details/",
+    "/sessions/{walk}/monitor/",
+    "/tablets/pair/",
+    "/nowhere/",
+]
+PATIENT_PAGES = ["/sessions/{session}/scores/", "/sessions/{kept}/scores/", "/tablet/"]
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with serve(tmp_path_factory.mktemp("data")) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def walks(server: Server) -> list[Walk]:
+    """One session for each feedback type."""
+    types = ("positive", "negative", "binary", "explicit")
+    return make_walks(server, *({"valence": valence} for valence in types))
+
+
+@pytest.fixture(scope="module")
+def places(server: Server, walks: list[Walk]) -> dict[str, str]:
+    """Somebody who has walked before, and where."""
+    told = subprocess.run(
+        [sys.executable, "manage.py", "shell", "-v0", "-c", WALKED],
+        cwd=ROOT,
+        env=clean_environment(server.folder, server.port),
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout
+    patient, session, kept, _ = told.split()
+    walk = str(walks[0].session)
+    return {"patient": patient, "session": session, "kept": kept, "walk": walk}
+
+
+@pytest.fixture
+def context(browser: Browser, server: Server, walks: list[Walk]) -> Iterator[BrowserContext]:
+    made = browser.new_context(base_url=server.url, reduced_motion="reduce")
+    made.add_cookies([{"name": "sessionid", "value": walks[0].cookie, "url": server.url}])
+    made.set_default_timeout(40_000)
+    yield made
+    made.close()
+
+
+def check(page: Page, *, for_patients: bool = False) -> None:
+    """Fail with axe-core's complaints about a page as it is now."""
+    if not page.evaluate("'axe' in window"):
+        page.evaluate(AXE.read_text())
+    if complaints := page.evaluate(CHECK, [ENHANCED if for_patients else {}, STANDARDS]):
+        pytest.fail(f"{page.url}\n{complaints}")
+
+
+def open_page(context: BrowserContext, path: str, size: str) -> Page:
+    page = context.new_page()
+    width, height = SIZES[size]
+    page.set_viewport_size({"width": width, "height": height})
+    page.goto(path)
+    return page
+
+
+@pytest.mark.parametrize("path", PT_PAGES)
+def test_therapists_pages(context: BrowserContext, places: dict[str, str], path: str) -> None:
+    page = open_page(context, path.format(**places), "laptop")
+    page.wait_for_load_state("networkidle")
+    check(page)
+
+
+@pytest.mark.parametrize("path", PATIENT_PAGES)
+def test_patients_pages(context: BrowserContext, places: dict[str, str], path: str) -> None:
+    page = open_page(context, path.format(**places), "tablet-portrait")
+    page.wait_for_load_state("networkidle")
+    check(page, for_patients=True)
+
+
+def test_signing_in(browser: Browser, server: Server) -> None:
+    with browser.new_context(base_url=server.url) as stranger:
+        page = stranger.new_page()
+        page.goto("/start/")
+        assert page.locator("[type=password]").is_visible()
+        check(page)
+
+
+def test_a_walk_in_every_look(context: BrowserContext, server: Server, walks: list[Walk]) -> None:
+    for number, walk in enumerate(walks):
+        page = open_page(context, walk.path, ("tablet-portrait", "tablet-landscape")[number % 2])
+
+        def look(name: str, page: Page = page) -> None:
+            page.wait_for_selector(f"body[data-look={name}]")
+            check(page, for_patients=True)
+
+        look("ready")
+        page.click("text=Start")
+        look("waiting")
+        with feet_of(server, walk) as feet:
+            look("begin")
+            feet.walk(0.8, None, 1.2)
+            page.wait_for_selector("body[data-step='3']")
+            look("feedback")
+            page.click("[aria-label=Pause]")
+            look("paused")
+            page.click("[data-ask=end]")
+            look("ask")
+        page.close()
