@@ -204,6 +204,7 @@ def dead_pid() -> int:
         ("elsewhere|1|1", False),  # one machine that was given another name
         (f"{HOST}|{os.getpid()}|1", False),  # the number was given to another process since
     ],
+    ids=["nobody", "nonsense", "no start", "another name", "another process"],
 )
 def test_which_owners_live(owner, alive):
     assert owners.is_alive(owner) == alive
