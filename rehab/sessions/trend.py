@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from django.db.models import Avg, Count, F, QuerySet
+from django.db.models import Avg, Count, F, OuterRef, QuerySet, Subquery
 
 from rehab.people.models import User
 from rehab.sessions.models import SessionMetric, Step, TrainingSession
@@ -66,6 +66,15 @@ def figures_of(user: User, sessions: Sequence[TrainingSession]) -> dict[int, dic
     for session_id, slug, value in rows.values_list("session_id", "slug", "value").order_by():
         found[session_id][slug] = value
     return found
+
+
+def with_figures(user: Any, sessions: QuerySet[TrainingSession]) -> QuerySet[TrainingSession]:
+    """Give sessions with ``metric_score`` and ``metric_hit_rate``, to be read and ordered by."""
+    figure = SessionMetric.objects.visible_to(user).filter(session=OuterRef("pk")).values("value")
+    return sessions.annotate(
+        metric_score=Subquery(figure.filter(slug="score")),
+        metric_hit_rate=Subquery(figure.filter(slug="hit_rate")),
+    )
 
 
 def read_trend(user: User, sessions: QuerySet[TrainingSession]) -> list[Point]:
@@ -132,6 +141,9 @@ def sum_up_all(
         "measure": last.session.measure.name if last else "",
         "walked": say_duration(sum(group["walked"] for group in counted)),
         "count": sum(group["pk__count"] for group in counted),
+        "left_out": 0
+        if simulated
+        else sum(group["pk__count"] for group in groups if group["simulated"]),
     }
 
 
@@ -142,9 +154,18 @@ def draw_trend(trend: list[Point], now: datetime) -> dict[str, Any]:
     """
     measure = trend[-1].session.measure if trend else None
 
+    begun = {
+        point.session.pk: (point.session.started_at or point.session.created_at).astimezone(
+            now.tzinfo
+        )
+        for point in trend
+    }
+    a_day = Counter(start.date() for start in begun.values())
+
     def day(point: Point) -> str:
-        start = point.session.started_at or point.session.created_at
-        return say_day(start.astimezone(now.tzinfo).date(), now.date()).capitalize()
+        start = begun[point.session.pk]
+        words = say_day(start.date(), now.date()).capitalize()
+        return f"{words} {start:%H:%M}" if a_day[start.date()] > 1 else words
 
     alike = [point for point in trend if point.session.measure == measure]
     return {

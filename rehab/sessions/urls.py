@@ -2,7 +2,7 @@
 
 from django.urls import path
 
-from rehab.sessions.views import history, monitor, setup, start, tablet, walk
+from rehab.sessions.views import history, monitor, setup, start, tablet, takehome, walk
 
 urlpatterns = [
     path("start/", start.choose_patient, name="start"),
@@ -13,6 +13,7 @@ urlpatterns = [
     path("patients/<int:patient_id>/screen/", start.set_screen, name="screen"),
     path("patients/<int:patient_id>/new/", setup.set_up, name="setup"),
     path("patients/<int:patient_id>/sessions/", history.list_sessions, name="history"),
+    path("patients/<int:patient_id>/home/", takehome.show_take_home, name="take-home"),
     path("tablet/", tablet.show_tablet, name="tablet"),
     path("tablet/app.webmanifest", tablet.describe_app, name="tablet-app"),
     path("tablet/state/", tablet.tell_tablet, name="tablet-state"),

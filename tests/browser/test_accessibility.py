@@ -45,6 +45,7 @@ PT_PAGES = [
     "/patients/{patient}/details/",
     "/patients/{patient}/screen/",
     "/patients/{patient}/sessions/",
+    "/patients/{patient}/home/",
     "/sessions/{session}/details/",
     "/sessions/{walk}/monitor/",
     "/tablets/pair/",

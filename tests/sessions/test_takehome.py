@@ -1,0 +1,85 @@
+"""The page to take home: figures that equal the log, in words that blame nobody."""
+
+from __future__ import annotations
+
+import html
+import re
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+
+from rehab.people.models import Patient
+from rehab.people.roles import Role
+from rehab.training.phases import make_phase
+from tests.walks import HIT, MISS, RIGHT, walk
+from tests.world import World, build_world
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+@pytest.fixture
+def patient(world: World) -> Patient:
+    return Patient.everywhere.create(
+        clinic=world.clinic, code="B-1", nickname="Rosa", paretic_side="left"
+    )
+
+
+def read(world: World, patient: Patient, role: Role = Role.PT) -> str:
+    """Give the page's words."""
+    client = Client()
+    client.force_login(world.people[role])
+    page = client.get(reverse("take-home", kwargs={"patient_id": patient.pk})).content.decode()
+    paper = page.split("<article")[1].split("</article>")[0]
+    text = html.unescape(re.sub(r"<[^>]+>", " ", paper)).replace("\N{NO-BREAK SPACE}", " ")
+    return " ".join(text.split())
+
+
+def test_it_counts_what_was_walked(world, patient):
+    walk(patient, "positive", [HIT] * 6 + [MISS] * 4 + [None, (RIGHT, HIT)], days_ago=14)
+    walk(patient, "binary", [HIT] * 3 + [MISS] + [HIT] * 6, days_ago=7)
+    walk(patient, "explicit", [HIT] * 4 + [MISS] * 6)
+    walk(patient, "positive", [HIT] * 5, simulated=True)  # nobody walked that
+    walk(patient, "positive", [HIT] * 5, end=None)  # not finished
+    words = read(world, patient)
+    assert "3 sessions" in words
+    assert "30 steps with your trained leg" in words
+    assert "In your last session you reached the goal in 4 of 10 steps" in words
+    assert "In your best session it was 9 of 10 steps" in words
+    assert "Your longest row of steps at the goal: 6" in words
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "said"),
+    [
+        (2.0, 2.5, "Your push-off grew from 2.00 to 2.50 W/kg: 25 % more."),
+        (2.0, 1.5, "went from 2.00 to 1.50 W/kg: 25 % less."),
+        (2.0, 2.02, "stayed the same: 2.02 W/kg."),
+    ],
+)
+def test_it_says_how_the_mean_has_changed(world, patient, first, last, said):
+    phases = (make_phase("baseline", strides=2), make_phase("training"))
+    walk(patient, "positive", [9.0, 9.0] + [first] * 5, days_ago=40, phases=phases)
+    walk(patient, "positive", [1.0] * 5, days_ago=20)
+    walk(patient, "positive", [9.0, 9.0] + [last] * 5, phases=phases)
+    words = read(world, patient)
+    assert said in words  # of the feedback phases alone
+    assert "First session, " in words
+    assert not re.search(r"fail|bad|worse|poor|only", words)
+
+
+def test_one_session_has_nothing_to_be_compared_with(world, patient):
+    walk(patient, "negative", [HIT] * 4)
+    words = read(world, patient)
+    assert "1 session " in words
+    assert "How it developed" not in words
+    assert "best session" not in words
+
+
+def test_nothing_walked_yet(world, patient):
+    assert "No finished session yet." in read(world, patient)
