@@ -1,0 +1,231 @@
+"""A backup and its restore: every row, on either database, all of it or nothing."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from django.apps import apps
+from django.core import serializers
+from django.core.management import CommandError, call_command
+from django.db import connection
+
+from rehab.exports import backup, sealed
+from rehab.exports.backup import LEFT_OUT, backed_up, read_lines, write_backup
+from rehab.people.models import Clinic, Patient, User
+from rehab.sessions.models import Step
+from tests.servers import ROOT, clean_environment
+from tests.walks import HIT, MISS, walk
+from tests.world import NOW, build_world
+
+pytestmark = pytest.mark.django_db
+
+PASSPHRASE = "correct horse battery staple"
+
+
+@pytest.fixture(autouse=True)
+def passphrase(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GARRY_BACKUP_PASSPHRASE", PASSPHRASE)
+    monkeypatch.setattr(sealed, "SCRYPT_N", 2)  # what a guess costs is not what is tried here
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "garry.backup"
+
+
+def fill() -> None:
+    for name in ("amber", "birch"):
+        world = build_world(name)
+        patient = Patient.everywhere.create(clinic=world.clinic, code="Ü-1", nickname="Zoë")
+        walk(patient, "positive", [HIT, MISS, None] * 30)
+
+
+def rows() -> dict[str, list[dict[str, Any]]]:
+    """Give everything there is, as it is stored."""
+    return {
+        model._meta.label_lower: [
+            json.loads(line)
+            for line in serializers.serialize(
+                "jsonl",
+                model._base_manager.order_by("pk"),
+                fields=[field.name for field in model._meta.concrete_fields],
+            ).splitlines()
+        ]
+        for model in backed_up()
+    }
+
+
+def empty() -> None:
+    """Make it a new installation again, as `migrate` leaves it."""
+    call_command("flush", verbosity=0, interactive=False)
+
+
+@pytest.mark.django_db(transaction=True)
+def test_every_row_comes_back(file):
+    fill()
+    before = rows()
+    call_command("backup", file)
+    empty()
+    assert rows() != before
+    call_command("restore", file)
+    assert rows() == before
+    assert all(before[name] for name in ("rehab.step", "rehab.sessionevent", "rehab.user"))
+    # Numbers of new rows go on after those of the old ones.
+    newest = max(row["pk"] for row in before["rehab.clinic"])
+    assert Clinic.everywhere.create(name="New").pk > newest
+
+
+def test_nothing_is_left_out_but_what_a_server_makes_anew():
+    kept = {model._meta.label_lower for model in backed_up()}
+    every = {model._meta.label_lower for model in apps.get_app_config("rehab").get_models()}
+    assert every - kept == {"rehab.pairing"}
+    assert not kept & LEFT_OUT
+
+
+@pytest.mark.django_db(transaction=True)
+def test_a_backup_is_one_moment_and_holds_nobody_up(file, monkeypatch):
+    fill()
+    steps = Step.everywhere.count()
+    patient = Patient.everywhere.first()
+    changed: list[int] = []
+
+    def write_meanwhile(*args: Any, **options: Any) -> Any:
+        if not changed:
+            same = Patient.everywhere.filter(pk=patient.pk)
+            changed.append(elsewhere(lambda: same.update(nickname="Changed meanwhile")))
+        return serialize(*args, **options)
+
+    serialize = serializers.serialize
+    monkeypatch.setattr(serializers, "serialize", write_meanwhile)
+    with file.open("wb") as out:
+        counts = write_backup(out, PASSPHRASE, NOW)
+    assert changed == [1]
+    patient.refresh_from_db()
+    assert patient.nickname == "Changed meanwhile"
+    assert counts["rehab.step"] == steps
+    with file.open("rb") as source:
+        assert "Changed meanwhile" not in "\n".join(read_lines(source, PASSPHRASE))
+
+
+def elsewhere(do: Callable[[], int]) -> int:
+    """Do something over a connection of its own, as a server beside the backup would."""
+    done: list[int] = []
+
+    def work() -> None:
+        try:
+            done.append(do())
+        finally:
+            connection.close()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join(20)
+    return done[0]
+
+
+def test_it_goes_into_a_new_installation_only(file):
+    fill()
+    call_command("backup", file)
+    before = rows()
+    with pytest.raises(CommandError, match="Restore into a new one"):
+        call_command("restore", file)
+    assert rows() == before
+
+
+@pytest.mark.django_db(transaction=True)
+def test_a_damaged_one_changes_nothing(file):
+    fill()
+    call_command("backup", file)
+    data = file.read_bytes()
+    empty()
+    fresh = rows()
+    for damaged, said in (
+        (data[:-1], "damaged"),
+        (data[:200], "damaged"),
+        (b"", "no backup of GARRY"),
+    ):
+        file.write_bytes(damaged)
+        with pytest.raises(CommandError, match=said):
+            call_command("restore", file)
+        assert rows() == fresh
+
+
+@pytest.mark.django_db(transaction=True)
+def test_one_of_another_version_is_refused(file, monkeypatch):
+    fill()
+    call_command("backup", file)
+    empty()
+    older = [row for row in backup.tables_version() if row[0] != "rehab"]
+    monkeypatch.setattr(backup, "tables_version", lambda: older)
+    with pytest.raises(CommandError, match="Install that version, restore, and then update"):
+        call_command("restore", file)
+    assert not User.everywhere.exists()
+
+
+@pytest.mark.parametrize("command", ["backup", "restore"])
+def test_a_passphrase_is_needed(file, monkeypatch, command):
+    monkeypatch.setenv("GARRY_BACKUP_PASSPHRASE", "short")
+    with pytest.raises(CommandError, match="16 characters or more"):
+        call_command(command, file)
+    assert not file.exists()
+
+
+def test_a_backup_that_fails_leaves_the_old_one(file, monkeypatch):
+    file.write_bytes(b"yesterday's")
+    monkeypatch.setattr(
+        "rehab.management.commands.backup.write_backup",
+        lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")),
+    )
+    with pytest.raises(CommandError, match="No space left"):
+        call_command("backup", file)
+    assert file.read_bytes() == b"yesterday's"
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_nobody_else_on_the_machine_may_read_it(file):
+    call_command("backup", file)
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+
+
+def test_from_one_machine_to_another(file, tmp_path):
+    """The two commands as an administrator runs them, on SQLite, each in a process of its own."""
+
+    def run(folder: str, *words: str) -> str:
+        environment = clean_environment(tmp_path / folder, 1)
+        environment["GARRY_BACKUP_PASSPHRASE"] = PASSPHRASE
+        return subprocess.run(
+            [sys.executable, "manage.py", *words],
+            cwd=ROOT,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+
+    run("old", "migrate", "-v0")
+    code = "from tests.world import build_world; build_world('amber')"
+    run("old", "shell", "-v0", "-c", code)
+    assert "1 patients" in run("old", "backup", os.fspath(file))
+    assert "1 patients" in run("new", "restore", os.fspath(file))
+    count = "from rehab.sessions.models import Step; print(Step.everywhere.count())"
+    steps = run("new", "shell", "-v0", "-c", count)
+    assert steps == run("old", "shell", "-v0", "-c", count)
+    assert int(steps) > 0
+
+
+def test_now_stands_in_it(file):
+    with file.open("wb") as out:
+        write_backup(out, PASSPHRASE, NOW + timedelta(days=1))
+    with file.open("rb") as source:
+        header = json.loads(next(read_lines(source, PASSPHRASE)))
+    assert header["made_at"].startswith("2026-11-22")
