@@ -23,19 +23,17 @@ from collections.abc import Sequence
 from functools import partial
 
 from robot import doctor, solo
-from robot.bases import BASES, BaseLost, MobileBase
+from robot.base_options import add_base_arguments, make_base
+from robot.bases import BadOption, BaseLost, MobileBase
 from robot.bases.twin.__main__ import main as run_twin
 from robot.dialing import CannotDial, add_dialing_arguments, find_token, websocket_url
 from robot.link import Link, LinkRefused
+from robot.original_topics import TOPICS, OriginalTopics
 from robot.worker import Worker
 
 ROBOT_PATH = "/ws/robot/"
 
 DONE, LOST, UNUSABLE, REFUSED, INTERRUPTED = 0, 1, 2, 3, 130
-
-
-class Unusable(ValueError):
-    """What was asked for cannot be done; the message says what could be."""
 
 
 def make_parser() -> ArgumentParser:
@@ -46,12 +44,13 @@ def make_parser() -> ArgumentParser:
         epilog="The token may also be in the environment, as GARRY_ROBOT_TOKEN.",
         formatter_class=RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--base", required=True, choices=sorted(BASES), help="what to drive")
+    add_base_arguments(parser)
     parser.add_argument(
-        "--port",
-        default="",
-        help="where a real base is: /dev/kobuki, COM3, socket://host:port (default: "
-        "GARRY_ROBOT_PORT, or a Kobuki that is plugged in)",
+        "--original-topics",
+        nargs="*",
+        choices=sorted(TOPICS),
+        help="publish on these of the original's topics at the rosbridge, beside any base "
+        "(without a name: on all)",
     )
     add_dialing_arguments(parser)
     return parser
@@ -81,9 +80,11 @@ async def until_told(is_child: bool) -> None:
     await told.wait()
 
 
-async def perform(url: str, token: str, base: MobileBase, is_child: bool) -> None:
+async def perform(
+    url: str, token: str, base: MobileBase, originals: OriginalTopics | None, is_child: bool
+) -> None:
     """Let the base perform until told to end. Raises LinkRefused and BaseLost."""
-    worker = Worker(partial(Link, url, token), base, notice=say)
+    worker = Worker(partial(Link, url, token), base, originals=originals, notice=say)
     tasks = [asyncio.create_task(worker.run()), asyncio.create_task(until_told(is_child))]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -101,11 +102,12 @@ def run(options: Namespace) -> int:
     token = find_token(options, "GARRY_ROBOT_TOKEN", "a robot")
     if options.child:  # Ctrl-C reaches both of us; the server tells when to end
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-    base = BASES[options.base](time.monotonic)
-    base.port = options.port
-    with base:
+    base, originals = make_base(options, time.monotonic), None
+    if options.original_topics is not None:
+        originals = OriginalTopics(options.ros_url, options.original_topics or TOPICS)
+    with base, originals or contextlib.nullcontext():
         try:
-            asyncio.run(perform(url, token, base, options.child))
+            asyncio.run(perform(url, token, base, originals, options.child))
         except KeyboardInterrupt:
             say("Stopped.")
             return INTERRUPTED
@@ -130,7 +132,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = make_parser().parse_args(words)
     try:
         return run(options)
-    except (CannotDial, Unusable) as problem:
+    except (CannotDial, BadOption) as problem:
         say(f"{problem}")
         return UNUSABLE
     except KeyboardInterrupt:

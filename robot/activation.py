@@ -18,6 +18,17 @@ TIME_MAX_S = 1e9
 PERFORMANCE_MAX = 1000.0
 NAME_MAX = 64
 LEAST_INTENSITY = 0.1
+# A cue of this intensity or less is performed quietly: without sounds, and at this share of every
+# speed and acceleration, so that half as far takes as long (our choice).
+QUIET = 0.5
+QUIET_PACE = 0.5
+
+# A window above is answered in full from this mean performance on, where the strong words for the
+# patient begin; at the threshold with this share of it (our choice).
+FULL_PERFORMANCE = 1.1
+FAINT = 0.5
+
+GESTURES_MAX = 8  # that come along with a cue
 
 # Why no gesture followed a decision.
 NO_GESTURE = "no_gesture"  # the order names none for it
@@ -54,6 +65,8 @@ class Cue:
         on the source's clock [s]: so what a robot does follows from the log, without chance.
     intensity
         Share of a gesture's size, 0.1 to 1; 0 for no gesture at all.
+    gestures
+        Gestures that somebody composed, as they traveled: not read yet.
     """
 
     above: str | None = None
@@ -62,6 +75,7 @@ class Cue:
     window_s: float = 5.0
     rest_s: float = 5.0
     intensity: float = 1.0
+    gestures: tuple[Any, ...] = ()
 
     @classmethod
     def read(cls, cue: Any) -> Cue:
@@ -71,6 +85,9 @@ class Cue:
         intensity = read_number(cue, "intensity", 0.0, 1.0)
         if 0 < intensity < LEAST_INTENSITY:
             raise BadMessage(f'"intensity" is 0, or a number from {LEAST_INTENSITY:g} to 1.')
+        gestures = cue.get("gestures", [])
+        if not isinstance(gestures, list) or len(gestures) > GESTURES_MAX:
+            raise BadMessage(f'"gestures" is a list of up to {GESTURES_MAX}.')
         return cls(
             above=_read_gesture(cue, "above"),
             below=_read_gesture(cue, "below"),
@@ -78,7 +95,13 @@ class Cue:
             window_s=read_number(cue, "window_s", 1.0, 600.0),
             rest_s=read_number(cue, "rest_s", 0.0, 3600.0),
             intensity=intensity,
+            gestures=tuple(gestures),
         )
+
+    @property
+    def is_quiet(self) -> bool:
+        """Whether it is to be performed without sounds, and slowly."""
+        return self.intensity <= QUIET
 
     def gesture(self, above: bool) -> str | None:
         """Give the gesture after a decision."""
@@ -108,6 +131,17 @@ class Decision:
     def is_late(self) -> bool:
         """Whether it is of so long ago that nobody may answer it any more."""
         return self.at_s - self.until_s > self.until_s - self.from_s
+
+    @property
+    def vigor(self) -> float:
+        """The share of the cue's intensity that answers it, ``FAINT`` to 1.
+
+        Above the threshold it grows with the mean performance; a window below never makes it grow.
+        """
+        if not self.above or self.mean >= FULL_PERFORMANCE:
+            return 1.0
+        grown = (self.mean - self.threshold) / (FULL_PERFORMANCE - self.threshold)
+        return FAINT + (1 - FAINT) * grown
 
 
 class Activation:

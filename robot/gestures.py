@@ -1,15 +1,17 @@
 """Gestures: places to go to, one after the other, and home again.
 
 A gesture says where, never for how long: timed ones end rotated and displaced as soon as a base
-speeds up gently (kobuki.md 2.5). Here are the gestures, and the arithmetic of how one is driven.
+speeds up gently (kobuki.md 2.5). Here are the gestures that we bring along, and what makes one.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from robot.motion import DEFAULT_LIMITS, HOME, Limits, Pose, least_time_s, wrap
+from robot.legs import Drive, Leg, lies_on, plan_legs
+from robot.motion import DEFAULT_LIMITS, HOME, Limits, Pose
 
 # A base never leaves this circle around its home [m]; gestures keep 5 cm away from its edge
 # (kobuki.md 5.3).
@@ -23,11 +25,20 @@ NEAR_RAD = 0.02
 GESTURE_MAX_S = 16.0  # the paper's longest, with slack
 GOALS_MAX = 32
 TURN_MAX_RAD = math.tau  # a longer cable than this winds up
+LEAST_PACE = 0.2  # slower turns stick and shake (kobuki.md 3: below 0.33 rad/s)
 SLACK = 1.5  # a goal's time over its shortest possible: odometry, grip and latency cost some
 
 
 class BadGesture(ValueError):
     """A gesture that a base could not perform; the message says what would be one."""
+
+
+class BadGoal(BadGesture):
+    """A gesture of which one goal is at fault: ``number`` says which, ``what`` what it does."""
+
+    def __init__(self, number: int, what: str) -> None:
+        super().__init__(f"Goal {number} {what}")
+        self.number, self.what = number, what
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,81 +85,39 @@ class Gesture:
         check_gesture(self)
 
     def scaled(self, intensity: float) -> Gesture:
-        """Give the gesture at this share of its size, above 0 and up to 1; never quicker."""
+        """Give the gesture at this share of its size, above 0 and up to 1; never longer.
+
+        Ways shrink, and turns with them as long as it drives on the line ahead of home only. Where
+        it drives aside its turns say where to, and stay as they are.
+        """
         if not 0 < intensity <= 1:
             raise BadGesture("An intensity lies above 0 and up to 1.")
+        turns = intensity if self._drives_ahead else 1.0
         goals = tuple(
             replace(
                 goal,
                 x_m=goal.x_m * intensity,
                 y_m=goal.y_m * intensity,
-                heading_rad=goal.heading_rad * intensity,
+                heading_rad=goal.heading_rad * turns,
             )
             for goal in self.goals
         )
         return replace(self, goals=goals)
 
     @property
+    def _drives_ahead(self) -> bool:
+        """Whether it drives with the heading of home only."""
+        legs = (leg for legs, _, _ in stages(self.goals, DEFAULT_LIMITS) for leg in legs)
+        drives = [leg for leg in legs if isinstance(leg, Drive)]
+        return all(abs(drive.heading_rad) < 1e-9 for drive in drives)
+
+    @property
     def least_s(self) -> float:
         """The shortest time that it can take within the default limits [s]."""
         return sum(
             hold_s + sum(leg.least_s(limits) for leg in legs)
-            for legs, limits, hold_s in _stages(self.goals, DEFAULT_LIMITS)
+            for legs, limits, hold_s in stages(self.goals, DEFAULT_LIMITS)
         )
-
-
-@dataclass(frozen=True, slots=True)
-class Turn:
-    """Turn on the spot to a heading [rad], seen from home; ``by_rad`` from where it should be."""
-
-    heading_rad: float
-    by_rad: float
-
-    def least_s(self, limits: Limits) -> float:
-        """Give the shortest time that it takes [s]."""
-        return least_time_s(
-            self.by_rad, limits.w_rad_s, limits.speed_up_rad_s2, limits.slow_down_rad_s2
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class Drive:
-    """Drive straight to a place, heading [rad] along the line; backwards where ``by_m`` < 0."""
-
-    x_m: float
-    y_m: float
-    heading_rad: float
-    by_m: float
-
-    def least_s(self, limits: Limits) -> float:
-        """Give the shortest time that it takes [s]."""
-        return least_time_s(self.by_m, limits.v_m_s, limits.speed_up_m_s2, limits.slow_down_m_s2)
-
-
-Leg = Turn | Drive
-
-
-def plan_legs(start: Pose, goal: Pose) -> tuple[Leg, ...]:
-    """Give the turns and the drive that lead from one pose to another.
-
-    The base turns to face the place, drives there and turns to the goal's heading. A place that
-    lies behind is driven to backwards, so that a base that went out comes back the way it went.
-    A turn by 0 is a leg too: who follows it comes to that heading from wherever it is.
-    """
-    legs: list[Leg] = []
-    heading_rad = start.heading_rad
-    distance_m = start.distance_m(goal)
-    if distance_m > 0:
-        bearing_rad = math.atan2(goal.y_m - start.y_m, goal.x_m - start.x_m)
-        ahead_rad = wrap(bearing_rad - heading_rad)
-        is_behind = abs(ahead_rad) > math.pi / 2
-        face_rad = wrap(ahead_rad + math.pi) if is_behind else ahead_rad
-        heading_rad += face_rad
-        legs.append(Turn(heading_rad, face_rad))
-        by_m = -distance_m if is_behind else distance_m
-        legs.append(Drive(goal.x_m, goal.y_m, heading_rad, by_m))
-    legs.append(Turn(goal.heading_rad, goal.heading_rad - heading_rad))
-    return tuple(legs)
 
 
 def check_gesture(gesture: Gesture) -> None:
@@ -156,42 +125,66 @@ def check_gesture(gesture: Gesture) -> None:
     if not 1 <= len(gesture.goals) <= GOALS_MAX:
         raise BadGesture(f"A gesture has 1 to {GOALS_MAX} goals.")
     for number, goal in enumerate(gesture.goals, start=1):
-        _check_goal(number, goal)
+        check_goal(number, goal)
     last = gesture.goals[-1].pose
     if last.distance_m(HOME) or abs(last.turn_rad(HOME)) > 1e-9:
         raise BadGesture("A gesture's last goal is home: x 0, y 0, heading 0.")
-    total_s = 0.0
-    stages = _stages(gesture.goals, DEFAULT_LIMITS)
-    for number, (goal, stage) in enumerate(zip(gesture.goals, stages, strict=True), start=1):
-        legs, limits, hold_s = stage
-        needed_s = SLACK * sum(leg.least_s(limits) for leg in legs) + hold_s
-        if goal.within_s < needed_s:
-            raise BadGesture(f"Goal {number} needs {needed_s:.1f} s; give it as long.")
-        total_s += needed_s
-    if total_s > GESTURE_MAX_S:
+    needed_s = [needed_time_s(*stage) for stage in stages(gesture.goals, DEFAULT_LIMITS)]
+    if sum(needed_s) > GESTURE_MAX_S:
         raise BadGesture(
-            f"This takes up to {total_s:.1f} s; a gesture takes at most {GESTURE_MAX_S:g} s. "
-            "Make it smaller or leave goals out."
+            f"This takes up to {sum(needed_s):.1f} s; a gesture takes at most {GESTURE_MAX_S:g} s. "
+            "Make it smaller, or leave something out."
         )
+    for number, (goal, least_s) in enumerate(zip(gesture.goals, needed_s, strict=True), start=1):
+        if goal.within_s < least_s:
+            raise BadGoal(number, f"needs {math.ceil(10 * least_s) / 10:.1f} s; give it as long.")
+    _check_ways_back(gesture.goals)
 
 
-def _check_goal(number: int, goal: Goal) -> None:
+def needed_time_s(legs: Sequence[Leg], limits: Limits, hold_s: float) -> float:
+    """Give the time [s] that a goal has to be given: of its legs, with slack, and of its hold."""
+    return SLACK * sum(leg.least_s(limits) for leg in legs) + hold_s
+
+
+def check_goal(number: int, goal: Goal) -> None:
+    """Raise BadGoal for a goal that no gesture may have, whatever comes before it."""
     numbers = (goal.x_m, goal.y_m, goal.heading_rad, goal.within_s, goal.pace, goal.hold_s)
     if not all(map(math.isfinite, numbers)):
-        raise BadGesture(f"Goal {number} has a number that is not finite.")
-    if math.hypot(goal.x_m, goal.y_m) > REACH_M:
-        raise BadGesture(f"Goal {number} is further than {REACH_M:g} m from home.")
-    if abs(goal.heading_rad) > TURN_MAX_RAD:
-        raise BadGesture(f"Goal {number} turns more than once around.")
-    if not 0.2 <= goal.pace <= 1:
-        raise BadGesture(f"Goal {number} has a pace outside 0.2 to 1.")
-    if not (0 < goal.within_s <= GESTURE_MAX_S and 0 <= goal.hold_s <= goal.within_s):
-        raise BadGesture(
-            f"Goal {number} takes above 0 and up to {GESTURE_MAX_S:g} s, its hold included."
+        raise BadGoal(number, "has a number that is not finite.")
+    away_m = goal.pose.distance_m(HOME)
+    if away_m > REACH_M:
+        raise BadGoal(
+            number,
+            f"goes {away_m:.2f} m away from home, further than {REACH_M:g} m. Make it shorter.",
         )
+    if abs(goal.heading_rad) > TURN_MAX_RAD:
+        raise BadGoal(number, "turns more than once around. Turn back first, or less.")
+    if not LEAST_PACE <= goal.pace <= 1:
+        raise BadGoal(number, f"has a pace outside {LEAST_PACE:g} to 1.")
+    if not (0 < goal.within_s <= GESTURE_MAX_S and 0 <= goal.hold_s <= goal.within_s):
+        raise BadGoal(number, f"may take up to {GESTURE_MAX_S:g} s, its hold included.")
 
 
-def _stages(goals: tuple[Goal, ...], limits: Limits) -> list[tuple[tuple[Leg, ...], Limits, float]]:
+def _check_ways_back(goals: Sequence[Goal]) -> None:
+    """Refuse a way that is backed over and was not come over before."""
+    seen: list[tuple[Pose, Pose]] = []
+    start = HOME
+    for number, goal in enumerate(goals, start=1):
+        for leg in plan_legs(start, goal.pose):
+            if not isinstance(leg, Drive):
+                continue
+            if leg.by_m > 0:
+                seen.append((start, goal.pose))
+            elif not lies_on(start, goal.pose, seen):
+                raise BadGoal(
+                    number,
+                    "backs where it did not come from; there is no bumper behind. "
+                    "Let it face the way, or go ahead first.",
+                )
+        start = goal.pose
+
+
+def stages(goals: Sequence[Goal], limits: Limits) -> list[tuple[tuple[Leg, ...], Limits, float]]:
     """Give each goal's legs, from the goal before, with their limits and the hold [s]."""
     starts = (HOME, *(goal.pose for goal in goals[:-1]))
     return [

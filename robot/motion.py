@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+TICK_S = 0.02  # between two orders to a base: 50 Hz, as often as a Kobuki tells where it is
+
 # Longer than this between two orders [s], a limiter counts no more: what hung may not lurch
 # (kobuki.md 5.2, rule 4).
 LONGEST_STEP_S = 0.1

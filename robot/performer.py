@@ -13,6 +13,7 @@ from typing import Any
 
 from robot.activation import (
     PERFORMANCE_MAX,
+    QUIET_PACE,
     TIME_MAX_S,
     Activation,
     BadMessage,
@@ -24,12 +25,19 @@ from robot.bases import BaseState, MobileBase, Mood
 from robot.gestures import GESTURES, ORIGINALS, Gesture
 from robot.motion import DEFAULT_LIMITS, Limits
 from robot.player import BAD_ODOMETRY, OUT_OF_TIME, Player
+from robot.repertoire import Repertoire
 from robot.reports import Report, decision_report, gesture_report, status_report, stop_report
-from robot.safety import ANNOUNCE_S, AWAY, QUIET, STALLED, STOPPED, Safety
+from robot.safety import (
+    ANNOUNCE_S,
+    AWAY,
+    BATTERY_WARN_V,
+    STALLED,
+    STOPPED,
+    Safety,
+    battery_share,
+)
 
 Message = Mapping[str, Any]
-
-TICK_S = 0.02  # between two orders to a base: 50 Hz, as often as a Kobuki tells where it is
 
 # Without a sign of life for so long [s] the base stands still. The server gives one every 0.25 s,
 # and one may come 0.4 s late; what nobody hears should move no longer than 0.75 s, and the order to
@@ -45,7 +53,6 @@ NO_LINK = "no_link"
 NO_SESSION = "no_session"
 NOT_RUNNING = "not_running"
 CANNOT_MOVE = "base_cannot_move"
-UNKNOWN_GESTURE = "unknown_gesture"
 REPLACED = "replaced"  # a welcome to another session
 
 
@@ -65,6 +72,8 @@ class Performer:
     ----------
     reports
         What is to be sent, oldest first; whoever sends takes them from the left.
+    decision
+        The newest decision; None before there was one.
     bad_messages, last_bad
         How many messages were not the protocol, and what was wrong with the last one.
     """
@@ -77,9 +86,10 @@ class Performer:
     ) -> None:
         self.base = base
         self.player = Player(limits)
-        self.gestures = gestures
+        self.repertoire = Repertoire(gestures, limits)
         self.activation = Activation(Cue())
         self.reports: deque[Report] = deque(maxlen=REPORTS_KEPT)
+        self.decision: Decision | None = None
         self.bad_messages = 0
         self.last_bad = ""
         self.safety = Safety(base.abilities)
@@ -155,7 +165,7 @@ class Performer:
             case "state":
                 self._follow_state(message)
             case "cue":
-                self.activation.follow(Cue.read(message.get("cue")))
+                self._follow_cue(Cue.read(message.get("cue")))
             case "arm":
                 self._arm(now_s)
             case _:
@@ -172,7 +182,7 @@ class Performer:
             if session != self._session:
                 self.activation = Activation(cue)
                 self.reports.clear()
-            self.activation.follow(cue)
+            self._follow_cue(cue)
             self.activation.forget()
             self._is_running = state == "running"
             self._follow_watch(message, False)
@@ -183,6 +193,12 @@ class Performer:
         if session != self._session or not self._is_running:
             self.player.stop(REPLACED)
         self._session, self._is_welcome = session, True
+
+    def _follow_cue(self, cue: Cue) -> None:
+        """Take an order, with the gestures that came along."""
+        for problem in self.repertoire.take(cue.gestures):
+            self.bad(problem)
+        self.activation.follow(cue)
 
     def _follow_state(self, message: Message) -> None:
         state = message.get("state")
@@ -231,31 +247,40 @@ class Performer:
             return
         decision = self.activation.add(time_s, performance)
         if decision is not None:
+            self.decision = decision
             self._answer(decision, now_s)
 
     def _answer(self, decision: Decision, now_s: float) -> None:
         """Report a decision, and start the gesture that follows from it."""
         state, cue = self.base.read(), self.activation.cue
-        name = cue.gesture(decision.above)
+        name, share = cue.gesture(decision.above), self.activation.share
         reason = self.activation.obstacle(decision, performing=self.player.is_busy)
-        reason = reason or self._obstacle(name, state)
-        gesture = None if reason or name is None else self.gestures[name]
-        told = None if gesture is None else gesture.name
-        self.reports.append(decision_report(decision, told, reason, self.activation.share))
+        gesture = None
+        if not reason and name is not None:
+            gesture, reason = self.repertoire.find(name)
         if gesture is not None:
-            after_s = ANNOUNCE_S if self.base.abilities.announces else 0.0
-            pose = self.base.read().pose  # a simulated base may have been put back
-            self.player.start(gesture.scaled(cue.intensity), now_s, pose, after_s)
-            self.safety.begin(now_s, state)
-            self.activation.started(decision)
-            self._tell_gesture(gesture, "started", "")
+            reason = self._obstacle(gesture, state)
+        if reason or gesture is None:
+            self.reports.append(decision_report(decision, None, None, reason, share))
+            return
+        # What replicates the paper does the same every time.
+        vigor = 1.0 if gesture.name in ORIGINALS else decision.vigor
+        intensity = round(cue.intensity * vigor * self.safety.share, 3)
+        self.reports.append(decision_report(decision, gesture.name, intensity, "", share))
+        after_s = ANNOUNCE_S if self.base.abilities.announces else 0.0
+        pose = self.base.read().pose  # a simulated base may have been put back
+        pace = QUIET_PACE if cue.is_quiet else 1.0
+        self.player.start(gesture.scaled(intensity), now_s, pose, after_s, pace)
+        self.safety.begin(now_s, state)
+        self.activation.started(decision)
+        self._tell_gesture(gesture, "started", "")
 
-    def _obstacle(self, name: str | None, state: BaseState) -> str:
-        """Say what else keeps the base from performing; nothing where it may."""
-        if name not in self.gestures:
-            return UNKNOWN_GESTURE
+    def _obstacle(self, gesture: Gesture, state: BaseState) -> str:
+        """Say what keeps the base from performing a gesture; nothing where it may."""
         if not self.base.abilities.moves:
             return CANNOT_MOVE
+        if reason := self.safety.refuses(gesture):
+            return reason
         if reason := self.safety.obstacle(state):
             return reason
         if not self.safety.is_at_home(state):
@@ -290,7 +315,7 @@ class Performer:
                 mood = Mood.WAITING
         if mood is not self._mood:
             self._mood = mood
-            is_loud = self.activation.cue.intensity > QUIET
+            is_loud = not self.activation.cue.is_quiet
             self.base.show(mood, aloud=is_loud and mood in (Mood.MOVING, Mood.STOPPED))
 
     def _tell_status(self, now_s: float, there: BaseState) -> None:
@@ -306,9 +331,12 @@ class Performer:
         gesture = self.player.gesture
         name = None if gesture is None else gesture.name
         base, counters = self.base, {"refused_arms": self.safety.refused_arms, **self.base.counters}
+        volts = there.senses.battery_v
+        battery = (None, False) if volts is None else (battery_share(volts), volts < BATTERY_WARN_V)
         self.reports.append(
-            status_report(base.name, *state, name, there, self.bad_messages, counters)
+            status_report(base, *state, name, there, battery, self.bad_messages, counters)
         )
 
     def _tell_gesture(self, gesture: Gesture, phase: str, outcome: str) -> None:
-        self.reports.append(gesture_report(gesture.name, phase, outcome))
+        is_open = not self.base.abilities.closed_loop
+        self.reports.append(gesture_report(gesture.name, phase, outcome, open_loop=is_open))

@@ -6,7 +6,8 @@ import math
 from collections import deque
 from dataclasses import replace
 
-from robot.gestures import NEAR_M, NEAR_RAD, Drive, Gesture, Goal, Leg, Turn, plan_legs
+from robot.gestures import LEAST_PACE, NEAR_M, NEAR_RAD, Gesture, Goal
+from robot.legs import Drive, Leg, Turn, plan_legs
 from robot.motion import HOME, STILL, Limits, Pose, Twist, wrap
 
 DONE = "done"
@@ -53,21 +54,39 @@ class Player:
         self._begins_s = 0.0  # before that it stands still, announced
         self._verdict = ""  # the outcome-to-be, while the base comes to rest
         self._turns_rad = 0.0  # full turns that were made before the gesture
+        self._pace = 1.0
 
     @property
     def is_busy(self) -> bool:
         """Whether a gesture is played, its coming to rest included."""
         return self.gesture is not None
 
-    def start(self, gesture: Gesture, time_s: float, pose: Pose, after_s: float = 0.0) -> None:
+    def start(
+        self,
+        gesture: Gesture,
+        time_s: float,
+        pose: Pose,
+        after_s: float = 0.0,
+        pace: float = 1.0,
+    ) -> None:
         """Begin a gesture around home, which is odometry's zero. Raises RuntimeError while busy.
 
-        ``pose`` is where the base is now: full turns that it has made do not count. It stands still
-        for ``after_s`` [s] first.
+        Parameters
+        ----------
+        gesture
+            What to play.
+        time_s
+            The player's clock [s].
+        pose
+            Where the base is now: full turns that it has made do not count.
+        after_s
+            How long it stands still first [s].
+        pace
+            Share of each goal's own pace to go at, above 0 and up to 1; its time grows with it.
         """
         if self.gesture is not None:
             raise RuntimeError(f"{self.gesture.name} is being played.")
-        self.gesture, self._verdict = gesture, ""
+        self.gesture, self._verdict, self._pace = gesture, "", pace
         self._turns_rad = pose.heading_rad - wrap(pose.heading_rad)
         self._goals = deque(gesture.goals)
         self._begins_s = time_s + after_s
@@ -109,7 +128,7 @@ class Player:
         """Give what the present goal asks for, within which limits."""
         here = replace(pose, heading_rad=pose.heading_rad - self._turns_rad)
         while self._goal is not None and not self._verdict:
-            limits = self.limits.scaled(self._goal.pace)
+            limits = self.limits.scaled(self._share(self._goal))
             if time_s < self._begins_s:
                 return limits, STILL
             if self._there_s is None and time_s > self._until_s:
@@ -137,7 +156,11 @@ class Player:
             return
         self._goal = self._goals.popleft()
         self._legs = deque(plan_legs(start, self._goal.pose))
-        self._until_s = time_s + self._goal.within_s
+        self._until_s = time_s + self._goal.within_s * self._goal.pace / self._share(self._goal)
+
+    def _share(self, goal: Goal) -> float:
+        """Give the share of the limits that a goal is gone to at."""
+        return max(LEAST_PACE, goal.pace * self._pace)
 
     def _end(self, outcome: str) -> None:
         self.gesture, self._goal = None, None

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from robot.bases import BASES
-from robot.motion import DEFAULT_LIMITS, Limits
-from robot.performer import TICK_S, Performer
+from robot.motion import DEFAULT_LIMITS, TICK_S, Limits
+from robot.performer import Performer
 
 # Simulated bases that keep to any clock.
 REHEARSED = [

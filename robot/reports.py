@@ -6,37 +6,49 @@ from collections.abc import Mapping
 from typing import Any
 
 from robot.activation import Decision
-from robot.bases.base import BaseState
+from robot.bases.base import BaseState, MobileBase
 
 Report = dict[str, Any]
 
 
 def status_report(
-    base: str,
+    base: MobileBase,
     state: str,
     reason: str,
     gesture: str | None,
     there: BaseState,
+    battery: tuple[float | None, bool],
     bad_messages: int,
     counters: Mapping[str, int],
 ) -> Report:
-    """Say how it is. Of the counters, those that counted something."""
-    pose = there.pose
+    """Say how it is: ``battery`` is its share and whether that is low. Of the counters, those that
+    counted something.
+    """
+    pose, (battery_share, is_low) = there.pose, battery
     return {
         "kind": "status",
-        "base": base,
+        "base": base.name,
+        "simulated": base.abilities.simulated,
+        "open_loop": not base.abilities.closed_loop,
+        "bumpers": base.abilities.bumpers,
         "state": state,
         "gesture": gesture,
         "pose": {"x_m": pose.x_m, "y_m": pose.y_m, "heading_rad": pose.heading_rad},
         "reason": reason,
         "battery_v": there.senses.battery_v,
+        "battery_share": battery_share,
+        "battery_low": is_low,
         "bad_messages": bad_messages,
         "counters": {name: count for name, count in counters.items() if count},
     }
 
 
 def decision_report(
-    decision: Decision, gesture: str | None, reason: str, share: float | None
+    decision: Decision,
+    gesture: str | None,
+    intensity: float | None,
+    reason: str,
+    share: float | None,
 ) -> Report:
     """Say what a window came to, and what follows."""
     return {
@@ -48,14 +60,16 @@ def decision_report(
         "threshold": decision.threshold,
         "above": decision.above,
         "gesture": gesture,
+        "intensity": intensity,
         "reason": reason,
         "activated_share": share,
     }
 
 
-def gesture_report(name: str, phase: str, outcome: str) -> Report:
-    """Say that a gesture started or ended."""
-    return {"kind": "gesture", "name": name, "phase": phase, "outcome": outcome}
+def gesture_report(name: str, phase: str, outcome: str, *, open_loop: bool) -> Report:
+    """Say that a gesture started or ended; one that no odometry closed is labeled so."""
+    report = {"kind": "gesture", "name": name, "phase": phase, "outcome": outcome}
+    return report | {"open_loop": True} if open_loop else report
 
 
 def stop_report(reason: str) -> Report:

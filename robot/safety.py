@@ -11,12 +11,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from robot.bases.base import Abilities, BaseState
-from robot.gestures import TETHER_M
+from robot.gestures import TETHER_M, Gesture
 from robot.motion import HOME, ORDER_HOLDS_S, Twist
 
 # Light and sound come so long before a gesture [s]: a sudden motion may startle whoever walks.
 ANNOUNCE_S = 0.5
-QUIET = 0.5  # a cue of this intensity or less is performed without sounds (our choice)
 
 # Nothing heard of the base for so long [s]. The reference takes 0.1 s (kobuki.md 1.6); twice that
 # forgives a busy computer (largest gap measured: 0.03 s) and keeps the whole within 0.35 s.
@@ -33,6 +32,7 @@ SLIP_RAD = 0.175  # 10°: wheels and gyro disagree about a gesture's turns
 
 # Of four lithium cells [V] (kobuki.md 1.9 and 3). A battery that was low has to come back to WARN:
 # at rest it recovers by itself, and would be low again with the next gesture.
+BATTERY_FULL_V = 16.5
 BATTERY_WARN_V = 14.0
 BATTERY_LOW_V = 13.5
 BATTERY_EMPTY_V = 13.2
@@ -45,6 +45,13 @@ AT_HOME_RAD = 0.087  # 5°
 # An arming so soon after the robot stopped itself [s] was given before anyone could look (our
 # choice; people react to what they see after 0.2 s and more).
 SEEN_S = 1.0
+
+# Where no odometry closes the loop, a gesture is short: of half its size, and within the limits not
+# longer than this [s]; and after so many since it was armed a person has to look where the base is
+# (ours: with 10 % of each way astray, 20 of them come to half the tether).
+OPEN_LOOP_SHARE = 0.5
+OPEN_LOOP_S = 4.0
+OPEN_LOOP_MOST = 20
 
 # Latches; those that a base feels have its own codes.
 STOPPED = "stopped"  # by a person
@@ -62,6 +69,14 @@ UNWATCHED = "unwatched"  # a real base, and no PT's page is open
 CHARGING = "charging"
 BATTERY_LOW = "battery_low"
 AWAY = "away_from_home"
+OPEN_LOOP = "open_loop"  # too long a gesture for a base that does not tell where it is
+PLACE_UNKNOWN = "place_unknown"  # such a base has to be looked at, and armed
+
+
+def battery_share(battery_v: float) -> float:
+    """Give how full a battery of that voltage [V] is, 0 to 1 (kobuki.md 1.9)."""
+    share = (battery_v - BATTERY_EMPTY_V) / (BATTERY_FULL_V - BATTERY_EMPTY_V)
+    return min(max(0.05 + 0.95 * share, 0.0), 1.0)
 
 
 class Safety:
@@ -94,6 +109,7 @@ class Safety:
         self._looked_s: float | None = None
         self._since: dict[str, float] = {}  # when what holds now began
         self._slip_rad = 0.0  # when the gesture began
+        self._begun = 0  # gestures since it was armed
         self._is_low = False
 
     def stop(self, reason: str) -> None:
@@ -123,12 +139,14 @@ class Safety:
             self.fail(reason, now_s)
             return reason
         self.latch, self._felt_s, self.is_armed = "", None, True
+        self._begun = 0
         self._since.clear()
         return ""
 
     def begin(self, now_s: float, state: BaseState) -> None:
         """Note that a gesture begins here and now."""
         self._looked_s, self._slip_rad = now_s, state.senses.slip_rad
+        self._begun += 1
 
     def watch(self, now_s: float, state: BaseState, ordered: Twist, *, performing: bool) -> str:
         """Look at the base; give the code of what must stop it now, or nothing.
@@ -168,7 +186,19 @@ class Safety:
             return BATTERY_LOW
         if is_real and not self.is_watched:
             return UNWATCHED
+        if not self._abilities.closed_loop and self._begun >= OPEN_LOOP_MOST:
+            return PLACE_UNKNOWN
         return ""
+
+    @property
+    def share(self) -> float:
+        """The share of a gesture's size that the base may perform."""
+        return 1.0 if self._abilities.closed_loop else OPEN_LOOP_SHARE
+
+    def refuses(self, gesture: Gesture) -> str:
+        """Say why the base cannot perform a gesture safely; nothing where it can."""
+        is_long = not self._abilities.closed_loop and gesture.least_s > OPEN_LOOP_S
+        return OPEN_LOOP if is_long else ""
 
     @staticmethod
     def is_at_home(state: BaseState) -> bool:

@@ -1,7 +1,8 @@
 """`python -m robot gesture NAME --base BASE`: plays a gesture without a server.
 
 For trying a base and its place. Whoever types it arms a real base by that: stand at its switch.
-Exit status: 0 it was played; 1 it ended otherwise, or the base does not answer; 130 Ctrl-C.
+Exit status: 0 it was played; 1 it ended otherwise, or the base does not answer; 2 the command line
+cannot be used; 130 Ctrl-C.
 """
 
 from __future__ import annotations
@@ -14,13 +15,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from robot.bases import BASES, BaseLost, MobileBase, Mood
+from robot.base_options import add_base_arguments, make_base
+from robot.bases import BASES, BadOption, BaseLost, MobileBase, Mood
 from robot.gestures import GESTURES, ORIGINALS, Gesture
-from robot.motion import DEFAULT_LIMITS, HOME
+from robot.motion import DEFAULT_LIMITS, HOME, TICK_S
 from robot.player import DONE, Player
 from robot.safety import ANNOUNCE_S, AWAY, Safety
 
-TICK_S = 0.02
 REST_S = 0.3  # until wheels, odometry and truth have come to rest
 
 
@@ -53,12 +54,13 @@ def play(
     player, safety = Player(DEFAULT_LIMITS), Safety(base.abilities)
     safety.is_watched = True
     state, began_s = base.read(), monotonic()
-    outcome = safety.arm(began_s, state) or safety.obstacle(state)
+    outcome = safety.refuses(gesture) or safety.arm(began_s, state) or safety.obstacle(state)
     if not outcome and not safety.is_at_home(state):
         outcome = AWAY
     if not outcome:
         base.show(Mood.MOVING, aloud=True)
-        player.start(gesture, began_s, state.pose, ANNOUNCE_S if base.abilities.announces else 0.0)
+        after_s = ANNOUNCE_S if base.abilities.announces else 0.0
+        player.start(gesture.scaled(safety.share), began_s, state.pose, after_s)
         safety.begin(began_s, state)
     farthest_m = 0.0
     while player.is_busy:
@@ -81,6 +83,7 @@ def play(
     return {
         "gesture": gesture.name,
         "base": base.name,
+        "abilities": asdict(base.abilities),
         "outcome": outcome,
         "took_s": round(took_s, 3),
         "pose": asdict(base.read().pose),
@@ -94,7 +97,9 @@ def describe(played: dict[str, Any]) -> str:
     """Say it to people."""
     pose = played["true_pose"] or played["pose"]
     where = f"x {1000 * pose['x_m']:.0f} mm, y {1000 * pose['y_m']:.0f} mm"
-    return f"{played['gesture']}: {played['outcome']} after {played['took_s']:.1f} s, at {where}"
+    loop = "" if played["abilities"]["closed_loop"] else ", open loop: where it should be"
+    took = f"after {played['took_s']:.1f} s"
+    return f"{played['gesture']}: {played['outcome']} {took}, at {where}{loop}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -106,18 +111,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("name", choices=sorted(GESTURES | ORIGINALS))
     moving = sorted(name for name, base in BASES.items() if base.abilities.moves)
-    parser.add_argument("--base", choices=moving, required=True)
-    parser.add_argument("--port", default="", help="of a real base; see python -m robot --help")
+    add_base_arguments(parser, moving)
     parser.add_argument("--times", type=int, default=1, metavar="N", help="so often, in a row")
     parser.add_argument("--json", action="store_true", help="print a JSON line each")
     options = parser.parse_args(arguments)
     clock = VirtualClock()
     is_real = BASES[options.base].abilities.real_time
     monotonic, sleep = (time.monotonic, time.sleep) if is_real else (clock.monotonic, clock.sleep)
-    base = BASES[options.base](monotonic)
-    base.port = options.port
     outcome = DONE
     try:
+        base = make_base(options, monotonic)
         with base:
             for _ in range(options.times):
                 played = play((GESTURES | ORIGINALS)[options.name], base, monotonic, sleep)
@@ -126,10 +129,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 sys.stdout.flush()
                 outcome = played["outcome"]
                 if outcome != DONE:
+                    if base.problem:
+                        sys.stderr.write(f"{base.problem}\n")
                     break
     except BaseLost as problem:
         sys.stderr.write(f"{problem}\n")
         return 1
+    except BadOption as problem:
+        sys.stderr.write(f"{problem}\n")
+        return 2
     except KeyboardInterrupt:
         return 130
     return 0 if outcome == DONE else 1

@@ -9,8 +9,9 @@ from typing import Any
 
 from robot.bases import MobileBase
 from robot.link import NOT_PROTOCOL, Link, LinkRefused, Message
-from robot.motion import DEFAULT_LIMITS, Limits
-from robot.performer import NO_LINK, TICK_S, Performer
+from robot.motion import DEFAULT_LIMITS, TICK_S, Limits
+from robot.original_topics import OriginalTopics
+from robot.performer import NO_LINK, Performer
 
 
 class Worker:
@@ -24,6 +25,8 @@ class Worker:
         An open base.
     limits
         Speeds and accelerations of every gesture.
+    originals
+        What publishes on the original's topics; open.
     notice
         Called with what somebody who looks on should know.
     monotonic, sleep
@@ -36,13 +39,14 @@ class Worker:
         base: MobileBase,
         *,
         limits: Limits = DEFAULT_LIMITS,
+        originals: OriginalTopics | None = None,
         notice: Callable[[str], None] = lambda _text: None,
         monotonic: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
     ) -> None:
         self.performer = Performer(base, limits)
         self._link = dial(greet=self._greet, on_lost=self._lose)
-        self._base = base
+        self._base, self._originals = base, originals
         self._notice = notice
         self._monotonic = monotonic
         self._sleep = sleep
@@ -87,7 +91,13 @@ class Worker:
 
     def _hear(self, message: Message) -> None:
         was_linked, bad = self.performer.is_linked, self.performer.bad_messages
+        decided = self.performer.decision
         self.performer.hear(message, self._monotonic())
+        if self._originals is not None:
+            self._originals.follow(message)
+            decision = self.performer.decision
+            if decision is not None and decision is not decided:
+                self._originals.decide(decision.above)
         if self.performer.is_linked and not was_linked:
             self._notice(f"Joined session {message.get('session')}.")
         if self.performer.bad_messages > bad:
@@ -95,11 +105,14 @@ class Worker:
         self._reported.set()
 
     async def _drive(self) -> None:
-        problem = ""
+        problem = trouble = ""
         while True:
             if problem != self._base.problem:
                 problem = self._base.problem
                 self._notice(problem or "The base answers.")
+            if self._originals is not None and trouble != self._originals.problem:
+                trouble = self._originals.problem
+                self._notice(trouble or "The original's topics are published.")
             was_linked = self.performer.is_linked
             self.performer.tick(self._monotonic())
             if was_linked and not self.performer.is_linked:

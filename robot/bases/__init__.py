@@ -1,9 +1,19 @@
 """The bases that can be driven: one module each."""
 
-from robot.bases.base import Abilities, BaseLost, BaseState, MobileBase, Mood, Senses, Truth
+from robot.bases.base import (
+    Abilities,
+    BadOption,
+    BaseLost,
+    BaseState,
+    MobileBase,
+    Mood,
+    Senses,
+    Truth,
+)
 from robot.bases.kinematic import KinematicBase
 from robot.bases.kobuki import KobukiBase
 from robot.bases.null import NullBase
+from robot.bases.rosbridge import RosbridgeBase
 from robot.bases.twinned import TwinBase
 
 # Name: its class, made with a monotonic clock [s].
@@ -12,6 +22,17 @@ BASES: dict[str, type[MobileBase]] = {
     "kinematic": KinematicBase,
     "twin": TwinBase,
     "kobuki": KobukiBase,
+    "rosbridge": RosbridgeBase,
 }
 
-__all__ = ["BASES", "Abilities", "BaseLost", "BaseState", "MobileBase", "Mood", "Senses", "Truth"]
+__all__ = [
+    "BASES",
+    "Abilities",
+    "BadOption",
+    "BaseLost",
+    "BaseState",
+    "MobileBase",
+    "Mood",
+    "Senses",
+    "Truth",
+]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from argparse import ArgumentParser, Namespace, _ArgumentGroup
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -16,26 +17,36 @@ class BaseLost(RuntimeError):
     """A base that does not answer any more; the message says what to look at."""
 
 
+class BadOption(ValueError):
+    """An option of a command line that no base could follow; the message says what one could."""
+
+
 @dataclass(frozen=True, slots=True)
 class Abilities:
-    """What a base is.
+    """What a base is and can do; what it cannot do safely is refused for that.
 
     Parameters
     ----------
     simulated
         Nothing in it can touch anyone; only such a base may arm itself.
     moves
-        Whether it can drive and tell where it is, as gestures need.
+        Whether it can drive and turn, as gestures need.
     announces
         Whether it has lights and sounds, with which it tells that it is about to move.
     real_time
         Whether it lives by the computer's clock, and so cannot be rehearsed with.
+    closed_loop
+        Whether it tells where it is. One that does not is reckoned to be where its orders lead.
+    bumpers
+        Whether it feels what it bumps into.
     """
 
     simulated: bool
     moves: bool
     announces: bool = False
     real_time: bool = False
+    closed_loop: bool = True
+    bumpers: bool = False
 
 
 class Mood(StrEnum):
@@ -103,12 +114,20 @@ class MobileBase(ABC):
     """
 
     name: ClassVar[str]
-    abilities: ClassVar[Abilities]
+    abilities: Abilities  # of the class, or of one that was told what it has
     port: str = ""  # where it hangs, for bases that hang somewhere; to be set before it is opened
 
     @abstractmethod
     def __init__(self, monotonic: Callable[[], float]) -> None:
         """Make one that is not open yet, given a clock [s]."""
+
+    @classmethod  # noqa: B027 (not every base has options)
+    def add_arguments(cls, group: ArgumentParser | _ArgumentGroup) -> None:
+        """Offer options of its own on a command line."""
+
+    def configure(self, options: Namespace) -> None:
+        """Take the options, before it is opened. Raises BadOption."""
+        self.port = options.port
 
     def __enter__(self) -> Self:
         """Open it."""

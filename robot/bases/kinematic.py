@@ -24,7 +24,7 @@ class KinematicBase(MobileBase):
     """Moves as ``advance`` says, on a clock [s] that is a parameter."""
 
     name: ClassVar[str] = "kinematic"
-    abilities: ClassVar[Abilities] = Abilities(simulated=True, moves=True)
+    abilities = Abilities(simulated=True, moves=True)
 
     def __init__(self, monotonic: Callable[[], float]) -> None:
         self._monotonic = monotonic

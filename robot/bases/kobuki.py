@@ -51,9 +51,7 @@ class KobukiBase(MobileBase):
     """Orders a Kobuki and adds up where it is. A port that is lost is opened again for ever."""
 
     name: ClassVar[str] = "kobuki"
-    abilities: ClassVar[Abilities] = Abilities(
-        simulated=False, moves=True, announces=True, real_time=True
-    )
+    abilities = Abilities(simulated=False, moves=True, announces=True, real_time=True, bumpers=True)
 
     def __init__(self, monotonic: Callable[[], float]) -> None:
         self._monotonic = monotonic

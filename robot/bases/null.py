@@ -13,7 +13,7 @@ class NullBase(MobileBase):
     """Stays at home, whatever it is told."""
 
     name: ClassVar[str] = "null"
-    abilities: ClassVar[Abilities] = Abilities(simulated=True, moves=False)
+    abilities = Abilities(simulated=True, moves=False)
 
     def __init__(self, _monotonic: Callable[[], float]) -> None:
         pass

@@ -21,9 +21,7 @@ class TwinBase(KobukiBase):
     """Starts a twin, drives it over its port, and ends it with itself."""
 
     name: ClassVar[str] = "twin"
-    abilities: ClassVar[Abilities] = Abilities(
-        simulated=True, moves=True, announces=True, real_time=True
-    )
+    abilities = Abilities(simulated=True, moves=True, announces=True, real_time=True, bumpers=True)
 
     def __init__(self, monotonic: Callable[[], float], *options: str) -> None:
         super().__init__(monotonic)

@@ -178,3 +178,16 @@ def test_an_order_is_read():
 def test_what_is_no_order(cue):
     with pytest.raises(BadMessage):
         Cue.read(cue)
+
+
+@given(st.floats(0, 3), st.floats(0.05, 2))
+def test_strong_walking_is_answered_strongly_within_bounds(mean, threshold):
+    above = mean >= threshold
+    decision = Decision(0, 5, 5, 4, mean, threshold, above)
+    vigor = decision.vigor
+    assert 0.5 <= vigor <= 1
+    if not above or mean >= 1.1:
+        assert vigor == 1
+    else:
+        assert vigor <= replace(decision, mean=mean + 0.1).vigor
+        assert replace(decision, mean=threshold).vigor == 0.5

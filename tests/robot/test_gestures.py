@@ -12,12 +12,10 @@ from robot.gestures import (
     GESTURES,
     REACH_M,
     BadGesture,
-    Drive,
     Gesture,
     Goal,
-    Turn,
-    plan_legs,
 )
+from robot.legs import Drive, Turn, plan_legs
 from robot.motion import HOME, Pose
 
 AWAY = Goal(0.1, 0.0, 0.0, within_s=4)
@@ -95,7 +93,7 @@ def test_a_place_behind_is_driven_to_backwards():
         ((replace(AWAY, heading_rad=6.3), BACK), "more than once around"),
         ((replace(AWAY, pace=0.1), BACK), "pace"),
         ((replace(AWAY, pace=1.1), BACK), "pace"),
-        ((replace(AWAY, within_s=1.0), BACK), "Goal 1 needs 1.5 s"),
+        ((replace(AWAY, within_s=1.0), BACK), "Goal 1 needs 1.6 s"),
         ((replace(AWAY, within_s=17), BACK), "up to 16 s"),
         ((replace(AWAY, hold_s=4.1), BACK), "hold included"),
         ((AWAY, BACK) * 7, "at most 16 s"),

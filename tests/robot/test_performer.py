@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 
 from robot.bases import Abilities, Mood, Senses
 from robot.bases.kinematic import KinematicBase
-from robot.motion import HOME, STILL, Twist
-from robot.performer import SILENCE_S, TICK_S, Performer
+from robot.composed import Move, to_data
+from robot.gestures import GESTURES, ORIGINALS
+from robot.motion import DEFAULT_LIMITS, HOME, STILL, TICK_S, Twist
+from robot.performer import SILENCE_S, Performer
 from robot.rehearsal import Rehearsal
 
 CUE = {
@@ -30,7 +32,7 @@ class RealBase(KinematicBase):
     """A base that no program may arm."""
 
     name: ClassVar[str] = "real"
-    abilities: ClassVar[Abilities] = Abilities(simulated=False, moves=True)
+    abilities = Abilities(simulated=False, moves=True)
 
 
 class Stage:
@@ -107,6 +109,7 @@ def test_a_strong_window_is_celebrated_and_told(stage):
         "threshold": 0.9,
         "above": True,
         "gesture": "celebrate",
+        "intensity": 0.75,
         "reason": "",
         "activated_share": 1.0,
     }
@@ -280,11 +283,141 @@ def test_no_session_no_gesture(stage):
     assert stage.state == ("idle", "no_session")
 
 
-def test_gestures_are_at_the_intensity_of_the_order(stage):
-    stage.hear(type="cue", cue=CUE | {"intensity": 0.5})
-    stage.perform().wait(4)
-    statuses = [report["pose"]["x_m"] for report in stage.of("status")]
-    assert 0.03 < max(statuses) < 0.036
+def farthest_m(stage):
+    return max(report["pose"]["x_m"] for report in stage.of("status"))
+
+
+@pytest.mark.parametrize(
+    ("intensity", "performance", "away_m"),
+    [(1, 1.2, 0.07), (1, 1.0, 0.0525), (1, 0.9, 0.035), (0.5, 1.2, 0.035), (0.5, 0.9, 0.0175)],
+)
+def test_a_celebration_is_as_large_as_order_and_walk_ask_for(stage, intensity, performance, away_m):
+    stage.hear(type="cue", cue=CUE | {"intensity": intensity})
+    stage.walk(*[performance] * 6)
+    stage.wait(5)
+    assert stage.of("decision")[0]["intensity"] == pytest.approx(away_m / 0.07, abs=1e-3)
+    assert farthest_m(stage) == pytest.approx(away_m, abs=0.006)
+    assert stage.ended == ["done"]
+
+
+def test_weak_walking_never_makes_a_droop_grow(stage):
+    stage.walk(*[0.1] * 6)
+    assert stage.of("decision")[0]["intensity"] == 1
+
+
+@pytest.mark.parametrize("name", ORIGINALS)
+@pytest.mark.parametrize("intensity", [1, 0.5])
+def test_the_paper_s_gestures_are_the_same_every_time(stage, name, intensity):
+    stage.hear(type="cue", cue=CUE | {"above": name, "intensity": intensity})
+    stage.walk(*[0.9] * 6)
+    assert stage.of("decision")[0]["intensity"] == intensity
+    stage.wait(40)
+    assert stage.ended == ["done"]
+    assert stage.base.read().pose.distance_m(HOME) < 0.01
+
+
+def test_a_quiet_robot_goes_half_as_far_at_half_the_speed_in_the_same_time():
+    def look(intensity):
+        stage = Stage()
+        stage.hear(**WELCOME | {"cue": CUE | {"intensity": intensity}})
+        stage.walk(*[1.2] * 5)
+        stage.hear(type="step", time_s=stage.source_s, performance=1.2)
+        speeds = []
+        while stage.robot.player.is_busy:
+            stage.wait(TICK_S)
+            speeds.append(abs(stage.base.read().twist.v_m_s))
+        return max(speeds), len(speeds) * TICK_S
+
+    (loud_m_s, loud_s), (quiet_m_s, quiet_s) = look(1), look(0.5)
+    assert quiet_m_s == pytest.approx(loud_m_s / 2, rel=0.15)
+    assert quiet_s == pytest.approx(loud_s, rel=0.15)
+
+
+def test_a_robot_that_is_off_decides_and_stands_still(stage):
+    stage.perform()
+    stage.hear(type="cue", cue=CUE | {"intensity": 0})
+    assert stage.robot.player.is_busy  # what has begun comes home
+    stage.walk(*[1.0] * 12)
+    assert stage.ended == ["done"]
+    last = stage.of("decision")[-1]
+    assert (last["gesture"], last["intensity"], last["reason"]) == (None, None, "off")
+    assert last["activated_share"] == 1
+
+
+# --- gestures that come along with the cue --------------------------------------------------------
+
+WAVE = to_data("wave", [Move(turn_rad=0.6), Move(turn_rad=-1.2), Move(turn_rad=0.6)])
+FAR = to_data("far", [Move(forward_m=0.4), Move(forward_m=-0.4)])
+
+
+def test_a_composed_gesture_needs_no_new_robot(stage):
+    stage.hear(type="cue", cue=CUE | {"above": "wave", "gestures": [WAVE]})
+    stage.walk(*[1.1] * 6)
+    stage.wait(5)
+    assert stage.of("decision")[0]["gesture"] == "wave"
+    assert [report["name"] for report in stage.of("gesture")] == ["wave", "wave"]
+    assert stage.ended == ["done"]
+    assert stage.base.read().pose.distance_m(HOME) < 0.01
+    stage.hear(type="cue", cue=CUE | {"above": "wave"})  # it goes with its cue
+    stage.walk(*[1.1] * 6)
+    assert stage.of("decision")[-1]["reason"] == "unknown_gesture"
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (FAR, "goes 0.40 m away"),
+        (FAR | {"name": "celebrate"}, "knows celebrate already"),
+        (FAR | {"steps": 3}, "list of steps"),
+        (WAVE | {"steps": [{"turn_rad": math.nan}]}, "not finite"),
+        (WAVE | {"steps": [{"turn_rad": 1.0}]}, "It ends turned by 57°"),
+    ],
+)
+@pytest.mark.parametrize("make", [KinematicBase, RealBase])
+def test_a_gesture_that_does_not_validate_here_moves_nothing(make, data, words):
+    stage = Stage(make)
+    name = data["name"]
+    stage.hear(**WELCOME | {"cue": CUE | {"above": name, "gestures": [data]}})
+    stage.hear(type="arm")
+    stage.walk(*[1.2] * 6)
+    decision = stage.of("decision")[0]
+    assert (decision["gesture"], decision["reason"]) == (None, "bad_gesture")
+    assert words in stage.robot.last_bad
+    assert stage.robot.bad_messages == 1
+    assert stage.base.read().pose == HOME
+    assert stage.of("gesture") == []
+
+
+def test_a_robot_s_own_gesture_is_not_replaced(stage):
+    stage.robot.repertoire.own = GESTURES | {"wave": GESTURES["nod"]}
+    stage.hear(type="cue", cue=CUE | {"above": "wave", "gestures": [WAVE]})
+    stage.walk(*[1.2] * 6)
+    assert stage.of("decision")[0]["reason"] == "bad_gesture"
+
+
+def test_a_slower_robot_refuses_what_it_cannot_reach_in_time(stage):
+    slow = Stage(KinematicBase)
+    slow.robot = Performer(slow.base, DEFAULT_LIMITS.scaled(0.1))
+    slow.hear(**WELCOME | {"cue": CUE | {"above": "wave", "gestures": [WAVE]}})
+    slow.walk(*[1.2] * 6)
+    assert slow.of("decision")[0]["reason"] == "bad_gesture"
+    assert "out_of_time" in slow.robot.last_bad
+
+
+@settings(deadline=None)  # each walks six seconds
+@given(st.lists(st.none() | st.integers() | st.text() | st.just({"name": [1]}), max_size=8))
+def test_no_gesture_of_a_cue_can_crash_it(gestures):
+    stage = Stage()
+    stage.hear(**WELCOME | {"cue": CUE | {"above": "wave", "gestures": gestures}})
+    stage.walk(*[1.2] * 6)
+    assert stage.of("decision")[0]["reason"] == "unknown_gesture"
+
+
+def test_gestures_are_a_short_list(stage):
+    stage.hear(type="cue", cue=CUE | {"intensity": 0.3, "gestures": [WAVE] * 9})
+    stage.hear(type="cue", cue=CUE | {"intensity": 0.3, "gestures": "wave"})
+    assert stage.robot.bad_messages == 2
+    assert stage.robot.activation.cue.intensity == 1
 
 
 def test_a_gesture_that_nobody_knows(stage):
@@ -300,7 +433,7 @@ def test_a_gesture_that_nobody_knows(stage):
 class FeelingBase(RealBase):
     """A real base that feels what a test tells it to, and has lights and sounds."""
 
-    abilities: ClassVar[Abilities] = Abilities(simulated=False, moves=True, announces=True)
+    abilities = Abilities(simulated=False, moves=True, announces=True)
 
     def __init__(self, monotonic):
         super().__init__(monotonic)
@@ -572,3 +705,15 @@ def test_a_rehearsal_refuses_what_a_robot_would():
     for name in ("twin", "kobuki"):
         with pytest.raises(ValueError, match="no simulation"):
             Rehearsal(name, CUE)
+
+
+@pytest.mark.parametrize(
+    ("battery_v", "share", "low"), [(None, None, False), (16.5, 1, False), (13.9, 0.25, True)]
+)
+def test_the_battery_is_told_as_people_read_it(felt, battery_v, share, low):
+    felt.base.senses = Senses(battery_v=battery_v)
+    felt.wait(1.1)
+    status = felt.of("status")[-1]
+    assert status["battery_v"] == battery_v
+    assert status["battery_share"] == (share if share is None else pytest.approx(share, abs=0.01))
+    assert status["battery_low"] is low

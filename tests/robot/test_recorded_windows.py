@@ -7,7 +7,8 @@ import pytest
 
 from rehab.sources.recording import read_recording
 from robot.bases import BASES
-from robot.performer import TICK_S, Performer
+from robot.motion import TICK_S
+from robot.performer import Performer
 from tests.data import recording
 
 CUE = {

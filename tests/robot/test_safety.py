@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from robot import safety as rules
 from robot.bases import Abilities, BaseState, Senses
+from robot.gestures import GESTURES, ORIGINALS
 from robot.motion import HOME, STILL, Pose, Twist
 from robot.safety import Safety
 
@@ -248,3 +249,33 @@ def test_nothing_but_an_arming_ends_a_latch(told):
         if before and what != "arm":
             assert safety.latch == before
             assert safety.obstacle(FINE) == before
+
+
+@pytest.mark.parametrize(
+    ("battery_v", "share"), [(17, 1), (16.5, 1), (14.85, 0.525), (13.2, 0.05), (12.9, 0), (0, 0)]
+)
+def test_a_battery_s_share_follows_from_its_voltage(battery_v, share):
+    assert rules.battery_share(battery_v) == pytest.approx(share, abs=0.01)
+
+
+OPEN = Abilities(simulated=False, moves=True, closed_loop=False)
+
+
+@pytest.mark.parametrize("gesture", (GESTURES | ORIGINALS).values(), ids=lambda one: one.name)
+def test_an_open_loop_refuses_long_gestures_and_halves_the_others(gesture):
+    closed, opened = Safety(REAL), Safety(OPEN)
+    assert (closed.refuses(gesture), closed.share) == ("", 1.0)
+    assert opened.refuses(gesture) == ("open_loop" if gesture.least_s > 4.0 else "")
+    assert opened.share == 0.5
+
+
+def test_an_open_loop_has_to_be_looked_at_after_twenty_gestures():
+    for abilities, refusal in ((REAL, ""), (OPEN, "place_unknown")):
+        watch = Watch(abilities)  # which begins the first
+        for _ in range(18):
+            watch.safety.begin(watch.now_s, FINE)
+        assert watch.safety.obstacle(FINE) == ""
+        watch.safety.begin(watch.now_s, FINE)
+        assert watch.safety.obstacle(FINE) == refusal
+        assert watch.safety.arm(watch.now_s, FINE) == ""
+        assert watch.safety.obstacle(FINE) == ""

@@ -1,0 +1,42 @@
+"""The base of a command line: which one, where it is, and what it has."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable, Collection
+
+from robot.bases import BASES, MobileBase
+from robot.ros.bridge import find_bridge, is_address
+
+
+def add_base_arguments(parser: ArgumentParser, names: Collection[str] = BASES) -> None:
+    """Let a command line choose one of these bases, with its options."""
+    parser.add_argument("--base", required=True, choices=sorted(names), help="what to drive")
+    parser.add_argument(
+        "--port",
+        default="",
+        help="where a Kobuki is: /dev/kobuki, COM3, socket://host:port (default: "
+        "GARRY_ROBOT_PORT, or one that is plugged in)",
+    )
+    parser.add_argument(
+        "--ros-url",
+        type=_read_address,
+        default=find_bridge(),
+        metavar="URL",
+        help="where a rosbridge is (default: GARRY_ROS_URL, or ws://127.0.0.1:9090)",
+    )
+    for name in names:
+        BASES[name].add_arguments(parser.add_argument_group(f"--base {name}"))
+
+
+def _read_address(text: str) -> str:
+    if not is_address(text):
+        raise ArgumentTypeError(f"{text!r} is no address. Write ws://192.168.1.20:9090.")
+    return text
+
+
+def make_base(options: Namespace, monotonic: Callable[[], float]) -> MobileBase:
+    """Give the base of a command line, not open yet. Raises BadOption."""
+    base = BASES[options.base](monotonic)
+    base.configure(options)
+    return base

@@ -1,0 +1,120 @@
+"""Any base that ROS drives: Twists out; odometry, bumpers and what was ordered back in."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from argparse import ArgumentParser, Namespace, _ArgumentGroup
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from types import TracebackType
+from typing import Self
+
+from robot.bases.base import BaseLost, BaseState, MobileBase
+from robot.bases.rosbridge.conversation import Conversation
+from robot.bases.rosbridge.topics import (
+    DEFAULT_PROFILE,
+    PROFILES,
+    Topics,
+    add_topic_arguments,
+    read_topics,
+)
+from robot.motion import STILL, Twist
+from robot.ros.bridge import Bridge, find_bridge
+
+GREETING_S = 3.0  # a bridge that is there has said by then where the base is
+
+
+class RosbridgeBase(MobileBase):
+    """Orders a base by way of a rosbridge. A connection that is lost is made again for ever.
+
+    It cannot stop the base once the connection is gone: the base's own driver has to, by a timeout
+    of its own (docs/robot.md). Every connection begins with an order to stand still.
+    """
+
+    name = "rosbridge"
+    abilities = PROFILES[DEFAULT_PROFILE].abilities
+
+    def __init__(
+        self, monotonic: Callable[[], float], topics: Topics = PROFILES[DEFAULT_PROFILE]
+    ) -> None:
+        self._monotonic = monotonic
+        self._lock = threading.Lock()  # the bridge has a thread of its own
+        self._bridge: Bridge | None = None
+        self._choose(topics)
+
+    @classmethod
+    def add_arguments(cls, group: ArgumentParser | _ArgumentGroup) -> None:
+        """Offer the base's topics."""
+        add_topic_arguments(group)
+
+    def configure(self, options: Namespace) -> None:
+        """Take the bridge's address and the base's topics. Raises BadOption."""
+        self.port = options.ros_url
+        self._choose(read_topics(options))
+
+    def __enter__(self) -> Self:
+        """Connect, and give the bridge a moment to say where the base is."""
+        self._bridge = Bridge(
+            self.port or find_bridge(), self._conversation, self._lock, self._monotonic
+        )
+        until_s = self._monotonic() + GREETING_S
+        while self._monotonic() < until_s and self.read().senses.silent_s == math.inf:
+            time.sleep(0.02)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        problem: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Leave it standing still."""
+        self.stop()
+        if self._bridge is not None:
+            self._bridge.close()
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """Count what went wrong with the connection, with orders, and with odometry."""
+        with self._lock:
+            counts = dict(self._conversation.counters)
+        return counts if self._bridge is None else counts | self._bridge.counters
+
+    @property
+    def problem(self) -> str:
+        """Say why the base is not reached; empty where it is."""
+        if self._bridge is None:
+            return ""
+        with self._lock:
+            return self._bridge.problem or self._conversation.problem(self._monotonic())
+
+    def drive(self, twist: Twist) -> Twist:
+        """Order a velocity; its speeds are clipped."""
+        if self._bridge is not None and self._bridge.is_dead:
+            raise BaseLost("The thread that talks to the rosbridge has ended: see its words above.")
+        with self._lock:
+            ordered = self._conversation.orders.order(twist, self._monotonic())
+        if self._bridge is not None:
+            self._bridge.wake()
+        return ordered
+
+    def stop(self) -> None:
+        """Stand still at once."""
+        with suppress(BaseLost):
+            self.drive(STILL)
+
+    def read(self) -> BaseState:
+        """Give what is believed of it now."""
+        with self._lock:
+            return self._conversation.state(self._monotonic())
+
+    def set_home(self) -> None:
+        """Begin odometry anew: this place is home."""
+        with self._lock:
+            self._conversation.sight.set_home()
+
+    def _choose(self, topics: Topics) -> None:
+        self.abilities = topics.abilities
+        self._conversation = Conversation(topics, self._monotonic())

@@ -1,0 +1,200 @@
+"""Gestures that people compose: steps from where the base is, made into poses seen from home.
+
+They travel as data, so that a new one needs no new robot. Whoever composes one and whoever plays it
+read it here: what is refused at one end is refused at the other, in the same words.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
+
+from robot.gestures import (
+    GESTURE_MAX_S,
+    GESTURES,
+    ORIGINALS,
+    BadGesture,
+    BadGoal,
+    Gesture,
+    Goal,
+    check_goal,
+    needed_time_s,
+    stages,
+)
+from robot.motion import DEFAULT_LIMITS, HOME, Pose
+
+NAME = re.compile(r"[A-Za-z0-9_-]{1,32}")
+MOVES_MAX = 16
+LEAST_WAY_M = 0.01  # nobody sees less, and a base that is as near as this has arrived
+LEAST_TURN_RAD = math.radians(1)
+
+# The last step ends at home if it is so near [m, rad]: people round 0.1414 m to 0.14.
+HOME_M = 0.005
+HOME_RAD = math.radians(2)
+
+# A step without a time of its own gets so much of what it needs, some twice the shortest possible
+# (kobuki.md 5.3), and a moment [s] for the last millimeters of a very short one.
+GENEROUS, MOMENT_S = 1.4, 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """One step of a composed gesture: a turn on the spot, then a way straight on, then a pause.
+
+    Parameters
+    ----------
+    turn_rad
+        Counter-clockwise, so to the left where positive [rad].
+    forward_m
+        Backwards where negative [m].
+    hold_s
+        How long to stay there [s].
+    pace
+        Share of the limits to go at, ``LEAST_PACE`` to 1.
+    within_s
+        Time that it may take, pause included [s]; None for as long as it needs.
+    """
+
+    turn_rad: float = 0.0
+    forward_m: float = 0.0
+    hold_s: float = 0.0
+    pace: float = 1.0
+    within_s: float | None = None
+
+
+NUMBERS = [field.name for field in fields(Move)]
+
+
+def to_data(name: str, moves: Sequence[Move]) -> dict[str, Any]:
+    """Give a gesture as it travels."""
+    return {"name": name, "steps": [asdict(move) for move in moves]}
+
+
+def read_gesture(data: Any) -> Gesture:
+    """Read a gesture that has traveled. Raises BadGesture, which names the step and the cure."""
+    if not isinstance(data, Mapping):
+        raise BadGesture("A gesture is an object with a name and steps.")
+    steps = data.get("steps")
+    if not isinstance(steps, list):
+        raise BadGesture("A gesture has a list of steps.")
+    return compose(data.get("name"), [_read_move(n, step) for n, step in enumerate(steps, start=1)])
+
+
+def _read_move(number: int, step: Any) -> Move:
+    if not isinstance(step, Mapping):
+        raise BadGesture(f"Step {number} is no object.")
+    given = {name: step[name] for name in NUMBERS if step.get(name) is not None}
+    for name, value in given.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise BadGesture(f'Step {number}: "{name}" is a number.')
+    try:
+        return Move(**{name: float(value) for name, value in given.items()})
+    except OverflowError:
+        raise BadGesture(f"Step {number} has a number that is not finite.") from None
+
+
+def check_name(name: Any) -> str:
+    """Give a name back. Raises BadGesture for one that messages cannot say, or robots have."""
+    if not isinstance(name, str) or not NAME.fullmatch(name):
+        raise BadGesture("A gesture's name has 1 to 32 letters, digits, hyphens or underscores.")
+    if name in GESTURES or name in ORIGINALS:
+        raise BadGesture(f"Every robot knows {name} already. Choose another name.")
+    return name
+
+
+def compose(name: Any, moves: Sequence[Move]) -> Gesture:
+    """Make a gesture of steps. Raises BadGesture, which names the step and the cure."""
+    check_name(name)
+    if not 1 <= len(moves) <= MOVES_MAX:
+        raise BadGesture(f"A gesture has 1 to {MOVES_MAX} steps.")
+    for number, move in enumerate(moves, start=1):
+        _check_move(number, move)
+    of_steps = list(_to_goals(moves))
+    goals = [goal for made in of_steps for goal in made]
+    owners = [number for number, made in enumerate(of_steps, start=1) for _ in made]
+    try:
+        for number, goal in enumerate(goals, start=1):
+            check_goal(number, goal)
+        goals[-1] = _at_home(goals[-1])
+        return Gesture(name, name, tuple(_give_times(goals, owners, moves)))
+    except BadGoal as problem:
+        raise BadGesture(f"Step {owners[problem.number - 1]} {problem.what}") from None
+
+
+def _check_move(number: int, move: Move) -> None:
+    numbers = (move.turn_rad, move.forward_m, move.hold_s, move.pace, move.within_s or 0.0)
+    if not all(map(math.isfinite, numbers)):
+        raise BadGesture(f"Step {number} has a number that is not finite.")
+    if not (move.turn_rad or move.forward_m or move.hold_s):
+        raise BadGesture(f"Step {number} does nothing. Give it a turn, a way or a pause.")
+    if 0 < abs(move.forward_m) < LEAST_WAY_M:
+        raise BadGesture(
+            f"Step {number} goes less than {LEAST_WAY_M:g} m, which nobody sees. Make it longer."
+        )
+    if 0 < abs(move.turn_rad) < LEAST_TURN_RAD:
+        raise BadGesture(f"Step {number} turns by less than 1°, which nobody sees. Turn further.")
+
+
+def places(moves: Sequence[Move]) -> list[Pose]:
+    """Give where each step ends, seen from home."""
+    return [made[-1].pose for made in _to_goals(moves)]
+
+
+def _to_goals(moves: Sequence[Move]) -> Iterator[list[Goal]]:
+    """Give the goals of each step: where it turns to, then where it goes. Times come later."""
+    here = HOME
+    for move in moves:
+        turned = replace(here, heading_rad=here.heading_rad + move.turn_rad)
+        poses = [turned] if move.turn_rad or not move.forward_m else []
+        if move.forward_m:
+            poses.append(_ahead(turned, move.forward_m))
+        made = [Goal(p.x_m, p.y_m, p.heading_rad, GESTURE_MAX_S, move.pace) for p in poses]
+        made[-1] = replace(made[-1], hold_s=move.hold_s)
+        yield made
+        here = made[-1].pose
+
+
+def _ahead(pose: Pose, by_m: float) -> Pose:
+    """Give the pose ahead; a place that is almost home is home."""
+    place = Pose(
+        pose.x_m + by_m * math.cos(pose.heading_rad),
+        pose.y_m + by_m * math.sin(pose.heading_rad),
+        pose.heading_rad,
+    )
+    return Pose(heading_rad=pose.heading_rad) if place.distance_m(HOME) <= HOME_M else place
+
+
+def _at_home(last: Goal) -> Goal:
+    """Give the last goal as home itself. Raises BadGesture where it is elsewhere."""
+    heading_rad = math.tau * round(last.heading_rad / math.tau)
+    away_m, off_rad = last.pose.distance_m(HOME), last.heading_rad - heading_rad
+    where = [f"{100 * away_m:.0f} cm from home"] if away_m else []
+    if abs(off_rad) > HOME_RAD:
+        side = "left" if off_rad > 0 else "right"
+        where.append(f"turned by {abs(math.degrees(off_rad)):.0f}° to the {side}")
+    if where:
+        raise BadGesture(f"It ends {', '.join(where)}. Add steps that lead back home.")
+    return replace(last, x_m=0.0, y_m=0.0, heading_rad=heading_rad)
+
+
+def _give_times(
+    goals: Sequence[Goal], owners: Sequence[int], moves: Sequence[Move]
+) -> Iterator[Goal]:
+    """Share each step's time among its goals, by what they need."""
+    needed_s = [needed_time_s(*stage) for stage in stages(goals, DEFAULT_LIMITS)]
+    of_step = dict.fromkeys(owners, 0.0)
+    for owner, least_s in zip(owners, needed_s, strict=True):
+        of_step[owner] += least_s
+    for goal, owner, least_s in zip(goals, owners, needed_s, strict=True):
+        all_s, given_s = of_step[owner], moves[owner - 1].within_s
+        if given_s is None:
+            given_s = min(GENEROUS * all_s + MOMENT_S, max(GESTURE_MAX_S, all_s))
+        elif given_s < all_s:
+            raise BadGesture(
+                f"Step {owner} needs {math.ceil(10 * all_s) / 10:.1f} s. Give it as long, or leave "
+                "its time empty."
+            )
+        yield replace(goal, within_s=min(given_s * least_s / all_s, GESTURE_MAX_S))

@@ -1,0 +1,59 @@
+"""What a robot can perform: gestures of its own, and those that came along with the cue."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from robot.gestures import BadGesture, Gesture
+from robot.motion import Limits
+from robot.trial import admit_gesture
+
+# Why a name cannot be performed.
+UNKNOWN_GESTURE = "unknown_gesture"
+BAD_GESTURE = "bad_gesture"  # it came along, and no base may perform it
+
+
+class Repertoire:
+    """Gestures by name.
+
+    Parameters
+    ----------
+    own
+        Those that no cue may replace.
+    limits
+        Speeds and accelerations that a gesture has to do with.
+    """
+
+    def __init__(self, own: Mapping[str, Gesture], limits: Limits) -> None:
+        self.own = own
+        self._limits = limits
+        self._came: dict[str, Gesture | None] = {}  # None: refused
+
+    def take(self, gestures: Iterable[Any]) -> list[str]:
+        """Take what came along instead of what came before; give what is wrong with the refused.
+
+        Nobody's word counts: each is read, checked and tried here.
+        """
+        self._came, problems = {}, []
+        for data in gestures:
+            try:
+                gesture = admit_gesture(data, self._limits)
+                if gesture.name in self.own:
+                    raise BadGesture(f"This robot has a gesture {gesture.name} of its own.")
+            except BadGesture as problem:
+                name = data.get("name") if isinstance(data, dict) else None
+                if isinstance(name, str):
+                    self._came[name] = None
+                problems.append(f"gesture {name}: {problem}")
+            else:
+                self._came[gesture.name] = gesture
+        return problems
+
+    def find(self, name: str) -> tuple[Gesture | None, str]:
+        """Give the gesture of that name, or why there is none."""
+        if name in self._came:
+            gesture = self._came[name]
+            return gesture, "" if gesture else BAD_GESTURE
+        gesture = self.own.get(name)
+        return gesture, "" if gesture else UNKNOWN_GESTURE

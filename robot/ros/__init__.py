@@ -1,0 +1,1 @@
+"""ROS by way of rosbridge: frames and messages (pure), and the websocket that carries them."""

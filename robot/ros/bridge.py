@@ -1,0 +1,224 @@
+"""The websocket to a rosbridge, on a thread of its own: it comes back by itself, and keeps nothing.
+
+What is said is asked for at the moment when it can be sent. A connection that is lost takes all
+with it that was to be said; what is said after it is what holds then.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import random
+import threading
+import time
+from collections import Counter
+from collections.abc import Awaitable, Callable, Iterable
+from contextlib import suppress
+from typing import Protocol
+from urllib.parse import urlsplit
+
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, WebSocketException
+
+from robot.link import BackOff
+from robot.motion import TICK_S
+from robot.ros.frames import MAX_FRAME_BYTES, BadFrame, Frame, Heard, read_frame, to_text
+
+DEFAULT_URL = "ws://127.0.0.1:9090"
+
+PING_EVERY_S = PONG_WITHIN_S = 1.0
+SEND_WITHIN_S = 0.5  # a bridge that takes nothing for so long takes nothing any more
+CONNECT_WITHIN_S = 3.0
+CLOSE_WITHIN_S = 0.5
+RETRY_FIRST_S, RETRY_LONGEST_S = 0.2, 5.0
+END_S = 2.0
+
+
+class Talk(Protocol):
+    """What is said to a bridge, and what hears it."""
+
+    def open(self, now_s: float) -> Iterable[Frame]:
+        """Give what is said first on a new connection."""
+
+    def due(self, now_s: float) -> Iterable[Frame]:
+        """Give what is to be said now."""
+
+    def hear(self, heard: Heard, now_s: float) -> None:
+        """Take what came. Raises BadFrame."""
+
+    def lose(self, now_s: float) -> None:
+        """Take note that the connection is lost."""
+
+    def end(self, now_s: float) -> Iterable[Frame]:
+        """Give what is said last."""
+
+
+class Bridge:
+    """A connection to a rosbridge that comes back by itself.
+
+    Parameters
+    ----------
+    url
+        ws://host:9090.
+    talk
+        What is said and heard.
+    lock
+        Held while the talk is asked and told, which happens on our thread.
+    monotonic
+        The clock [s] that the talk is told.
+    sleep, jitter
+        How to pause between attempts, and where chance comes from, in [0, 1).
+
+    Attributes
+    ----------
+    problem
+        Why there is no connection; empty while there is one.
+    counters
+        How often a connection came about (``bridge_openings``), and how many frames meant nothing
+        (``bridge_bad``).
+    """
+
+    def __init__(
+        self,
+        url: str,
+        talk: Talk,
+        lock: threading.Lock,
+        monotonic: Callable[[], float] = time.monotonic,
+        *,
+        sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
+        jitter: Callable[[], float] = random.random,
+    ) -> None:
+        self.url = url
+        self._talk, self._lock = talk, lock
+        self._monotonic = monotonic
+        self._sleep = sleep
+        self._back_off = BackOff(RETRY_FIRST_S, RETRY_LONGEST_S, jitter)
+        self.problem = f"No connection to the rosbridge at {url} yet."
+        self.counters: Counter[str] = Counter(bridge_openings=0, bridge_bad=0)
+        self._loop = asyncio.new_event_loop()
+        self._wanted, self._closing = asyncio.Event(), asyncio.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    @property
+    def is_dead(self) -> bool:
+        """Whether nothing is sent any more."""
+        return not self._thread.is_alive()
+
+    def wake(self) -> None:
+        """Have said at once what is due. Never waits, never raises."""
+        with suppress(RuntimeError):  # it has been closed
+            self._loop.call_soon_threadsafe(self._wanted.set)
+
+    def close(self) -> None:
+        """Say the last words and hang up. Never raises."""
+        with suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(self._closing.set)
+        self._thread.join(END_S)
+
+    def _run(self) -> None:
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+            runner.run(self._stay())
+
+    async def _stay(self) -> None:
+        """Connect, again and again, until closed."""
+        closing = asyncio.create_task(self._closing.wait())
+        while not self._closing.is_set():
+            staying = asyncio.create_task(self._connect())
+            await asyncio.wait((staying, closing), return_when=asyncio.FIRST_COMPLETED)
+            staying.cancel()
+            with suppress(asyncio.CancelledError):
+                await staying
+        closing.cancel()
+
+    async def _connect(self) -> None:
+        """Stay on one connection until it is lost, then pause."""
+        loopback = urlsplit(self.url).hostname in {"localhost", "127.0.0.1", "::1"}
+        try:
+            socket = await connect(
+                self.url,
+                compression=None,
+                proxy=None if loopback else True,
+                max_size=MAX_FRAME_BYTES,
+                open_timeout=CONNECT_WITHIN_S,
+                ping_interval=PING_EVERY_S,
+                ping_timeout=PONG_WITHIN_S,
+                close_timeout=CLOSE_WITHIN_S,
+            )
+        except (OSError, WebSocketException) as problem:
+            self.problem = f"No rosbridge answers at {self.url} ({_explain(problem)})."
+        else:
+            self.counters["bridge_openings"] += 1
+            self.problem = ""
+            try:
+                await self._converse(socket)
+            finally:
+                with self._lock:
+                    self._talk.lose(self._monotonic())
+                self.problem = f"The connection to the rosbridge at {self.url} was lost."
+        await self._sleep(self._back_off.next_s())
+
+    async def _converse(self, socket: ClientConnection) -> None:
+        """Say and hear until the connection is lost, or we are closed."""
+        try:
+            await self._say(socket, self._talk.open)
+            hearing = asyncio.create_task(self._listen(socket))
+            try:
+                while not hearing.done():
+                    await self._say(socket, self._talk.due)
+                    with suppress(TimeoutError):
+                        async with asyncio.timeout(TICK_S):
+                            await self._wanted.wait()
+                    self._wanted.clear()
+            finally:
+                hearing.cancel()
+                with suppress(asyncio.CancelledError):
+                    await hearing
+        except (ConnectionClosed, TimeoutError):
+            socket.transport.abort()
+        except asyncio.CancelledError:
+            with suppress(ConnectionClosed, TimeoutError):
+                await self._say(socket, self._talk.end)
+            raise
+        finally:
+            await socket.close()
+
+    async def _say(self, socket: ClientConnection, ask: Callable[[float], Iterable[Frame]]) -> None:
+        with self._lock:
+            frames = list(ask(self._monotonic()))
+        for frame in frames:
+            async with asyncio.timeout(SEND_WITHIN_S):
+                await socket.send(to_text(frame))
+
+    async def _listen(self, socket: ClientConnection) -> None:
+        with suppress(ConnectionClosed):
+            async for text in socket:
+                try:
+                    heard = read_frame(text)
+                    with self._lock:
+                        self._talk.hear(heard, self._monotonic())
+                except BadFrame:
+                    self.counters["bridge_bad"] += 1
+                else:
+                    self._back_off.reset()
+                    self._wanted.set()  # what was waited for may have come
+
+
+def find_bridge() -> str:
+    """Give the address of the environment (GARRY_ROS_URL), or where a bridge would be here."""
+    return os.environ.get("GARRY_ROS_URL", DEFAULT_URL)
+
+
+def is_address(url: str) -> bool:
+    """Whether a bridge could be there: ws://host:port, or wss://…"""
+    try:
+        parts = urlsplit(url)
+        return parts.scheme in ("ws", "wss") and bool(parts.hostname) and parts.port != 0
+    except ValueError:
+        return False
+
+
+def _explain(problem: OSError | WebSocketException) -> str:
+    if isinstance(problem, TimeoutError):
+        return "in time"
+    return (problem.strerror if isinstance(problem, OSError) else None) or str(problem)

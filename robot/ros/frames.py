@@ -1,0 +1,111 @@
+"""Frames of rosbridge v2: the six operations that are said, and the two that are heard.
+
+A bridge complains of nothing that it is told (kobuki.md 2.6): what matters has to come back from
+it. So nothing is sent here that waits in a queue anywhere: publishers and subscriptions keep one.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+MAX_FRAME_BYTES = 64 * 1024  # an Odometry with its covariances has 2 KiB
+
+Frame = dict[str, Any]
+
+
+class BadFrame(ValueError):
+    """What came is no frame that would mean something here."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A ROS topic: its name, and the type of its messages, as in ``std_msgs/Bool``."""
+
+    name: str
+    kind: str
+
+
+@dataclass(frozen=True, slots=True)
+class Publication:
+    """A message that was published on a topic we subscribe to."""
+
+    topic: str
+    message: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a service answered to the question of that name; None where it could not."""
+
+    question: str
+    values: Mapping[str, Any] | None
+
+
+Heard = Publication | Answer
+
+
+def advertise(topic: Topic, *, latch: bool = False) -> Frame:
+    """Say that we publish; with ``latch``, whoever comes later gets the last message."""
+    return {
+        "op": "advertise",
+        "topic": topic.name,
+        "type": topic.kind,
+        "latch": latch,
+        "queue_size": 1,
+    }
+
+
+def unadvertise(topic: Topic) -> Frame:
+    """Say that we do not publish any more."""
+    return {"op": "unadvertise", "topic": topic.name}
+
+
+def publish(topic: Topic, message: Mapping[str, Any]) -> Frame:
+    """Publish a message."""
+    return {"op": "publish", "topic": topic.name, "msg": dict(message)}
+
+
+def subscribe(topic: Topic, *, newest_every_ms: int = 0) -> Frame:
+    """Ask for a topic's messages: each one, or only the newest of every so often."""
+    return {
+        "op": "subscribe",
+        "topic": topic.name,
+        "type": topic.kind,
+        "id": topic.name,
+        "throttle_rate": newest_every_ms,
+        "queue_length": 1 if newest_every_ms else 0,
+    }
+
+
+def unsubscribe(topic: Topic) -> Frame:
+    """Ask for a topic no more."""
+    return {"op": "unsubscribe", "topic": topic.name, "id": topic.name}
+
+
+def call_service(service: str, arguments: Mapping[str, Any], question: str) -> Frame:
+    """Ask a service; its answer has the question's name."""
+    return {"op": "call_service", "service": service, "args": dict(arguments), "id": question}
+
+
+def to_text(frame: Frame) -> str:
+    """Give a frame's text. Raises ValueError for a number that is not finite."""
+    return json.dumps(frame, separators=(",", ":"), allow_nan=False)
+
+
+def read_frame(text: str | bytes) -> Heard:
+    """Read what a bridge said. Raises BadFrame for anything that is neither of the two."""
+    try:
+        frame = json.loads(text)
+    except (ValueError, RecursionError):
+        raise BadFrame("A frame is a JSON object.") from None
+    match frame:
+        case {"op": "publish", "topic": str(topic), "msg": dict(message)}:
+            return Publication(topic, message)
+        case {"op": "service_response", "id": str(question), **rest}:
+            # A failure puts its words where the values would be (kobuki.md 5.4).
+            values = rest.get("values") if rest.get("result") is True else None
+            return Answer(question, values if isinstance(values, dict) else None)
+    raise BadFrame('A frame that is heard has the "op" publish or service_response.')
