@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 
-from rehab.gait.filters import Floats
-from rehab.gait.samples import FORCE, TIME, SampleBuffer
+from rehab.gait.filters import Floats, find_highest, find_middle
+from rehab.gait.samples import FORCE, TIME, LegBuffer
 
 # Force is not filtered here: 20 Hz of causal filter would move both events by 10 ms (gait.md 2.1).
 CONTACT_N = 30.0  # 6 times the noise of an unloaded treadmill plate (4.5 N sd, gait.md 2.1)
@@ -58,7 +59,7 @@ class ContactFinder:
 
     def __init__(
         self,
-        buffer: SampleBuffer,
+        buffer: LegBuffer,
         rate_hz: float,
         weight_n: float,
         contact_n: float = CONTACT_N,
@@ -111,6 +112,16 @@ class ContactFinder:
                     self._rezero(start + done)
         return ended
 
+    def cut_off(self) -> Contact | None:
+        """Give the step that is under way, once no more samples come, as if it ended there."""
+        contact, self._current = self._current, None
+        stop = self._buffer.samples.end
+        if contact is None or not contact.seen or contact.bounce:
+            return None
+        contact.end_index = stop - 1
+        contact.end_s = float(self._buffer.channel(TIME, stop - 1, stop)[0])
+        return contact if self._is_step(contact, stop) else None
+
     def _begin(self, index: int) -> None:
         buffer, level = self._buffer, self.offset_n + self._release_n
         first = max(0, index - max(2, int(LOOK_BACK_S * self._rate_hz)))
@@ -132,15 +143,18 @@ class ContactFinder:
         assert contact is not None  # noqa: S101 (said for mypy)
         contact.end_index = index
         contact.end_s = self._cross(index, self.offset_n + self._release_n)
-        begin = max(contact.begin_index, index - self._buffer.keep // 2)
-        force = self._buffer.channel(FORCE, begin, index)
-        contact.peak_n = _find_peak(force) - contact.offset_n
         self._current = None
-        if contact.peak_n < STEP_PEAK * self._weight_n:
+        if not self._is_step(contact, index):
             self.recent.pop()  # it is the newest
-        elif np.isfinite(contact.begin_s) and np.isfinite(contact.end_s):
+        elif math.isfinite(contact.begin_s) and math.isfinite(contact.end_s):
             self._last = contact
             ended.append(contact)
+
+    def _is_step(self, contact: Contact, stop: int) -> bool:
+        """Find the peak of a contact until ``stop``; say whether so much is a step."""
+        begin = max(contact.begin_index, stop - self._buffer.samples.keep // 2)
+        contact.peak_n = _find_peak(self._buffer.channel(FORCE, begin, stop)) - contact.offset_n
+        return contact.peak_n >= STEP_PEAK * self._weight_n
 
     def _cross(self, index: int, level: float) -> float:
         """Give when the force crossed a level between the sample before ``index`` and this one."""
@@ -155,7 +169,7 @@ class ContactFinder:
         """Take the zero from the swing that ends at ``index``: the median of its middle."""
         last = self._last
         begin = self._zero_index if last is None or last.end_index is None else last.end_index
-        begin = max(begin, self._zero_index, index - self._buffer.keep // 2)
+        begin = max(begin, self._zero_index, index - self._buffer.samples.keep // 2)
         margin = (index - begin) // 5
         swing = self._buffer.channel(FORCE, begin + margin, index - margin)
         if len(swing) < max(3, int(BLOCK_S * self._rate_hz / 2)):
@@ -191,8 +205,8 @@ class ContactFinder:
 
 def _find_peak(force: Floats) -> float:
     """Give the largest finite value, 0 without one."""
-    peak = float(force.max()) if len(force) else 0.0
-    if np.isfinite(peak):
+    peak = find_highest(force) if len(force) else 0.0
+    if math.isfinite(peak):
         return peak
     finite = force[np.isfinite(force)]
     return float(finite.max()) if len(finite) else 0.0
@@ -200,9 +214,7 @@ def _find_peak(force: Floats) -> float:
 
 def _find_median(values: Floats) -> float:
     """Give the middle value of the finite ones, infinity without one."""
-    middle = len(values) // 2
-    median = float(np.partition(values, middle)[middle])
     if np.isfinite(values).all():
-        return median
+        return find_middle(values)
     finite = values[np.isfinite(values)]
     return float(np.median(finite)) if len(finite) else np.inf

@@ -85,7 +85,7 @@ class GyroscopeDetector:
             Angular velocity [rad/s] about the axis to the walker's left: toes that go down count
             positive, the swing negative. NaN where missing.
         """
-        time, rate = read_chunk(t_s, rate_rad_s)
+        time, rate = read_chunk(("t_s", "rate_rad_s"), (t_s, rate_rad_s))
         found: list[GyroscopeContact] = []
         for sample in zip(np.asarray(time).tolist(), np.asarray(rate).tolist(), strict=True):
             self._take(sample[0], sample[1], found)

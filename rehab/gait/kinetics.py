@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rehab.gait.filters import Floats, ZeroPhaseFilter, find_slope, refine_peak
+from rehab.gait.filters import Floats, ZeroPhaseFilter, find_highest, find_slope, refine_peak
+from rehab.gait.grid import EvenStance
 
 COP_FORCE_N = 40.0  # below, the center of pressure is a division by about nothing (gait.md 2.1)
 COP_REACH_M = 0.35  # from the ankle; no shoe is longer
@@ -67,26 +68,22 @@ def find_ankle_velocity(foot_rad_s: ArrayLike, shank_rad_s: ArrayLike) -> Floats
 
 @dataclass(frozen=True, slots=True)
 class PushOff:
-    """Ankle moment, velocity and power of one stance, smoothed, and the peak of power.
+    """Ankle moment, angle, velocity and power of a stance, smoothed, and the peak of power.
 
-    Shapes (n,): ``time_s``, ``moment_nm_kg``, ``velocity_rad_s``, ``power_w_kg``. ``begin`` and
-    ``end`` index the samples of the stance from which the peak was chosen.
+    Shapes (n,), as the even stance that they come from: ``moment_nm_kg``, ``angle_rad`` (the
+    velocity again where velocities are sent), ``velocity_rad_s``, ``power_w_kg``; ``peak`` is the
+    highest sample.
     """
 
-    time_s: Floats
     moment_nm_kg: Floats
+    angle_rad: Floats
     velocity_rad_s: Floats
     power_w_kg: Floats
-    begin: int
-    end: int
     peak: int
     a2_w_kg: float
     a2_time_s: float
-
-    @property
-    def moment_peak_nm_kg(self) -> float:
-        """Largest plantarflexion moment until the foot left the floor."""
-        return float(self.moment_nm_kg[: self.end + 1].max())
+    moment_peak_nm_kg: float
+    mass_kg: float
 
     @property
     def a2_moment_nm_kg(self) -> float:
@@ -105,7 +102,7 @@ class PushOffMeter:
     Parameters
     ----------
     rate_hz
-        Of the even grid that samples are brought to.
+        Of the even stances.
     mass_kg
         Of the walker.
     cutoff_hz
@@ -129,29 +126,17 @@ class PushOffMeter:
         back = np.arange(-max(2, round(SLOPE_S * rate_hz)), 1) / rate_hz
         self._slope = (back - back.mean()) / ((back - back.mean()) ** 2).sum()  # least squares
 
-    def measure(
-        self, time_s: Floats, moment_nm: Floats, angle_rad: Floats, begin_s: float, end_s: float
-    ) -> PushOff | None:
-        """Measure a stance from ``begin_s`` to ``end_s``; None where too little of it is there.
-
-        Parameters
-        ----------
-        time_s, moment_nm, angle_rad
-            Shape (n,), finite, time increasing; from before the stance to its end or later.
-        """
-        rate = self._rate_hz
-        count = int((time_s[-1] - time_s[0]) * rate + 1e-6) + 1
-        grid = time_s[-1] - np.arange(count - 1, -1, -1) / rate
-        signals = np.empty((2, count))
-        signals[0] = np.interp(grid, time_s, moment_nm)
-        signals[1] = np.interp(grid, time_s, angle_rad)
-        begin = int(np.ceil((begin_s + PUSH_OFF_FROM * (end_s - begin_s) - grid[0]) * rate))
-        end = min(count - 1, int((end_s - grid[0]) * rate + 1e-6))
+    def measure(self, stance: EvenStance) -> PushOff | None:
+        """Measure a stance; None where too little of it is there."""
+        signals, end = stance.signals[1:], stance.end
+        count = signals.shape[1]
+        begin = stance.index(PUSH_OFF_FROM)
         if begin < 1 or end - begin < 4 or count <= len(self._beyond_s):
             return None
-        moment, angle = self._smooth(signals, float(grid[-1]) - end_s)
-        velocity = angle if self._is_velocity else find_slope(angle, rate)
-        moment /= self._mass_kg
+        last_s = stance.first_s + (count - 1) / self._rate_hz
+        moment, angle = self._smooth(signals, last_s - stance.end_s)
+        velocity = angle if self._is_velocity else find_slope(angle, self._rate_hz)
+        moment = moment / self._mass_kg
         power = moment * velocity
         peak = begin + int(power[begin : end + 1].argmax())
         if 0 < peak < count - 1:
@@ -159,30 +144,39 @@ class PushOffMeter:
         else:
             place, height = float(peak), float(power[peak])
         return PushOff(
-            grid, moment, velocity, power, begin, end, peak, height, float(grid[0] + place / rate)
+            moment_nm_kg=moment,
+            angle_rad=angle,
+            velocity_rad_s=velocity,
+            power_w_kg=power,
+            peak=peak,
+            a2_w_kg=height,
+            a2_time_s=stance.first_s + place / self._rate_hz,
+            moment_peak_nm_kg=find_highest(moment[: end + 1]),
+            mass_kg=self._mass_kg,
         )
 
     def _smooth(self, signals: Floats, known_s: float) -> Floats:
         """Smooth moment and angle, known until ``known_s`` after the foot left the floor."""
         n = len(self._beyond_s)
-        extended = np.empty((2, signals.shape[1] + 2 * n))
+        moment, angle = signals
+        extended = np.empty((2, len(angle) + 2 * n))
         extended[:, :n] = 2 * signals[:, :1] - signals[:, n:0:-1]
         extended[:, n:-n] = signals
-        extended[0, -n:] = signals[0, -1]
-        left = signals.shape[1] - min(round(known_s * self._rate_hz), signals.shape[1] // 2)
-        braking = self._find_velocity(signals[1, :left]) / STOP_S
+        extended[0, -n:] = moment[-1]
+        left = len(angle) - min(round(known_s * self._rate_hz), len(angle) // 2)
+        braking = self._find_velocity(angle[:left]) / STOP_S
         # The slope is that of half its stretch ago, for as much of it as the ankle brakes already.
         late_s = 0.0 if self._is_velocity else min(max(known_s, 0.0), SLOPE_S) / 2
-        velocity = self._find_velocity(signals[1]) - braking * (self._beyond_s + late_s)
-        velocity = np.maximum(velocity, -TURN_S * braking)
+        velocity = self._find_velocity(angle) - braking * (self._beyond_s + late_s)
+        np.maximum(velocity, -TURN_S * braking, out=velocity)
         if self._is_velocity:
             extended[1, -n:] = velocity
         else:
-            extended[1, -n:] = signals[1, -1] + np.cumsum(velocity) / self._rate_hz
+            extended[1, -n:] = angle[-1] + velocity.cumsum() / self._rate_hz
         return self._filter.smooth_extended(extended, n)
 
     def _find_velocity(self, motion: Floats) -> float:
         """Give the ankle's velocity at the end of a stretch of motion, 0 if it turns back."""
         if self._is_velocity:
             return max(0.0, float(motion[-1]))
-        return max(0.0, float((motion[-len(self._slope) :] * self._slope).sum()))
+        return max(0.0, float(motion[-len(self._slope) :].dot(self._slope)))

@@ -10,10 +10,15 @@ from typing import NamedTuple
 from numpy.typing import ArrayLike
 
 from rehab.gait.contacts import CONTACT_N, RELEASE_N, STEP_PEAK, Contact
+from rehab.gait.detector import KEEP_S, Beside, Draft, LegDetector
+from rehab.gait.filters import find_highest
 from rehab.gait.kinetics import CUTOFF_HZ
-from rehab.gait.online import STRIDE_MAX_S, StrideDetector
-from rehab.gait.samples import FORCE, POSITION, read_chunk
+from rehab.gait.samples import FORCE, NAMES, POSITION, SampleBuffer, cut, read_chunk
+from rehab.gait.settings import check_settings
+from rehab.gait.stances import Stance
 from rehab.gait.strides import Flag, Reason, Stride
+
+CHANNELS = ("t_s", *(f"{side} {name}" for side in ("left", "right") for name in NAMES))
 
 # Mean force of both plates over a cycle, by body weight (gait.md 2.3): a handrail takes some of it,
 # a harness up to half; nothing adds any, so that more tells of a wrong mass, unit or plate.
@@ -51,18 +56,21 @@ class TwoLegDetector:
         release_n: float = RELEASE_N,
         is_velocity: bool = False,
     ) -> None:
-        self.left, self.right = (
-            StrideDetector(
+        check_settings(rate_hz, mass_kg, look_ahead_s, cutoff_hz, contact_n, release_n)
+        self._samples = SampleBuffer(int(KEEP_S * rate_hz), legs=2)
+        self._left, self._right = (
+            LegDetector(
+                buffer,
                 rate_hz,
                 mass_kg,
-                look_ahead_s=look_ahead_s,
-                cutoff_hz=cutoff_hz,
-                contact_n=contact_n,
-                release_n=release_n,
-                is_velocity=is_velocity,
-                side=side,
+                look_ahead_s,
+                cutoff_hz,
+                contact_n,
+                release_n,
+                is_velocity,
+                side,
             )
-            for side in ("left", "right")
+            for buffer, side in zip(self._samples.legs, ("left", "right"), strict=True)
         )
         self._steps_m: dict[str | None, float | None] = {}
 
@@ -79,94 +87,83 @@ class TwoLegDetector:
         GaitInputError
             For channels of different lengths.
         """
-        both = [(self.left, read_chunk(t_s, *left)), (self.right, read_chunk(t_s, *right))]
-        time = both[0][1][0]
-        length = 0 if time is None else len(time)
+        chunk = read_chunk(CHANNELS, (t_s, *_fill_up(left), *_fill_up(right)))
         strides: list[Stride] = []
-        for start in range(0, length, self.left.piece):
-            stop = min(length, start + self.left.piece)
-            found = [found for leg, chunk in both for found in leg.take(chunk, start, stop)]
-            if found:
-                found.sort(key=lambda one: one[0])
-                strides += [self._compare(*one) for one in found]
+        for piece, count in cut(chunk, self._left.piece):
+            first = self._samples.end
+            self._samples.append(piece, count)
+            stop = self._samples.end
+            left_found = self._left.advance(first, stop)
+            right_found = self._right.advance(first, stop)
+            if left_found or right_found:
+                strides += self._tell(left_found, right_found)
         return strides
 
     def finish(self) -> list[Stride]:
-        """Give the strides that still wait for samples after their terminal contact."""
-        end = self.left.buffer.end
-        found = [*self.left.take_rest(), *self.right.take_rest()]
-        found.sort(key=lambda one: one[0].terminal_contact_s)
-        return [self._compare(end - 1, stride, contact) for stride, contact in found]
+        """Give what still waits, and the stances that the end of the samples cuts off, invalid."""
+        return self._tell(self._left.finish(), self._right.finish())
 
-    def _compare(self, index: int, stride: Stride, this: Contact) -> Stride:
-        """Complete a stride by what the other leg did until sample ``index``."""
-        leg, other = (self.left, self.right) if stride.side == "left" else (self.right, self.left)
-        own = _find_contacts(leg, index)
-        others = [
-            c
-            for c in _find_contacts(other, index)
-            if c.begin_index < _end(this) and _end(c) > this.begin_index
-        ]
-        reasons, flags = list(stride.reasons), list(stride.flags)
-        first, second = (others[0], others[1]) if len(others) == 2 else (None, None)
-        if first is None or second is None or not _is_walked(first, this, second):
-            if Reason.LONG_STANCE not in reasons:
+    def _tell(self, left: list[Draft], right: list[Draft]) -> list[Stride]:
+        """Give the strides of both legs, in the order in which they were complete."""
+        found = [(draft, self._left, self._right) for draft in left]
+        found += [(draft, self._right, self._left) for draft in right]
+        found.sort(key=lambda one: (one[0].index, one[0].contact.end_index))
+        return [leg.tell(draft, self._compare(draft, leg, other)) for draft, leg, other in found]
+
+    def _compare(self, draft: Draft, leg: LegDetector, other: LegDetector) -> Beside:
+        """Give what the other leg did until the sample that completed a stride."""
+        this, is_whole = draft.contact, Reason.CUT_OFF not in draft.reasons
+        reasons: list[Reason] = []
+        flags: list[Flag] = []
+        known = _find_contacts(other, draft.index)
+        others = [c for c in known if c.begin_index < _end(this) and _end(c) > this.begin_index]
+        first = others[0] if others else None
+        second = others[1] if len(others) == 2 else None
+        if is_whole and (first is None or second is None or not _is_walked(first, this, second)):
+            if Reason.LONG_STANCE not in draft.reasons:
                 reasons.append(Reason.CROSS_STEP)
             first = second = None
-        ratio = self._weigh(own, this, other, index)
+        plates, zeros_n = (leg, other), (this.offset_n, known[-1].offset_n if known else 0.0)
+        ratio = carried = _weigh(draft.cycle_index, this.begin_index, plates, zeros_n)
         if ratio is None and second is not None:
             # No whole cycle was seen: a step comes near enough to tell a wrong mass.
-            begin, end = this.begin_index, second.begin_index
-            carried = self._find_load(begin, end, this.offset_n + second.offset_n)
-        else:
-            carried = ratio
+            carried = _weigh(this.begin_index, second.begin_index, plates, zeros_n)
         if carried is not None and not WEIGHT_MIN <= carried <= WEIGHT_MAX:
             reasons.append(Reason.WEIGHT)
-        elif ratio is not None and ratio < SUPPORTED_BELOW and Flag.SUPPORTED not in flags:
+        elif ratio is not None and ratio < SUPPORTED_BELOW:
             flags.append(Flag.SUPPORTED)
-        step_s = first_s = second_s = length = None
-        if first is not None and second is not None:
-            step_s = _find_time(first.begin_s if first.seen else None, this.begin_s)
-            first_s = _find_time(this.begin_s, first.end_s)
-            second_s = _find_time(second.begin_s, this.end_s)
-            length = _find_length(stride, other, this.begin_index)
+        length = None if first is None else _find_length(draft.stance, other, this.begin_index)
         symmetry = _find_symmetry(length, self._steps_m.get(other.side))
-        self._steps_m[stride.side] = length
-        return replace(
-            stride,
-            valid=not reasons,
-            reasons=tuple(reasons),
-            flags=tuple(flags),
-            step_s=step_s,
+        self._steps_m[leg.side] = length
+        return Beside(
+            reasons=reasons,
+            flags=flags,
+            step_s=_find_time(first.begin_s, this.begin_s) if first and first.seen else None,
             step_length_m=length,
             step_symmetry=symmetry,
-            first_double_support_s=first_s,
-            second_double_support_s=second_s,
+            first_double_support_s=_find_time(this.begin_s, first.end_s) if first else None,
+            second_double_support_s=_find_time(second.begin_s, this.end_s) if second else None,
             weight_ratio=ratio,
         )
 
-    def _weigh(
-        self, own: list[Contact], this: Contact, other: StrideDetector, index: int
-    ) -> float | None:
-        """Give the mean force of both plates over the cycle before a contact, by body weight."""
-        before = [c for c in own if c.end_index is not None and c.end_index < this.begin_index]
-        before = [c for c in before if not c.bounce]
-        if not before:
-            return None
-        begin, end = before[-1].begin_index, this.begin_index
-        if begin == 0:
-            return None
-        known = _find_contacts(other, index)
-        offset = known[-1].offset_n if known else 0.0
-        return self._find_load(begin, end, this.offset_n + offset)
 
-    def _find_load(self, begin: int, end: int, offset_n: float) -> float | None:
-        """Give the mean force of both plates between two samples, by body weight."""
-        if end - begin > STRIDE_MAX_S * self.left.rate_hz:
-            return None
-        left, right = (leg.buffer.channel(FORCE, begin, end) for leg in (self.left, self.right))
-        load = float((left.sum() + right.sum()) / (end - begin)) - offset_n
-        return load / self.left.weight_n if math.isfinite(load) else None
+def _fill_up(leg: LegSamples | Sequence[ArrayLike]) -> Sequence[ArrayLike | None]:
+    return leg if len(leg) == len(NAMES) else LegSamples(*leg)
+
+
+def _weigh(
+    begin: int | None,
+    end: int,
+    plates: tuple[LegDetector, LegDetector],
+    zeros_n: tuple[float, float],
+) -> float | None:
+    """Give the mean force of both plates between two samples, by body weight, if it is known."""
+    if begin is None:
+        return None
+    load = sum(
+        leg.find_load(begin, end, zero_n) for leg, zero_n in zip(plates, zeros_n, strict=True)
+    )
+    return load if math.isfinite(load) else None
 
 
 def _is_walked(first: Contact, this: Contact, second: Contact) -> bool:
@@ -183,7 +180,7 @@ def _end(contact: Contact) -> float:
     return math.inf if contact.end_index is None else contact.end_index
 
 
-def _find_contacts(leg: StrideDetector, index: int) -> list[Contact]:
+def _find_contacts(leg: LegDetector, index: int) -> list[Contact]:
     """Give a leg's contacts as they were known at sample ``index``, whatever came later."""
     contacts = []
     for contact in leg.contacts.recent:
@@ -192,7 +189,7 @@ def _find_contacts(leg: StrideDetector, index: int) -> list[Contact]:
             break
         if end is None or end > index:
             begin = max(contact.begin_index, index - leg.piece)
-            peak_n = leg.buffer.channel(FORCE, begin, index + 1).max() - contact.offset_n
+            peak_n = find_highest(leg.buffer.channel(FORCE, begin, index + 1)) - contact.offset_n
             if not peak_n >= STEP_PEAK * leg.weight_n:
                 continue
             if end is not None:
@@ -201,19 +198,19 @@ def _find_contacts(leg: StrideDetector, index: int) -> list[Contact]:
     return contacts
 
 
-def _find_time(begin_s: float | None, end_s: float | None) -> float | None:
+def _find_time(begin_s: float, end_s: float | None) -> float | None:
     """Give the time between two moments, if both are known."""
-    if begin_s is None or end_s is None or not math.isfinite(end_s - begin_s):
+    if end_s is None or not math.isfinite(end_s - begin_s):
         return None
     return end_s - begin_s
 
 
-def _find_length(stride: Stride, other: StrideDetector, index: int) -> float | None:
+def _find_length(stance: Stance, other: LegDetector, index: int) -> float | None:
     """Give how far the foot landed ahead of the other one."""
-    if stride.position_m is None:
+    if stance.position_m is None:
         return None
     position = float(other.buffer.channel(POSITION, index, index + 1)[0])
-    length = stride.position_m - position
+    length = stance.position_m - position
     return length if math.isfinite(length) else None
 
 

@@ -11,21 +11,21 @@ from rehab.gait.filters import Floats
 from rehab.gait.strides import GaitInputError
 
 TIME, FORCE, MOMENT, ANGLE, FORWARD, POSITION = range(6)
-NAMES = ("t_s", "force_n", "moment_nm", "angle_rad", "forward_n", "position_m")
+NAMES = ("force_n", "moment_nm", "angle_rad", "forward_n", "position_m")
 
 
-def read_chunk(*channels: ArrayLike | None) -> list[Floats | None]:
+def read_chunk(names: Sequence[str], channels: Sequence[ArrayLike | None]) -> list[Floats | None]:
     """Give the channels as float arrays of one length; a single number is one sample.
 
     Raises GaitInputError for channels of different lengths or with more than one dimension.
     """
     chunk = [None if values is None else np.asarray(values, np.float64) for values in channels]
-    shapes = [array.shape for array in chunk if array is not None]
-    if shapes.count(shapes[0]) == len(shapes) and len(shapes[0]) == 1:
+    shapes = {array.shape for array in chunk if array is not None}
+    if len(shapes) == 1 and len(*shapes) == 1:
         return chunk
-    named = {name: a for name, a in zip(NAMES, chunk, strict=False) if a is not None}
-    if not any(shapes):
+    if shapes == {()}:
         return [None if array is None else array.reshape(1) for array in chunk]
+    named = {name: a for name, a in zip(names, chunk, strict=True) if a is not None}
     for name, array in named.items():
         if array.ndim != 1:
             raise GaitInputError(
@@ -38,43 +38,77 @@ def read_chunk(*channels: ArrayLike | None) -> list[Floats | None]:
     )
 
 
+def cut(chunk: list[Floats | None], longest: int) -> list[tuple[list[Floats | None], int]]:
+    """Give a chunk, whose first channel is there, in pieces of no more than so many samples."""
+    length = 0 if chunk[0] is None else len(chunk[0])
+    if length <= longest:
+        return [(chunk, length)]
+    parts = [slice(start, start + longest) for start in range(0, length, longest)]
+    return [
+        (
+            [None if values is None else values[part] for values in chunk],
+            min(longest, length - part.start),
+        )
+        for part in parts
+    ]
+
+
 class SampleBuffer:
-    """The newest samples of six channels. Indices count samples since the start.
+    """The newest samples of one or two legs. Indices count samples since the start.
 
     Parameters
     ----------
     keep
         How many samples are certain to be there still; no more than these may be appended at once.
+    legs
+        One or two. ``legs`` of the buffer then are what each of them sees.
     """
 
-    def __init__(self, keep: int) -> None:
+    def __init__(self, keep: int, legs: int = 1) -> None:
         self.keep = keep
         self.end = 0
-        self._first = 0
-        self._table = np.full((len(NAMES), 3 * keep), np.nan)
-        self._rows = list(self._table)
-        self._sent = [True, True, True, True, False, False]  # what is not, stays NaN
+        self.first = 0  # the oldest sample that is still there
+        # Time lies between the legs, so that each has its six channels side by side.
+        table = np.full((1 + legs * len(NAMES), 3 * keep), np.nan)
+        tables = [table] if legs == 1 else [table[len(NAMES) :: -1], table[len(NAMES) :]]
+        self.legs = [LegBuffer(self, leg) for leg in tables]
+        self._table = table
+        self._rows = [tables[0][TIME], *(row for leg in tables for row in leg[FORCE:])]
+        self._sent = [False] * len(self._rows)  # what never is, stays NaN
 
-    def append(self, chunk: Sequence[Floats | None], start: int, stop: int) -> None:
-        """Take samples ``start:stop`` of each channel of a chunk."""
-        begin = self.end - self._first
-        end = begin + stop - start
+    def append(self, chunk: Sequence[Floats | None], count: int) -> None:
+        """Take ``count`` samples of each channel: times, then those of each leg."""
+        begin = self.end - self.first
+        end = begin + count
         if end > self._table.shape[1]:
             self._table[:, : self.keep] = self._table[:, begin - self.keep : begin]
-            self._first = self.end - self.keep
-            begin, end = self.keep, self.keep + stop - start
-        for row, values in enumerate(chunk):
+            self.first = self.end - self.keep
+            begin, end = self.keep, self.keep + count
+        for place, values in enumerate(chunk):
             if values is not None:
-                self._rows[row][begin:end] = values[start:stop]
-                self._sent[row] = True
-            elif self._sent[row]:
-                self._rows[row][begin:end] = np.nan
-        self.end += stop - start
+                self._rows[place][begin:end] = values
+                self._sent[place] = True
+            elif self._sent[place]:
+                self._rows[place][begin:end] = np.nan
+        self.end += count
+
+
+class LegBuffer:
+    """One leg's channels in a buffer."""
+
+    def __init__(self, samples: SampleBuffer, table: Floats) -> None:
+        self.samples = samples
+        self._table: Floats = table
+        self._rows = list(table)
 
     def view(self, start: int, stop: int) -> Floats:
         """Give samples ``start:stop`` of all channels, shape (6, samples), without copying."""
-        return self._table[:, start - self._first : stop - self._first]
+        first = self.samples.first
+        part: Floats = self._table[:, start - first : stop - first]
+        return part
 
     def channel(self, row: int, start: int, stop: int) -> Floats:
         """Give samples ``start:stop`` of one channel, without copying."""
-        return self._rows[row][start - self._first : stop - self._first]
+        first = self.samples.first
+        part: Floats = self._rows[row][start - first : stop - first]
+        return part

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,15 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rehab.gait.continuity import RATE_TOLERANCE
+from rehab.gait.detector import GRAVITY_M_S2, OFFSET_N
 from rehab.gait.filters import Floats
 from rehab.gait.lag import BRAKE_S, PERSON_S, find_brake
 from rehab.gait.legs import SUPPORTED_BELOW, LegSamples, TwoLegDetector
-from rehab.gait.online import GRAVITY_M_S2, OFFSET_N, StrideDetector
-from rehab.gait.plausibility import RATE_TOLERANCE
+from rehab.gait.online import StrideDetector
 from rehab.gait.strides import Reason, Stride
 
 OFTEN = 0.2  # of the strides; what is wrong with fewer is the walker's, not the set-up's
 WEIGHT_ABOVE = 1.05  # shoes and instrumentation weigh up to 3 % (moore2013)
+USUAL_LOAD = (0.42, 0.58)  # of body weight on one leg; 0.52 on each of moore2013's
 OWN_LAG_S = 0.003  # against the person's own mark
 USUAL_MOMENT = (0.8, 2.0)  # Nm/kg, healthy (gait.md 6)
 USUAL_A2 = (0.3, 7.0)  # W/kg (gait.md 6)
@@ -145,6 +148,9 @@ def check_signals(
     ratios = [s.weight_ratio for s in strides if s.weight_ratio is not None]
     ratio = float(np.median(ratios)) if ratios else None
     findings += _check_weight(ratio, mass_kg)
+    if len(given) == 1:
+        ((side, leg),) = given.items()
+        findings += _check_load(_find_load(time, leg, strides) / GRAVITY_M_S2, mass_kg, side)
     lag_s = _find_lag(brakes, own_brake_s)
     findings += _check_lag(lag_s, OWN_LAG_S if own_brake_s else PERSON_S)
     return SignalCheck(
@@ -232,6 +238,30 @@ def _check_weight(ratio: float | None, mass_kg: float) -> list[Finding]:
     if ratio < 1:
         message += "; if it is right, a handrail or harness carries the rest, and A2 is lower"
     return [Finding("weight", message + ".")]
+
+
+def _find_load(time: Floats, leg: LegSamples, strides: list[Stride]) -> float:
+    """Give the median of a plate's mean force over whole strides [N], NaN without one."""
+    force = np.asarray(leg.force_n, dtype=np.float64)
+    means = []
+    for stride in strides:
+        if stride.stride_s is not None:
+            end_s = stride.initial_contact_s
+            part = slice(*np.searchsorted(time, (end_s - stride.stride_s, end_s)))
+            means.append(force[part].mean() - stride.offset_n)
+    return float(np.median(means)) if means else math.nan
+
+
+def _check_load(load_kg: float, mass_kg: float, side: str) -> list[Finding]:
+    """With one leg, all that is known of the weight is that a leg carries half of it."""
+    share = load_kg / mass_kg
+    if not (share < USUAL_LOAD[0] or share > USUAL_LOAD[1]):
+        return []
+    message = (
+        f"The plate carries {share * 100:.0f} % of {mass_kg:g} kg over whole strides; half is "
+        "usual. Right for a leg that is spared or favored; else check the body mass."
+    )
+    return [Finding("weight_unusual", message, side)]
 
 
 def _find_lag(brakes: dict[str, float | None], own: dict[str, float] | None) -> float | None:

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rehab.gait.contacts import Contact
-from rehab.gait.filters import Floats, ZeroPhaseFilter
+from rehab.gait.continuity import check_samples, check_steps
+from rehab.gait.filters import Floats, ZeroPhaseFilter, find_highest
+from rehab.gait.grid import spread_out
 from rehab.gait.kinetics import PushOff, PushOffMeter
 from rehab.gait.plausibility import (
     STANCE_MAX_S,
@@ -16,9 +18,8 @@ from rehab.gait.plausibility import (
     check_force,
     check_lever,
     check_push_off,
-    check_samples,
 )
-from rehab.gait.samples import ANGLE, FORCE, FORWARD, MOMENT, POSITION, TIME, SampleBuffer
+from rehab.gait.samples import ANGLE, FORCE, FORWARD, MOMENT, POSITION, TIME, LegBuffer
 from rehab.gait.strides import Reason
 
 BEFORE_S = 0.25  # of swing that the filter gets to settle, and that the moment is looked at in
@@ -50,7 +51,7 @@ class StanceMeter:
 
     def __init__(
         self,
-        buffer: SampleBuffer,
+        buffer: LegBuffer,
         rate_hz: float,
         mass_kg: float,
         weight_n: float,
@@ -63,8 +64,9 @@ class StanceMeter:
         self._weight_n = weight_n
         self._is_velocity = is_velocity
         self._thin = max(1, int(rate_hz // THIN_HZ))
-        self._meter = PushOffMeter(rate_hz / self._thin, mass_kg, cutoff_hz, is_velocity)
-        self._forward_filter = ZeroPhaseFilter(FORWARD_HZ, rate_hz / self._thin)
+        self._even_hz = rate_hz / self._thin
+        self._meter = PushOffMeter(self._even_hz, mass_kg, cutoff_hz, is_velocity)
+        self._forward_filter = ZeroPhaseFilter(FORWARD_HZ, self._even_hz)
         self._before = int(BEFORE_S * rate_hz)
 
     def measure(self, contact: Contact, stop: int) -> Stance:
@@ -84,22 +86,36 @@ class StanceMeter:
         elif end_s - begin_s > STANCE_MAX_S:
             reasons.append(Reason.LONG_STANCE)
         force = window[FORCE, before : before + end - begin + 1] - contact.offset_n
-        for reason in check_force(force, contact.peak_n, self._weight_n, self._rate_hz):
-            if reason not in reasons:
-                reasons.append(reason)
-        clean = _thin_out(_mend(window), self._thin)
+        reasons += check_force(force, contact.peak_n, self._weight_n, self._rate_hz)
+        mended, hole_s = _mend(window, before)
+        clean = None if mended is None else _thin_out(mended[: ANGLE + 1], self._thin)
         push_off = None
         if clean is not None and clean[TIME, -1] - clean[TIME, 0] < LONGEST_S:
-            push_off = self._meter.measure(clean[TIME], clean[MOMENT], clean[ANGLE], begin_s, end_s)
-        if push_off is not None and clean is not None:
-            force = clean[FORCE] - contact.offset_n
-            reasons += check_lever(
-                clean[TIME], force, clean[MOMENT], begin_s, end_s, self._weight_n
-            )
-            reasons += check_push_off(push_off, begin_s, end_s, self._is_velocity)
-        elif not reasons:
+            push_off = self._measure_push_off(contact, clean, hole_s, reasons)
+        if push_off is None and not reasons:
             reasons.append(Reason.NO_PUSH_OFF)
-        return Stance(reasons, push_off, self._find_propulsion(clean), self._find_position(contact))
+        return Stance(
+            list(dict.fromkeys(reasons)),
+            push_off,
+            self._find_propulsion(window),
+            self._find_position(contact),
+        )
+
+    def locate(self, contact: Contact) -> Stance:
+        """Give what is known of the stance of a contact that has not ended."""
+        return Stance([], None, None, self._find_position(contact))
+
+    def _measure_push_off(
+        self, contact: Contact, clean: Floats, hole_s: float, reasons: list[Reason]
+    ) -> PushOff | None:
+        """Measure push-off from samples whose holes are bridged; add what is wrong with it."""
+        stance = spread_out(clean, self._even_hz, contact.begin_s, contact.end_s or 0.0)
+        push_off = None if stance is None else self._meter.measure(stance)
+        if stance is not None and push_off is not None:
+            reasons += check_steps(stance, push_off, hole_s, self._is_velocity)
+            reasons += check_lever(stance, contact.offset_n, self._weight_n)
+            reasons += check_push_off(push_off, stance, self._is_velocity)
+        return push_off
 
     def _find_before(self, begin: int) -> int:
         """Give how many samples before a stance follow each other well enough to use them."""
@@ -109,11 +125,15 @@ class StanceMeter:
         breaks = np.flatnonzero(~((steps > 0) & (steps <= BEFORE_S)))
         return before - int(breaks[-1]) - 1 if len(breaks) else before
 
-    def _find_propulsion(self, window: Floats | None) -> float | None:
-        if window is None or not np.isfinite(window[FORWARD]).all():
+    def _find_propulsion(self, window: Floats) -> float | None:
+        forward = window[FORWARD : FORWARD + 1]
+        if not math.isfinite(forward[0, -1]) or not np.isfinite(forward).all():
             return None
-        smooth = self._forward_filter.smooth(window[FORWARD : FORWARD + 1])[0]
-        return float(smooth[len(smooth) // 2 :].max()) / self._mass_kg
+        thin = _thin_out(forward, self._thin)
+        if thin is None:
+            return None
+        smooth = self._forward_filter.smooth(thin)[0]
+        return find_highest(smooth[len(smooth) // 2 :]) / self._mass_kg
 
     def _find_position(self, contact: Contact) -> float | None:
         index = contact.begin_index
@@ -123,26 +143,30 @@ class StanceMeter:
         return position if math.isfinite(position) else None
 
 
-def _mend(window: Floats) -> Floats | None:
+def _mend(window: Floats, stance: int) -> tuple[Floats | None, float]:
     """Give a stance's samples with holes in moment and angle bridged; None where there is nothing.
 
-    Holes too long for it have their reason already; nobody is shown what is measured across them.
+    And the longest time [s] from sample ``stance`` on over which a straight line stands. Holes too
+    long for it have their reason already; nobody is shown what is measured across them.
     """
-    signals = window[MOMENT : ANGLE + 1]
-    if np.isfinite(signals.sum()):
-        return window
+    time = window[TIME]
+    steps = time[stance + 1 :] - time[stance:-1]
+    longest_s = find_highest(steps)
+    if math.isfinite(window[MOMENT : ANGLE + 1].sum()):
+        return window, longest_s
     mended = window.copy()
     for row in mended[MOMENT : ANGLE + 1]:
         known = np.isfinite(row)
         if known.sum() < 2:
-            return None
-        row[~known] = np.interp(window[TIME][~known], window[TIME][known], row[known])
-    return mended
+            return None, longest_s
+        row[~known] = np.interp(time[~known], time[known], row[known])
+        longest_s = max(longest_s, float(np.diff(time[known]).max()))
+    return mended, longest_s
 
 
-def _thin_out(window: Floats | None, factor: int) -> Floats | None:
+def _thin_out(window: Floats, factor: int) -> Floats | None:
     """Average each ``factor`` neighbors, aligned to the end."""
-    if window is None or factor == 1:
+    if factor == 1:
         return window
     count = window.shape[1] // factor
     if count < 2:

@@ -20,9 +20,10 @@ class Reason(StrEnum):
     FORCE_TOO_LARGE = "force_too_large"  # more than anybody's weight: unit, or mass
     SHORT_STANCE = "short_stance"
     LONG_STANCE = "long_stance"  # standing
+    CUT_OFF = "cut_off"  # the record ends before the foot leaves the floor
     IRREGULAR = "irregular"  # far from the usual stance: stumble, stop, both feet on one plate
     CROSS_STEP = "cross_step"  # the other foot was not where a walker has it
-    WEIGHT = "weight"  # both plates together do not carry this person
+    WEIGHT = "weight"  # the plates do not carry this person
     MOMENT_LOST = "moment_lost"  # not finite, frozen or jumping
     MOMENT_SIGN = "moment_sign"  # plantarflexion is not positive
     MOMENT_TOO_SMALL = "moment_too_small"
@@ -54,7 +55,8 @@ class Stride:
     number
         Counts this leg's strides from 1.
     initial_contact_s, terminal_contact_s
-        When the foot met and left the floor [s, the clock of the samples].
+        When the foot met and left the floor [s, the clock of the samples]; of a stride that is
+        ``cut_off``, the end of the record.
     a2_w_kg, a2_time_s
         Peak ankle push-off power [W/kg] and when it was reached [s]; None where there is none. Only
         a valid stride's value may be shown to anybody.

@@ -22,6 +22,7 @@ KINDS: dict[str, dict[str, float]] = {
     "500 Hz": {"rate_hz": 500},
     "slow 1 kHz": {"rate_hz": 1000, "a2_w_kg": 0.5, "stride_s": 1.8, "mass_kg": 60.0},
     "fast 100 Hz": {"rate_hz": 100, "a2_w_kg": 5.0, "stride_s": 0.95, "mass_kg": 90.0},
+    "child 200 Hz": {"rate_hz": 200, "stride_s": 0.95, "mass_kg": 22.0},
 }
 
 
@@ -86,12 +87,13 @@ def test_a_force_that_cannot_be_makes_no_stride(walk, factor):
 
 
 @pytest.mark.parametrize("rows", [[FORCE], [MOMENT], [ANGLE], [MOMENT, ANGLE]])
-def test_channels_of_the_other_leg(walk, clean, rows):
+@pytest.mark.parametrize("look_ahead_s", [0.0, 0.05])
+def test_channels_of_the_other_leg(walk, rows, look_ahead_s):
     swapped = walk.left.copy()
     swapped[rows] = walk.right[rows]
-    found = replace(walk, left=swapped).one_leg()
+    found = replace(walk, left=swapped).one_leg(look_ahead_s=look_ahead_s)
 
-    assert sum(stride.valid for stride in found) <= 0.05 * len(found)
+    assert not any(stride.valid for stride in found)
 
 
 @pytest.mark.parametrize("channel", [FORCE, MOMENT, ANGLE])
@@ -113,9 +115,9 @@ def test_holes(walk, clean, channel, width_s):
     )
 
 
-@pytest.mark.parametrize("width_s", [0.02, 0.08, 0.4])
-def test_missing_samples(walk, clean, width_s):
-    rng = np.random.default_rng(1)
+@pytest.mark.parametrize(("width_s", "seed"), [(0.02, 1), (0.08, 1), (0.4, 1), (1.0, 1), (1.5, 2)])
+def test_missing_samples(walk, clean, width_s, seed):
+    rng = np.random.default_rng(seed)
     keep = np.ones(len(walk.t_s), dtype=bool)
     for stride in clean:
         begin = stride.initial_contact_s + rng.uniform() * stride.stance_s
@@ -129,7 +131,7 @@ def test_missing_samples(walk, clean, width_s):
     )
 
     check_nothing_is_wrong(found, clean)
-    if width_s > 0.05:
+    if 0.05 < width_s < 0.5:  # else few strides have both their contacts
         assert share_with(found, Reason.GAP) > 0.8
 
 
@@ -163,7 +165,8 @@ def test_frozen_channels(walk, clean, channel, width_s):
 
 
 @pytest.mark.parametrize(
-    ("channel", "size"), [(ANGLE, 0.2), (ANGLE, 1.0), (MOMENT, 40.0), (MOMENT, 100.0)]
+    ("channel", "size"),
+    [(ANGLE, 0.07), (ANGLE, 0.2), (ANGLE, 1.0), (MOMENT, 10.0), (MOMENT, 40.0), (MOMENT, 100.0)],
 )
 @pytest.mark.parametrize("samples", [1, 5])
 def test_spikes(walk, clean, channel, size, samples):
@@ -176,6 +179,31 @@ def test_spikes(walk, clean, channel, size, samples):
         return values
 
     check_nothing_is_wrong(walk.change(channel, strike).one_leg(look_ahead_s=0.0), clean, but=0.1)
+
+
+@pytest.mark.parametrize(("channel", "size"), [(ANGLE, 0.05), (ANGLE, -0.05), (MOMENT, 25.0)])
+def test_steps(walk, clean, channel, size):
+    """A channel that jumps late in stance and goes on from there until the foot swings."""
+    rng = np.random.default_rng(4)
+
+    def jump(values):
+        for stride in clean:
+            begin = stride.terminal_contact_s - rng.uniform(0.04, 0.25)
+            part = slice(*np.searchsorted(walk.t_s, (begin, stride.terminal_contact_s + 0.2)))
+            values[part] += size
+        return values
+
+    found = walk.change(channel, jump).one_leg(look_ahead_s=0.0)
+    # In one stride of moore2013 it falls into a gap of 38 ms, which hides it.
+    check_nothing_is_wrong(found, clean, but=0.1, allowed=len(clean) // 40)
+
+
+@pytest.mark.parametrize("early_s", [0.05, 0.08])
+def test_a_moment_that_runs_ahead_of_the_force(walk, early_s):
+    early = walk.change(MOMENT, lambda x: np.interp(walk.t_s + early_s, walk.t_s, x))
+    found = early.one_leg()
+
+    assert not any(stride.valid for stride in found)
 
 
 @pytest.mark.parametrize("jump_s", [-100.0, -0.5, -0.05, 0.0, 100.0, np.nan])
@@ -222,19 +250,22 @@ def test_both_feet_on_one_plate(walk, clean):
     assert any(Reason.CROSS_STEP in s.reasons or Reason.LONG_STANCE in s.reasons for s in found)
 
 
-def test_a_belt_that_stops(walk, clean):
-    """The walker stands still for two seconds in the middle of a stance."""
+@pytest.mark.parametrize("still_s", [2.0, 7.0, 15.0, 23.0, 24.5])
+def test_a_belt_that_stops(walk, clean, still_s):
+    """The walker stands still in the middle of a stance, for longer than samples are kept."""
     middle = clean[len(clean) // 2]
     at = int(np.searchsorted(walk.t_s, middle.initial_contact_s + 0.5 * middle.stance_s))
-    still = int(2 * walk.rate_hz)
+    still = int(still_s * walk.rate_hz)
     time = np.concatenate([walk.t_s[:at], walk.t_s[at] + np.arange(still) / walk.rate_hz])
-    time = np.concatenate([time, walk.t_s[at:] + 2.0])
+    time = np.concatenate([time, walk.t_s[at:] + still / walk.rate_hz])
     left, right = (
         np.concatenate([leg[:, :at], np.repeat(leg[:, at : at + 1], still, 1), leg[:, at:]], axis=1)
         for leg in (walk.left, walk.right)
     )
-    found = replace(walk, t_s=time, left=left, right=right).one_leg(look_ahead_s=0.0)
+    stopped = replace(walk, t_s=time, left=left, right=right)
+    found = stopped.one_leg(look_ahead_s=0.0)
 
+    assert len([s for s in stopped.both_legs() if s.side == "left"]) == len(found)
     stood = [s for s in found if abs(s.initial_contact_s - middle.initial_contact_s) < 0.1]
     assert [s.valid for s in stood] == [False]
     assert sum(s.valid for s in found) >= sum(s.valid for s in clean) - 2
@@ -244,6 +275,13 @@ def test_a_belt_that_stops(walk, clean):
 def test_a_wrong_mass_is_seen_by_two_legs(walk, factor):
     found = replace(walk, mass_kg=walk.mass_kg * factor).both_legs()
     assert sum(stride.valid for stride in found) <= 1  # walking has just begun
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.2])
+def test_a_wrong_mass_is_seen_by_one_leg(walk, factor):
+    """Pounds for kilograms, as a rule. Less is told by the self-check."""
+    found = replace(walk, mass_kg=walk.mass_kg * factor).one_leg()
+    assert sum(stride.valid for stride in found) <= 2  # where no whole stride was seen before
 
 
 def test_a_handrail_is_told(walk):

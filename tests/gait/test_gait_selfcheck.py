@@ -109,6 +109,21 @@ def test_millinewtons(synthetic):
     assert "force_unit" in codes
 
 
+@pytest.mark.parametrize(("factor", "percent"), [(0.8, 63), (1.25, 40)])
+def test_a_wrong_mass_is_named_with_one_leg(synthetic, factor, percent):
+    mass_kg = synthetic.mass_kg * factor
+    leg = LegSamples(*synthetic.left)
+    settings = {"rate_hz": synthetic.rate_hz, "mass_kg": mass_kg}
+    (finding,) = [
+        f
+        for f in check_signals(synthetic.t_s, leg, None, **settings).findings
+        if f.code == "weight_unusual"
+    ]
+
+    assert f"carries {percent} % of {mass_kg:g} kg" in finding.message
+    assert finding.side == "left"
+
+
 def test_a_wrong_mass_or_rate_is_named(synthetic):
     heavy = check(replace(synthetic, mass_kg=90.0)).findings
     assert any("carry 83 % of 90 kg" in finding.message for finding in heavy)
@@ -119,7 +134,7 @@ def test_a_wrong_mass_or_rate_is_named(synthetic):
 
 
 def test_every_reason_of_the_set_up_has_a_cure():
-    of_the_walker = {Reason.SHORT_STANCE, Reason.IRREGULAR}
+    of_the_walker = {Reason.SHORT_STANCE, Reason.IRREGULAR, Reason.CUT_OFF}
     of_its_own = {Reason.RATE}  # told from the times themselves
     assert set(CURES) == set(Reason) - of_the_walker - of_its_own
     assert STANCE_MAX_S < 2.5
