@@ -1,25 +1,184 @@
-"""Admin of leaderboards."""
+"""Admin of leaderboards: one form, and beside it the board as a patient would see it."""
 
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from csp.constants import SELF
+from csp.decorators import csp_replace
+from django import forms
 from django.contrib import admin
+from django.core.exceptions import PermissionDenied
+from django.db.models import Max, Q, QuerySet
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import render
+from django.urls import URLPattern, path
+from django.utils import timezone
+from django.utils.decorators import method_decorator
+from django.views.decorators.clickjacking import xframe_options_sameorigin
+from django.views.decorators.http import require_safe
 
+from rehab.boards.forms import LeaderboardForm
 from rehab.boards.models import Leaderboard
+from rehab.boards.showing import Viewer
+from rehab.people.access import person
 from rehab.people.admin_base import ScopedAdmin
+from rehab.people.models import Boards, Patient
+from rehab.people.roles import Role
+from rehab.sessions.models import TrainingSession
+from rehab.training.changes import State
+
+SEEN_AS = 60  # patients to see a preview as, those who walked last first
 
 
 @admin.register(Leaderboard)
 class LeaderboardAdmin(ScopedAdmin):
     """Leaderboards of the clinic."""
 
-    list_display = ("name", "among", "types", "metric", "period", "active")
+    form = LeaderboardForm
+    change_form_template = "boards/admin_form.html"
+    list_display = ("name", "among", "types", "metric", "period", "moment", "active")
+    list_filter = ("active", "moment")
+    radio_fields = dict.fromkeys(
+        ("among", "types", "entry", "period", "moment", "display", "names", "ties"),
+        admin.HORIZONTAL,
+    )
     fieldsets = (
-        (None, {"fields": ("name", "active", "among", "entry", "mean_of")}),
         (
-            "What counts",
-            {"fields": ("types", "valences", "metric", "min_valid_strides", "include_simulated")},
+            "Who and what",
+            {
+                "fields": (
+                    "name",
+                    "among",
+                    "group",
+                    "metric",
+                    "entry",
+                    "mean_of",
+                    "types",
+                    "valences",
+                )
+            },
         ),
-        ("When", {"fields": ("period", "period_from", "period_to", "moment")}),
         (
-            "How it looks",
-            {"fields": ("display", "top_n", "ties", "show_ranks", "names", "min_participants")},
+            "Which sessions",
+            {
+                "fields": (
+                    "period",
+                    ("period_from", "period_to"),
+                    ("min_valid_strides", "min_minutes"),
+                    "include_simulated",
+                )
+            },
+        ),
+        (
+            "How it is shown",
+            {
+                "fields": (
+                    "moment",
+                    "display",
+                    "top_n",
+                    "total_goal",
+                    "names",
+                    "show_ranks",
+                    "min_participants",
+                    "active",
+                )
+            },
+        ),
+        (
+            "Finer points",
+            {
+                "classes": ("collapse",),
+                "fields": ("ties", "tie_breaker", "higher_is_better", "frozen_on"),
+            },
         ),
     )
+
+    def get_urls(self) -> list[URLPattern]:
+        """Give the addresses, the preview's among them."""
+        preview = self.admin_site.admin_view(self.preview)
+        return [path("preview/", preview, name="rehab_leaderboard_preview"), *super().get_urls()]
+
+    def formfield_for_choice_field(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
+        """Offer what this person may build: boards across clinics are the host's, and only they."""
+        if db_field.name == "among":
+            across = Leaderboard.Among.ACROSS
+            hosts = person(request).role == Role.HOST
+            kwargs["choices"] = [
+                choice for choice in Leaderboard.Among.choices if (choice[0] == across) == hosts
+            ]
+        return super().formfield_for_choice_field(db_field, request, **kwargs)
+
+    def formfield_for_manytomany(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
+        """Let a group be ticked."""
+        kwargs["widget"] = forms.CheckboxSelectMultiple()
+        return super().formfield_for_manytomany(db_field, request, **kwargs)
+
+    def get_changeform_initial_data(self, request: HttpRequest) -> dict[str, Any]:
+        """Begin with a board that can be saved."""
+        if person(request).role == Role.HOST:
+            return {"among": Leaderboard.Among.ACROSS, "entry": Leaderboard.Entry.BEST}
+        return {}
+
+    def render_change_form(
+        self, request: HttpRequest, context: dict[str, Any], *args: Any, **kwargs: Any
+    ) -> HttpResponse:
+        """Show the form; patients to see the preview as stand beside it."""
+        context["seen_as"] = self._walkers(request)[:SEEN_AS]
+        return super().render_change_form(request, context, *args, **kwargs)
+
+    @method_decorator(require_safe)
+    @method_decorator(xframe_options_sameorigin)
+    @method_decorator(csp_replace({"frame-ancestors": [SELF]}))
+    def preview(self, request: HttpRequest) -> HttpResponse:
+        """Show the board that a form describes, of the clinic's own sessions. Stores nothing.
+
+        Refuses whoever could not save it.
+        """
+        row = self.get_object(request, request.GET.get("board", "")) or None
+        may = self.has_change_permission if row else self.has_add_permission
+        if not may(request, *([row] if row else [])):
+            raise PermissionDenied
+        given = request.GET.copy()
+        given["name"] = given.get("name", "").strip() or "Leaderboard"
+        form = self.get_form(request, row, change=row is not None)(given, instance=row)
+        if not form.is_valid():
+            faults = [
+                (form.fields[name].label if name in form.fields else "", " ".join(problems))
+                for name, problems in form.errors.items()
+            ]
+            return render(request, "boards/preview_faults.html", {"faults": faults})
+        if form.instance.clinic_id is None:
+            fault = "It is made of patients, whom a host does not see. Clinics see it on tablets."
+            return render(request, "boards/preview_faults.html", {"faults": [("", fault)]})
+        board = self._viewer(request, form.instance).show()
+        return render(request, "boards/scores.html", {"boards": [board], "ranked": True})
+
+    def _viewer(self, request: HttpRequest, board: Leaderboard) -> Viewer:
+        """Give the eyes to see it with: a patient's after the newest session, or anybody's."""
+        anybody = Viewer(board, timezone.now(), stored=False)
+        if board.moment == Leaderboard.Moment.WAITING:
+            return anybody
+        finished = TrainingSession.objects.visible_to(request.user).filter(
+            state=State.FINISHED.value
+        )
+        newest = finished.order_by("simulated", "-started_at")
+        chosen = request.GET.get("seen_as", "")
+        walkers = self._walkers(request)
+        if chosen.isdecimal():
+            patient = walkers.filter(pk=chosen).first()
+        else:  # somebody who sees the board itself, where there is one
+            typical = replace(anybody, session=newest.first()).find_typical()
+            patient = walkers.filter(pk=typical or 0).first() or walkers.first()
+        session = newest.filter(patient=patient).first()
+        return replace(anybody, patient=patient, session=session)
+
+    def _walkers(self, request: HttpRequest) -> QuerySet[Patient]:
+        """Give the patients who have walked, those who agreed to boards first."""
+        walked = Patient.objects.visible_to(request.user).filter(
+            sessions__state=State.FINISHED.value
+        )
+        return walked.annotate(
+            alone=Q(boards=Boards.OWN), last_here=Max("sessions__started_at")
+        ).order_by("alone", "-last_here")

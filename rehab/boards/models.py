@@ -1,47 +1,76 @@
-"""Leaderboards as PTs build them. Ranking reads these fields; here they are only kept valid."""
+"""Leaderboards as PTs build them, and the rows that groups of patients have on them."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 from django.core.exceptions import ValidationError
-from django.core.validators import MinValueValidator
+from django.core.validators import MaxValueValidator, MinValueValidator
 from django.db import models
-from django.db.models import Q
+from django.db.models import Exists, Q
 
-from rehab.people.models import Clinic
-from rehab.people.scope import ClinicRow, Scope
+from rehab.boards.rules import find_faults
+from rehab.people.models import Boards, Clinic, Patient
+from rehab.people.scope import ClinicRow, Scope, ScopedModel
 from rehab.training.metrics import METRICS
 from rehab.training.valences import VALENCES
 
-# Metrics whose range depends on the feedback type: one board must not mix types by them.
-TYPED_METRICS = frozenset({"score", "points_per_100_steps"})
+METRIC_LABELS = {
+    "hit_rate": "Steps at the goal (%)",
+    "mean_performance": "Mean step, in % of the own goal",
+    "improvement_over_baseline": "Improvement over the own baseline (%)",
+    "retention_in_washout": "Improvement kept in the washout (%)",
+    "active_minutes": "Minutes walked",
+    "target_met": "Days on which the target was met",
+}
+
+
+def metric_choices() -> list[tuple[str, str]]:
+    """Give what can be ranked by, the hit rate first."""
+    slugs = sorted(METRICS, key=lambda slug: slug != "hit_rate")
+    return [(slug, METRIC_LABELS.get(slug, METRICS[slug].label)) for slug in slugs]
+
+
+@dataclass(frozen=True)
+class BoardScope(Scope):
+    """Boards of the own clinic, and those across clinics while it takes part in them."""
+
+    def of_clinic(self, clinic_id: int) -> Q:
+        """Give the boards that a member of this clinic may see."""
+        takes_part = Exists(Clinic.everywhere.filter(pk=clinic_id, boards_across=True))
+        return Q(clinic=clinic_id) | Q(takes_part, clinic__isnull=True)
 
 
 class Leaderboard(ClinicRow):
-    """Who is compared with whom, by what, over which time, and how it is shown."""
+    """Who is compared with whom, by what, over which time, and how it is shown.
+
+    Without a clinic it is the host's, and compares patients of all clinics that take part.
+    """
 
     class Among(models.TextChoices):
         """Whose sessions are on the board."""
 
         SELF = "self", "The patient's own sessions"
-        CLINIC = "clinic", "Patients of the clinic"
+        GROUP = "group", "A group of patients"
+        CLINIC = "clinic", "All patients of the clinic"
+        ACROSS = "across", "Patients of several clinics"
 
     class Types(models.TextChoices):
         """Which feedback types are on the board."""
 
-        SAME = "same", "The type of the session at hand"
-        CHOSEN = "chosen", "The types chosen below"
+        SAME = "same", "Same as the session at hand"
+        CHOSEN = "chosen", "Chosen types"
         ALL = "all", "All types"
 
     class Entry(models.TextChoices):
         """What stands in a row."""
 
         EACH = "each", "Each session"
-        BEST = "best", "Best session of each patient"
-        LATEST = "latest", "Latest session of each patient"
-        MEAN = "mean", "Mean of the last sessions of each patient"
-        SUM = "sum", "Sum over the period for each patient"
+        BEST = "best", "Best session"
+        LATEST = "latest", "Latest session"
+        MEAN = "mean", "Mean of the last sessions"
+        SUM = "sum", "Sum over the period"
 
     class Period(models.TextChoices):
         """Which sessions count."""
@@ -57,73 +86,132 @@ class Leaderboard(ClinicRow):
 
         STANDARD = "standard", "1, 2, 2, 4"
         DENSE = "dense", "1, 2, 2, 3"
-        EARLIER = "earlier", "Shared place, earlier date first"
+        EARLIER = "earlier", "1, 2, 3, 4: the earlier first"
 
     class Display(models.TextChoices):
         """Which rows are shown."""
 
-        NEIGHBORS = "neighbors", "Me and two neighbors on each side"
+        NEIGHBORS = "neighbors", "You and two on each side"
         TOP = "top", "The best"
-        TOP_AND_ME = "top_and_me", "The best, and me"
-        TOTAL = "total", "The clinic's total"
+        TOP_AND_ME = "top_and_me", "The best, and you"
+        TOTAL = "total", "One total, reached together"
 
     class Names(models.TextChoices):
         """What patients are called."""
 
-        PSEUDONYM = "pseudonym", "Pseudonym"
+        PSEUDONYM = "pseudonym", "Animal names"
         INITIALS = "initials", "Initials"
-        CODE = "code", "Code"
+        CODE = "code", "Codes"
 
     class Moment(models.TextChoices):
         """When it is shown."""
 
-        AFTER_SESSION = "after_session", "After each session"
-        WAITING = "waiting", "On the waiting screen"
-        PT_ONLY = "pt_only", "To the PT only"
+        AFTER_SESSION = "after_session", "After a session"
+        WAITING = "waiting", "While the tablet waits"
+        PT_ONLY = "pt_only", "Only here, to therapists"
 
-    scope = Scope(clinic="clinic")
+    scope = BoardScope(clinic="clinic", shared=True, host=Q(clinic__isnull=True))
 
-    clinic = models.ForeignKey(Clinic, on_delete=models.CASCADE, related_name="leaderboards")
-    name = models.CharField(max_length=64)
-    among = models.CharField(max_length=16, choices=Among.choices, default=Among.SELF)
-    types = models.CharField(max_length=16, choices=Types.choices, default=Types.SAME)
-    valences = models.JSONField(
-        default=list, blank=True, help_text='Chosen types, as a list: ["positive", "binary"].'
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.CASCADE, related_name="leaderboards", null=True, blank=True
+    )
+    name = models.CharField("name on the tablet", max_length=32)
+    active = models.BooleanField(default=True)
+    among = models.CharField(
+        "compare with", max_length=16, choices=Among.choices, default=Among.SELF
+    )
+    group = models.ManyToManyField(
+        Patient, related_name="+", blank=True, verbose_name="patients of the group"
     )
     metric = models.CharField(
-        max_length=32,
-        choices=[(metric.slug, metric.label) for metric in METRICS.values()],
-        default="hit_rate",
+        "measure", max_length=32, choices=metric_choices(), default="hit_rate"
     )
-    entry = models.CharField(max_length=16, choices=Entry.choices, default=Entry.EACH)
-    mean_of = models.PositiveSmallIntegerField(default=3, validators=[MinValueValidator(1)])
-    min_valid_strides = models.PositiveIntegerField(default=100)
-    include_simulated = models.BooleanField(default=False)
+    higher_is_better = models.BooleanField("higher is better", default=True)
+    entry = models.CharField("a row is", max_length=16, choices=Entry.choices, default=Entry.EACH)
+    mean_of = models.PositiveSmallIntegerField(
+        "sessions in the mean", default=3, validators=[MinValueValidator(1)]
+    )
+    types = models.CharField(
+        "feedback types", max_length=16, choices=Types.choices, default=Types.SAME
+    )
+    valences = models.JSONField("which types", default=list, blank=True)
+    min_valid_strides = models.PositiveIntegerField(
+        "fewest steps",
+        default=100,
+        help_text="A session counts from so many valid steps with feedback on.",
+    )
+    min_minutes = models.PositiveSmallIntegerField(
+        "or fewest minutes",
+        null=True,
+        blank=True,
+        help_text="A session with fewer steps counts as well if it was walked so long.",
+    )
+    include_simulated = models.BooleanField("simulated sessions too", default=False)
     period = models.CharField(max_length=16, choices=Period.choices, default=Period.DAYS_30)
-    period_from = models.DateField(null=True, blank=True)
-    period_to = models.DateField(null=True, blank=True)
-    ties = models.CharField(max_length=16, choices=Ties.choices, default=Ties.STANDARD)
-    display = models.CharField(max_length=16, choices=Display.choices, default=Display.NEIGHBORS)
-    top_n = models.PositiveSmallIntegerField(default=10, validators=[MinValueValidator(1)])
-    show_ranks = models.BooleanField(default=True)
+    period_from = models.DateField("from", null=True, blank=True)
+    period_to = models.DateField("to", null=True, blank=True)
+    frozen_on = models.DateField(
+        "frozen on",
+        null=True,
+        blank=True,
+        help_text="The board stays as it was at the end of this day: for a report.",
+    )
+    display = models.CharField(
+        "rows", max_length=16, choices=Display.choices, default=Display.NEIGHBORS
+    )
+    top_n = models.PositiveSmallIntegerField(
+        "how many of the best",
+        default=10,
+        validators=[MinValueValidator(1), MaxValueValidator(50)],
+    )
+    total_goal = models.PositiveIntegerField(
+        "goal of the total",
+        null=True,
+        blank=True,
+        validators=[MinValueValidator(1)],
+        help_text="Draws a bar that fills up to it.",
+    )
+    show_ranks = models.BooleanField("show places", default=True)
+    ties = models.CharField(
+        "equal figures", max_length=16, choices=Ties.choices, default=Ties.STANDARD
+    )
+    tie_breaker = models.CharField(
+        "of equal figures, first",
+        max_length=32,
+        choices=metric_choices(),
+        blank=True,
+        help_text="Who has more of this stands first; after that, who was earlier.",
+    )
     names = models.CharField(max_length=16, choices=Names.choices, default=Names.PSEUDONYM)
     min_participants = models.PositiveSmallIntegerField(
+        "fewest patients",
         default=5,
         validators=[MinValueValidator(5)],
-        help_text="With fewer patients the board falls back to the patient's own sessions.",
+        help_text="With fewer, everyone sees the own sessions only.",
     )
-    moment = models.CharField(max_length=16, choices=Moment.choices, default=Moment.AFTER_SESSION)
-    active = models.BooleanField(default=True)
+    moment = models.CharField(
+        "shown", max_length=16, choices=Moment.choices, default=Moment.AFTER_SESSION
+    )
 
     class Meta(ClinicRow.Meta):
         ordering: ClassVar = ["name"]
         constraints: ClassVar = [
             models.UniqueConstraint(fields=["clinic", "name"], name="board_name_once_per_clinic"),
+            models.UniqueConstraint(
+                fields=["name"], condition=Q(clinic__isnull=True), name="board_name_once_across"
+            ),
             models.CheckConstraint(
                 condition=~Q(period="dates")
                 | Q(period_from__isnull=False, period_to__gte=models.F("period_from")),
                 name="board_dates_in_order",
                 violation_error_message="Give both dates, the first not after the second.",
+            ),
+            models.CheckConstraint(
+                condition=Q(clinic__isnull=False, among__in=["self", "group", "clinic"])
+                | Q(clinic__isnull=True, among="across"),
+                name="board_across_is_the_hosts",
+                violation_error_message="Boards across clinics are the host's, and a host has no "
+                "other boards.",
             ),
         ]
 
@@ -131,23 +219,85 @@ class Leaderboard(ClinicRow):
         return self.name
 
     def clean(self) -> None:
-        """Refuse boards that would rank by feedback type, or several rows a person in a group."""
-        errors: dict[str, Any] = {}
-        chosen = self.valences
-        if not isinstance(chosen, list) or not all(slug in VALENCES for slug in chosen):
-            errors["valences"] = f"Give a list of these types: {', '.join(VALENCES)}."
-        elif self.types == self.Types.CHOSEN and not chosen:
-            errors["valences"] = "Choose at least one type."
-        elif self.metric in TYPED_METRICS:
-            mixed = self.types == self.Types.ALL or len(set(chosen)) > 1
-            if mixed and self.types != self.Types.SAME:
-                errors["metric"] = (
-                    "Points of different feedback types cannot be compared: negative ones are "
-                    "never above 0. Choose the hit rate, or a single type."
-                )
-            elif self.types == self.Types.CHOSEN and chosen == ["explicit"]:
-                errors["metric"] = "Explicit feedback has no points. Choose the hit rate."
-        if self.among != self.Among.SELF and self.entry == self.Entry.EACH:
-            errors["entry"] = "A board of several patients shows one row for each of them."
-        if errors:
-            raise ValidationError(errors)
+        """Refuse boards that would mislead or expose somebody, with the cure at the field."""
+        faults = dict(find_faults(self))
+        if faults:
+            raise ValidationError(faults)
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it compares a patient with nobody else."""
+        return self.among == self.Among.SELF
+
+    @property
+    def agreed(self) -> list[str]:
+        """What a patient must have agreed to, to stand on it: one of these."""
+        if self.among == self.Among.ACROSS:
+            return [Boards.ACROSS]
+        total = [Boards.TOTAL] if self.display == self.Display.TOTAL else []
+        return [*total, Boards.CLINIC, Boards.ACROSS]
+
+    @property
+    def slugs(self) -> list[str]:
+        """The feedback types that count; none means all."""
+        return list(self.valences) if self.types == self.Types.CHOSEN else []
+
+    def list_of(self, valence: str) -> str:
+        """Give the list that a session of this type is on: one a type, or one for all ("")."""
+        return valence if self.types == self.Types.SAME else ""
+
+
+class BoardEntry(ScopedModel):
+    """A patient's row on a board of several: what the sessions that count add up to.
+
+    It follows from the sessions (`entries.py`) and is there to be found by index. ``key`` orders
+    the rows: the greater, the better.
+    """
+
+    scope = Scope(clinic="patient__clinic")
+
+    # No indexes of their own: those below begin with them.
+    board = models.ForeignKey(
+        Leaderboard, on_delete=models.CASCADE, related_name="entries", db_index=False
+    )
+    patient = models.ForeignKey(Patient, on_delete=models.CASCADE, related_name="+", db_index=False)
+    valence = models.CharField(
+        max_length=16, blank=True, choices=[(v.slug, v.label) for v in VALENCES.values()]
+    )
+    figure = models.IntegerField(help_text="As it is shown: in whole numbers.")
+    stake = models.IntegerField(null=True, help_text="What could be kept, where points are lost.")
+    key = models.CharField(max_length=48)
+    stale_on = models.DateField(null=True, help_text="When time alone alters it.")
+
+    class Meta(ScopedModel.Meta):
+        constraints: ClassVar = [
+            models.UniqueConstraint(fields=["patient", "board", "valence"], name="board_entry_once")
+        ]
+        indexes: ClassVar = [
+            models.Index(fields=["board", "valence", "key"], name="entry_by_place"),
+            models.Index(fields=["board", "stale_on"], name="entry_by_staleness"),
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.figure}"
+
+
+class BoardCount(ScopedModel):
+    """How many rows of a board have a figure: places are sums of these, never counts of rows."""
+
+    scope = Scope(clinic="board__clinic")
+
+    board = models.ForeignKey(
+        Leaderboard, on_delete=models.CASCADE, related_name="counts", db_index=False
+    )
+    valence = models.CharField(max_length=16, blank=True)
+    figure = models.IntegerField()
+    rows = models.PositiveIntegerField()
+
+    class Meta(ScopedModel.Meta):
+        constraints: ClassVar = [
+            models.UniqueConstraint(fields=["board", "valence", "figure"], name="board_count_once")
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.figure}: {self.rows}"

@@ -1,4 +1,4 @@
-"""Addresses of scores."""
+"""Addresses of scores and boards."""
 
 from django.urls import path
 
@@ -6,4 +6,6 @@ from rehab.boards import views
 
 urlpatterns = [
     path("sessions/<int:session_id>/scores/", views.show_scores, name="scores"),
+    path("sessions/<int:session_id>/scores/leave/", views.leave_boards, name="leave-boards"),
+    path("tablet/board/", views.show_waiting_board, name="waiting-board"),
 ]

@@ -1,23 +1,25 @@
-"""What a patient sees after a session: how it compares with the earlier ones."""
+"""What a patient sees after a session: how it compares with the earlier ones, and with others."""
 
 from __future__ import annotations
 
-from collections import Counter
-from dataclasses import dataclass
-from datetime import datetime
+import time
 
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
-from django.utils import timezone
-from django.views.decorators.http import require_safe
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_POST, require_safe
 
 from rehab.boards.ranking import By, Entry, cut, rank, ranking_of, read_figures
+from rehab.boards.rows import Row, date_rows, share
+from rehab.boards.showing import Shown, show_after, show_waiting
 from rehab.people.access import actor_of, for_roles
+from rehab.people.models import Boards
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.words import at_clinic, say_day, say_duration, say_number
+from rehab.sessions.words import SPACE, say_number
 from rehab.training.changes import OPEN, State
 
+SHOWN_S = 20  # a board on a tablet that waits, before the next one
 TITLES = {
     By.POINTS: "Your points",
     By.KEPT: "Points you kept",
@@ -25,46 +27,60 @@ TITLES = {
 }
 
 
-@dataclass(frozen=True)
-class Row:
-    """A session on the page. ``bar`` is in percent; ``skips``: rows before it are left out."""
+@for_roles(Role.LEAD, Role.PT, tablets=True)
+@never_cache
+@require_safe
+def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
+    """Show the patient's own sessions, the one at hand marked, and the boards that were built.
 
-    session_id: int
-    rank: int
-    value: str
-    stake: int | None
-    bar: int
-    day: str
-    detail: str
-    you: bool
-    skips: bool
-
-
-@dataclass(frozen=True)
-class Board:
-    """One tab of the page."""
-
-    slug: str
-    label: str
-    by: By
-    rows: list[Row]
-
-    @property
-    def title(self) -> str:
-        """What the figures are."""
-        return TITLES[self.by]
+    A session that still runs has no place. In a blinded study there is nothing to compare.
+    """
+    session = find_session(request, session_id)
+    if State(session.state) in OPEN:
+        return redirect("walk", session_id=session.pk)
+    boards = (
+        [] if session.patient.blinded else [*show_after(session), *own_boards(request, session)]
+    )
+    context = {
+        "session": session,
+        "boards": boards,
+        "tablet": not request.user.is_authenticated,
+        "ranked": not boards or any(board.has_you for board in boards),
+    }
+    return render(request, "boards/scores.html", context)
 
 
 @for_roles(Role.LEAD, Role.PT, tablets=True)
+@require_POST
+def leave_boards(request: HttpRequest, session_id: int) -> HttpResponse:
+    """Take the session's patient off all boards, at once. Only a therapist brings one back."""
+    session = find_session(request, session_id)
+    session.patient.boards = Boards.OWN
+    session.patient.save(update_fields=["boards"])
+    return redirect("scores", session_id=session.pk)
+
+
+@for_roles(Role.LEAD, Role.PT, tablets=True)
+@never_cache
 @require_safe
-def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
-    """Show the patient's own sessions, the one at hand marked. One that still runs has no place."""
+def show_waiting_board(request: HttpRequest) -> HttpResponse:
+    """Show a board of the clinic on a tablet that waits, each in its turn; nothing without one."""
+    boards = show_waiting(actor_of(request).clinic)
+    if not boards:
+        return HttpResponse(status=204)
+    turn = int(time.time() // SHOWN_S) % len(boards)
+    return render(request, "boards/waiting.html", {"board": boards[turn]})
+
+
+def find_session(request: HttpRequest, session_id: int) -> TrainingSession:
+    """Give a session that whoever asks may see. Raises Http404 for any other."""
+    sessions = TrainingSession.objects.visible_to(actor_of(request))
+    return get_object_or_404(sessions.select_related("patient", "clinic"), pk=session_id)
+
+
+def own_boards(request: HttpRequest, session: TrainingSession) -> list[Shown]:
+    """Give the two boards that are always there: own sessions of this type, and of all types."""
     actor = actor_of(request)
-    session = get_object_or_404(
-        TrainingSession.objects.visible_to(actor).select_related("patient", "clinic"), pk=session_id
-    )
-    if State(session.state) in OPEN:
-        return redirect("walk", session_id=session.pk)
     valence = session.to_plan().valence
     figures = read_figures(actor, session)
     same = [own for own in figures if own.valence == session.valence]
@@ -82,52 +98,33 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
         .only("created_at", "started_at", "active_s")
         .order_by()  # by key; the model's own order would lead through the clinic's other rows
     }
-    boards = [
-        Board(slug, label, kind, write_rows(entries, facts, session, kind))
+    return [
+        Shown(
+            slug=slug,
+            title=TITLES[kind],
+            label=label,
+            rows=date_rows(write_rows(entries, kind), facts, session, session.clinic),
+            kept=kind is By.KEPT,
+        )
         for (slug, label, kind), entries in shown.items()
     ]
-    context = {
-        "session": session,
-        "boards": boards,
-        "tablet": not request.user.is_authenticated,
-        "ranked": any(own.session_id == session.pk for own in figures),
-    }
-    return render(request, "boards/scores.html", context)
 
 
-def write_rows(
-    entries: list[Entry], facts: dict[int, TrainingSession], session: TrainingSession, by: By
-) -> list[Row]:
-    """Put places into words, each with its day and how long was walked."""
-    began = {
-        pk: at_clinic(row.started_at or row.created_at, session.clinic) for pk, row in facts.items()
-    }
-    a_day = Counter(began[entry.session_id].date() for entry in entries)
-    today = at_clinic(timezone.now(), session.clinic).date()
+def write_rows(entries: list[Entry], by: By) -> list[Row]:
+    """Put places into words."""
     full = 100 if by is By.RATE else max([1, *(entry.value for entry in entries)])
     rows: list[Row] = []
     expected = 1
     for entry in entries:
-        start = began[entry.session_id]
-        walked = say_duration(facts[entry.session_id].active_s)
-        scale = entry.stake or full if by is By.KEPT else full
         rows.append(
             Row(
                 session_id=entry.session_id,
-                rank=entry.rank,
-                value=say_number(entry.value, 0) + ("\N{NO-BREAK SPACE}%" if by is By.RATE else ""),
-                stake=entry.stake,
-                bar=max(0, round(100 * entry.value / scale)),
-                day=say_day(start.date(), today),
-                detail=f"{say_time(start)} · {walked}" if a_day[start.date()] > 1 else walked,
-                you=entry.session_id == session.pk,
+                rank=None if by is By.KEPT else entry.rank,
+                value=say_number(entry.value, 0) + (f"{SPACE}%" if by is By.RATE else ""),
+                stake="" if entry.stake is None else say_number(entry.stake, 0),
+                bar=share(entry.value, entry.stake or full if by is By.KEPT else full),
                 skips=entry.place != expected,
             )
         )
         expected = entry.place + 1
     return rows
-
-
-def say_time(moment: datetime) -> str:
-    """Write the time of day."""
-    return f"{moment:%H:%M}"

@@ -68,8 +68,12 @@ function take(event) {
     case "activation_threshold":
       session.activation_threshold = event.value;
       break;
+    case "robot_intensity":
+      session.robot_intensity = event.value;
+      break;
     case "presence":
       session.presence = event.presence;
+      robot.take(event);
       break;
     case "remark":
       marks.push({ after: event.number, kind: event.what, value: event.value });
@@ -150,10 +154,11 @@ function drawLast() {
 
 function drawPresence() {
   const { source, robot: base, tablets } = session.presence;
-  const words = { source: source ? "connected" : "not connected", robot: base ? "connected" : "none", tablets: tablets ? "connected" : "this page’s mirror" };
+  const words = { source: source ? "connected" : "not connected", robot: robot.presence.words, tablets: tablets ? "connected" : "this page’s mirror" };
   const there = { source, robot: base, tablets: tablets > 0 };
   for (const row of document.querySelectorAll("[data-presence]")) {
     row.classList.toggle("there", there[row.dataset.presence]);
+    row.classList.toggle("low", row.dataset.presence === "robot" && robot.presence.low);
     row.querySelector("small").textContent = words[row.dataset.presence];
   }
 }
@@ -167,6 +172,11 @@ const MAIN = {
 function drawControls() {
   show("goal", session.goal === null ? "–" : session.goal.toFixed(2));
   show("threshold", percent(session.activation_threshold));
+  for (const level of document.querySelectorAll("[data-levels] button")) {
+    const on = Number(level.value) === session.robot_intensity;
+    level.classList.toggle("on", on);
+    level.setAttribute("aria-pressed", on);
+  }
   const gains = document.querySelector("[data-gains]");
   const wanted = [...new Set([...GAINS, session.gain])].sort((a, b) => a - b);
   if (gains.dataset.of !== wanted.join()) {
@@ -230,6 +240,7 @@ document.addEventListener("click", (event) => {
   else if (order !== undefined) robot.order(order);
   else if (remark === "borg") document.getElementById("exertion").showModal();
   else if (remark !== undefined) note(remark);
+  else if (button.parentElement.dataset.levels !== undefined) change("robot_intensity", Number(button.value));
   else if (button.parentElement.dataset.gains !== undefined) change("gain", Number(button.value));
 });
 

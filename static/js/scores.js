@@ -1,4 +1,4 @@
-// Scores: two tabs, and a list that glides once to the newest score, which then turns blue.
+// Scores: a tab for each board, and a list that glides once to the newest score, which then turns blue.
 const GLIDE_MS = 2000;
 const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
 const tabs = [...document.querySelectorAll("[role=tab]")];
@@ -60,11 +60,13 @@ function choose(tab) {
 for (const [index, tab] of tabs.entries()) {
   tab.addEventListener("click", () => choose(tab));
   tab.addEventListener("keydown", (event) => {
-    if (event.key !== "ArrowRight" && event.key !== "ArrowLeft") return;
-    const next = tabs[(index + 1) % tabs.length];
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!step) return;
+    const next = tabs.at((index + step) % tabs.length);
     choose(next);
     next.focus();
   });
 }
-addEventListener("resize", () => goTo(boardOf(tabs.find((tab) => tab.tabIndex === 0))));
-glide(boardOf(tabs[0]));
+const boards = [...document.querySelectorAll("section.board")];
+addEventListener("resize", () => boards.filter((board) => !board.hidden).forEach(goTo));
+if (boards.length) glide(boards[0]);

@@ -1,10 +1,17 @@
 """A board that would rank by feedback type, or list a person twice, cannot be built."""
 
+from typing import Any
+
 import pytest
 from django.core.exceptions import ValidationError
+from django.test import Client
+from django.urls import reverse, reverse_lazy
 
-from rehab.boards.models import Leaderboard
-from rehab.people.models import Clinic
+from rehab.boards.models import BoardEntry, Leaderboard
+from rehab.people.aliases import MANNERS, draw_alias
+from rehab.people.models import Clinic, Patient, User
+from rehab.people.roles import Role
+from tests.world import World, build_world, fill_board
 
 pytestmark = pytest.mark.django_db
 
@@ -17,7 +24,24 @@ def board(**fields) -> Leaderboard:
 def test_the_defaults_are_safe():
     made = board()
     made.full_clean()
-    assert (made.among, made.metric, made.min_participants) == ("self", "hit_rate", 5)
+    defaults = {
+        "among": "self",
+        "types": "same",
+        "metric": "hit_rate",
+        "entry": "each",
+        "min_valid_strides": 100,
+        "include_simulated": False,
+        "period": "days_30",
+        "ties": "standard",
+        "display": "neighbors",
+        "show_ranks": True,
+        "names": "pseudonym",
+        "min_participants": 5,
+        "moment": "after_session",
+        "frozen_on": None,
+        "higher_is_better": True,
+    }
+    assert {name: getattr(made, name) for name in defaults} == defaults
 
 
 @pytest.mark.parametrize(
@@ -35,6 +59,22 @@ def test_the_defaults_are_safe():
         ({"among": "clinic"}, "one row for each"),
         ({"min_participants": 3}, "greater than or equal to 5"),
         ({"period": "dates"}, "Give both dates"),
+        ({"entry": "best"}, "Choose “Each session”"),
+        ({"metric": "attended"}, "Compare with other patients"),
+        ({"display": "total"}, "reached together"),
+        ({"among": "clinic", "entry": "sum"}, "cannot be added up"),
+        ({"among": "clinic", "entry": "best", "metric": "target_met"}, "Choose the sum"),
+        ({"among": "clinic", "entry": "best", "display": "total"}, "Choose the sum"),
+        ({"moment": "waiting"}, "belongs to nobody yet"),
+        ({"moment": "waiting", "among": "clinic", "entry": "best"}, "belongs to nobody yet"),
+        (
+            {"moment": "waiting", "among": "clinic", "entry": "best", "display": "top"},
+            "no session at hand",
+        ),
+        ({"among": "across", "entry": "best"}, "the host's"),
+        ({"among": "across", "entry": "best", "names": "code"}, "animal names only"),
+        ({"top_n": 0}, "greater than or equal to 1"),
+        ({"tie_breaker": "luck"}, "not a valid choice"),
     ],
 )
 def test_a_board_that_would_mislead_is_refused(fields, message):
@@ -45,3 +85,131 @@ def test_a_board_that_would_mislead_is_refused(fields, message):
 def test_points_of_one_type_may_be_ranked():
     board(metric="score", types="chosen", valences=["binary"]).full_clean()
     board(metric="score", types="same").full_clean()
+
+
+# --- in the admin ---------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+def client_of(user) -> Client:
+    client = Client()
+    client.force_login(user)
+    return client
+
+
+def filled(**fields) -> dict[str, Any]:
+    """What a form sends that was only given a name."""
+    board = Leaderboard(name="Board")
+    names = [field.name for field in Leaderboard._meta.concrete_fields if field.editable]
+    sent = {name: getattr(board, name) for name in names if name not in {"id", "clinic"}}
+    return {name: value for name, value in (sent | fields).items() if value not in (None, False)}
+
+
+PREVIEW = reverse_lazy("admin:rehab_leaderboard_preview")
+
+
+def test_one_name_is_enough_to_save_a_board(world):
+    client = client_of(world.people[Role.PT])
+    answer = client.post(reverse("admin:rehab_leaderboard_add"), filled())
+    assert answer.status_code == 302, answer.context["errors"]
+    board = Leaderboard.everywhere.get(name="Board")
+    assert (board.clinic, board.among, board.active) == (world.clinic, "self", True)
+
+
+def test_a_preview_shows_the_clinics_own_rows_and_stores_nothing(world):
+    fill_board(world)
+    client = client_of(world.people[Role.PT])
+    counts = [model.everywhere.count() for model in (Leaderboard, BoardEntry)]
+    wanted = filled(
+        among="clinic", entry="best", names="code", min_valid_strides=1, period="all", name=""
+    )
+    page = client.get(PREVIEW, wanted).content.decode()
+    assert world.patient.code in page
+    assert page.count('class="rank"') == 3
+    assert 'data-facts="5 patients on it now."' in page
+    alone = client.get(PREVIEW, wanted | {"min_participants": 6}).content.decode()
+    assert "Fewer than 6 people so far." in alone
+    assert [model.everywhere.count() for model in (Leaderboard, BoardEntry)] == counts
+    assert client.post(PREVIEW).status_code == 405
+
+
+def test_what_is_seen_in_the_preview_is_what_the_tablet_shows(world):
+    fill_board(world)
+    board = Leaderboard.everywhere.get()
+    client = client_of(world.people[Role.PT])
+    fields = filled(**{name: getattr(board, name) for name in filled()})
+    preview = client.get(PREVIEW, fields | {"board": board.pk, "seen_as": world.patient.pk})
+    shown = client.get(reverse("scores", kwargs={"session_id": world.session.pk}))
+    rows = [
+        answer.content.decode().split("<ol>")[1].split("</ol>")[0] for answer in (preview, shown)
+    ]
+    assert rows[0].split() == rows[1].split()
+
+
+def test_a_preview_says_what_cannot_be(world):
+    client = client_of(world.people[Role.PT])
+    page = client.get(PREVIEW, filled(metric="score", types="all")).content.decode()
+    assert "<b>Measure</b> Points of different feedback types cannot be compared" in page
+
+
+def test_a_group_has_patients_of_the_own_clinic_and_enough_of_them(world):
+    other = build_world("birch")
+    client = client_of(world.people[Role.PT])
+    wanted = filled(among="group", entry="best")
+    few = client.get(PREVIEW, wanted | {"group": [world.patient.pk]}).content.decode()
+    assert "Choose at least 5 patients." in few
+    foreign = client.get(PREVIEW, wanted | {"group": [other.patient.pk]}).content.decode()
+    assert "not one of the available choices" in foreign
+
+
+@pytest.mark.parametrize(
+    ("role", "status"), [(Role.LEAD, 200), (Role.PT, 200), (Role.RESEARCHER, 403)]
+)
+def test_who_may_not_build_a_board_sees_no_preview(world, role, status):
+    assert client_of(world.people[role]).get(PREVIEW, filled()).status_code == status
+
+
+def test_only_a_host_builds_boards_across_clinics_and_sees_no_patient_in_it(world):
+    host = client_of(User.everywhere.create_user("host", role=Role.HOST))
+    wanted = filled(name="Across", among="across", entry="best")
+    pt = client_of(world.people[Role.PT])
+    assert "not one of the available choices" in pt.get(PREVIEW, wanted).content.decode()
+    preview = host.get(PREVIEW, wanted).content.decode()
+    assert "a host does not see" in preview
+    answer = host.post(reverse("admin:rehab_leaderboard_add"), wanted)
+    assert answer.status_code == 302, answer.context["errors"]
+    board = Leaderboard.everywhere.get(name="Across")
+    assert board.clinic is None
+    change = reverse("admin:rehab_leaderboard_change", kwargs={"object_id": board.pk})
+    assert pt.get(change).status_code == 302  # the clinic takes no part in it
+    world.clinic.boards_across = True
+    world.clinic.save()
+    assert pt.get(change).status_code == 200  # to be read
+    assert pt.post(change, wanted).status_code == 403
+
+
+def test_animal_names_are_drawn_on_agreeing_and_again_on_demand(world):
+    patient = Patient.everywhere.create(clinic=world.clinic, code="N", nickname="N")
+    assert patient.alias is None
+    patient.boards = "total"
+    patient.save(update_fields=["boards"])
+    patient.refresh_from_db()
+    first = patient.alias
+    assert str(first).split()[0] in MANNERS
+    client = client_of(world.people[Role.PT])
+    sent = {"action": "draw_aliases", "_selected_action": [patient.pk]}
+    assert client.post(reverse("admin:rehab_patient_changelist"), sent).status_code == 302
+    patient.refresh_from_db()
+    assert patient.alias not in {None, first}
+
+
+def test_names_never_run_out():
+    taken: set[str] = set()
+    for _ in range(3000):
+        name = draw_alias(taken.__contains__)
+        assert name not in taken
+        taken.add(name)

@@ -13,6 +13,7 @@ from django.urls import reverse
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rehab.boards.models import Leaderboard
 from rehab.boards.ranking import SHOWN, By, Figures, cut, rank, ranking_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
@@ -38,7 +39,9 @@ class Seen:
 
 @pytest.fixture
 def world() -> World:
-    return build_world("amber")
+    world = build_world("amber")
+    Leaderboard.everywhere.all().delete()  # tests/boards/test_boards.py has those
+    return world
 
 
 @pytest.fixture
@@ -320,7 +323,8 @@ def test_among_ten_thousand_sessions_only_the_patients_rows_are_read(client, cro
         connection,
     ) as asked:
         page = client.get(url).content.decode()
-    assert len(asked) == 5  # browser session, account, session, figures, facts of what is shown
+    # browser session, account, session, boards of the clinic, figures, facts of what is shown
+    assert len(asked) == 6
     rows = read(page, "same")
     assert len(rows) <= SHOWN
     assert [row.session for row in rows if row.you] == [crowd.pk]

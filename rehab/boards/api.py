@@ -1,0 +1,84 @@
+"""Calls about leaderboards: which there are, and what a patient would see on them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.http import HttpRequest
+from django.shortcuts import get_object_or_404
+from django.utils import timezone
+from ninja import Path, Query, Router, Schema
+
+from rehab.boards.models import Leaderboard
+from rehab.boards.showing import Shown, Viewer, show_after
+from rehab.people.access import for_roles
+from rehab.people.api_base import Key, Page, Paging, answers, caller, cut
+from rehab.people.roles import Role
+from rehab.sessions.models import TrainingSession
+
+router = Router(tags=["Boards"])
+
+
+class BoardOut(Schema):
+    """A board as it was built."""
+
+    id: int
+    name: str
+    active: bool
+    among: str
+    metric: str
+    entry: str
+    types: str
+    period: str
+    display: str
+    moment: str
+
+
+class RowOut(Schema):
+    """A row, in the words of the page."""
+
+    rank: int | None
+    title: str
+    value: str
+    stake: str
+    detail: str
+    you: bool
+
+
+class ShownOut(Schema):
+    """A board as it is shown. `note` says why it is not the one that was built."""
+
+    title: str
+    note: str
+    shared: bool
+    total: str | None
+    rows: list[RowOut]
+
+    @staticmethod
+    def resolve_total(shown: Shown) -> str | None:
+        """Give what all have reached together, on boards of totals."""
+        return None if shown.total is None else shown.total.value
+
+
+@router.get("/boards", response=answers(Page[BoardOut]))
+@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
+def list_boards(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
+    """List the clinic's leaderboards."""
+    return cut(Leaderboard.objects.visible_to(caller(request)).order_by("pk"), wanted)
+
+
+@router.get("/boards/{board_id}/rows", response=answers(ShownOut, 404))
+@for_roles(Role.LEAD, Role.PT)
+def show_board(request: HttpRequest, board_id: Path[Key]) -> Shown:
+    """Show a board as it is for whoever comes by, with those who agreed to stand on it."""
+    boards = Leaderboard.objects.visible_to(caller(request)).select_related("clinic")
+    return Viewer(get_object_or_404(boards, pk=board_id), timezone.now()).show()
+
+
+@router.get("/sessions/{session_id}/boards", response=answers(list[ShownOut], 404))
+@for_roles(Role.LEAD, Role.PT)
+def list_session_boards(request: HttpRequest, session_id: Path[Key]) -> list[Shown]:
+    """Show the boards that the patient sees after a session."""
+    sessions = TrainingSession.objects.visible_to(caller(request))
+    session = get_object_or_404(sessions.select_related("patient", "clinic"), pk=session_id)
+    return show_after(session)

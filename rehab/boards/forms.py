@@ -1,0 +1,33 @@
+"""The form that a leaderboard is built in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django import forms
+
+from rehab.boards.models import Leaderboard
+from rehab.people.admin_base import ClinicForm
+from rehab.training.valences import VALENCES
+
+
+class LeaderboardForm(ClinicForm):
+    """All of a board on one page; what is left as it is makes a safe one."""
+
+    valences = forms.MultipleChoiceField(
+        label="Which types",
+        choices=[(valence.slug, valence.label) for valence in VALENCES.values()],
+        widget=forms.CheckboxSelectMultiple,
+        required=False,
+    )
+
+    def clean(self) -> dict[str, Any]:
+        """Refuse a group that is too small ever to be shown."""
+        cleaned: dict[str, Any] = super().clean() or self.cleaned_data
+        group = cleaned.get("group")
+        if group is not None:
+            self.instance.chosen = [patient.pk for patient in group]
+        fewest = cleaned.get("min_participants") or 0
+        if cleaned.get("among") == Leaderboard.Among.GROUP and len(group or []) < fewest:
+            self.add_error("group", f"Choose at least {fewest} patients.")
+        return cleaned

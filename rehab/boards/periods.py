@@ -1,0 +1,72 @@
+"""Which days a board looks at, by the clinic's own calendar."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, date, datetime, time, timedelta, tzinfo
+from zoneinfo import ZoneInfo
+
+from rehab.boards.models import Leaderboard
+
+LAST_DAYS = 30
+
+
+@dataclass(frozen=True, slots=True)
+class Period:
+    """From the first day to the last one, both included; None where it has no bound."""
+
+    first: date | None
+    last: date | None
+    zone: tzinfo
+    rolls_on: date | None = None  # the day on which a new week or month begins
+    lasts: timedelta | None = None  # how long a session stays in a period that glides
+
+    @property
+    def began(self) -> datetime | None:
+        """The first moment."""
+        return None if self.first is None else datetime.combine(self.first, time(), self.zone)
+
+    @property
+    def ended(self) -> datetime | None:
+        """The first moment after it."""
+        if self.last is None:
+            return None
+        return datetime.combine(self.last + timedelta(days=1), time(), self.zone)
+
+    def day_of(self, moment: datetime) -> date:
+        """Give the day that a moment falls on."""
+        return moment.astimezone(self.zone).date()
+
+    def leaves(self, day: date) -> date | None:
+        """Say when a session of this day no longer counts; None for never."""
+        return self.rolls_on if self.lasts is None else day + self.lasts
+
+
+def period_of(board: Leaderboard, now: datetime) -> Period:
+    """Give the days that count now; on a frozen board, those that counted on its last day."""
+    zone = UTC if board.clinic is None else ZoneInfo(board.clinic.time_zone)
+    today = now.astimezone(zone).date()
+    frozen = board.frozen_on if board.frozen_on and board.frozen_on < today else None
+    as_of = frozen or today
+    period = _reach(board, as_of, zone)
+    if frozen is None:
+        return period
+    last = frozen if period.last is None else min(period.last, frozen)
+    return Period(period.first, last, zone)
+
+
+def _reach(board: Leaderboard, today: date, zone: tzinfo) -> Period:
+    match board.period:
+        case Leaderboard.Period.DAYS_30:
+            days = timedelta(days=LAST_DAYS)
+            return Period(today - days + timedelta(days=1), None, zone, lasts=days)
+        case Leaderboard.Period.WEEK:
+            first = today - timedelta(days=today.weekday())
+            return Period(first, None, zone, rolls_on=first + timedelta(days=7))
+        case Leaderboard.Period.MONTH:
+            first = today.replace(day=1)
+            after = (first + timedelta(days=32)).replace(day=1)
+            return Period(first, None, zone, rolls_on=after)
+        case Leaderboard.Period.DATES:
+            return Period(board.period_from, board.period_to, zone)
+    return Period(None, None, zone)

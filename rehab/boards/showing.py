@@ -1,0 +1,188 @@
+"""A board as a patient sees it: the others, all together, or the own sessions and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+
+from django.utils import timezone
+
+from rehab.boards import entries
+from rehab.boards.choosing import choose
+from rehab.boards.figures import keeps, read_figures, read_own, standing_on
+from rehab.boards.models import Leaderboard
+from rehab.boards.rows import Row, date_rows, name_rows, say_figure, share, write
+from rehab.boards.standings import Listed, Placed, Standings, Stored
+from rehab.people.models import Clinic, Patient
+from rehab.sessions.models import TrainingSession
+
+OWN = "These are your own sessions."
+FEW = "Fewer than {} people so far."
+
+
+@dataclass(frozen=True)
+class Total:
+    """What all have reached together. ``bar`` is in percent of the goal, which may be missing."""
+
+    value: str
+    goal: str
+    bar: int
+    people: int
+    mine: str
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A board on a page. ``note``: what it shows instead of the others; ``shared``: others are on
+    it; ``kept``: its points are told as kept, without places. ``facts`` are for whoever builds it.
+    """
+
+    slug: str
+    title: str
+    label: str
+    rows: Sequence[Row] = field(default_factory=list)
+    total: Total | None = None
+    note: str = ""
+    kept: bool = False
+    shared: bool = False
+    facts: str = ""
+
+    @property
+    def has_you(self) -> bool:
+        """Whether the session or patient at hand stands on it."""
+        return any(row.you for row in self.rows) or bool(self.total and self.total.mine)
+
+
+def boards_at(moment: Leaderboard.Moment, clinic: Clinic) -> list[Leaderboard]:
+    """Give the boards that a clinic's tablets show at this moment."""
+    boards = Leaderboard.everywhere.filter(active=True, moment=moment).select_related("clinic")
+    of_clinic = boards.filter(clinic=clinic)
+    return list(of_clinic | boards.filter(clinic=None) if clinic.boards_across else of_clinic)
+
+
+def show_after(session: TrainingSession, now: datetime | None = None) -> list[Shown]:
+    """Give the boards that are shown after a session; none in a blinded study."""
+    if session.patient.blinded:
+        return []
+    boards = boards_at(Leaderboard.Moment.AFTER_SESSION, session.clinic)
+    now = now or timezone.now()
+    return [Viewer(board, now, session.patient, session).show() for board in boards]
+
+
+def show_waiting(clinic: Clinic, now: datetime | None = None) -> list[Shown]:
+    """Give the boards that a waiting tablet shows: those on which there are enough patients."""
+    boards = boards_at(Leaderboard.Moment.WAITING, clinic)
+    now = now or timezone.now()
+    shown = [Viewer(board, now).show() for board in boards]
+    return [board for board in shown if board.shared]
+
+
+@dataclass(frozen=True)
+class Viewer:
+    """A board in somebody's eyes: a patient's, with or without a session at hand, or anybody's.
+
+    ``stored`` is False for a board that is not saved: its rows are then made of the sessions.
+    """
+
+    board: Leaderboard
+    now: datetime
+    patient: Patient | None = None
+    session: TrainingSession | None = None
+    stored: bool = True
+
+    @property
+    def valence(self) -> str:
+        """The feedback type of the session at hand."""
+        return self.session.valence if self.session else ""
+
+    def show(self) -> Shown:
+        """Give the board, or the own sessions and why."""
+        board, patient = self.board, self.patient
+        if board.is_own:
+            return self._show_own("")
+        standings = self._standings()
+        people = f"{standings.count} patient{'' if standings.count == 1 else 's'} on it now."
+        if standings.count < board.min_participants:
+            few = f"{people} Under {board.min_participants}, all see their own sessions."
+            return self._show_own(f"{FEW.format(board.min_participants)} {OWN}", few)
+        if patient is not None and not standing_on(board).filter(pk=patient.pk).exists():
+            return self._show_own(OWN, f"{people} {patient.nickname} has not agreed to be on it.")
+        me = standings.find(patient.pk) if patient else None
+        if board.display == Leaderboard.Display.TOTAL:
+            return self._shown(total=self._total(standings, me), shared=True, facts=people)
+        rows = name_rows(board, choose(board, standings, me), patient.pk if patient else None)
+        if rows:
+            return self._shown(rows=rows, shared=True, facts=people)
+        return self._show_own(OWN, f"{people} Outside its first half, own sessions are shown.")
+
+    def find_typical(self) -> int | None:
+        """Give the patient in the middle of the first half; None for a board of own sessions."""
+        if self.board.is_own:
+            return None
+        standings = self._standings()
+        ahead = standings.top((standings.count + 1) // 2)
+        return ahead[len(ahead) // 2].patient_id if ahead else None
+
+    def _standings(self) -> Standings:
+        key = self.board.list_of(self.valence)
+        if self.stored:
+            entries.refresh_stale(self.board, self.now)
+            return Stored(self.board, key)
+        figures = read_figures(self.board, self.now)
+        return Listed(self.board, (row for row in figures if row.valence == key))
+
+    def _total(self, standings: Standings, me: Placed | None) -> Total:
+        metric, goal = self.board.metric, self.board.total_goal
+        return Total(
+            value=say_figure(metric, standings.total),
+            goal=say_figure(metric, goal) if goal else "",
+            bar=share(standings.total, goal) if goal else 0,
+            people=standings.count,
+            mine=say_figure(metric, me.figure) if me else "",
+        )
+
+    def _show_own(self, note: str, facts: str = "") -> Shown:
+        """Give the patient's own sessions. Where they add up, their sum; nothing for nobody."""
+        board, patient = self.board, self.patient
+        if patient is None:
+            return self._shown(note=note, facts=facts)
+        figures = read_own(board, patient, self.valence, self.now)
+        listed = Listed(board, figures)
+        if board.entry == Leaderboard.Entry.SUM:
+            mine = write(board, choose(self._alone(), listed, None))
+            rows = [replace(row, title="", rank=None, you=True) for row in mine]
+            return self._shown(rows=rows, note=note, facts=facts)
+        me = listed.find_session(self.session.pk) if self.session else None
+        rows = write(board, choose(board if board.is_own else self._alone(), listed, me))
+        sessions = TrainingSession.everywhere.only("created_at", "started_at", "active_s")
+        found = sessions.in_bulk([row.session_id for row in rows])
+        dated = date_rows(rows, found, self.session, patient.clinic)
+        return self._shown(rows=dated, note=note, facts=facts)
+
+    def _alone(self) -> Leaderboard:
+        """Give the board as it is where a patient is compared with nobody."""
+        return Leaderboard(among=Leaderboard.Among.SELF, display=Leaderboard.Display.NEIGHBORS)
+
+    def _shown(
+        self,
+        *,
+        rows: Sequence[Row] = (),
+        total: Total | None = None,
+        note: str = "",
+        shared: bool = False,
+        facts: str = "",
+    ) -> Shown:
+        board = self.board
+        valence = self.valence if board.list_of(self.valence) else next(iter(board.slugs), "")
+        return Shown(
+            slug=f"{board.pk or 'new'}",
+            title=board.name,
+            label=board.name,
+            rows=rows,
+            total=total,
+            note=note,
+            kept=keeps(board.metric, valence),
+            shared=shared,
+            facts=facts,
+        )

@@ -1,0 +1,70 @@
+"""What alters boards: says so to `entries` the moment that it happens."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.db.models.signals import m2m_changed, post_delete, post_save
+from django.utils import timezone
+
+from rehab.boards import entries
+from rehab.boards.models import Leaderboard
+from rehab.people.models import Clinic, Patient
+from rehab.sessions.models import SessionMetric, TrainingSession, figures_stored
+from rehab.training.changes import State
+
+
+def watch() -> None:
+    """Listen, from the start of the process on."""
+    figures_stored.connect(on_figures)
+    post_save.connect(on_patient, sender=Patient)
+    post_save.connect(on_session, sender=TrainingSession)
+    post_delete.connect(on_session, sender=TrainingSession)
+    post_save.connect(on_figure, sender=SessionMetric)
+    post_delete.connect(on_figure, sender=SessionMetric)
+    post_save.connect(on_board, sender=Leaderboard)
+    m2m_changed.connect(on_group, sender=Leaderboard.group.through)
+    post_save.connect(on_clinic, sender=Clinic)
+
+
+def on_figures(sessions: set[int], **_signal: Any) -> None:
+    """Sessions have ended: part of the transaction that stores their figures."""
+    ended = TrainingSession.everywhere.filter(pk__in=sessions)
+    entries.refresh_patients(set(ended.values_list("patient_id", flat=True)))
+
+
+def on_patient(instance: Patient, created: bool, **_signal: Any) -> None:
+    """A patient has agreed to more or less, or has entered or left a blinded study."""
+    if not created:
+        entries.refresh_patients({instance.pk})
+
+
+def on_session(instance: TrainingSession, **_signal: Any) -> None:
+    """A session was corrected or removed."""
+    if instance.state == State.FINISHED:
+        entries.refresh_patients({instance.patient_id})
+
+
+def on_figure(instance: SessionMetric, **_signal: Any) -> None:
+    """A figure was corrected or removed."""
+    on_figures({instance.session_id})
+
+
+def on_board(instance: Leaderboard, **_signal: Any) -> None:
+    """A board was built or changed."""
+    entries.refresh(instance)
+
+
+def on_group(instance: Leaderboard, action: str, **_signal: Any) -> None:
+    """A board's group was chosen."""
+    if action.startswith("post_"):
+        entries.refresh(instance)
+
+
+def on_clinic(instance: Clinic, created: bool, **_signal: Any) -> None:
+    """A clinic takes part in boards across clinics, or no longer."""
+    if created:
+        return
+    patients = Patient.everywhere.filter(clinic=instance).values_list("pk", flat=True)
+    for board in entries.boards_of(None):
+        entries.refresh(board, set(patients), timezone.now())

@@ -1,0 +1,100 @@
+// The form that a leaderboard is built in: hides what does not apply, keeps choices that go together
+// together, and shows the board as it would look after each change.
+
+const PAUSE_MS = 300; // after the last change, before the preview is drawn again
+const SUMS = ["steps", "score", "active_minutes", "attended", "target_met"];
+const COUNTED = ["attended", "target_met"];
+
+const form = document.querySelector("#leaderboard_form");
+const preview = document.querySelector(".preview");
+if (form && preview) build();
+
+function build() {
+  const frame = preview.querySelector("iframe");
+  const facts = preview.querySelector(".facts");
+  const seenAs = preview.querySelector("#seen_as");
+  let waiting;
+
+  function value(name) {
+    const field = form.elements[name];
+    return field && "value" in field ? field.value : "";
+  }
+
+  function set(name, wanted) {
+    const field = form.elements[name];
+    if (field && value(name) !== wanted) field.value = wanted;
+  }
+
+  function show(name, wanted) {
+    const field = form.querySelector(`.field-${name}`);
+    if (field) field.hidden = !wanted;
+  }
+
+  // What was just chosen stays; what no longer goes with it follows.
+  function follow(changed) {
+    const own = value("among") === "self";
+    const total = value("display") === "total";
+    if (changed === "metric" && COUNTED.includes(value("metric"))) {
+      if (own) set("among", "clinic");
+      set("entry", "sum");
+    }
+    if (changed === "display" && total && own) set("among", "clinic");
+    if (changed === "display" && total) {
+      set("entry", "sum");
+      if (!SUMS.includes(value("metric"))) set("metric", "active_minutes");
+    }
+    if (changed === "among") {
+      if (own) set("entry", "each");
+      else if (value("entry") === "each") set("entry", "best");
+      if (own && total) set("display", "neighbors");
+    }
+    if (changed === "moment" && value("moment") === "waiting") {
+      if (value("among") === "self") set("among", "clinic");
+      if (value("entry") === "each") set("entry", "best");
+      if (!["top", "total"].includes(value("display"))) set("display", "top");
+      if (value("types") === "same") set("types", "all");
+    }
+    if (changed === "metric" && value("entry") === "sum" && !SUMS.includes(value("metric"))) {
+      set("entry", value("among") === "self" ? "each" : "best");
+      if (total) set("display", "neighbors");
+    }
+  }
+
+  function hide() {
+    const own = value("among") === "self";
+    const [display, entry] = [value("display"), value("entry")];
+    show("group", value("among") === "group");
+    show("entry", !own);
+    show("mean_of", entry === "mean");
+    show("valences", value("types") === "chosen");
+    show("period_from", value("period") === "dates"); // a row of both dates
+    show("top_n", display === "top" || display === "top_and_me");
+    show("total_goal", display === "total");
+    show("show_ranks", display !== "total");
+    show("names", !own && display !== "total");
+    show("min_participants", !own);
+  }
+
+  function draw() {
+    const chosen = new FormData(form);
+    for (const name of ["csrfmiddlewaretoken", "_save"]) chosen.delete(name);
+    if (preview.dataset.board) chosen.set("board", preview.dataset.board);
+    chosen.set("seen_as", seenAs.value);
+    frame.src = `${preview.dataset.preview}?${new URLSearchParams(chosen)}`;
+  }
+
+  frame.addEventListener("load", () => {
+    facts.textContent = frame.contentDocument?.body?.dataset.facts ?? "";
+  });
+  preview.addEventListener("change", draw);
+  form.addEventListener("change", ({ target }) => {
+    follow(target.name);
+    hide();
+  });
+  form.addEventListener("input", () => {
+    clearTimeout(waiting);
+    waiting = setTimeout(draw, PAUSE_MS);
+  });
+  hide();
+  draw();
+}
