@@ -2,6 +2,7 @@
 
 import os
 import secrets
+from datetime import timedelta
 from pathlib import Path
 from zoneinfo import available_timezones
 
@@ -87,7 +88,9 @@ INSTALLED_APPS = [
     "django.contrib.sessions",
     "django.contrib.messages",
     "django.contrib.staticfiles",
+    "axes",
     "csp",
+    "ninja",  # so that the API's documentation draws with files of ours, not from elsewhere
 ]
 MIDDLEWARE = [
     "django.middleware.security.SecurityMiddleware",
@@ -97,10 +100,12 @@ MIDDLEWARE = [
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",
     "django.contrib.auth.middleware.AuthenticationMiddleware",
+    "rehab.people.entry.EntryMiddleware",
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "rehab.stations.tablets.TabletMiddleware",
     "rehab.people.access.AccessMiddleware",
+    "axes.middleware.AxesMiddleware",
 ]
 ROOT_URLCONF = "garry_site.urls"
 ASGI_APPLICATION = "garry_site.asgi.application"
@@ -175,17 +180,53 @@ PASSWORD_HASHERS = [
     "django.contrib.auth.hashers.PBKDF2PasswordHasher",
 ]
 AUTH_PASSWORD_VALIDATORS = [
-    {"NAME": f"django.contrib.auth.password_validation.{name}"}
-    for name in (
-        "UserAttributeSimilarityValidator",
-        "MinimumLengthValidator",
-        "CommonPasswordValidator",
-        "NumericPasswordValidator",
+    {"NAME": f"django.contrib.auth.password_validation.{name}Validator", "OPTIONS": options}
+    for name, options in (
+        ("MinimumLength", {"min_length": 12}),
+        ("UserAttributeSimilarity", {}),
+        ("CommonPassword", {}),
+        ("NumericPassword", {}),
     )
 ]
-LOGIN_URL = "admin:login"
-SESSION_COOKIE_AGE = 12 * 3600  # one working day
+AUTHENTICATION_BACKENDS = [
+    "axes.backends.AxesStandaloneBackend",  # first: who has guessed too often is not even asked
+    "rehab.people.backends.PasswordBackend",
+    "rehab.people.backends.CodeBackend",
+]
+LOGIN_URL = "sign-in"
+SESSION_ENGINE = "rehab.people.browser_sessions"
+SESSION_COOKIE_AGE = 12 * 3600  # one working day, however busy
 SESSION_COOKIE_SAMESITE = "Lax"
+SESSION_MINUTES = number(
+    "GARRY_SESSION_MINUTES",
+    30 if HOSTED else 12 * 60,
+    "minutes after which a sign-in ends that nobody uses",
+    low=5,
+    high=12 * 60,
+)
+PROXIES = number(
+    "GARRY_PROXIES",
+    1 if HOSTED else 0,
+    "proxies of your own before the server, each of which adds to X-Forwarded-For",
+    low=0,
+    high=9,
+)
+
+# Wrong passwords and codes: rehab.people.lockout says what counts together.
+AXES_FAILURE_LIMIT = 5
+AXES_COOLOFF_TIME = timedelta(minutes=15)
+AXES_RESET_COOL_OFF_ON_FAILURE_DURING_LOCKOUT = False  # so that the wait that we tell is true
+AXES_LOCKOUT_PARAMETERS = "rehab.people.lockout.counted_by"
+AXES_USERNAME_CALLABLE = "rehab.people.lockout.counted_name"
+AXES_CLIENT_IP_CALLABLE = "rehab.people.lockout.client_address"
+AXES_LOCKOUT_CALLABLE = "rehab.people.lockout.answer"
+AXES_SENSITIVE_PARAMETERS = [
+    *("username", "ip_address"),
+    *("code", "passkey", "old_password", "new_password1", "new_password2", "csrfmiddlewaretoken"),
+]
+AXES_DISABLE_ACCESS_LOG = True
+AXES_ENABLE_ADMIN = False  # its rows belong to no clinic
+AXES_VERBOSE = False
 
 # --- words, time, files -------------------------------------------------------------------------
 
@@ -214,7 +255,8 @@ STORAGES = {
         else "django.contrib.staticfiles.storage.StaticFilesStorage"
     },
 }
-DATA_UPLOAD_MAX_MEMORY_SIZE = 2 * 1024 * 1024
+DATA_UPLOAD_MAX_MEMORY_SIZE = 2 * 1024 * 1024  # the server hangs up on anything longer
+DATA_UPLOAD_MAX_NUMBER_FILES = 0  # no page takes any
 
 # --- browsers -----------------------------------------------------------------------------------
 

@@ -12,8 +12,10 @@ class RehabConfig(AppConfig):
     default_auto_field = "django.db.models.BigAutoField"
 
     def ready(self) -> None:
-        """Register the checks, and the shared rows that every database begins with."""
+        """Register the checks, the shared rows of every database, and what boards listen to."""
         from rehab import checks  # noqa: F401
+        from rehab.boards.watching import watch
         from rehab.sessions.defaults import install_defaults
 
         post_migrate.connect(install_defaults, sender=self)
+        watch()

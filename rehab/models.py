@@ -1,7 +1,10 @@
 """Gathers the rooms' models, nothing else."""
 
-from rehab.boards.models import Leaderboard
+from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.gestures.models import Gesture, GestureStep
+from rehab.people.factors import Authenticator, RecoveryCode
 from rehab.people.models import Clinic, Patient, User
+from rehab.people.tokens import ApiToken
 from rehab.sessions.models import (
     Measure,
     Protocol,
@@ -14,13 +17,20 @@ from rehab.sessions.models import (
 from rehab.stations.models import Device, Station
 
 __all__ = [
+    "ApiToken",
+    "Authenticator",
+    "BoardCount",
+    "BoardEntry",
     "Clinic",
     "Device",
+    "Gesture",
+    "GestureStep",
     "Leaderboard",
     "Measure",
     "Patient",
     "Protocol",
     "ProtocolPhase",
+    "RecoveryCode",
     "SessionEvent",
     "SessionMetric",
     "Station",

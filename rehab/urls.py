@@ -2,7 +2,10 @@
 
 from django.urls import include, path
 
+from rehab import api
+
 urlpatterns = [
+    path("api/v1/", include((api.urls(), "ninja"), namespace="api")),
     path("", include("rehab.people.urls")),
     path("", include("rehab.stations.urls")),
     path("", include("rehab.sessions.urls")),

@@ -19,6 +19,7 @@ def seed(count: int) -> list[dict[str, Any]]:
     from django.db import transaction
     from django.utils import timezone
 
+    from rehab.people.entry import BACKEND
     from rehab.people.first_start import first_clinic, prepare_database
     from rehab.people.models import Patient, User
     from rehab.people.roles import Role
@@ -35,7 +36,7 @@ def seed(count: int) -> list[dict[str, Any]]:
     person = User.everywhere.create_user(f"pt{os.getpid()}", role=Role.PT, clinic=clinic)
     cookies = import_module(settings.SESSION_ENGINE).SessionStore()
     cookies[SESSION_KEY] = str(person.pk)
-    cookies[BACKEND_SESSION_KEY] = "django.contrib.auth.backends.ModelBackend"
+    cookies[BACKEND_SESSION_KEY] = BACKEND
     cookies[HASH_SESSION_KEY] = person.get_session_auth_hash()
     cookies.save()
     made = []

@@ -82,7 +82,7 @@ def test_constraints_are_exact_versions_only() -> None:
 def test_browser_libraries_are_exact_and_without_address() -> None:
     package = json.loads((ROOT / "package.json").read_text())
     lock = json.loads((ROOT / "package-lock.json").read_text())
-    wanted = package["dependencies"]
+    wanted = package["dependencies"] | package["devDependencies"]
     locked = {path: entry for path, entry in lock["packages"].items() if path}
     assert package["private"]
     assert wanted == {

@@ -1,7 +1,8 @@
 """Puts sessions to walk into a server's database: `python -m tests.walk_seed JSON` prints them.
 
-JSON is a list of sessions: {"valence", "name", "phases": [{"kind", …}], "goal", "minutes", "screen":
-{"screen_side", …}}, where anything may be left out. Each gets a station of its own with tokens for its devices.
+JSON is a list of sessions: {"valence", "name", "phases": [{"kind", …}], "goal", "minutes",
+"screen": {"screen_side", …}}, where anything may be left out. Each gets a station of its own with
+tokens for its devices.
 """
 
 from __future__ import annotations
@@ -99,6 +100,7 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
     from django.conf import settings
     from django.contrib.auth import BACKEND_SESSION_KEY, HASH_SESSION_KEY, SESSION_KEY
 
+    from rehab.people.entry import BACKEND
     from rehab.people.first_start import first_clinic
     from rehab.people.models import Patient, User
     from rehab.people.roles import Role
@@ -112,7 +114,7 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
     person = User.everywhere.create_user(f"walker{count}", role=Role.PT, clinic=clinic)
     cookies = import_module(settings.SESSION_ENGINE).SessionStore()
     cookies[SESSION_KEY] = str(person.pk)
-    cookies[BACKEND_SESSION_KEY] = "django.contrib.auth.backends.ModelBackend"
+    cookies[BACKEND_SESSION_KEY] = BACKEND
     cookies[HASH_SESSION_KEY] = person.get_session_auth_hash()
     cookies.save()
     made = []

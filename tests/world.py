@@ -10,9 +10,12 @@ from django.apps import apps
 from django.contrib.auth.models import AnonymousUser
 from django.db.models import Model
 
-from rehab.boards.models import Leaderboard
+from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.gestures.models import Gesture, GestureStep
+from rehab.people.factors import Authenticator, RecoveryCode
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
+from rehab.people.tokens import ApiToken
 from rehab.sessions.live.actor import Row, SessionActor
 from rehab.sessions.live.writer import Job, commit
 from rehab.sessions.models import (
@@ -111,11 +114,14 @@ def build_world(name: str) -> World:
         name=mark(name, ProtocolPhase),
         feedback=True,
     )
+    gesture = Gesture.everywhere.create(clinic=clinic, name=mark(name, Gesture))
+    step = GestureStep.everywhere.create(gesture=gesture, position=1, hold_s=1.0)
     patient = Patient.everywhere.create(
         clinic=clinic,
         code=mark(name, Patient),
         nickname=mark(name, Patient),
         paretic_side="left",
+        boards="clinic",
     )
     session = create_session(
         patient,
@@ -135,7 +141,16 @@ def build_world(name: str) -> World:
         stride = Measurement(number, number * 1.1, Side.LEFT, value, reasons)
         store(actor, [actor.take(stride, NOW)])
     store(actor, actor.change(Change(ChangeKind.FINISH), people[Role.PT], NOW))
-    board = Leaderboard.everywhere.create(clinic=clinic, name=mark(name, Leaderboard))
+    board = Leaderboard.everywhere.create(
+        clinic=clinic,
+        name=mark(name, Leaderboard),
+        among="clinic",
+        entry="best",
+        display="top",
+        names="code",
+        period="all",
+        min_valid_strides=1,
+    )
     world = World(name, clinic, people, device, token)
     for row in (
         clinic,
@@ -145,12 +160,27 @@ def build_world(name: str) -> World:
         measure,
         protocol,
         phase,
+        gesture,
+        step,
         patient,
         session,
         Step.everywhere.get(session=session, number=3),
         SessionEvent.everywhere.filter(session=session).first(),
         SessionMetric.everywhere.filter(session=session).first(),
         board,
+        BoardEntry.everywhere.get(board=board),
+        BoardCount.everywhere.get(board=board),
+        ApiToken.everywhere.create(
+            clinic=clinic,
+            user=people[Role.PT],
+            name=mark(name, ApiToken),
+            role=Role.PT,
+            token_hash=f"program-{name}",
+        ),
+        Authenticator.everywhere.create(
+            user=people[Role.PT], kind="app", name=mark(name, Authenticator), material="-"
+        ),
+        RecoveryCode.everywhere.create(user=people[Role.PT], digest=mark(name, RecoveryCode)),
         Pairing.everywhere.create(
             code=f"P{clinic.pk}",
             secret_hash=f"pairing-{name}",
@@ -160,6 +190,30 @@ def build_world(name: str) -> World:
     ):
         world.rows[type(row)] = row
     return world
+
+
+def fill_board(world: World) -> None:
+    """Let four more patients of a clinic walk, so that there are enough for its board."""
+    session, shared = world.session, {"id", "patient_id", "clinic_id"}
+    session.refresh_from_db()
+    columns = [f.attname for f in TrainingSession._meta.concrete_fields if f.attname not in shared]
+    for number in range(2, 6):
+        patient = Patient.everywhere.create(
+            clinic=world.clinic,
+            code=f"{mark(world.name, Patient)}{number}",
+            nickname=mark(world.name, Patient),
+            paretic_side="left",
+            boards="clinic",
+        )
+        walked = TrainingSession.everywhere.create(
+            clinic=world.clinic,
+            patient=patient,
+            **{column: getattr(session, column) for column in columns},
+        )
+        for figure in session.metrics.all():
+            SessionMetric.everywhere.create(
+                session=walked, slug=figure.slug, value=figure.value - number / 100
+            )
 
 
 @dataclass(frozen=True)

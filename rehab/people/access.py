@@ -7,16 +7,18 @@ Which rows they then see is `visible_to`'s business. The admin guards itself (`S
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import PermissionDenied
 from django.http import HttpRequest, HttpResponseBase
 
+from rehab.people import entry
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 
 View = Callable[..., HttpResponseBase]
+Open = TypeVar("Open", bound=Callable[..., Any])  # a page, or a call of the API
 PUBLIC: frozenset[Role] = frozenset()
 
 
@@ -24,18 +26,23 @@ class UndeclaredView(PermissionDenied):
     """A view that does not say who may open it."""
 
 
-def public(view: View) -> View:
+def public(view: Open) -> Open:
     """Open a view to everyone, strangers included."""
     view.access = PUBLIC  # type: ignore[attr-defined]
     return view
 
 
-def for_roles(*roles: Role, tablets: bool = False) -> Callable[[View], View]:
-    """Open a view to signed-in people of these roles, and to paired ``tablets``."""
+def for_roles(
+    *roles: Role, tablets: bool = False, setting_up: bool = False
+) -> Callable[[Open], Open]:
+    """Open a view to signed-in people of these roles, to paired ``tablets``, and to people who
+    have to set up a second factor before they are signed in (``setting_up``).
+    """
 
-    def declare(view: View) -> View:
+    def declare(view: Open) -> Open:
         view.access = frozenset(roles)  # type: ignore[attr-defined]
         view.tablets = tablets  # type: ignore[attr-defined]
+        view.setting_up = setting_up  # type: ignore[attr-defined]
         return view
 
     return declare
@@ -94,6 +101,8 @@ class AccessMiddleware:
         if user.is_authenticated and user.is_active and user.role in access:
             return None
         if getattr(view, "tablets", False) and tablet_of(request) is not None:
+            return None
+        if getattr(view, "setting_up", False) and entry.setting_up(request) is not None:
             return None
         if not user.is_authenticated:
             return redirect_to_login(request.get_full_path())

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.contrib import admin
+from django.contrib import admin, messages
 from django.contrib.auth.admin import UserAdmin
 from django.contrib.auth.forms import AdminUserCreationForm
 from django.contrib.auth.models import Group
+from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import ValidationError
-from django.http import HttpRequest
+from django.db.models import QuerySet
+from django.http import HttpRequest, HttpResponseBase
+from django.shortcuts import redirect
+from django.urls import reverse
 
+from rehab.people import factors, lockout
 from rehab.people.access import person
-from rehab.people.admin_base import ScopedAdmin, ScopedOptions, rights
+from rehab.people.admin_base import ScopedAdmin, ScopedOptions, TokenAdmin, rights
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
+from rehab.people.tokens import ApiToken
+from rehab.people.views.sign_in import sign_out
 
 admin.site.site_header = "GARRY"
 admin.site.site_title = "GARRY"
@@ -22,12 +29,28 @@ admin.site.index_title = "Clinic"
 admin.site.unregister(Group)  # rights come from roles
 
 
+def to_sign_in(request: HttpRequest, extra_context: Any = None) -> HttpResponseBase:
+    """Send to the one page where everybody signs in."""
+    return redirect_to_login(request.GET.get("next", "") or reverse("admin:index"))
+
+
+def to_own_password(request: HttpRequest, extra_context: Any = None) -> HttpResponseBase:
+    """Send to the one page where people change their own password."""
+    return redirect("own-password")
+
+
+# One door: the admin's own pages for these know no second factor.
+admin.site.login = to_sign_in  # type: ignore[assignment]
+admin.site.logout = sign_out  # type: ignore[assignment]
+admin.site.password_change = to_own_password  # type: ignore[assignment]
+
+
 @admin.register(Clinic)
 class ClinicAdmin(ScopedAdmin):
     """Clinics: the host adds them, a lead keeps the details of the own one."""
 
     list_display = ("name", "language", "time_zone")
-    fields = ("name", "language", "time_zone")
+    fields = ("name", "language", "time_zone", "boards_across", "second_factor_required")
 
 
 class NewAccountForm(AdminUserCreationForm):
@@ -53,6 +76,25 @@ class AccountAdmin(ScopedOptions, UserAdmin):
     add_form = NewAccountForm
     filter_horizontal = ()
     ordering = ("username",)
+    actions = ("unlock", "remove_second_factors")
+
+    @admin.action(description="Unlock after too many wrong tries", permissions=["change"])
+    def unlock(self, request: HttpRequest, accounts: QuerySet[User]) -> None:
+        """Let the chosen accounts try again at once."""
+        for account in accounts:
+            lockout.forgive(account)
+        messages.success(request, f"{accounts.count()} account(s) may try again.")
+
+    @admin.action(description="Remove second factors (lost phone or key)", permissions=["change"])
+    def remove_second_factors(self, request: HttpRequest, accounts: QuerySet[User]) -> None:
+        """Take the chosen accounts back to their passwords alone."""
+        for account in accounts:
+            factors.forget_all(account)
+        messages.warning(
+            request,
+            f"{accounts.count()} account(s) sign in by password alone now, or set up a new second "
+            "factor where the clinic asks for one. If a phone was stolen, give a new password too.",
+        )
 
     def has_module_permission(self, request: HttpRequest) -> bool:
         """Whether accounts are on the front page."""
@@ -92,20 +134,42 @@ class AccountAdmin(ScopedOptions, UserAdmin):
         return super().formfield_for_choice_field(db_field, request, **kwargs)
 
 
+@admin.register(ApiToken)
+class ApiTokenAdmin(TokenAdmin):
+    """What lets programs use the API."""
+
+    list_display = ("name", "user", "role", "created_at", "last_seen_at", "revoked_at")
+    list_filter = ("role",)
+    fields = ("name", "user", "role", "created_at", "last_seen_at", "revoked_at")
+
+
 @admin.register(Patient)
 class PatientAdmin(ScopedAdmin):
     """Patients of the clinic."""
 
-    list_display = ("nickname", "code", "paretic_side", "language", "created_at")
-    list_filter = ("paretic_side", "language")
+    list_display = ("nickname", "code", "paretic_side", "language", "boards", "created_at")
+    list_filter = ("paretic_side", "language", "boards")
     search_fields = ("nickname", "code")
-    readonly_fields = ("pseudonym", "created_at")
+    readonly_fields = ("pseudonym", "alias", "created_at")
     fields = (
         "code",
         "nickname",
         "body_mass_kg",
         "paretic_side",
         "language",
+        "boards",
+        "alias",
+        "blinded",
         "pseudonym",
         "created_at",
     )
+    actions = ("draw_aliases",)
+
+    @admin.action(description="Draw new animal names for boards", permissions=["change"])
+    def draw_aliases(self, request: HttpRequest, patients: QuerySet[Patient]) -> None:
+        """Give the chosen patients other names on boards."""
+        for patient in patients:
+            patient.draw_alias()
+            patient.save(update_fields=["alias"])
+        names = ", ".join(f"{patient.nickname}: {patient.alias}" for patient in patients)
+        messages.success(request, f"New names on boards. {names}")

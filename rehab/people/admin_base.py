@@ -5,14 +5,16 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from django import forms
-from django.contrib import admin
+from django.contrib import admin, messages
 from django.db import models
 from django.db.models import QuerySet
 from django.http import HttpRequest
+from django.utils import timezone
 
 from rehab.people.access import person
 from rehab.people.roles import Right, Role, rights_of
 from rehab.people.scope import ScopedModel, visible
+from rehab.people.tokens import TokenRow
 
 
 def rights(request: HttpRequest, model: type[models.Model]) -> Right:
@@ -109,6 +111,38 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
         """Give the form; a new row's clinic is the person's own, or none for a host."""
         form: Any = super().get_form(request, obj, change=change, **kwargs)
         return type(form)(form.__name__, (form,), {"new_clinic_id": person(request).clinic_id})
+
+
+class TokenAdmin(ScopedAdmin):
+    """Pages of rows that are known by a token. It is shown once, when it is made."""
+
+    readonly_fields = ("created_at", "last_seen_at", "revoked_at")
+    actions = ("renew_tokens", "revoke_tokens")
+
+    def save_model(self, request: HttpRequest, obj: Any, form: Any, change: bool) -> None:
+        """Save the row; a new one gets its token, shown this one time."""
+        token = None if change else obj.new_token()
+        super().save_model(request, obj, form, change)
+        if token:
+            self._show(request, obj, token)
+
+    @admin.action(description="Give new tokens (old ones stop at once)", permissions=["change"])
+    def renew_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:
+        """Replace the tokens of the chosen rows."""
+        for holder in holders:
+            token = holder.new_token()
+            holder.revoked_at = None
+            holder.save()
+            self._show(request, holder, token)
+
+    @admin.action(description="Revoke tokens", permissions=["change"])
+    def revoke_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:
+        """Close the door to the chosen rows."""
+        count = holders.filter(revoked_at__isnull=True).update(revoked_at=timezone.now())
+        messages.success(request, f"{count} token(s) revoked.")
+
+    def _show(self, request: HttpRequest, holder: TokenRow, token: str) -> None:
+        messages.warning(request, f"Token of {holder}, shown this one time only: {token}")
 
 
 class ReadOnlyAdmin(ScopedAdmin):

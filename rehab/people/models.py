@@ -13,6 +13,7 @@ from django.core.validators import MaxValueValidator, MinValueValidator
 from django.db import models
 from django.db.models import Q
 
+from rehab.people.aliases import draw_alias
 from rehab.people.roles import Role
 from rehab.people.scope import ClinicRow, Scope, ScopedManager, ScopedModel
 from rehab.training.steps import Side
@@ -37,6 +38,18 @@ class Clinic(ScopedModel):
     name = models.CharField(max_length=100, unique=True)
     time_zone = models.CharField(max_length=64, default="UTC", validators=[check_time_zone])
     language = models.CharField(max_length=8, choices=LANGUAGES, default="en")
+    boards_across = models.BooleanField(
+        "boards across clinics",
+        default=False,
+        help_text="Patients who agree may stand, by their animal names, on boards with patients "
+        "of other clinics.",
+    )
+    second_factor_required = models.BooleanField(
+        "second factor required",
+        default=False,
+        help_text="Everybody who works here signs in with an app or a passkey besides the "
+        "password. Whoever has none is led to set one up first; you as well.",
+    )
     created_at = models.DateTimeField(auto_now_add=True)
 
     class Meta(ScopedModel.Meta):
@@ -120,6 +133,15 @@ class ScreenSide(models.TextChoices):
     CENTER = "center", "all of it in the middle, smaller"
 
 
+class Boards(models.TextChoices):
+    """Which leaderboards a patient has agreed to stand on; each includes those before it."""
+
+    OWN = "own", "None: sees own sessions only"
+    TOTAL = "total", "Counts in totals, stands in no row"
+    CLINIC = "clinic", "Boards of this clinic"
+    ACROSS = "across", "Boards of this clinic and across clinics"
+
+
 class Patient(ClinicRow):
     """Someone who walks. The clinic's code and a nickname, never a full name."""
 
@@ -154,14 +176,47 @@ class Patient(ClinicRow):
         help_text="A soft tone a step, the higher the better; a second one for points. "
         "The patient can mute it on the page.",
     )
+    boards = models.CharField(
+        "leaderboards",
+        max_length=8,
+        choices=Boards.choices,
+        default=Boards.OWN,
+        help_text="What the patient has agreed to. Taken back, it takes effect at once.",
+    )
+    alias = models.CharField(
+        "animal name", max_length=32, unique=True, null=True, blank=True, editable=False
+    )
+    blinded = models.BooleanField(
+        "in a blinded study",
+        default=False,
+        help_text="No leaderboards and no scores: the patient sees none and stands on none.",
+    )
     simulated = models.BooleanField(default=False, editable=False)
+    original_id = models.BigIntegerField(
+        null=True, editable=False, help_text="The participant of the original GARRY's database."
+    )
     created_at = models.DateTimeField(auto_now_add=True)
 
     class Meta(ClinicRow.Meta):
         ordering: ClassVar = ["nickname", "code"]
         constraints: ClassVar = [
-            models.UniqueConstraint(fields=["clinic", "code"], name="patient_code_once_per_clinic")
+            models.UniqueConstraint(fields=["clinic", "code"], name="patient_code_once_per_clinic"),
+            models.UniqueConstraint(
+                fields=["clinic", "original_id"], name="patient_imported_once_per_clinic"
+            ),
         ]
 
     def __str__(self) -> str:
         return f"{self.nickname} ({self.code})"
+
+    def save(self, *args: Any, **kwargs: Any) -> None:
+        """Save the patient; who agrees to stand on boards gets an animal name first."""
+        if self.boards != Boards.OWN and self.alias is None:
+            self.draw_alias()
+            if kwargs.get("update_fields") is not None:
+                kwargs["update_fields"] = {*kwargs["update_fields"], "alias"}
+        super().save(*args, **kwargs)
+
+    def draw_alias(self) -> None:
+        """Give the patient another animal name, one that nobody on this server has."""
+        self.alias = draw_alias(lambda name: Patient.everywhere.filter(alias=name).exists())

@@ -34,6 +34,9 @@ class Right(Flag):
 RIGHTS: dict[str, dict[Role, Right]] = {
     "Clinic": {Role.HOST: Right.EDIT, Role.LEAD: Right.VIEW | Right.CHANGE},
     "User": {Role.HOST: Right.EDIT, Role.LEAD: Right.EDIT},
+    "ApiToken": {Role.LEAD: Right.EDIT},
+    "Authenticator": {},
+    "RecoveryCode": {},
     "Patient": {Role.LEAD: Right.EDIT, Role.PT: Right.EDIT},
     "Station": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
     "Device": {Role.LEAD: Right.EDIT, Role.PT: Right.VIEW},
@@ -56,6 +59,8 @@ RIGHTS: dict[str, dict[Role, Right]] = {
         Role.PT: Right.ALL,
         Role.RESEARCHER: Right.VIEW,
     },
+    "Gesture": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
+    "GestureStep": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "TrainingSession": {
         Role.LEAD: Right.VIEW,
         Role.PT: Right.VIEW,
@@ -64,7 +69,14 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Step": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "SessionEvent": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "SessionMetric": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
-    "Leaderboard": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
+    "Leaderboard": {
+        Role.HOST: Right.ALL,
+        Role.LEAD: Right.ALL,
+        Role.PT: Right.ALL,
+        Role.RESEARCHER: Right.VIEW,
+    },
+    "BoardEntry": {},
+    "BoardCount": {},
 }
 
 
@@ -73,3 +85,16 @@ def rights_of(role: str, noun: str) -> Right:
     if role not in Role.values:
         return Right.NONE
     return RIGHTS.get(noun, {}).get(Role(role), Right.NONE)
+
+
+# What a person may lend to a program: the own role, or one that sees or does less.
+LENT: dict[Role, tuple[Role, ...]] = {
+    Role.LEAD: (Role.LEAD, Role.PT, Role.RESEARCHER),
+    Role.PT: (Role.PT, Role.RESEARCHER),
+    Role.RESEARCHER: (Role.RESEARCHER,),
+}
+
+
+def may_lend(role: str, lent: str) -> bool:
+    """Say whether somebody with a role may let a program work with another one."""
+    return role in Role.values and lent in LENT.get(Role(role), ())

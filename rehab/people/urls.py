@@ -1,10 +1,20 @@
-"""Addresses of the front page."""
+"""Addresses of the front page, of coming in, and of the own account."""
 
 from django.urls import path
 
-from rehab.people import views
+from rehab.people.views import account, home, second_factor, sign_in
 
 urlpatterns = [
-    path("", views.home, name="home"),
-    path("healthz", views.healthz, name="healthz"),
+    path("", home.home, name="home"),
+    path("healthz", home.healthz, name="healthz"),
+    path("sign-in/", sign_in.sign_in, name="sign-in"),
+    path("sign-in/code/", sign_in.prove, name="second-factor"),
+    path("sign-out/", sign_in.sign_out, name="sign-out"),
+    path("account/", account.show_account, name="account"),
+    path("account/password/", account.change_password, name="own-password"),
+    path("account/second-factor/", second_factor.choose, name="set-up-second-factor"),
+    path("account/second-factor/app/", second_factor.add_app, name="add-app"),
+    path("account/second-factor/passkey/", second_factor.add_passkey, name="add-passkey"),
+    path("account/second-factor/remove/", second_factor.remove, name="remove-authenticator"),
+    path("account/recovery-codes/", second_factor.renew_codes, name="recovery-codes"),
 ]

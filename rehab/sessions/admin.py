@@ -6,7 +6,7 @@ from typing import Any
 
 from django.contrib import admin
 from django.contrib.admin import RelatedOnlyFieldListFilter
-from django.db.models import OuterRef, QuerySet, Subquery
+from django.db.models import QuerySet
 from django.http import HttpRequest
 from django.urls import reverse
 from django.utils.html import format_html
@@ -23,6 +23,7 @@ from rehab.sessions.models import (
     Step,
     TrainingSession,
 )
+from rehab.sessions.trend import with_figures
 
 
 @admin.register(Measure)
@@ -90,13 +91,7 @@ class TrainingSessionAdmin(ScopedAdmin):
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[TrainingSession]:
         """Give the visible sessions with their score and hit rate."""
-        figures = SessionMetric.objects.visible_to(request.user)
-        figure = figures.filter(session=OuterRef("pk")).values("value")
-        sessions: QuerySet[TrainingSession] = super().get_queryset(request)
-        return sessions.annotate(
-            metric_score=Subquery(figure.filter(slug="score")),
-            metric_hit_rate=Subquery(figure.filter(slug="hit_rate")),
-        )
+        return with_figures(request.user, super().get_queryset(request))
 
     def get_list_display(self, request: HttpRequest) -> Any:
         """Give the columns."""

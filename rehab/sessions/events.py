@@ -171,6 +171,9 @@ def _robot_step(plan: SessionPlan, phase: Phase, step: ScoredStep, *, live: bool
         "number": step.number,
         "time_s": step.time_s,
         "performance": step.performance,
+        # For the original's ROS topics (robot/original_topics.py).
+        "shown": step.shown,
+        "goal": step.goal,
     }
 
 
@@ -199,7 +202,8 @@ def describe_cue(fold: SessionFold) -> Message:
         "threshold": fold.activation_threshold,
         "window_s": 5.0,
         "rest_s": 5.0,
-        "intensity": 1.0,
+        "intensity": fold.robot_intensity,
+        "gestures": list(fold.plan.gestures),
     }
 
 
@@ -228,10 +232,15 @@ def change_event(fold: SessionFold, kind: ChangeKind) -> LiveEvent:
             return _to_each(fold, monitor={"kind": "gain", "gain": fold.gain})
         case ChangeKind.ACTIVATION_THRESHOLD:
             threshold = {"kind": "activation_threshold", "value": fold.activation_threshold}
-            return _to_each(
-                fold, monitor=threshold, robot={"type": "cue", "cue": describe_cue(fold)}
-            )
+            return _to_each(fold, monitor=threshold, robot=_cue(fold))
+        case ChangeKind.ROBOT_INTENSITY:
+            intensity = {"kind": "robot_intensity", "value": fold.robot_intensity}
+            return _to_each(fold, monitor=intensity, robot=_cue(fold))
     return state_event(fold)
+
+
+def _cue(fold: SessionFold) -> Message:
+    return {"type": "cue", "cue": describe_cue(fold)}
 
 
 def presence_event(fold: SessionFold, presence: Message) -> LiveEvent:
@@ -339,6 +348,7 @@ def snapshot(
             "goal": fold.goal,
             "gain": fold.gain,
             "activation_threshold": fold.activation_threshold,
+            "robot_intensity": fold.robot_intensity,
             "hit_rate": fold.feedback.hit_rate,
             "hits": fold.feedback.hits,
             "judged": fold.feedback.judged,

@@ -14,15 +14,17 @@ from django.db.models import QuerySet
 
 from rehab.people.access import clinic_of
 from rehab.people.models import SIDES, Patient, User
-from rehab.sessions.models import Protocol, TrainingSession
+from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
+from rehab.sessions.models import Protocol, SessionEvent, TrainingSession
 from rehab.sessions.services import create_session
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
 from rehab.sources.synthetic import PROFILES
 from rehab.stations.models import Station
-from rehab.training.changes import OPEN
+from rehab.training.changes import OPEN, ChangeKind
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting
+from rehab.training.plans import ROBOT_LEVELS, name_robot_level
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES
 
@@ -107,6 +109,11 @@ class SessionForm(forms.Form):
     )
     source = forms.ChoiceField(widget=forms.RadioSelect)
     trained_side = forms.ChoiceField(choices=SIDES, widget=forms.RadioSelect)
+    robot = forms.ChoiceField(
+        choices=[(level, level.capitalize()) for level in ROBOT_LEVELS], widget=forms.RadioSelect
+    )
+    robot_above = forms.ChoiceField()
+    robot_below = forms.ChoiceField()
 
     def __init__(self, *args: Any, patient: Patient, by: User, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -115,6 +122,7 @@ class SessionForm(forms.Form):
         fields["protocol"].queryset = Protocol.objects.visible_to(by)
         fields["station"].queryset = Station.objects.visible_to(by)
         fields["source"].choices = list_sources()
+        fields["robot_above"].choices = fields["robot_below"].choices = list_gestures(by)
 
     def clean_station(self) -> Station:
         """Refuse a station where somebody else may be walking right now."""
@@ -166,6 +174,8 @@ class SessionForm(forms.Form):
             target=Target(
                 hit_rate=hits / 100 if hits else None, duration_s=minutes * 60 if minutes else None
             ),
+            cue=to_cue(data["robot_above"], data["robot_below"], data["valence"]),
+            robot_intensity=ROBOT_LEVELS[data["robot"]],
             station=data["station"],
             created_by=self.by,
             source=dict(list_sources()).get(data["source"], ""),
@@ -244,12 +254,16 @@ def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
             "source": (source := "synthetic good" if patient.simulated else LIVE),
             "source_words": words[source],
             "trained_side": patient.paretic_side or Side.LEFT.value,
+            "robot": "normal",
+            "robot_above": USUAL,
+            "robot_below": USUAL,
         }
     plan = last.to_plan()
     source = next((name for name, label in words.items() if label == last.source), LIVE)
     if last.runs and not patient.simulated:
         source = LIVE  # one trial with a simulator makes nobody a simulated patient
     hits, seconds = plan.target.hit_rate, plan.target.duration_s
+    above, below = to_choices(plan.valence.cue, last.valence, by)
     return {
         "valence": last.valence,
         "goal_by": "percent" if plan.goal.needs_baseline else "value",
@@ -262,4 +276,16 @@ def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
         "source": source,
         "source_words": words[source],
         "trained_side": last.trained_side,
+        "robot": name_robot_level(_last_intensity(last, by)),
+        "robot_above": above,
+        "robot_below": below,
     }
+
+
+def _last_intensity(session: TrainingSession, by: User) -> float:
+    """Give how the robot answered at the end of a session."""
+    changes = SessionEvent.objects.visible_to(by).filter(
+        session=session, kind=ChangeKind.ROBOT_INTENSITY.value
+    )
+    last = changes.order_by("-pk").values_list("value", flat=True).first()
+    return session.to_plan().robot_intensity if last is None else last

@@ -8,6 +8,7 @@ from typing import ClassVar
 from django.core.exceptions import ValidationError
 from django.db import models
 from django.db.models import F, Q
+from django.dispatch import Signal
 from django.utils import timezone
 
 from rehab.people.models import SIDES, Clinic, Patient, User
@@ -196,6 +197,9 @@ class TrainingSession(ClinicRow):
     started_at = models.DateTimeField(null=True, blank=True)
     ended_at = models.DateTimeField(null=True, blank=True)
     active_s = models.FloatField("walked (s)", default=0.0, help_text="Time without pauses.")
+    # Its row in the original GARRY's database, where it was imported from there: without steps.
+    original_id = models.BigIntegerField("imported session", null=True, editable=False)
+    original = models.JSONField(null=True, editable=False)
     # Which process writes the log: each taking over raises the epoch and shuts out the one before.
     epoch = models.PositiveIntegerField(default=0, editable=False)
     owner = models.CharField(max_length=200, blank=True, editable=False)
@@ -206,6 +210,11 @@ class TrainingSession(ClinicRow):
         indexes: ClassVar = [
             models.Index(fields=["clinic", "-created_at"], name="session_by_clinic_and_date"),
             models.Index(fields=["patient", "-created_at"], name="session_by_patient_and_date"),
+        ]
+        constraints: ClassVar = [
+            models.UniqueConstraint(
+                fields=["clinic", "original_id"], name="session_imported_once_per_clinic"
+            )
         ]
 
     def __str__(self) -> str:
@@ -301,6 +310,10 @@ class SessionEvent(ScopedModel):
 
     def __str__(self) -> str:
         return self.get_kind_display()
+
+
+# Sent with ``sessions``, a set of keys, within the transaction that stores their figures.
+figures_stored = Signal()
 
 
 class SessionMetric(ScopedModel):

@@ -9,11 +9,12 @@ from typing import Any
 from rehab.people.models import User
 from rehab.sessions.live.actor import read_log
 from rehab.sessions.models import Remark, RobotEntry, SessionEvent, Step, TrainingSession
+from rehab.sessions.trend import figures_of
 from rehab.sessions.words import say_duration, say_number, say_quantity, say_rate
 from rehab.training.changes import ChangeKind
 from rehab.training.figures import describe_session
 from rehab.training.fold import SessionFold
-from rehab.training.plans import SessionPlan
+from rehab.training.plans import SessionPlan, name_robot_level
 
 # What a robot did is counted; in the list it would hide what people did.
 COUNTED = (RobotEntry.DECISION.value, RobotEntry.GESTURE.value)
@@ -27,6 +28,7 @@ NAMES = {
     ChangeKind.GAIN: "Gain",
     ChangeKind.PHASE: "Phase",
     ChangeKind.ACTIVATION_THRESHOLD: "Robot threshold",
+    ChangeKind.ROBOT_INTENSITY: "Robot",
     RobotEntry.STOP: "Robot stopped",
     RobotEntry.ARM: "Robot armed",
     Remark.BORG: "Exertion (Borg)",
@@ -68,7 +70,11 @@ def review_session(user: User, session: TrainingSession) -> Review:
         event.kind == RobotEntry.GESTURE.value and event.data.get("phase") == "started"
         for event in events
     )
-    return Review(describe_session(fold), moments, gestures, draw(user, session, plan, moments))
+    figures = describe_session(fold)
+    if session.original_id is not None:  # no log: what the original added up is all there is
+        stored = figures_of(user, [session]).get(session.pk, {})
+        figures |= {"score": stored.get("score"), "active_s": session.active_s}
+    return Review(figures, moments, gestures, draw(user, session, plan, moments))
 
 
 def say_event(event: SessionEvent, plan: SessionPlan) -> str:
@@ -82,6 +88,8 @@ def say_event(event: SessionEvent, plan: SessionPlan) -> str:
             return f"{name} {say_number(event.old)} → {say_number(event.value)}"
         case ChangeKind.ACTIVATION_THRESHOLD:
             return f"{name} {say_rate(event.old)} → {say_rate(event.value)}"
+        case ChangeKind.ROBOT_INTENSITY:
+            return f"{name} {name_robot_level(event.old)} → {name_robot_level(event.value)}"
         case Remark.BORG:
             return f"{name} {say_number(event.value, 0)}"
         case ChangeKind.PHASE:

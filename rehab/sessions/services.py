@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from asgiref.sync import async_to_sync
 
 from rehab.people.models import Patient, User
+from rehab.sessions.cues import find_composed
 from rehab.sessions.live import runtime
 from rehab.sessions.models import Measure, Protocol, TrainingSession
 from rehab.stations.models import Station
@@ -16,7 +18,7 @@ from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.plans import DEFAULT_ACTIVATION_THRESHOLD, SessionPlan
 from rehab.training.steps import Side
-from rehab.training.valences import find_valence
+from rehab.training.valences import Cue, find_valence
 
 
 def create_session(
@@ -30,6 +32,8 @@ def create_session(
     trained_side: Side | None = None,
     target: Target | None = None,
     activation_threshold: float = DEFAULT_ACTIVATION_THRESHOLD,
+    cue: Cue | None = None,
+    robot_intensity: float = 1.0,
     station: Station | None = None,
     created_by: User | None = None,
     source: str = "",
@@ -38,10 +42,10 @@ def create_session(
 ) -> TrainingSession:
     """Create a session that is ready to start, with everything it will be scored with.
 
-    Phases are given, or come from the protocol. ``runs`` are arguments of `python -m rehab.sources`
-    for a source that the server runs beside the session. Raises InvalidSetting for a plan that
-    could not be walked and CrossClinic where patient, station and the rest are not of one clinic;
-    nothing is stored then.
+    Phases are given, or come from the protocol; the robot's cue is given, or the feedback type's.
+    ``runs`` are arguments of `python -m rehab.sources` for a source that the server runs beside the
+    session. Raises InvalidSetting for a plan that could not be walked and CrossClinic where
+    patient, station and the rest are not of one clinic; nothing is stored then.
     """
     measure = measure or Measure.everywhere.get(clinic=None, slug=A2.slug)
     if phases is None:
@@ -53,14 +57,19 @@ def create_session(
         raise InvalidSetting(
             f"Which leg is trained? Set the paretic side of {patient}, or choose a leg."
         )
+    rules = find_valence(valence)
+    if cue is not None:
+        rules = replace(rules, cue=cue)
     plan = SessionPlan(
         measure=measure.to_rule(),
-        valence=find_valence(valence),
+        valence=rules,
         phases=tuple(phases),
         trained_side=side,
         goal=goal,
         target=target or Target(),
         activation_threshold=activation_threshold,
+        robot_intensity=robot_intensity,
+        gestures=tuple(find_composed(patient, rules.cue)),
     )
     session = TrainingSession(
         clinic_id=patient.clinic_id,

@@ -8,7 +8,8 @@ from datetime import datetime, timedelta
 from django.core.cache import cache
 
 from rehab.people.models import UNAMBIGUOUS
-from rehab.stations.models import Device, Pairing, Station, hash_token
+from rehab.people.tokens import hash_token
+from rehab.stations.models import Device, Pairing, Station
 
 LIFETIME = timedelta(minutes=5)
 CODE_LENGTH = 6  # of 31 characters: one in 900 million, with ten tries in five minutes

@@ -30,11 +30,12 @@ class ChangeKind(StrEnum):
     GAIN = "gain"
     PHASE = "phase"
     ACTIVATION_THRESHOLD = "activation_threshold"
+    ROBOT_INTENSITY = "robot_intensity"
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One change. ``value``: the new goal, gain, threshold or phase index; None for the others."""
+    """One change. ``value``: the new goal, gain, threshold, intensity or phase index, or None."""
 
     kind: ChangeKind
     value: float | None = None
@@ -58,6 +59,7 @@ TRANSITIONS: dict[ChangeKind, tuple[frozenset[State], State | None]] = {
     ChangeKind.GAIN: (OPEN, None),
     ChangeKind.PHASE: (OPEN, None),
     ChangeKind.ACTIVATION_THRESHOLD: (OPEN, None),
+    ChangeKind.ROBOT_INTENSITY: (OPEN, None),
 }
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from rehab.training.changes import Change, ChangeKind, Refused, State, next_state
 from rehab.training.goals import MIN_BASELINE_STRIDES
 from rehab.training.measures import InvalidSetting, check_gain
-from rehab.training.plans import SessionPlan, check_activation_threshold
+from rehab.training.plans import SessionPlan, check_activation_threshold, check_robot_intensity
 from rehab.training.scoring import RULES_VERSION, judge
 from rehab.training.steps import (
     InvalidMeasurement,
@@ -41,6 +41,7 @@ class SessionFold:
         self.active_s = 0.0
         self.goal: float | None = plan.goal.resolve(plan.measure, None)
         self.activation_threshold = plan.activation_threshold
+        self.robot_intensity = plan.robot_intensity
         self.trained = Tally()  # every step of the trained leg
         self.feedback = Tally()  # those in feedback phases: what score and hit rate count
         self.phases = tuple(Tally() for _ in plan.phases)
@@ -198,6 +199,8 @@ class SessionFold:
                 self.gain = check_gain(_needed(change))
             case ChangeKind.ACTIVATION_THRESHOLD:
                 self.activation_threshold = check_activation_threshold(_needed(change))
+            case ChangeKind.ROBOT_INTENSITY:
+                self.robot_intensity = check_robot_intensity(_needed(change))
             case ChangeKind.PHASE:
                 self._enter(self._phase_index(_needed(change)))
             case ChangeKind.PAUSE:

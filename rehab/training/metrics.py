@@ -77,6 +77,26 @@ def _retention_in_washout(fold: SessionFold) -> float | None:
     return 100 * kept / trained
 
 
+def _steps(fold: SessionFold) -> float | None:
+    """Judged steps of feedback phases: what hit rate and score were made from."""
+    return float(fold.feedback.judged) or None
+
+
+def _active_minutes(fold: SessionFold) -> float | None:
+    return fold.active_s / 60 or None
+
+
+def _attended(fold: SessionFold) -> float | None:
+    """1 for a session in which something was walked; sums count sessions."""
+    return 1.0 if fold.trained.valid else None
+
+
+def _target_met(fold: SessionFold) -> float | None:
+    """1 where the PT's wishes for the session were fulfilled, else 0; None without a wish."""
+    met = fold.plan.target.is_met(fold.feedback.hit_rate, fold.active_s)
+    return None if met is None or not fold.trained.valid else float(met)
+
+
 METRICS: dict[str, Metric] = {
     metric.slug: metric
     for metric in (
@@ -92,6 +112,10 @@ METRICS: dict[str, Metric] = {
             _improvement_over_baseline,
         ),
         Metric("retention_in_washout", "Retention in washout", "%", _retention_in_washout),
+        Metric("steps", "Steps", "steps", _steps),
+        Metric("active_minutes", "Active minutes", "min", _active_minutes),
+        Metric("attended", "Sessions attended", "sessions", _attended),
+        Metric("target_met", "Target met", "days", _target_met),
     )
 }
 

@@ -14,6 +14,10 @@ from rehab.training.valences import Band, Confetti, Cue, Valence
 # The paper's default (P 3.4.1): the robot answers windows of at least 90 % of the goal.
 DEFAULT_ACTIVATION_THRESHOLD = 0.90
 
+# How the robot may answer: the share of a gesture's size. What makes half of it gentle (no sounds,
+# half the speed) is the robot's own rule.
+ROBOT_LEVELS = {"normal": 1.0, "gentle": 0.5, "off": 0.0}
+
 
 def check_activation_threshold(threshold: float) -> float:
     """Give the threshold back as a number. Raises InvalidSetting outside (0, 2]."""
@@ -22,10 +26,24 @@ def check_activation_threshold(threshold: float) -> float:
     return float(threshold)
 
 
+def check_robot_intensity(intensity: float) -> float:
+    """Give the intensity back as a number. Raises InvalidSetting for one that is no level."""
+    if intensity not in ROBOT_LEVELS.values():
+        levels = ", ".join(f"{level} ({value:g})" for level, value in ROBOT_LEVELS.items())
+        raise InvalidSetting(f"A robot's intensity is one of: {levels}.")
+    return float(intensity)
+
+
+def name_robot_level(intensity: float | None) -> str:
+    """Give the level's name; empty for none."""
+    return next((name for name, value in ROBOT_LEVELS.items() if value == intensity), "")
+
+
 @dataclass(frozen=True, slots=True)
 class SessionPlan:
-    """What is measured, how it is paid, in which phases, towards which goal.
+    """What is measured, how it is paid, in which phases, towards which goal, how a robot answers.
 
+    ``gestures`` are those that somebody composed and the cue names, as they travel to the robot.
     Raises InvalidSetting for a plan that could not be walked: no phase, a goal outside the
     measure's bounds, a goal from a baseline that does not come before the first feedback.
     """
@@ -37,12 +55,15 @@ class SessionPlan:
     goal: GoalRule
     target: Target = field(default_factory=Target)
     activation_threshold: float = DEFAULT_ACTIVATION_THRESHOLD
+    robot_intensity: float = 1.0
+    gestures: tuple[dict[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
         if not self.phases:
             raise InvalidSetting("A session needs at least one phase.")
         self.goal.resolve(self.measure, None)
         check_activation_threshold(self.activation_threshold)
+        check_robot_intensity(self.robot_intensity)
         if self.goal.needs_baseline:
             kinds = [phase.kind for phase in self.phases]
             first_feedback = next((i for i, p in enumerate(self.phases) if p.feedback), len(kinds))
@@ -77,4 +98,6 @@ class SessionPlan:
             goal=GoalRule(**data["goal"]),
             target=Target(**data["target"]),
             activation_threshold=data["activation_threshold"],
+            robot_intensity=data["robot_intensity"],
+            gestures=tuple(data["gestures"]),
         )

@@ -49,6 +49,10 @@ PT_PAGES = [
     "/sessions/{session}/details/",
     "/sessions/{walk}/monitor/",
     "/tablets/pair/",
+    "/account/",
+    "/account/password/",
+    "/account/second-factor/",
+    "/account/second-factor/app/",
     "/nowhere/",
 ]
 PATIENT_PAGES = ["/sessions/{session}/scores/", "/sessions/{kept}/scores/", "/tablet/"]
@@ -118,6 +122,7 @@ def open_page(context: BrowserContext, path: str, size: str) -> Page:
 def test_therapists_pages(context: BrowserContext, places: dict[str, str], path: str) -> None:
     page = open_page(context, path.format(**places), "laptop")
     page.wait_for_load_state("networkidle")
+    assert "/sign-in/" not in page.url
     check(page)
 
 

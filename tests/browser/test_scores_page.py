@@ -127,9 +127,9 @@ def test_the_list_glides_to_the_newest_score_which_then_stands_out(server, sessi
     with tablet(browser, server, size) as page:
         page.goto(f"/sessions/{sessions[0]}/scores/")
         board = page.locator("#board-same")
-        expect(board).to_have_class("board points gliding")
+        expect(board).to_have_class("board gliding")
         assert not is_in_view(page, "board-same")
-        expect(board).to_have_class("board points", timeout=6000)
+        expect(board).to_have_class("board", timeout=6000)
         assert is_in_view(page, "board-same")
         row = board.locator(".you")
         expect(row).to_have_css("background-color", BLUE)

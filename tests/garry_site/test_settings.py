@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from django.contrib.auth.hashers import make_password
 from django.core.checks import CheckMessage, run_checks
 
 ROOT = Path(__file__).parents[2]
@@ -99,6 +100,10 @@ def test_an_order_of_applications_that_hides_our_commands_is_named(settings):
     apps.remove("rehab")
     settings.INSTALLED_APPS = [*apps, "rehab"]
     assert "garry.E010" in ids(run_checks())
+
+
+def test_passwords_are_kept_by_argon2():
+    assert make_password("walk well 2026").startswith("argon2$argon2id$")
 
 
 @pytest.mark.django_db

@@ -33,7 +33,7 @@ def test_a_new_machine_serves_tells_its_password_and_ends_clean(server):
     status, page = get(port, "/")
     assert (status, "GARRY" in page) == (200, True)
     assert get(port, "/static/css/tokens.css")[0] == 200
-    assert "Log in" in get(port, "/admin/")[1]
+    assert "Sign in" in get(port, "/admin/")[1]
     with pytest.raises(urllib.error.HTTPError, match="404"):
         get(port, "/nowhere")
     process.send_signal(signal.SIGINT)

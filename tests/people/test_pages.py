@@ -77,7 +77,8 @@ def test_a_researcher_finds_sessions_by_pseudonym_and_no_other_way(world):
 
 
 def test_a_new_patient_belongs_to_the_therapists_clinic(world):
-    form = {"code": "K7-204", "nickname": "Rosa", "paretic_side": "left", "language": "es"}
+    form = {"code": "K7-204", "nickname": "Rosa", "paretic_side": "left"}
+    form |= {"language": "es", "boards": "own"}
     signed_in(world, Role.PT).post("/admin/rehab/patient/add/", form)
     assert Patient.everywhere.get(code="K7-204").clinic == world.clinic
 

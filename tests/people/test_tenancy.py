@@ -17,6 +17,10 @@ from django.test import Client, RequestFactory
 from django.urls import URLPattern, URLResolver, get_resolver, path, reverse
 
 from garry_site import urls as site_urls
+from rehab.boards import rows, showing
+from rehab.boards.models import BoardEntry, Leaderboard
+from rehab.boards.standings import Stored
+from rehab.people import api as people_api
 from rehab.people.access import for_roles, public
 from rehab.people.admin import PatientAdmin
 from rehab.people.admin_base import ScopedOptions
@@ -25,7 +29,15 @@ from rehab.people.roles import Right, Role, rights_of
 from rehab.people.scope import CrossClinic, Scope, ScopedManager, UnscopedQuery
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device, Station
-from tests.world import Actor, World, all_actors, build_world, mark, scoped_models
+from tests.world import (
+    Actor,
+    World,
+    all_actors,
+    build_world,
+    fill_board,
+    mark,
+    scoped_models,
+)
 
 pytestmark = pytest.mark.django_db
 
@@ -33,13 +45,21 @@ pytestmark = pytest.mark.django_db
 # no patient; a host sees clinics and accounts and nothing else.
 HOST_SEES = {"Clinic", "User"}
 
-# Parameters of addresses, and the model whose key they are.
-KEYS: dict[str, type[Model]] = {"patient_id": Patient, "session_id": TrainingSession}
+# Parameters of addresses, the model that they name a row of, and by what.
+KEYS: dict[str, tuple[type[Model], str]] = {
+    "board_id": (Leaderboard, "pk"),
+    "code": (Patient, "code"),
+    "patient_id": (Patient, "pk"),
+    "session_id": (TrainingSession, "pk"),
+}
 
 
 @pytest.fixture
 def worlds() -> tuple[World, World]:
-    return build_world("amber"), build_world("birch")
+    both = build_world("amber"), build_world("birch")
+    for world in both:
+        fill_board(world)
+    return both
 
 
 def may_read(actor: Actor, model: type[Model], clinic: str) -> bool:
@@ -48,6 +68,8 @@ def may_read(actor: Actor, model: type[Model], clinic: str) -> bool:
         return model.__name__ in HOST_SEES
     if actor.clinic != clinic:
         return False
+    if model.__name__ == "ApiToken":
+        return actor.role == "lead"
     if actor.role == "researcher":
         return model.__name__ not in {"Patient", "User", "Clinic", "Station", "Device"}
     return actor.role in {"lead", "pt"}
@@ -201,8 +223,8 @@ def fill(
                 kwargs = {"content_type_id": type_id, "object_id": row.pk}
                 yield Route(name, reverse(name, kwargs=kwargs), world.name, kind)
         elif len(wanted) == 1 and (parameter := min(wanted)) in KEYS:
-            target = KEYS[parameter]
-            key = world.rows[target].pk
+            target, by = KEYS[parameter]
+            key = getattr(world.rows[target], by)
             yield Route(name, reverse(name, kwargs={parameter: key}), world.name, target)
         elif wanted == {"app_label"}:
             yield Route(name, reverse(name, kwargs={"app_label": "rehab"}))
@@ -352,6 +374,38 @@ def test_a_public_page_with_patients_is_caught(worlds, settings, monkeypatch):
     with_patterns(settings, monkeypatch, path("leaky", leaky, name="leaky"))
     leaks, _ = find_leaks(worlds, all_actors(*worlds), under="/leaky")
     assert "stranger: /leaky shows Patient of amber" in leaks
+
+
+def test_rows_of_another_clinics_board_are_caught(worlds, monkeypatch):
+    monkeypatch.setattr(Stored, "find_rows", lambda self: BoardEntry.everywhere.all())
+    monkeypatch.setattr(rows, "standing_on", lambda board: Patient.everywhere.all())
+    leaks, _ = find_leaks(worlds, all_actors(*worlds), under="/sessions/")
+    url = reverse("scores", kwargs={"session_id": worlds[0].session.pk})
+    assert f"pt of amber: {url} shows Patient of birch" in leaks
+
+
+def test_a_board_of_another_clinic_is_caught(worlds, monkeypatch):
+    monkeypatch.setattr(
+        showing, "boards_at", lambda moment, clinic: list(Leaderboard.everywhere.all())
+    )
+    leaks, _ = find_leaks(worlds, all_actors(*worlds), under="/sessions/")
+    url = reverse("scores", kwargs={"session_id": worlds[0].session.pk})
+    assert f"pt of amber: {url} shows Leaderboard of birch" in leaks
+
+
+def test_unscoped_calls_of_the_api_are_caught(worlds, monkeypatch):
+    monkeypatch.setattr(people_api, "patients_of", lambda user: Patient.everywhere.order_by("pk"))
+    leaks, _ = find_leaks(worlds, all_actors(*worlds), under="/api/v1/")
+    key = worlds[0].patient.pk
+    assert "pt of birch: /api/v1/patients shows Patient of amber" in leaks
+    assert f"pt of birch: /api/v1/patients/{key} shows Patient of amber" in leaks
+    assert not any("researcher" in leak for leak in leaks)  # the role table held
+
+
+def test_a_name_that_the_api_tells_researchers_is_caught(worlds, monkeypatch):
+    monkeypatch.setattr(people_api, "sees_names", lambda context: True)
+    leaks, _ = find_leaks(worlds, all_actors(*worlds), under="/api/v1/")
+    assert "researcher of amber: /api/v1/sessions shows Patient of amber" in leaks
 
 
 def test_a_page_that_declares_nothing_is_closed_and_caught(worlds, settings, monkeypatch):

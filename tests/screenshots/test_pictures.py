@@ -15,11 +15,15 @@ pytestmark = pytest.mark.browser
 FOLDER = ROOT / "screenshots"
 PAGES = {
     "home": "/",
+    "account": "/account/",
+    "second-factor": "/account/second-factor/app/",
     "admin": "/admin/",
     "patients": "/admin/rehab/patient/",
     "sessions": "/admin/rehab/trainingsession/",
     "session": "/admin/rehab/trainingsession/1/change/",
     "protocol": "/admin/rehab/protocol/2/change/",
+    "leaderboard": "/admin/rehab/leaderboard/add/",
+    "gesture": "/admin/rehab/gesture/1/change/",
     "scores-points": "/sessions/12/scores/",
     "scores-kept": "/sessions/11/scores/",
     "past-sessions": "/patients/2/sessions/",
@@ -31,15 +35,19 @@ PAGES = {
     "therapist": "/sessions/13/monitor/",  # last: by then there is something to see
 }
 
-# Patient 2 with the sessions 4 to 12, walked over three weeks.
+# A gesture, and patient 2 with the sessions 4 to 12, walked over three weeks.
 VISITS = """
 from django.utils import timezone
 from rehab.people.first_start import first_clinic
+from rehab.gestures.models import Gesture
 from rehab.people.models import Patient
 from tests.walks import visit
 rosa = Patient.everywhere.create(
     clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"
 )
+wave = Gesture.everywhere.create(clinic=first_clinic(), name="slow-wave")
+for position, (turn, way) in enumerate([(40, 0.12), (0, -0.12), (-80, 0.12), (0, -0.12), (40, 0)]):
+    wave.steps.create(position=position + 1, turn_deg=turn, forward_m=way)
 types = "explicit positive positive negative binary positive binary negative positive".split()
 for index, valence in enumerate(types):
     days_ago = 3 * (len(types) - 1 - index)

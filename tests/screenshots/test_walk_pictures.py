@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 from playwright.sync_api import Page, ViewportSize
@@ -72,7 +73,7 @@ def test_pictures_of_a_walk(server: Server, stack: ExitStack) -> None:
     sides = [
         {"screen": {"screen_side": side, "screen_sounds": True}} for side in ("left", "center")
     ]
-    wanted = [*({"valence": valence} for valence in valences), *sides, catch]
+    wanted: list[dict[str, Any]] = [*({"valence": valence} for valence in valences), *sides, catch]
     *walks, left, center, calm = make_walks(server, *wanted)
     browser = stack.enter_context(chromium())
     pages = {}

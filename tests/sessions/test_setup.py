@@ -5,12 +5,18 @@ from __future__ import annotations
 import pytest
 from django.test import Client
 
+from rehab.gestures.models import Gesture
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import Protocol, TrainingSession
-from rehab.sessions.services import change_session
+from rehab.sessions.services import change_session, create_session
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind
+from rehab.training.goals import GoalRule
+from rehab.training.measures import InvalidSetting
+from rehab.training.valences import Cue
+from robot.composed import read_gesture
+from robot.motion import HOME
 from tests.world import World, build_world
 
 pytestmark = pytest.mark.django_db
@@ -53,6 +59,9 @@ def choices(place: Station, protocol: str = "Training only", **others: object) -
         "station": place.pk,
         "source": "live",
         "trained_side": "right",
+        "robot": "gentle",
+        "robot_above": "(usual)",
+        "robot_below": "(usual)",
         **others,
     }
 
@@ -74,6 +83,7 @@ def test_every_choice_reaches_the_plan(pt, patient, station, world):
     assert (plan.valence.slug, plan.goal.value, plan.trained_side) == ("negative", 4.05, "right")
     assert (plan.target.hit_rate, plan.target.duration_s) == (0.65, 720)
     assert [phase.kind for phase in plan.phases] == ["training"]
+    assert (plan.robot_intensity, plan.valence.cue, plan.gestures) == (0.5, Cue(None, "droop"), ())
     assert (session.runs, session.simulated) == ([], False)
 
 
@@ -104,6 +114,9 @@ def test_a_goal_in_percent_waits_for_its_baseline(pt, patient, station):
         ("valence", "kind", "Select a valid choice"),
         ("source", "recording ../../etc/passwd", "Select a valid choice"),
         ("station", "999999", "Select a valid choice"),
+        ("robot", "wild", "Select a valid choice"),
+        ("robot_above", "somersault", "Select a valid choice"),
+        ("robot_below", "", "Robot below: This field is required"),
     ],
 )
 def test_what_cannot_be_walked_is_refused_in_words(pt, patient, station, field, value, words):
@@ -145,6 +158,7 @@ def test_like_last_time_offers_what_the_last_session_was(pt, patient, station):
     assert session.simulated
     change_session(session, ChangeKind.START)
     change_session(session, ChangeKind.GOAL, 4.2)
+    change_session(session, ChangeKind.ROBOT_INTENSITY, 0.0)
     change_session(session, ChangeKind.FINISH)
     page = pt.get(f"/patients/{patient.pk}/")
     last = page.context["last"]
@@ -159,7 +173,54 @@ def test_like_last_time_offers_what_the_last_session_was(pt, patient, station):
     again = newest()
     assert again.pk != session.pk
     assert again.to_plan().goal.value == 4.2
-    assert again.plan | {"goal": None} == session.plan | {"goal": None}
+    assert again.to_plan().robot_intensity == 0
+    alike = {"goal": None, "robot_intensity": None}
+    assert again.plan | alike == session.plan | alike
+
+
+def compose(world: World, name: str = "wave") -> Gesture:
+    gesture = Gesture.everywhere.create(clinic=world.clinic, name=name)
+    for position, degrees in enumerate((30, -60, 30), start=1):
+        gesture.steps.create(position=position, turn_deg=degrees)
+    return gesture
+
+
+def test_a_composed_gesture_goes_along_with_the_plan(pt, patient, station, world):
+    gesture = compose(world)
+    url = f"/patients/{patient.pk}/new/"
+    assert "wave" in pt.get(url).content.decode()
+    pt.post(url, choices(station, robot_above="wave", robot_below="(nothing)"))
+    plan = newest().to_plan()
+    assert plan.valence.cue == Cue("wave", None)
+    assert [data["name"] for data in plan.gestures] == ["wave"]
+    assert read_gesture(plan.gestures[0]).goals[-1].pose == HOME
+    TrainingSession.everywhere.filter(pk=newest().pk).update(state="finished")
+    form = pt.get(url).context["form"]
+    assert (form["robot_above"].value(), form["robot_below"].value()) == ("wave", "(nothing)")
+    gesture.delete()  # the next set-up does without it; the session has kept its own
+    form = pt.get(url).context["form"]
+    assert (form["robot_above"].value(), form["robot_below"].value()) == ("(usual)", "(nothing)")
+    assert newest().to_plan().gestures == plan.gestures
+
+
+def test_a_gesture_that_no_robot_plays_is_refused_in_words(pt, patient, station, world):
+    compose(world).steps.filter(position=3).delete()
+    page = pt.post(f"/patients/{patient.pk}/new/", choices(station, robot_above="wave"))
+    assert "Gesture wave: It ends turned by 30° to the right" in page.content.decode()
+
+
+def test_a_gesture_of_another_clinic_cannot_be_chosen(pt, patient, station, world):
+    compose(build_world("birch"))
+    page = pt.post(f"/patients/{patient.pk}/new/", choices(station, robot_above="wave"))
+    assert "Select a valid choice" in page.content.decode()
+    with pytest.raises(InvalidSetting, match="no gesture wave"):
+        create_session(
+            patient,
+            valence="positive",
+            goal=GoalRule(value=4.0),
+            protocol=Protocol.everywhere.get(name="Training only"),
+            cue=Cue(above="wave"),
+        )
 
 
 def test_recordings_of_this_machine_can_be_chosen_and_are_looked_at(

@@ -139,7 +139,7 @@ def test_a_session_of_its_station_appears_and_no_other(world, pt, station):
     scores = tablet.get(f"{there}scores/").content.decode()
     assert 'href="/tablet/"' in scores
     for elsewhere in ("/start/", f"{there}monitor/", f"/patients/{world.patient.pk}/"):
-        assert tablet.get(elsewhere).headers["Location"].startswith("/admin/login/")
+        assert tablet.get(elsewhere).headers["Location"].startswith("/sign-in/")
 
 
 def test_a_revoked_tablet_shows_a_code_again(pt, station):

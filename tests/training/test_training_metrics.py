@@ -7,6 +7,7 @@ import math
 import pytest
 
 from rehab.training.fold import SessionFold
+from rehab.training.goals import Target
 from rehab.training.metrics import METRICS, measure_session
 from rehab.training.phases import make_phase
 from tests.training.training_sessions import SWAY, make_plan, start, walk
@@ -40,6 +41,9 @@ def test_a_session_worked_out_by_hand() -> None:
         "points_per_100_steps": 50.0,
         "improvement_over_baseline": pytest.approx(12.5),  # 4.5 against 4.0
         "retention_in_washout": pytest.approx(40.0),  # 0.2 of 0.5
+        "steps": 4,
+        "active_minutes": pytest.approx(fold.active_s / 60),
+        "attended": 1,
     }
 
 
@@ -90,6 +94,20 @@ def test_a_figure_that_would_mean_nothing_is_absent(session: SessionFold, absent
 def test_no_hit_is_a_streak_of_none_not_an_absent_figure() -> None:
     figures = measure_session(walk_session([], [3.0], []))
     assert (figures["best_streak"], figures["hit_rate"], figures["score"]) == (0, 0.0, -1)
+
+
+def test_a_target_is_met_missed_or_was_never_set() -> None:
+    wished = Target(hit_rate=0.6)
+    met, missed = (
+        measure_session(walk_session([], values, [], target=wished))["target_met"]
+        for values in ([5.0, 5.0, 3.0], [5.0, 3.0])
+    )
+    assert (met, missed) == (1.0, 0.0)
+    assert "target_met" not in measure_session(walk_session([], [5.0], []))
+
+
+def test_nothing_valid_was_not_attended() -> None:
+    assert "attended" not in measure_session(walk_session([], [None, None], []))
 
 
 def test_sessions_of_different_length_compare_by_points_per_100_steps() -> None:

@@ -25,6 +25,8 @@ def test_a_plan_survives_being_stored(valence: str, measure: Measure) -> None:
         percent=118.0,
         target=Target(0.6, 600.0),
         activation_threshold=1.0,
+        robot_intensity=0.5,
+        gestures=({"name": "wave", "steps": [{"turn_rad": 0.5}, {"turn_rad": -0.5}]},),
     )
     again = SessionPlan.from_json(json.loads(json.dumps(plan.to_json(), allow_nan=False)))
     assert again == plan
@@ -47,6 +49,11 @@ def test_a_goal_out_of_bounds_is_refused_with_the_plan(goal: float) -> None:
 def test_a_threshold_out_of_bounds_is_refused_with_the_plan() -> None:
     with pytest.raises(InvalidSetting, match="activation threshold"):
         make_plan(activation_threshold=90)
+
+
+def test_a_robot_is_normal_gentle_or_off() -> None:
+    with pytest.raises(InvalidSetting, match=r"normal \(1\), gentle \(0.5\), off \(0\)"):
+        make_plan(robot_intensity=0.7)
 
 
 @pytest.mark.parametrize(

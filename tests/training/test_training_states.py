@@ -31,11 +31,17 @@ LEADS_TO = {
     **{(K.ABORT, state): S.ABORTED for state in (S.READY, S.RUNNING, S.PAUSED)},
     **{
         (kind, state): state
-        for kind in (K.GOAL, K.GAIN, K.PHASE, K.ACTIVATION_THRESHOLD)
+        for kind in (K.GOAL, K.GAIN, K.PHASE, K.ACTIVATION_THRESHOLD, K.ROBOT_INTENSITY)
         for state in (S.READY, S.RUNNING, S.PAUSED)
     },
 }
-VALUES = {K.GOAL: 3.0, K.GAIN: 0.9, K.PHASE: 1.0, K.ACTIVATION_THRESHOLD: 1.2}
+VALUES = {
+    K.GOAL: 3.0,
+    K.GAIN: 0.9,
+    K.PHASE: 1.0,
+    K.ACTIVATION_THRESHOLD: 1.2,
+    K.ROBOT_INTENSITY: 0.0,
+}
 
 
 def session_in(state: State) -> SessionFold:
@@ -83,6 +89,7 @@ def test_a_change_that_needs_a_value_says_so(kind: ChangeKind) -> None:
         (K.GOAL, math.nan, "above 0 and up to 15 W/kg"),
         (K.GAIN, 2.0, "0.5 to 1.5"),
         (K.ACTIVATION_THRESHOLD, 90.0, "0.9 for 90 %"),
+        *((K.ROBOT_INTENSITY, value, r"gentle \(0.5\)") for value in (-1, 0.3, 2, math.nan)),
         *((K.PHASE, value, "0 to 1") for value in (-1, 0.5, 2, 1e308, math.nan, math.inf)),
     ],
 )
@@ -102,8 +109,10 @@ def test_a_change_holds_from_the_next_step_on() -> None:
     fold.change(Change(K.GOAL, 5.0))
     fold.change(Change(K.GAIN, 1.5))
     fold.change(Change(K.ACTIVATION_THRESHOLD, 1.1))
+    fold.change(Change(K.ROBOT_INTENSITY, 0.5))
     (after,) = walk(fold, [4.0])
     assert (before.goal, before.gain, before.hit) == (4.0, 1.0, True)
     assert (after.goal, after.gain, after.shown, after.performance) == (5.0, 1.5, 6.0, 1.2)
     assert fold.score == 2
     assert fold.activation_threshold == 1.1
+    assert fold.robot_intensity == 0.5

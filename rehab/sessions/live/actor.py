@@ -46,6 +46,8 @@ class SessionActor:
     def __init__(self, session: TrainingSession) -> None:
         self.session = session
         self.fold = SessionFold(session.to_plan())
+        if session.original_id is not None:
+            self.fold.state = State.FINISHED  # imported: it has no log, and takes none
         self.marks: deque[dict[str, Any]] = deque(maxlen=MARKS)  # what a PT's chart points out
 
     @classmethod
@@ -143,6 +145,8 @@ class SessionActor:
                 return self.fold.phase_index
             case ChangeKind.ACTIVATION_THRESHOLD:
                 return self.fold.activation_threshold
+            case ChangeKind.ROBOT_INTENSITY:
+                return self.fold.robot_intensity
         return None
 
 

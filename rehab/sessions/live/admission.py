@@ -15,6 +15,8 @@ from django.http.request import split_domain_port, validate_host
 from django.utils import timezone
 from django.utils.module_loading import import_string
 
+from rehab.people import browser_sessions
+from rehab.people.entry import holds
 from rehab.people.models import User
 from rehab.sessions.models import TrainingSession
 from rehab.stations import tablets
@@ -83,32 +85,39 @@ def _signed_in(scope: Mapping[str, Any]) -> User | None:
     store = import_string(f"{settings.SESSION_ENGINE}.SessionStore")
     request.session = store(key)
     user = get_user(request)
-    return user if isinstance(user, User) else None
+    return user if isinstance(user, User) and holds(request.session, user) else None
 
 
 @database_sync_to_async
 def find_unwelcome(admitted: Sequence[tuple[Actor, Mapping[str, Any]]]) -> list[int]:
     """Say which of these actors, each with its socket's scope, would no longer be let in: devices
-    whose token was revoked or renewed, people who have signed out or were switched off.
+    whose token was revoked or renewed, people whose sign-in has ended or no longer holds.
     """
     devices = {actor.pk for actor, _ in admitted if isinstance(actor, Device)}
     people = {actor.pk for actor, _ in admitted if isinstance(actor, User)}
     keys = {session_key_of(scope) for actor, scope in admitted if isinstance(actor, User)}
     valid = Device.everywhere.filter(pk__in=devices, revoked_at__isnull=True)
     hashes = dict(valid.values_list("pk", "token_hash"))
-    active = set(User.everywhere.filter(pk__in=people, is_active=True).values_list("pk", flat=True))
-    open_keys = set(
-        Session.objects.filter(session_key__in=keys, expire_date__gt=timezone.now()).values_list(
-            "session_key", flat=True
-        )
-    )
+    accounts = User.everywhere.select_related("clinic").in_bulk(people)
+    live = Session.objects.filter(session_key__in=keys, expire_date__gt=timezone.now())
+    signed_in = {row.session_key: row.get_decoded() for row in live}
 
     def is_welcome(actor: Actor, scope: Mapping[str, Any]) -> bool:
         if isinstance(actor, Device):
             return hashes.get(actor.pk) == actor.token_hash
-        return actor is None or (actor.pk in active and session_key_of(scope) in open_keys)
+        if actor is None:
+            return True
+        account, data = accounts.get(actor.pk), signed_in.get(session_key_of(scope) or "")
+        return account is not None and data is not None and holds(data, account)
 
     return [index for index, one in enumerate(admitted) if not is_welcome(*one)]
+
+
+@database_sync_to_async
+def keep_signed_in(scopes: Sequence[Mapping[str, Any]]) -> None:
+    """Put off the end of the sign-ins by which these sockets came in: a training runs there."""
+    keys = {key for scope in scopes if (key := session_key_of(scope))}
+    browser_sessions.keep(keys, timezone.now())
 
 
 @database_sync_to_async

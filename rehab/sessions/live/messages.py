@@ -214,8 +214,10 @@ def read_report(message: dict[str, Any]) -> dict[str, Any]:
             pose = report.get("pose")
             for part in ("x_m", "y_m", "heading_rad"):
                 read_number(pose if isinstance(pose, dict) else {}, part)
-            if report.get("battery_v") is not None:
-                read_number(report, "battery_v")
+            for part in ("battery_v", "battery_share"):
+                _optional_number(report, part)
+            for part in ("battery_low", "simulated", "open_loop", "bumpers"):
+                _optional_flag(report, part)
         case "stop":
             read_name(report, "reason")
         case "decision":
@@ -226,10 +228,12 @@ def read_report(message: dict[str, Any]) -> dict[str, Any]:
                 raise BadFrame('"above" is true or false.')
             _read_code(report, "reason")
             _optional_name(report, "gesture")
+            _optional_number(report, "intensity")
         case "gesture":
             read_name(report, "name")
             _read_one_of(report, "phase", GESTURE_PHASES)
             _read_code(report, "outcome")
+            _optional_flag(report, "open_loop")
     return report
 
 
@@ -246,6 +250,11 @@ def _read_code(message: dict[str, Any], name: str) -> None:
 def _optional_name(message: dict[str, Any], name: str) -> None:
     if message.get(name) is not None:
         read_name(message, name)
+
+
+def _optional_flag(message: dict[str, Any], name: str) -> None:
+    if not isinstance(message.get(name, False), bool):
+        raise BadFrame(f'"{name}" is true or false.')
 
 
 def _read_speed(message: dict[str, Any]) -> float | None:

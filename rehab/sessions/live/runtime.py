@@ -23,7 +23,7 @@ from rehab.people.models import User
 from rehab.sessions.events import to_text
 from rehab.sessions.live import owners, sources
 from rehab.sessions.live.actor import SessionActor
-from rehab.sessions.live.admission import find_unwelcome
+from rehab.sessions.live.admission import find_unwelcome, keep_signed_in
 from rehab.sessions.live.children import Children
 from rehab.sessions.live.session import RECENT, LiveSession
 from rehab.sessions.live.writer import Writer
@@ -162,14 +162,18 @@ class Runtime:
                         await self._close(live)
                     live.asked_for = False  # whoever gets it now has until the next sweep to join
             if ticks % SWEEP == 0:
-                await self._send_off_unwelcome()
+                await self._look_after_sign_ins()
             if ticks % CHECKPOINT == 0:
                 await self.loop.run_in_executor(None, _checkpoint)
 
-    async def _send_off_unwelcome(self) -> None:
-        """End the sockets of devices and people that would no longer be let in."""
+    async def _look_after_sign_ins(self) -> None:
+        """Keep people signed in while their page shows a training that runs; end the sockets of
+        devices and people that would no longer be let in.
+        """
         sockets = [socket for socket in self.sockets if socket.actor is not None]
+        running = [one.scope for one in sockets if one.live is not None and one.live.is_running]
         try:
+            await keep_signed_in(running)
             for index in await find_unwelcome([(one.actor, one.scope) for one in sockets]):
                 sockets[index].send_off()
         except DatabaseError:

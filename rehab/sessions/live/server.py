@@ -12,8 +12,10 @@ from typing import Any
 
 from autobahn.twisted import websocket as twisted_websocket
 from autobahn.websocket import protocol as websocket_protocol
+from daphne import http_protocol
 from daphne.server import Server
 from daphne.ws_protocol import WebSocketFactory, WebSocketProtocol
+from django.conf import settings
 from twisted.internet import defer, reactor
 
 from rehab.sessions.live import runtime as runtimes
@@ -54,6 +56,34 @@ class EagerProtocol(WebSocketProtocol):  # type: ignore[misc]
 
 
 WebSocketFactory.protocol = EagerProtocol
+
+
+class BoundedRequest(http_protocol.WebRequest):  # type: ignore[misc]
+    """Hangs up on a body that is longer than any page takes.
+
+    Twisted would write all of it to the disk before Django could refuse it.
+    """
+
+    too_long = False
+
+    def handleContentChunk(self, data: bytes) -> None:  # noqa: N802
+        """Take a part of the body."""
+        if self.too_long:
+            return
+        if self.content.tell() + len(data) > settings.DATA_UPLOAD_MAX_MEMORY_SIZE:
+            self.too_long = True
+            self.channel.transport.write(b"HTTP/1.1 413 Content Too Large\r\n\r\n")
+            self.channel.loseConnection()
+            return
+        super().handleContentChunk(data)
+
+    def process(self) -> None:
+        """Answer the request, unless it was cut short here."""
+        if not self.too_long:
+            super().process()
+
+
+http_protocol.WebRequest = BoundedRequest
 
 
 class LiveServer(Server):  # type: ignore[misc]

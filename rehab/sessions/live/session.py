@@ -27,12 +27,13 @@ from rehab.sessions.live.hub import Channel, Viewer
 from rehab.sessions.live.lateness import Lateness
 from rehab.sessions.live.writer import Job, Writer
 from rehab.sessions.models import Remark, RobotEntry, Step
-from rehab.training.changes import Change, ChangeKind
+from rehab.training.changes import Change, ChangeKind, State
 from rehab.training.steps import Measurement, ScoredStep
 
 RECENT = 60  # strides that a page's chart may begin with
 LOGGED = {"decision": RobotEntry.DECISION, "gesture": RobotEntry.GESTURE}  # of a robot's reports
-TOLD = set(ChangeKind) - {ChangeKind.GAIN, ChangeKind.ACTIVATION_THRESHOLD}  # what a source hears
+# What a source hears nothing of.
+UNTOLD = {ChangeKind.GAIN, ChangeKind.ACTIVATION_THRESHOLD, ChangeKind.ROBOT_INTENSITY}
 
 
 class NotStored(RuntimeError):
@@ -108,6 +109,11 @@ class LiveSession:
         return not (self.channel.viewers or self.source or self.robot or self.unwritten)
 
     @property
+    def is_running(self) -> bool:
+        """Whether somebody walks."""
+        return self.actor.fold.state is State.RUNNING
+
+    @property
     def is_watched(self) -> bool:
         """Whether a PT's page is open: a real robot begins no gesture while none is."""
         viewers = self.channel.viewers
@@ -141,7 +147,7 @@ class LiveSession:
         rows = self.actor.change(change, by, at)
         events = [change_event(fold, change.kind)]
         told = []
-        if change.kind in TOLD:
+        if change.kind not in UNTOLD:
             told.append(self._source_change(change.kind))
         if change.kind is ChangeKind.PHASE and fold.goal != goal:
             told.append(self._source_change(ChangeKind.GOAL))

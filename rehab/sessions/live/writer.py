@@ -19,7 +19,7 @@ from typing import Any
 from django.db import close_old_connections, connection, transaction
 
 from rehab.sessions.live.actor import Row, StepRow, Summary
-from rehab.sessions.models import SessionEvent, SessionMetric, TrainingSession
+from rehab.sessions.models import SessionEvent, SessionMetric, TrainingSession, figures_stored
 
 log = logging.getLogger(__name__)
 
@@ -127,6 +127,17 @@ def commit(jobs: Sequence[Job]) -> None:
         for job in jobs:
             if job.summary is not None:
                 TrainingSession.everywhere.filter(pk=job.session_id).update(**job.summary)
+        if metrics:
+            _tell({row.session_id for row in metrics})
+
+
+def _tell(sessions: set[int]) -> None:
+    """Let those who live by sessions' figures follow. Their trouble is theirs: steps are kept."""
+    try:
+        with transaction.atomic():
+            figures_stored.send(TrainingSession, sessions=sessions)
+    except Exception:
+        log.exception("Boards did not follow sessions %s; run manage.py rebuildboards", sessions)
 
 
 def _check_epochs(expected: dict[int, int]) -> None:

@@ -118,7 +118,7 @@ def write_line(
         goal=say_number(session.goal),
         score=say_number(figures.get("score"), 0),
         hit_rate=say_rate(figures.get("hit_rate")),
-        state=STATES[State(session.state)],
+        state="imported" if session.original_id is not None else STATES[State(session.state)],
     )
 
 

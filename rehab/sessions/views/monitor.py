@@ -10,6 +10,7 @@ from rehab.people.access import for_roles, person
 from rehab.people.roles import Role
 from rehab.sessions.live.messages import BORG_MAX
 from rehab.sessions.models import Remark, TrainingSession
+from rehab.training.plans import ROBOT_LEVELS
 
 ICONS = {
     Remark.REST: "rest",
@@ -35,5 +36,10 @@ def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
     session = get_object_or_404(
         sessions.select_related("patient", "station", "measure"), pk=session_id
     )
-    context = {"session": session, "remarks": REMARKS, "borg": range(BORG_MAX + 1)}
+    context = {
+        "session": session,
+        "remarks": REMARKS,
+        "borg": range(BORG_MAX + 1),
+        "levels": ROBOT_LEVELS,
+    }
     return render(request, "sessions/monitor.html", context)

@@ -19,6 +19,7 @@ from rehab.stations.models import Device, Station
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.phases import Phase, make_phase
+from rehab.training.valences import Cue
 
 PATIENCE_S = 10.0  # only a failing test waits so long
 OWN_PAGE = "http://localhost:8000"
@@ -318,6 +319,7 @@ def open_session(
     valence: str = "binary",
     goal: GoalRule | None = None,
     at_station: bool = True,
+    cue: Cue | None = None,
 ) -> TrainingSession:
     """Make a session that is ready at the place's station."""
     return create_session(
@@ -325,6 +327,7 @@ def open_session(
         valence=valence,
         goal=goal or GoalRule(value=3.0),
         phases=phases or (make_phase("training"),),
+        cue=cue,
         station=place.station if at_station else None,
         created_by=place.pt,
     )

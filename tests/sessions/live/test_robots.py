@@ -8,10 +8,14 @@ from typing import Any
 import pytest
 from asgiref.sync import sync_to_async
 
+from rehab.gestures.models import Gesture
+from rehab.people.models import Clinic
 from rehab.sessions.live import hub
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.models import SessionEvent, TrainingSession
+from rehab.training.valences import Cue
+from robot.trial import admit_gesture
 from tests.sessions.live.callers import Message, change, turns
 
 STATUS = {
@@ -248,6 +252,12 @@ def spoiled(report: Message, *path: str, value: Any) -> Message:
         spoiled(GESTURE, "phase", value="begun"),
         spoiled(GESTURE, "outcome", value={}),
         spoiled(STATUS, "battery_v", value="full"),
+        spoiled(STATUS, "battery_share", value=True),
+        spoiled(STATUS, "battery_low", value=0.2),
+        spoiled(STATUS, "open_loop", value="yes"),
+        spoiled(STATUS, "bumpers", value=3),
+        spoiled(GESTURE, "open_loop", value=None),
+        spoiled(DECISION, "intensity", value="much"),
         {"kind": "stop"},
         {"kind": "stop", "reason": ""},
         "status",
@@ -335,3 +345,64 @@ async def test_what_a_robot_missed_is_past(place, begun):
     assert (await robot.hello())["session"] == session.pk
     await source.walk(4.0)
     assert (await robot.hear("step"))["number"] == 4
+
+
+async def test_a_robot_hears_what_the_original_s_topics_tell(place, begun):
+    session = await begun(place)
+    source, robot = await place.source().dial(), await place.robot().dial()
+    await source.hello()
+    assert (await robot.hello())["valence"] == session.plan["valence"]["slug"]
+    await source.walk(4.0)
+    step = await robot.hear("step")
+    assert step["shown"] / step["goal"] == pytest.approx(step["performance"])
+
+
+async def test_a_pt_calms_the_robot_with_one_tap(place, begun):
+    session = await begun(place)
+    robot, source = await place.robot().dial(), await place.source().dial()
+    assert (await robot.hello())["cue"]["intensity"] == 1
+    await source.hello()
+    await source.walk(4.0, 4.0)
+    monitor, tablet = place.monitor(session), place.tablet(session)
+    assert (await monitor.watch())["robot_intensity"] == 1
+    assert "robot_intensity" not in await tablet.watch()
+    for level in (0.5, 0):
+        assert (await monitor.change("robot_intensity", level))["type"] == "done"
+        cue = (await robot.hear("cue"))["cue"]
+        assert (cue["intensity"], cue["above"], cue["threshold"]) == (level, "celebrate", 0.9)
+        await monitor.until(lambda event, v=level: event == {"kind": "robot_intensity", "value": v})
+    refused = await monitor.change("robot_intensity", 0.7)
+    assert (refused["type"], refused["code"]) == ("error", "refused")
+    rows = SessionEvent.everywhere.filter(session=session, kind="robot_intensity").order_by("pk")
+    fields = ("old", "value", "by", "after_number")
+    by = place.pt.pk
+    assert [row async for row in rows.values_list(*fields)] == [(1, 0.5, by, 2), (0.5, 0, by, 2)]
+
+    await restart()
+    assert (await (await place.robot().dial()).hello())["cue"]["intensity"] == 0
+    assert (await place.monitor(session).watch())["robot_intensity"] == 0
+
+
+async def test_a_tablet_leaves_the_robot_s_intensity_alone(place, begun):
+    session = await begun(place)
+    tablet = place.tablet(session)
+    await tablet.watch()
+    await tablet.say({"type": "change", "kind": "robot_intensity", "value": 0, "id": "x"})
+    assert "therapist" in (await tablet.hear("error"))["message"]
+
+
+async def test_composed_gestures_travel_in_the_cue(place, ready):
+    wave = await sync_to_async(compose)(place.clinic)
+    await ready(place, cue=Cue(above="wave"))
+    cue = (await (await place.robot().dial()).hello())["cue"]
+    assert (cue["above"], cue["below"]) == ("wave", None)
+    assert cue["gestures"] == [wave]
+    assert admit_gesture(cue["gestures"][0]).name == "wave"
+
+
+def compose(clinic: Clinic) -> Message:
+    """Make a gesture; give it as it travels."""
+    gesture = Gesture.everywhere.create(clinic=clinic, name="wave")
+    for position, degrees in enumerate((30, -60, 30), start=1):
+        gesture.steps.create(position=position, turn_deg=degrees)
+    return gesture.to_data()

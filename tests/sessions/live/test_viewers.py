@@ -38,7 +38,10 @@ PHASES = (
     make_phase("catch", strides=2),
     make_phase("training", gain=0.9),
 )
-TOTALS = ("number", "state", "score", "phase", "goal", "gain", "activation_threshold", "hit_rate")
+TOTALS = [
+    *("number", "state", "score", "phase", "goal", "gain", "hit_rate"),
+    *("activation_threshold", "robot_intensity"),
+]
 
 
 def apply(page: Page) -> Message:
@@ -60,8 +63,8 @@ def apply(page: Page) -> Message:
                 totals |= {k: event[k] for k in ("phase", "goal", "gain", "obstacle") if k in event}
             case "goal" | "gain":
                 totals[event["kind"]] = event[event["kind"]]
-            case "activation_threshold":
-                totals["activation_threshold"] = event["value"]
+            case "activation_threshold" | "robot_intensity":
+                totals[event["kind"]] = event["value"]
     return totals
 
 
@@ -76,7 +79,8 @@ async def test_snapshot_and_events_give_a_fresh_snapshot(place, ready, valence):
         await page.watch()
     await change(session, "start")
     for round_ in range(40):
-        kind = chance.choice(["step"] * 6 + ["goal", "gain", "pause", "phase", "threshold"])
+        kinds = ["goal", "gain", "pause", "phase", "threshold", "robot"]
+        kind = chance.choice(["step"] * 6 + kinds)
         if kind == "step":
             value = chance.choice([None, 2.0, 3.0, 4.0, 99.0])
             await source.walk(value, side=chance.choice(["left", "left", "right"]))
@@ -88,6 +92,8 @@ async def test_snapshot_and_events_give_a_fresh_snapshot(place, ready, valence):
             await change(session, "phase", chance.randrange(3))
         elif kind == "threshold":
             await change(session, "activation_threshold", chance.choice([0.8, 0.9]))
+        elif kind == "robot":
+            await change(session, "robot_intensity", chance.choice([0, 0.5, 1]))
         else:
             await change(session, kind, {"goal": 3.5, "gain": 1.1}[kind])
         if round_ % 8 == 7:

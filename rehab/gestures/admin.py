@@ -1,0 +1,107 @@
+"""Admin of gestures: a PT composes steps, sees where they lead, and hears what is wrong."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django import forms
+from django.contrib import admin
+from django.core.exceptions import ValidationError
+from django.http import HttpRequest
+from django.utils.html import format_html
+
+from rehab.gestures.models import Gesture, GestureStep
+from rehab.gestures.picture import draw
+from rehab.people.admin_base import ScopedAdmin, ScopedOptions
+from robot.composed import MOVES_MAX, to_data
+from robot.gestures import TETHER_M, BadGesture
+from robot.trial import Trial, admit_gesture, try_gesture
+
+WINDOW_S = 5.0  # what takes longer is still running when the next decision comes
+
+
+class StepFormSet(forms.BaseInlineFormSet):
+    """The steps of one gesture, which must be one together."""
+
+    def clean(self) -> None:
+        """Refuse steps that no robot plays, in the robot's own words."""
+        super().clean()
+        if any(self.errors):
+            return
+        kept: list[GestureStep] = []
+        for form in self.forms:
+            if form in self.deleted_forms or not (form.instance.pk or form.has_changed()):
+                continue
+            if form.instance.position is None:  # a row without a number follows the one above
+                form.instance.position = 1 + max((step.position for step in kept), default=0)
+            kept.append(form.instance)
+        kept.sort(key=lambda step: step.position)
+        try:
+            admit_gesture(to_data("composed", [step.to_move() for step in kept]))
+        except BadGesture as problem:
+            raise ValidationError(str(problem)) from problem
+
+
+class StepForm(forms.ModelForm):
+    """A row of small numbers."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.fields["position"].required = False
+        for name, field in self.fields.items():
+            if name not in {"DELETE", "gesture"}:
+                field.widget.attrs["class"] = "vIntegerField"
+
+
+class StepRows(ScopedOptions, admin.TabularInline):
+    """A gesture's steps on its page."""
+
+    model = GestureStep
+    form = StepForm
+    formset = StepFormSet
+    max_num = MOVES_MAX
+    ordering = ("position",)
+
+    def get_extra(self, request: HttpRequest, obj: Any = None, **options: Any) -> int:
+        """Give a new gesture some rows to begin with."""
+        return 0 if obj else 4
+
+
+def tell(trial: Trial) -> str:
+    """Say how long a gesture takes and how far it goes."""
+    late = " Longer than a window: it may miss the next." if trial.took_s > WINDOW_S else ""
+    return (
+        f"Takes {trial.took_s:.1f} s, goes up to {trial.farthest_m:.2f} m from home "
+        f"(tether {TETHER_M:.2f} m), ends at home.{late}"
+    )
+
+
+@admin.register(Gesture)
+class GestureAdmin(ScopedAdmin):
+    """Gestures of the clinic."""
+
+    list_display = ("name", "simulated")
+    search_fields = ("name",)
+    fields = ("name", "picture")
+    readonly_fields = ("picture",)
+    inlines = (StepRows,)
+
+    @admin.display(description="simulated")
+    def simulated(self, gesture: Gesture) -> str:
+        """Say how long it takes and how far it goes, or what is wrong with it."""
+        try:
+            return tell(try_gesture(admit_gesture(gesture.to_data())))
+        except BadGesture as problem:
+            return str(problem)
+
+    @admin.display(description="where it goes")
+    def picture(self, gesture: Gesture) -> str:
+        """Draw the way of what is stored."""
+        if not gesture.pk:
+            return "Save it to see where it goes. Its last step has to end at home."
+        try:
+            trial = try_gesture(admit_gesture(gesture.to_data()))
+        except BadGesture as problem:
+            return str(problem)
+        words = tell(trial)
+        return format_html("{}<p>{}</p>", draw(gesture.to_moves(), trial, words), words)

@@ -1,0 +1,85 @@
+"""Gestures that a clinic composes. What makes one is the robot's rule; here it is only kept."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+from django.core.exceptions import ValidationError
+from django.db import models
+
+from rehab.people.models import Clinic
+from rehab.people.scope import ClinicRow, Scope, ScopedModel
+from robot.composed import Move, check_name, to_data
+from robot.gestures import BadGesture
+
+
+class Gesture(ClinicRow):
+    """Steps that a robot of the clinic can perform where a session's cue names them."""
+
+    scope = Scope(clinic="clinic")
+
+    clinic = models.ForeignKey(Clinic, on_delete=models.CASCADE, related_name="gestures")
+    name = models.SlugField(max_length=32, help_text="Letters, digits and hyphens: slow-wave.")
+
+    class Meta(ClinicRow.Meta):
+        ordering: ClassVar = ["name"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(fields=["clinic", "name"], name="gesture_name_once_per_clinic")
+        ]
+
+    def __str__(self) -> str:
+        return self.name
+
+    def clean(self) -> None:
+        """Refuse the names of gestures that every robot knows."""
+        try:
+            check_name(self.name)
+        except BadGesture as problem:
+            raise ValidationError({"name": str(problem)}) from problem
+
+    def to_moves(self) -> list[Move]:
+        """Give the steps as a robot knows them."""
+        return [step.to_move() for step in self.steps.order_by("position")]
+
+    def to_data(self) -> dict[str, Any]:
+        """Give the gesture as it travels to a robot."""
+        return to_data(self.name, self.to_moves())
+
+
+class GestureStep(ScopedModel):
+    """One step of a gesture: turn on the spot, go straight on, wait."""
+
+    scope = Scope(clinic="gesture__clinic")
+
+    gesture = models.ForeignKey(Gesture, on_delete=models.CASCADE, related_name="steps")
+    position = models.PositiveSmallIntegerField("number", help_text="Empty: after the row above.")
+    turn_deg = models.FloatField("turn (°)", default=0.0, help_text="First; to the left above 0.")
+    forward_m = models.FloatField("forward (m)", default=0.0, help_text="Then; back below 0.")
+    hold_s = models.FloatField("pause (s)", default=0.0, help_text="At the end.")
+    pace = models.FloatField(default=1.0, help_text="Share of the full speed, 0.2 to 1.")
+    within_s = models.FloatField(
+        "time (s)", null=True, blank=True, help_text="It stops if it takes longer. Empty: as usual."
+    )
+
+    class Meta(ScopedModel.Meta):
+        verbose_name = "step"
+        ordering: ClassVar = ["gesture", "position"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(
+                fields=["gesture", "position"], name="gesture_step_position_once"
+            )
+        ]
+
+    def __str__(self) -> str:
+        return f"Step {self.position}"
+
+    def to_move(self) -> Move:
+        """Give the step as a robot knows it."""
+        return Move(
+            turn_rad=math.radians(self.turn_deg),
+            forward_m=self.forward_m,
+            hold_s=self.hold_s,
+            pace=self.pace,
+            within_s=self.within_s,
+        )

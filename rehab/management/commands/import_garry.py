@@ -1,0 +1,208 @@
+"""`manage.py import_garry`: take participants and sessions over from the original GARRY."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from collections import Counter
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+from zoneinfo import ZoneInfo
+
+from django.core.management import BaseCommand, CommandError
+from django.db import transaction
+
+from rehab.people.first_start import first_clinic, prepare_database
+from rehab.people.models import Clinic, Patient
+from rehab.sessions.models import Measure, SessionMetric, TrainingSession
+from rehab.sessions.original import Damaged, Original, OriginalSession, read_original
+from rehab.training.changes import State
+from rehab.training.goals import GoalRule
+from rehab.training.measures import A2, InvalidSetting
+from rehab.training.phases import make_phase
+from rehab.training.plans import SessionPlan
+from rehab.training.steps import Side
+from rehab.training.valences import VALENCES, find_valence
+
+SOURCE = "Original GARRY"
+
+
+class TakeOver:
+    """Takes a file's rows over into a clinic, each once; keeps count of what became of them."""
+
+    def __init__(self, clinic: Clinic, original: Original) -> None:
+        self.clinic = clinic
+        self.original = original
+        self.taken: Counter[str] = Counter()
+        self.here: Counter[str] = Counter()
+        self.faults = {
+            "participants": dict[int, str](),
+            "sessions": dict(original.faults),
+        }
+        self._measure = Measure.everywhere.get(clinic=None, slug=A2.slug)
+        self._zone = ZoneInfo(clinic.time_zone)
+
+    def run(self) -> None:
+        """Take over all that can be."""
+        patients = {pk: self._take_participant(pk) for pk in self.original.participants}
+        for found in self.original.sessions:
+            patient = patients[found.participant]
+            if patient is None:
+                words = f"participant {found.participant} could not be taken over"
+                self.faults["sessions"][found.id] = words
+            else:
+                self._take_session(found, patient)
+
+    def _take_participant(self, pk: int) -> Patient | None:
+        own = Patient.everywhere.filter(clinic=self.clinic)
+        patient = own.filter(original_id=pk).first()
+        if patient is not None:
+            self.here["participants"] += 1
+            return patient
+        if own.filter(code=f"{pk}").exists():
+            self.faults["participants"][pk] = (
+                f"another patient of {self.clinic} has the code {pk}. Give that one another code"
+            )
+            return None
+        self.taken["participants"] += 1
+        return Patient.everywhere.create(
+            clinic=self.clinic,
+            code=f"{pk}",
+            nickname=f"P{pk}",
+            language=self.clinic.language,
+            original_id=pk,
+        )
+
+    def _take_session(self, found: OriginalSession, patient: Patient) -> None:
+        before = TrainingSession.everywhere.filter(clinic=self.clinic, original_id=found.id).first()
+        if before is not None and before.original == found.row:
+            self.here["sessions"] += 1
+            return
+        if before is not None:
+            self.faults["sessions"][found.id] = (
+                "a session with this id but other contents was imported before. If this is "
+                "another file, import it into a clinic of its own"
+            )
+            return
+        try:
+            self._store(found, patient)
+        except InvalidSetting as problem:
+            self.faults["sessions"][found.id] = str(problem).removesuffix(".")
+        else:
+            self.taken["sessions"] += 1
+
+    def _store(self, found: OriginalSession, patient: Patient) -> None:
+        """Store a finished session without steps. Raises InvalidSetting for a goal that is none."""
+        plan = SessionPlan(
+            measure=self._measure.to_rule(),
+            valence=find_valence(found.valence),
+            phases=(make_phase("training"),),
+            trained_side=Side.LEFT,  # not known, and without a step it scores nothing
+            goal=GoalRule(value=found.goal),
+        )
+        start = found.start.replace(tzinfo=self._zone)
+        session = TrainingSession.everywhere.create(
+            clinic=self.clinic,
+            patient=patient,
+            measure=self._measure,
+            created_at=start,
+            valence=found.valence,
+            trained_side="",
+            source=SOURCE,
+            plan=plan.to_json(),
+            state=State.FINISHED.value,
+            goal=found.goal,
+            started_at=start,
+            ended_at=start + timedelta(seconds=found.duration_s),
+            active_s=found.duration_s,
+            original_id=found.id,
+            original=found.row,
+        )
+        if plan.valence.has_points and found.score is not None:
+            SessionMetric.everywhere.create(session=session, slug="score", value=found.score)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing had to be left behind."""
+        return not any(self.faults.values())
+
+    def report(self) -> list[str]:
+        """Tell what was read, what became of it, and why some of it could not be taken."""
+        read = {
+            "participants": len(self.original.participants),
+            "sessions": len(self.original.sessions) + len(self.original.faults),
+        }
+        lines = [f"{'':14}{'read':>6}{'taken over':>12}{'here before':>13}{'could not':>11}"]
+        lines += [
+            f"{noun:14}{read[noun]:6}{self.taken[noun]:12}{self.here[noun]:13}{len(faults):11}"
+            for noun, faults in self.faults.items()
+        ]
+        lines += [
+            f"  {noun.removesuffix('s')} {pk}: {words}."
+            for noun, faults in self.faults.items()
+            for pk, words in sorted(faults.items())
+        ]
+        return lines + self._left_out()
+
+    def _left_out(self) -> list[str]:
+        unpaid = sum(not VALENCES[one.valence].has_points for one in self.original.sessions)
+        lines = [
+            "Left out: strides and the trained leg, which the original did not keep.",
+        ]
+        if self.original.named:
+            lines.append(
+                f"Left out: {self.original.named} name(s). GARRY keeps no real names: patients are "
+                "called P1, P2, … until a therapist gives them a nickname."
+            )
+        if unpaid:
+            lines.append(
+                f"Left out: the score of {unpaid} explicit session(s). Explicit feedback has none."
+            )
+        return lines
+
+
+class Command(BaseCommand):
+    """Takes over what can be, or, where something cannot, nothing at all; always says why."""
+
+    help = "Import participants and sessions of an original GARRY (data.db). Again, only new ones."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Offer the file and how far to go."""
+        parser.add_argument("file", type=Path, metavar="FILE")
+        parser.add_argument("--dry-run", action="store_true", help="report, and change nothing")
+        parser.add_argument(
+            "--partial", action="store_true", help="leave out rows that cannot be taken over"
+        )
+        parser.add_argument("--clinic", metavar="NAME", help="whose they are, if there are several")
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Import. Raises CommandError where nothing was changed because of what could not be."""
+        try:
+            original = read_original(options["file"])
+        except Damaged as problem:
+            raise CommandError(f"{problem} Nothing was changed.") from problem
+        prepare_database()
+        with transaction.atomic():
+            work = TakeOver(find_clinic(options["clinic"]), original)
+            work.run()
+            goes_on = work.is_whole or options["partial"]
+            if options["dry_run"] or not goes_on:
+                transaction.set_rollback(True)
+        self.stdout.write("\n".join(work.report()))
+        if not goes_on:
+            raise CommandError(
+                "Nothing was changed, since not all could be taken over. Mend that, or take over "
+                "the rest with --partial."
+            )
+        self.stdout.write("Nothing was changed (--dry-run)." if options["dry_run"] else "Done.")
+
+
+def find_clinic(name: str | None) -> Clinic:
+    """Give the clinic of this name, or the only one. Raises CommandError."""
+    names = list(Clinic.everywhere.values_list("name", flat=True))
+    if name is None and len(names) <= 1:
+        return first_clinic()
+    if name not in names:
+        wanted = "Which clinic?" if name is None else f"There is no clinic {name!r}."
+        raise CommandError(f"{wanted} Say --clinic with one of: {', '.join(names) or '(none)'}.")
+    return Clinic.everywhere.get(name=name)

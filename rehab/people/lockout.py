@@ -1,0 +1,83 @@
+"""Who has guessed too often waits. django-axes counts; by what, and what is said, is here.
+
+Passwords are counted by name and address, so that nobody can shut another one out from elsewhere.
+Codes are counted by name alone: whoever tries those has the password already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from ipaddress import IPv6Address, ip_address, ip_network
+from typing import Any
+
+from axes.handlers.proxy import AxesProxyHandler
+from axes.models import AccessAttempt
+from axes.utils import reset
+from django.conf import settings
+from django.db.models import Max
+from django.http import HttpRequest, HttpResponse
+from django.utils import timezone
+
+from rehab.people.models import User
+
+CODES = " (code)"  # no username has a blank
+
+Credentials = Mapping[str, Any] | None
+
+
+def client_address(request: HttpRequest) -> str:
+    """Give the address that a request comes from, as the outermost of our own proxies saw it.
+
+    What stands further left in X-Forwarded-For was written by the client and is not believed.
+    Of an IPv6 address the network counts: whoever has one has 2^64 of them.
+    """
+    forwarded = request.META.get("HTTP_X_FORWARDED_FOR", "")
+    seen = [word.strip() for word in forwarded.split(",") if word.strip()]
+    seen.append(request.META.get("REMOTE_ADDR", ""))
+    try:
+        address = ip_address(seen[max(0, len(seen) - 1 - settings.PROXIES)])
+    except ValueError:
+        return "0.0.0.0"  # noqa: S104  (an address that is none; such clients share one count)
+    if isinstance(address, IPv6Address):
+        if address.ipv4_mapped:
+            return str(address.ipv4_mapped)
+        return str(ip_network((address, 64), strict=False).network_address)
+    return str(address)
+
+
+def counted_name(request: HttpRequest, credentials: Credentials) -> str:
+    """Give the name under which a try is counted."""
+    name = str((credentials or request.POST).get("username") or "")
+    return name[:150] + (CODES if "code" in (credentials or {}) else "")
+
+
+def counted_by(request: Any, credentials: Credentials = None) -> list[str | list[str]]:
+    """Give what makes two tries count together."""
+    return ["username"] if "code" in (credentials or {}) else [["username", "ip_address"]]
+
+
+def answer(request: HttpRequest, response: HttpResponse, credentials: Credentials) -> HttpResponse:
+    """Let our own page, which says how long to wait, answer; machines read the status."""
+    response.status_code = 429
+    return response
+
+
+def wait_of(request: HttpRequest, **credentials: str) -> str:
+    """Say what to do where no more tries are taken; "" where they are."""
+    if AxesProxyHandler.is_allowed(request, credentials):
+        return ""
+    name = counted_name(request, credentials)
+    tries = AccessAttempt.objects.filter(username=name)
+    if "code" not in credentials:
+        tries = tries.filter(ip_address=client_address(request))
+    last = tries.aggregate(last=Max("attempt_time"))["last"] or timezone.now()
+    left_s = (last + settings.AXES_COOLOFF_TIME - timezone.now()).total_seconds()
+    minutes = max(1, -int(-left_s // 60))
+    wait = "a minute" if minutes == 1 else f"{minutes} minutes"
+    return f"Too many wrong tries. Try again in {wait}, or ask your clinic’s lead to unlock you."
+
+
+def forgive(user: User) -> None:
+    """Take new tries for an account, of passwords and codes, from every address."""
+    for name in (user.username, user.username + CODES):
+        reset(username=name)

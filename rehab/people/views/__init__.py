@@ -1,0 +1,1 @@
+"""Pages about people: the front page, coming in, the own account."""

@@ -1,0 +1,156 @@
+"""A leaderboard from the first click to the tablet: built in the admin with the preview beside it,
+seen after a session and while the tablet waits, and left by its patient with one tap.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.browser.test_scores_page import READ_TEXTS
+from tests.browsers import SIZES, chromium
+from tests.servers import ROOT, clean_environment, serve
+
+pytestmark = pytest.mark.browser
+
+PATIENCE_MS = 40_000
+
+SEED = """
+from django.utils import timezone
+from rehab.people.first_start import first_clinic
+from rehab.people.models import Patient
+from tests.walks import strides, walk
+clinic = first_clinic()
+for number, name in enumerate("Rosa Ken Mia Omar Lena Pavel".split()):
+    patient = Patient.everywhere.create(
+        clinic=clinic, code=f"R-{number}", nickname=name, paretic_side="left", boards="clinic"
+    )
+    walk(patient, "positive", strides(20 - number, number), now=timezone.now())
+    print(patient.alias)
+Patient.everywhere.create(
+    clinic=clinic, code="demo", nickname="Demo", paretic_side="left", simulated=True,
+    boards="clinic",
+)
+"""
+
+
+def choose(page: Page, words: str) -> None:
+    page.click(f".radiolist label:has-text('{words}')")
+
+
+def test_a_board_is_built_with_its_preview_and_seen_on_a_tablet(tmp_path):
+    with serve(tmp_path) as server, chromium() as browser:
+        seeded = subprocess.run(
+            [sys.executable, "manage.py", "shell", "-v0", "-c", SEED],
+            cwd=ROOT,
+            env=clean_environment(server.folder, server.port),
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+        names = seeded.stdout.split("\n")
+        complaints: list[str] = []
+
+        def open_page(size: str) -> Page:
+            width, height = SIZES[size]
+            context = browser.new_context(
+                base_url=server.url,
+                viewport={"width": width, "height": height},
+                reduced_motion="reduce",
+            )
+            context.set_default_timeout(PATIENCE_MS)
+            page = context.new_page()
+            page.on("pageerror", lambda error: complaints.append(str(error)))
+            page.on(
+                "console",
+                lambda said: complaints.append(said.text) if said.type == "error" else None,
+            )
+            return page
+
+        pt, tablet = open_page("laptop"), open_page("tablet-portrait")
+        pt.goto("/admin/rehab/leaderboard/add/")
+        pt.fill("#id_username", "pt")
+        pt.fill("#id_password", server.password)
+        pt.click("[type=submit]")
+        build(pt, names)
+
+        tablet.goto("/tablet/")
+        pt.goto("/tablets/pair/")
+        pt.fill("#code", tablet.inner_text(".code"))
+        pt.click("text=Let it in")
+        expect(tablet.locator(".waiting h1")).to_have_text("First of all", timeout=PATIENCE_MS)
+        expect(tablet.locator(".waiting .day").first).to_have_text(names[0])
+        can_be_read(tablet)
+
+        walk_a_demo(pt, tablet)
+        board = tablet.locator("section.board:not([hidden])")
+        expect(tablet.locator("h1")).to_have_text("Steps at the goal")
+        expect(board.locator(".you")).to_contain_text("You")
+        expect(board.locator("li .day").first).to_have_text(names[0])
+        assert "Demo" not in tablet.inner_text("main")
+        can_be_read(tablet)
+
+        tablet.click("text=Do not compare me")
+        expect(board).to_contain_text("These are your own sessions.")
+        assert names[0] not in tablet.inner_text("main")
+        assert complaints == []
+
+
+def build(pt: Page, names: list[str]) -> None:
+    """Build two boards; the preview follows every choice and says what cannot be."""
+    seen = pt.frame_locator(".preview iframe")
+    expect(seen.locator(".none")).to_have_text("No scores yet")  # all walked fewer than 100 steps
+    expect(pt.locator(".field-group")).to_be_hidden()
+    pt.fill("#id_name", "Steps at the goal")
+    expect(seen.locator("h1")).to_have_text("Steps at the goal")
+    choose(pt, "All patients of the clinic")
+    expect(pt.locator("input[name=entry][value=best]")).to_be_checked()
+    expect(pt.locator(".facts")).to_contain_text("0 patients on it now.")
+    pt.fill("#id_min_valid_strides", "5")
+    expect(seen.locator("li")).to_have_count(3)  # of six, the first half
+    expect(pt.locator(".facts")).to_have_text("6 patients on it now.")
+    pt.select_option("#id_metric", "score")
+    choose(pt, "All types")
+    expect(seen.locator(".faults")).to_contain_text("negative ones are never above 0")
+    pt.select_option("#id_metric", "hit_rate")
+    choose(pt, "The best, and you")
+    pt.check("#id_include_simulated")
+    expect(seen.locator("li .day").first).to_have_text(names[0])
+    pt.select_option("#seen_as", label="Pavel (R-5)")
+    expect(seen.locator(".you .day")).to_contain_text(names[5])
+    pt.click("text=Save and add another")
+    pt.fill("#id_name", "First of all")
+    pt.fill("#id_min_valid_strides", "5")
+    choose(pt, "While the tablet waits")
+    expect(pt.locator("input[name=among][value=clinic]")).to_be_checked()
+    expect(seen.locator("li .day")).to_have_text(names[:3])
+    pt.click("[name=_save]")
+    expect(pt.locator(".success")).to_contain_text("First of all")
+
+
+def walk_a_demo(pt: Page, tablet: Page) -> None:
+    pt.goto("/start/")
+    pt.click("text=Try a demo")
+    pt.click("text=Change something")
+    pt.click("text=To the therapist")
+    tablet.wait_for_selector("body[data-look=ready]")
+    pt.click("[data-main]")
+    tablet.wait_for_function("() => document.body.dataset.step >= 6")
+    pt.click("[data-end]")
+    pt.click("text=End session")
+    tablet.wait_for_url("**/scores/")
+
+
+def can_be_read(page: Page) -> None:
+    """From 1.5 m, and tapped by a stiff hand."""
+    texts = page.evaluate(READ_TEXTS)
+    assert len(texts) > 5
+    for text in texts:
+        assert text["size"] >= 32, text
+        assert text["contrast"] >= 7, text
+    for control in page.locator("button:visible, a:visible").all():
+        assert control.bounding_box()["height"] >= 72
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")

@@ -1,0 +1,162 @@
+"""Signing in with a second factor in a real browser: codes of an app, and a passkey."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from rehab.people.codes import STEP_S, code_of
+from tests.browsers import SIZES, chromium
+from tests.servers import Server, serve
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with serve(tmp_path_factory.mktemp("data")) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as running:
+        yield running
+
+
+@pytest.fixture
+def page(browser: Browser, server: Server) -> Iterator[Page]:
+    width, height = SIZES["phone"]
+    # By name: browsers have no passkeys for an address of numbers.
+    with browser.new_context(
+        base_url=f"http://localhost:{server.port}",
+        viewport={"width": width, "height": height},
+        has_touch=True,
+    ) as context:
+        made = context.new_page()
+        made.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
+        made.on("console", lambda said: pytest.fail(said.text) if said.type == "error" else None)
+        yield made
+
+
+def sign_in(page: Page, server: Server) -> None:
+    expect(page.locator("#id_username")).to_be_focused()
+    page.keyboard.type("pt")
+    page.fill("#id_password", server.password)
+    page.tap("[type=submit]")
+
+
+def sign_out(page: Page) -> None:
+    page.goto("/account/")  # on a phone it is only there
+    page.tap("main >> text=Sign out")
+    expect(page.locator(".notes")).to_contain_text("You are signed out.")
+
+
+def fresh_code(secret: str, after: str = "") -> str:
+    """Give a code that was not used yet, waiting for it where need be."""
+    while (code := code_of(secret, int(time.time()) // STEP_S)) == after:
+        time.sleep(0.5)
+    return code
+
+
+def set_up_app(page: Page) -> tuple[str, str, list[str]]:
+    """Read the secret, type the code, read the recovery codes."""
+    page.tap("summary")
+    secret = page.inner_text(".secret").replace(" ", "")
+    code = fresh_code(secret)
+    page.fill("#id_code", code)
+    page.tap("[type=submit]")
+    expect(page.locator("h1")).to_have_text("Keep these codes")
+    kept = page.locator(".codes code").all_inner_texts()
+    page.tap("text=I have them")
+    return secret, code, kept
+
+
+def test_an_app_and_its_recovery_codes(page: Page, server: Server) -> None:
+    page.goto("/account/")
+    sign_in(page, server)
+    expect(page.locator("h1")).to_have_text("Your account")
+    page.tap("a:has-text('Authenticator app')")
+    secret, used, recovery_codes = set_up_app(page)
+    expect(page.locator(".kept")).to_contain_text("Authenticator app")
+
+    sign_out(page)
+    page.goto("/patients/new/")
+    sign_in(page, server)
+    expect(page.locator("#id_code")).to_be_focused()
+    page.keyboard.type(used)
+    page.tap("[type=submit]")
+    expect(page.locator(".errorlist")).to_contain_text("or was used")
+    page.fill("#id_code", fresh_code(secret, used))
+    page.tap("[type=submit]")
+    expect(page).to_have_url(f"http://localhost:{server.port}/patients/new/")
+
+    sign_out(page)
+    sign_in(page, server)
+    page.fill("#id_code", recovery_codes[0])
+    page.tap("[type=submit]")
+    expect(page.locator("h1").first).to_contain_text("Patients")
+
+
+def test_a_clinic_that_asks_for_it(page: Page, server: Server) -> None:
+    page.goto("/admin/rehab/clinic/1/change/")
+    sign_in(page, server)
+    page.check("#id_second_factor_required")
+    page.click("[name=_save]")
+    expect(page.locator("#id_username")).to_be_visible()  # the sign-in from before is over
+    page.goto("/start/")
+    sign_in(page, server)
+    expect(page.locator("h1")).to_have_text("Set up a second factor")
+    page.goto("/start/")  # there is no way around
+    expect(page.locator("#id_username")).to_be_visible()
+    sign_in(page, server)
+    page.tap("a:has-text('Authenticator app')")
+    set_up_app(page)
+    expect(page.locator("h1").first).to_contain_text("Patients")
+
+
+def test_a_passkey(page: Page, server: Server) -> None:
+    devices = page.context.new_cdp_session(page)
+    devices.send("WebAuthn.enable")
+    device = devices.send(
+        "WebAuthn.addVirtualAuthenticator",
+        {
+            "options": {
+                "protocol": "ctap2",
+                "transport": "internal",
+                "hasUserVerification": True,
+                "isUserVerified": True,
+                "automaticPresenceSimulation": True,
+            }
+        },
+    )["authenticatorId"]
+    page.goto("/account/")
+    sign_in(page, server)
+    page.tap("a:has-text('Passkey')")
+    page.fill("#name", "Laptop")
+    page.tap("text=Make a passkey")
+    expect(page.locator("h1")).to_have_text("Keep these codes")
+    page.tap("text=I have them")
+    expect(page.locator(".kept")).to_contain_text("Laptop")
+
+    page.tap("a:has-text('Passkey')")
+    page.tap("text=Make a passkey")
+    expect(page.locator("[data-say]")).to_contain_text("already has a passkey")
+    page.goto("/account/")
+
+    sign_out(page)
+    page.goto("/account/")
+    sign_in(page, server)
+    expect(page.locator("h1")).to_have_text("Is it you?")
+    page.tap("text=Use a passkey")
+    expect(page.locator("h1")).to_have_text("Your account")
+
+    sign_out(page)
+    devices.send("WebAuthn.setUserVerified", {"authenticatorId": device, "isUserVerified": True})
+    devices.send("WebAuthn.clearCredentials", {"authenticatorId": device})  # the device is lost
+    sign_in(page, server)
+    page.tap("text=Use a passkey")
+    expect(page.locator("[data-say]")).to_contain_text("No passkey was given")

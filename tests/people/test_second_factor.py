@@ -1,0 +1,376 @@
+"""Nobody who has a second factor, or needs one, comes in without it."""
+
+from __future__ import annotations
+
+import re
+from datetime import timedelta
+
+import pytest
+from axes.models import AccessAttempt
+from django.core.management import call_command
+from django.test import Client
+from django.urls import reverse
+from django.utils import timezone
+
+from rehab.people import codes, factors
+from rehab.people.codes import STEP_S, code_of, new_secret, step_of
+from rehab.people.factors import Authenticator, RecoveryCode
+from rehab.people.models import Clinic, User
+from rehab.people.roles import Role
+
+PASSWORD = "walk well 2026"
+RFC_SECRET = "GEZDGNBVGY3TQOJQGEZDGNBVGY3TQOJQ"  # "12345678901234567890"
+
+
+# --- codes --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("now_s", "code"),  # RFC 6238, appendix B, SHA1, the last six digits
+    [
+        (59, "287082"),
+        (1111111109, "081804"),
+        (1111111111, "050471"),
+        (1234567890, "005924"),
+        (2000000000, "279037"),
+        (20000000000, "353130"),
+    ],
+)
+def test_codes_are_those_of_the_standard(now_s, code):
+    assert code_of(RFC_SECRET, now_s // STEP_S) == code
+    assert step_of(RFC_SECRET, f"{code[:3]} {code[3:]}", now_s) == now_s // STEP_S
+
+
+@pytest.mark.parametrize("drift", [-2, -1, 0, 1, 2])
+def test_a_phone_may_be_half_a_minute_off(drift):
+    now = 1234567890
+    code = code_of(RFC_SECRET, now // STEP_S + drift)
+    assert (step_of(RFC_SECRET, code, now) is not None) == (abs(drift) <= 1)
+
+
+@pytest.mark.parametrize("code", ["", " ", "28708", "2870820", "٢٨٧٠٨٢", "28708x", "-287082"])
+def test_what_is_no_code_is_refused(code):
+    assert step_of(RFC_SECRET, code, 59) is None
+
+
+def test_recovery_codes_are_read_as_people_type_them():
+    code = codes.new_recovery_code()
+    assert re.fullmatch("([2-9A-Z]{4}-){2}[2-9A-Z]{4}", code)
+    assert codes.digest_of(f" {code.lower().replace('-', ' ')} ") == codes.digest_of(code)
+    assert codes.digest_of(code) != codes.digest_of(codes.new_recovery_code())
+
+
+def test_an_app_reads_who_and_where_from_the_square():
+    address = codes.address(RFC_SECRET, "rosa@elm")
+    assert address == f"otpauth://totp/GARRY%3Arosa%40elm?secret={RFC_SECRET}&issuer=GARRY"
+
+
+# --- accounts -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(autouse=True)
+def _quick_hashes(settings):
+    settings.PASSWORD_HASHERS = ["django.contrib.auth.hashers.MD5PasswordHasher"]
+
+
+@pytest.fixture
+def pt(db: None) -> User:
+    clinic = Clinic.everywhere.create(name="Elm")
+    return User.everywhere.create_user("rosa", password=PASSWORD, role=Role.PT, clinic=clinic)
+
+
+@pytest.fixture
+def app(pt) -> App:
+    """An app of the therapist's, set up a while ago."""
+    secret = new_secret()
+    then = timezone.now() - timedelta(days=3)
+    kept = factors.add_app(pt, secret, code_of(secret, int(then.timestamp()) // STEP_S), then)
+    return App(secret, kept)
+
+
+class App:
+    """What shows the codes, and the recovery codes that came with it."""
+
+    def __init__(self, secret: str, recovery_codes: list[str]) -> None:
+        self.secret = secret
+        self.recovery_codes = recovery_codes
+
+    def code(self, steps_ago: int = 0) -> str:
+        return code_of(self.secret, int(timezone.now().timestamp()) // STEP_S - steps_ago)
+
+
+def enter(client: Client, username: str = "rosa", then: str = ""):
+    """Fill in the sign-in page; give where it leads."""
+    form = {"username": username, "password": PASSWORD, "next": then}
+    return client.post("/sign-in/", form).headers["Location"]
+
+
+def prove(client: Client, code: str):
+    return client.post("/sign-in/code/", {"code": code})
+
+
+def is_in(client: Client) -> bool:
+    return client.get("/start/").status_code == 200
+
+
+def require(pt: User) -> None:
+    pt.clinic.second_factor_required = True
+    pt.clinic.save()
+
+
+def test_the_password_alone_takes_nobody_past_the_second_factor(client, pt, app):
+    assert enter(client, then="/patients/new/") == "/sign-in/code/"
+    assert not is_in(client)
+    assert client.get("/admin/", follow=True).request["PATH_INFO"] == "/sign-in/"
+    assert prove(client, "000000").status_code == 200
+    assert not is_in(client)
+    assert prove(client, app.code()).headers["Location"] == "/patients/new/"
+    assert is_in(client)
+
+
+def test_whoever_has_a_second_factor_cannot_set_up_another_one_halfway(client, pt, app):
+    enter(client)
+    for name in ("set-up-second-factor", "add-app", "add-passkey", "account", "recovery-codes"):
+        assert client.get(reverse(name)).headers["Location"].startswith("/sign-in/?next="), name
+        assert client.post(reverse(name)).headers["Location"].startswith("/sign-in/?next="), name
+
+
+def test_a_code_counts_once_and_no_earlier_one_after_it(pt, app):
+    now = app.code()
+    for code, is_good in ((now, True), (now, False), (app.code(steps_ago=1), False)):
+        client = Client()
+        enter(client)
+        prove(client, code)
+        assert is_in(client) == is_good
+
+
+def test_a_recovery_code_lets_in_once(pt, app):
+    for is_good in (True, False):
+        client = Client()
+        enter(client)
+        prove(client, app.recovery_codes[3].lower())
+        assert is_in(client) == is_good
+    assert factors.recovery_codes_left(pt) == 9
+
+
+def test_the_way_halfway_ends(client, pt, app):
+    enter(client)
+    store = client.session
+    store["halfway"] = store["halfway"] | {"at": timezone.now().timestamp() - 601}
+    store.save()
+    assert prove(client, app.code()).headers["Location"] == "/sign-in/"
+    enter(client)
+    pt.set_password("other words 2027")
+    pt.save()
+    assert prove(client, app.code()).headers["Location"] == "/sign-in/"
+    assert not is_in(client)
+
+
+def test_a_key_that_somebody_else_planted_gets_nobody_halfway(client, pt, app):
+    client.get(reverse("sign-in"))
+    store = client.session
+    store["x"] = 1
+    store.save()
+    planted = store.session_key
+    client.cookies["sessionid"] = planted
+    enter(client)
+    assert client.cookies["sessionid"].value != planted
+
+
+def test_codes_are_guessed_five_times_whatever_the_address(pt, app):
+    for number in range(5):
+        client = Client(REMOTE_ADDR=f"203.0.113.{number}")
+        enter(client)
+        answer = prove(client, "000000")
+    assert answer.status_code == 429
+    assert "Too many wrong tries. Try again in 15 minutes" in answer.content.decode()
+    assert prove(client, app.code()).status_code == 429
+    assert not is_in(client)
+    AccessAttempt.objects.update(attempt_time=timezone.now() - timedelta(minutes=15, seconds=1))
+    prove(client, app.code())
+    assert is_in(client)
+
+
+def test_wrong_passwords_of_strangers_do_not_close_the_second_door(client, pt, app):
+    stranger = Client(REMOTE_ADDR="203.0.113.9")
+    for _ in range(6):
+        stranger.post("/sign-in/", {"username": "rosa", "password": "wrong"})
+    enter(client)
+    prove(client, app.code())
+    assert is_in(client)
+
+
+def test_no_secret_lies_open_in_the_database(pt, app, settings):
+    row = Authenticator.everywhere.get()
+    assert app.secret not in row.material
+    digests = RecoveryCode.everywhere.values_list("digest", flat=True)
+    assert not set(digests) & set(app.recovery_codes)
+    settings.SECRET_KEY = "another one " * 5  # as for whoever has the database alone
+    assert not factors.take_code(pt, app.code(), timezone.now())
+    assert factors.take_code(pt, app.recovery_codes[0], timezone.now())
+
+
+# --- setting up ---------------------------------------------------------------------------------
+
+
+def set_up_app(client: Client):
+    """Read the secret from the page and give the code back. Gives the answer and the secret."""
+    page = client.get(reverse("add-app")).content.decode()
+    secret = re.search(r'class="secret">([^<]+)<', page).group(1).replace(" ", "")
+    assert "<svg" in page
+    return client.post(reverse("add-app"), {"code": App(secret, []).code()}), secret
+
+
+def test_an_app_is_kept_once_it_shows_the_right_code(client, pt):
+    assert enter(client) == "/start/"
+    wrong = client.post(reverse("add-app"), {"code": "000000"})
+    assert "This code does not fit" in wrong.content.decode()
+    assert not factors.authenticators_of(pt).exists()
+    kept, secret = set_up_app(client)
+    shown = re.findall("<code>([^<]+)</code>", kept.content.decode())
+    assert len(shown) == 10
+    assert kept.headers["Cache-Control"].count("no-store")
+    account = client.get("/account/").content.decode()
+    assert "Authenticator app" in account
+    assert "10 left" in account
+    assert not any(code in account for code in shown)
+    assert set_up_app(client)[1] != secret  # a second one has a secret, and no codes, of its own
+    assert factors.recovery_codes_left(pt) == 10
+    elsewhere = Client()
+    assert enter(elsewhere) == "/sign-in/code/"
+    prove(elsewhere, shown[0])
+    assert is_in(elsewhere)
+
+
+def test_removing_and_renewing_take_the_password(client, pt, app):
+    enter(client)
+    prove(client, app.code())
+    removal = f"{reverse('remove-authenticator')}?which={Authenticator.everywhere.get().pk}"
+    for url in (removal, reverse("recovery-codes")):
+        refused = client.post(url, {"password": "wrong"})
+        assert "That is not your password" in refused.content.decode()
+    renewed = client.post(reverse("recovery-codes"), {"password": PASSWORD})
+    shown = re.findall("<code>([^<]+)</code>", renewed.content.decode())
+    assert not factors.take_code(pt, app.recovery_codes[0], timezone.now())
+    assert factors.take_code(pt, shown[0], timezone.now())
+    client.post(removal, {"password": PASSWORD})
+    assert not factors.authenticators_of(pt).exists()
+    assert factors.recovery_codes_left(pt) == 0
+    assert enter(Client()) == "/start/"
+
+
+def test_nobody_removes_what_is_another_ones(client, pt, app):
+    User.everywhere.create_user("other", password=PASSWORD, role=Role.LEAD, clinic=pt.clinic)
+    enter(client, "other")
+    removal = f"{reverse('remove-authenticator')}?which={Authenticator.everywhere.get().pk}"
+    assert client.post(removal, {"password": PASSWORD}).headers["Location"] == "/account/"
+    assert factors.authenticators_of(pt).exists()
+
+
+# --- a clinic that requires it ------------------------------------------------------------------
+
+CLOSED = [
+    "/start/",
+    "/admin/",
+    "/account/",
+    "/account/password/",
+    "/patients/new/",
+    "/tablets/pair/",
+]
+
+
+def test_a_clinic_that_asks_for_one_is_closed_until_it_is_set_up(client, pt):
+    require(pt)
+    assert enter(client, then="/patients/new/") == reverse("set-up-second-factor")
+    for url in CLOSED:
+        answer = client.get(url, follow=True)
+        assert answer.request["PATH_INFO"] == "/sign-in/", url
+    choice = client.get(reverse("set-up-second-factor")).content.decode()
+    assert "Elm asks for one" in choice
+    assert "Sign out" not in choice  # nobody is in yet
+    codes_page = set_up_app(client)[0].content.decode()
+    assert 'href="/patients/new/"' in codes_page
+    for url in CLOSED:
+        assert client.get(url).status_code == 200, url
+
+
+def test_sign_ins_from_before_the_clinic_asked_are_over(client, pt):
+    enter(client)
+    assert is_in(client)
+    require(pt)
+    assert not is_in(client)
+    assert enter(client) == reverse("set-up-second-factor")
+
+
+def test_calls_of_the_api_are_closed_to_such_a_sign_in(client, pt):
+    enter(client)
+    assert client.get("/api/v1/patients").status_code == 200
+    require(pt)
+    assert client.get("/api/v1/patients").status_code == 401
+
+
+def test_a_sign_in_by_second_factor_stays_when_the_clinic_begins_to_ask(client, pt, app):
+    enter(client)
+    prove(client, app.code())
+    require(pt)
+    assert is_in(client)
+
+
+def test_the_last_one_stays_where_one_is_required(client, pt, app):
+    require(pt)
+    enter(client)
+    prove(client, app.code())
+    removal = f"{reverse('remove-authenticator')}?which={Authenticator.everywhere.get().pk}"
+    page = client.post(removal, {"password": PASSWORD}, follow=True).content.decode()
+    assert "Add another one first" in page
+    assert factors.authenticators_of(pt).exists()
+
+
+def test_a_lead_asks_for_it_and_helps_whoever_lost_it(client, pt, app):
+    lead = User.everywhere.create_user("lead", password=PASSWORD, role=Role.LEAD, clinic=pt.clinic)
+    enter(client, "lead")
+    form = {"name": "Elm", "language": "en", "time_zone": "UTC", "second_factor_required": "on"}
+    client.post(f"/admin/rehab/clinic/{pt.clinic.pk}/change/", form)
+    pt.clinic.refresh_from_db()
+    assert pt.clinic.second_factor_required
+    assert enter(client, "lead") == reverse("set-up-second-factor")
+    set_up_app(client)
+    form = {"action": "remove_second_factors", "_selected_action": pt.pk}
+    client.post("/admin/rehab/user/", form)
+    assert not factors.authenticators_of(pt).exists()
+    assert factors.authenticators_of(lead).exists()
+    assert enter(Client()) == reverse("set-up-second-factor")
+
+
+def test_a_lead_of_another_clinic_removes_nothing(client, pt, app):
+    oak = Clinic.everywhere.create(name="Oak")
+    User.everywhere.create_user("oak", password=PASSWORD, role=Role.LEAD, clinic=oak)
+    enter(client, "oak")
+    form = {"action": "remove_second_factors", "_selected_action": pt.pk}
+    client.post("/admin/rehab/user/", form)
+    assert factors.authenticators_of(pt).exists()
+
+
+@pytest.mark.parametrize(("hosted", "then"), [(False, "/admin/"), (True, "second factor")])
+def test_a_hosted_servers_hosts_always_need_one(client, db, settings, monkeypatch, hosted, then):
+    settings.HOSTED = hosted
+    monkeypatch.setenv("DJANGO_SUPERUSER_PASSWORD", PASSWORD)
+    call_command("createsuperuser", "--no-input", username="host", email="host@example.org")
+    where = reverse("set-up-second-factor") if hosted else then
+    assert enter(client, "host") == where
+
+
+def test_passkeys_are_offered_where_browsers_have_them(client, pt, settings):
+    settings.ALLOWED_HOSTS = ["*"]
+    enter(client)
+    for host, secure, is_offered in (
+        ("garry.example", True, True),
+        ("garry.example", False, False),
+        ("localhost:8000", False, True),
+        ("192.168.1.5", True, False),
+        ("[::1]:8000", True, False),
+    ):
+        page = client.get("/account/", secure=secure, headers={"host": host}).content.decode()
+        assert (reverse("add-passkey") in page) == is_offered, host
+        form = client.get(reverse("add-passkey"), secure=secure, headers={"host": host})
+        assert (form.status_code == 200) == is_offered

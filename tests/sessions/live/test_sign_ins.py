@@ -1,0 +1,87 @@
+"""A page's socket lives as long as its sign-in; a training that runs on it keeps that alive."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+import pytest
+from asgiref.sync import sync_to_async
+from django.contrib.sessions.models import Session
+from django.utils import timezone
+
+from rehab.people.models import Clinic
+from rehab.sessions.live import runtime as runtimes
+from tests.sessions.live.callers import sign_in
+
+pytestmark = pytest.mark.django_db(transaction=True)
+
+
+@pytest.fixture(autouse=True)
+def _hasty(monkeypatch):
+    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+
+
+async def end_in(key: str, minutes: float) -> None:
+    """Let a sign-in end soon."""
+    end = timezone.now() + timedelta(minutes=minutes)
+    await Session.objects.filter(pk=key).aupdate(expire_date=end)
+
+
+async def minutes_left(key: str) -> float:
+    row = await Session.objects.aget(pk=key)
+    return (row.expire_date - timezone.now()).total_seconds() / 60
+
+
+async def test_a_running_training_keeps_its_therapist_signed_in(place, begun, settings):
+    settings.SESSION_MINUTES = 30
+    session = await begun(place)
+    monitor = place.monitor(session)
+    await monitor.watch()
+    await end_in(sign_in(place.pt), 1)
+    while await minutes_left(sign_in(place.pt)) < 29:
+        await monitor.hear("heartbeat")
+    await monitor.change("pause")  # nobody walks: a page left open is nobody who is there
+    await end_in(sign_in(place.pt), 1)
+    for _ in range(3):
+        await monitor.hear("heartbeat")
+    assert await minutes_left(sign_in(place.pt)) <= 1
+    await end_in(sign_in(place.pt), -1)
+    assert (await monitor.sent_away())[0] == 4001
+
+
+async def test_a_working_day_ends_though_a_training_runs(place, begun, settings):
+    session = await begun(place)
+    store = await sync_to_async(_signed_in_since)(sign_in(place.pt), 11.9, settings)
+    monitor = place.monitor(session)
+    await monitor.watch()
+    for _ in range(3):
+        await monitor.hear("heartbeat")
+    assert await minutes_left(store) <= 6
+
+
+def _signed_in_since(key: str, hours: float, settings) -> str:
+    from rehab.people.browser_sessions import SIGNED_IN_AT, SessionStore
+
+    settings.SESSION_MINUTES = 30
+    store = SessionStore(key)
+    store[SIGNED_IN_AT] = int((timezone.now() - timedelta(hours=hours)).timestamp())
+    store.save()
+    return key
+
+
+async def test_a_new_password_ends_open_sockets(place, begun):
+    monitor = place.monitor(await begun(place))
+    await monitor.watch()
+    place.pt.set_password("walk well again 2026")
+    await place.pt.asave()
+    assert (await monitor.sent_away())[0] == 4001
+
+
+async def test_a_clinic_that_comes_to_ask_for_a_second_factor_closes_sockets(place, begun):
+    session = await begun(place)
+    monitor = place.monitor(session)
+    await monitor.watch()
+    await Clinic.everywhere.filter(pk=place.clinic.pk).aupdate(second_factor_required=True)
+    assert (await monitor.sent_away())[0] == 4001
+    again = await place.monitor(session).dial()
+    assert (await again.sent_away())[0] == 4001
