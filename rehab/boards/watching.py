@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
 from typing import Any
 
+from django.db.models import Model
 from django.db.models.signals import m2m_changed, post_delete, post_save
 from django.utils import timezone
 
@@ -27,29 +30,44 @@ def watch() -> None:
     post_save.connect(on_clinic, sender=Clinic)
 
 
+def unless_restored(heed: Callable[..., None]) -> Callable[..., None]:
+    """Leave out rows that a backup brings: their boards come with them."""
+
+    @wraps(heed)
+    def heed_people(instance: Model, raw: bool = False, **signal: Any) -> None:
+        if not raw:
+            heed(instance=instance, **signal)
+
+    return heed_people
+
+
 def on_figures(sessions: set[int], **_signal: Any) -> None:
     """Sessions have ended: part of the transaction that stores their figures."""
     ended = TrainingSession.everywhere.filter(pk__in=sessions)
     entries.refresh_patients(set(ended.values_list("patient_id", flat=True)))
 
 
+@unless_restored
 def on_patient(instance: Patient, created: bool, **_signal: Any) -> None:
     """A patient has agreed to more or less, or has entered or left a blinded study."""
     if not created:
         entries.refresh_patients({instance.pk})
 
 
+@unless_restored
 def on_session(instance: TrainingSession, **_signal: Any) -> None:
     """A session was corrected or removed."""
     if instance.state == State.FINISHED:
         entries.refresh_patients({instance.patient_id})
 
 
+@unless_restored
 def on_figure(instance: SessionMetric, **_signal: Any) -> None:
     """A figure was corrected or removed."""
     on_figures({instance.session_id})
 
 
+@unless_restored
 def on_board(instance: Leaderboard, **_signal: Any) -> None:
     """A board was built or changed."""
     entries.refresh(instance)
@@ -61,6 +79,7 @@ def on_group(instance: Leaderboard, action: str, **_signal: Any) -> None:
         entries.refresh(instance)
 
 
+@unless_restored
 def on_clinic(instance: Clinic, created: bool, **_signal: Any) -> None:
     """A clinic takes part in boards across clinics, or no longer."""
     if created:

@@ -2,59 +2,46 @@
 
 from __future__ import annotations
 
-from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Any
 
 from django.db.models import F, Q, QuerySet
 from django.http import HttpRequest
 from django.shortcuts import get_object_or_404
-from ninja import Field, Path, Query, Router, Schema, Status
+from ninja import Path, Query, Router, Status
 from ninja.errors import HttpError
-from pydantic import AfterValidator
 
 from rehab.people.access import for_roles
-from rehab.people.api import PatientName, Short
-from rehab.people.api_base import (
-    Given,
-    Key,
-    Moment,
-    Page,
-    Paging,
-    Rejected,
-    Whole,
-    Words,
-    answers,
-    caller,
-    cut,
-    left_out,
-    say_errors,
-)
+from rehab.people.api import Short
+from rehab.people.api_base import Key, Page, Paging, Rejected, answers, caller, cut, say_errors
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.forms import SessionForm, like_last_time
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import NotStored
 from rehab.sessions.models import Protocol, SessionMetric, Step, TrainingSession
+from rehab.sessions.schemas import (
+    ChangeGiven,
+    Choice,
+    MetricOut,
+    PaperFilter,
+    PaperSession,
+    SessionFilter,
+    SessionGiven,
+    SessionOut,
+    StepFilter,
+    StepPage,
+)
 from rehab.sessions.services import change_session
 from rehab.sessions.trend import with_figures
 from rehab.sessions.words import at_clinic
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Station
-from rehab.training.changes import ChangeKind, Refused, State
+from rehab.training.changes import Refused
 from rehab.training.measures import InvalidSetting
-from rehab.training.metrics import METRICS
-from rehab.training.steps import Side
-from rehab.training.valences import VALENCES, find_valence
 
 router = Router(tags=["Sessions"])
 paper = Router(tags=["The paper's calls"])
 
-STEPS_MAX = 1000
-FeedbackType = Annotated[
-    str,
-    AfterValidator(lambda slug: find_valence(slug).slug),
-    Field(json_schema_extra={"enum": list(VALENCES)}),
-]
 ORDERS = {
     "newest": ("-created_at", "-pk"),
     "oldest": ("created_at", "pk"),
@@ -62,161 +49,6 @@ ORDERS = {
 }
 # What the set-up form calls otherwise.
 FORM_NAMES = {"feedback_type": "valence", "goal": "goal_value"}
-
-
-class Choice(Schema):
-    """Something that a session can be built with."""
-
-    id: int
-    name: str
-
-
-class SessionOut(Schema):
-    """A session. Score and hit rate come when it is finished; explicit feedback has no score."""
-
-    id: int
-    patient: PatientName
-    state: str
-    feedback_type: str = Field(alias="valence")
-    goal: float | None
-    measure: str = Field(alias="measure.name")
-    unit: str = Field(alias="measure.unit")
-    trained_side: str | None
-    protocol: str | None = Field(None, alias="protocol.name")
-    station: str | None = Field(None, alias="station.name")
-    source: str
-    simulated: bool
-    imported: bool = Field(description="From the original GARRY, without steps.")
-    created_at: datetime
-    started_at: datetime | None
-    ended_at: datetime | None
-    active_s: float
-    score: float | None = Field(alias="metric_score")
-    hit_rate: float | None = Field(alias="metric_hit_rate")
-
-    @staticmethod
-    def resolve_imported(session: TrainingSession) -> bool:
-        """Say whether it has no steps of its own."""
-        return session.original_id is not None
-
-    @staticmethod
-    def resolve_trained_side(session: TrainingSession) -> str | None:
-        """Give the trained leg; null where the original did not keep it."""
-        return session.trained_side or None
-
-
-class SessionFilter(Paging):
-    """Which sessions are wanted, and in which order."""
-
-    patient: Key | None = None
-    pseudonym: Short | None = None
-    feedback_type: FeedbackType | None = None
-    state: State | None = None
-    since: Moment | None = Field(None, description="Created at this moment or later.")
-    until: Moment | None = Field(None, description="Created before this moment.")
-    order: Literal["newest", "oldest", "best"] = "newest"
-
-
-class SessionGiven(Given):
-    """A new session. What is left out is like the patient's last time."""
-
-    patient: Key
-    feedback_type: FeedbackType = left_out()
-    goal: float = left_out(description="In the measure's unit, or give `goal_percent`.")
-    goal_percent: float = left_out(description="Percent of the baseline.")
-    wanted_hits: Whole | None = Field(None, description="Percent of the steps.")
-    minutes: Whole | None = None
-    protocol: Key = left_out()
-    station: Key = left_out()
-    source: Words = left_out(description="`live`, `synthetic good`, `recording walk.csv`, …")
-    trained_side: Side = left_out(strict=False)
-    robot: Words = left_out(description="As in the set-up: `off`, `quiet`, `normal`, …")
-    robot_above: Words = left_out(description="Gesture after a window above the threshold.")
-    robot_below: Words = left_out(description="Gesture after a window below it.")
-
-
-class ChangeGiven(Given):
-    """What is to be changed of a session, as on the therapist's page."""
-
-    kind: ChangeKind = Field(strict=False)
-    value: float | None = Field(
-        None, description="The new goal, gain, threshold or phase; nothing for the others."
-    )
-
-
-class StepOut(Schema):
-    """A scored stride."""
-
-    number: int
-    time_s: float
-    received_at: datetime
-    side: str
-    value: float | None
-    gain: float
-    shown: float | None
-    goal: float | None
-    performance: float | None
-    hit: bool | None
-    points: int | None
-    valid: bool
-    reasons: list[str]
-    phase: int
-    rules_version: int
-    extra: dict[str, float]
-
-
-class StepPage(Schema):
-    """Steps in their order. `next_after` is where to go on; null at the end (so far)."""
-
-    items: list[StepOut]
-    next_after: int | None
-
-
-class StepFilter(Schema):
-    """Which steps are wanted."""
-
-    after: int = Field(0, ge=0, lt=2**31)
-    limit: int = Field(200, ge=1, le=STEPS_MAX)
-
-
-class MetricOut(Schema):
-    """A figure of a finished session."""
-
-    slug: str
-    label: str
-    unit: str
-    value: float
-
-    @staticmethod
-    def resolve_label(metric: SessionMetric) -> str:
-        """Give what the figure is."""
-        return METRICS[metric.slug].label
-
-    @staticmethod
-    def resolve_unit(metric: SessionMetric) -> str:
-        """Give the figure's unit; none for a ratio or a count."""
-        return METRICS[metric.slug].unit
-
-
-class PaperSession(Schema):
-    """A session with the ten attributes of the paper, and its names for them."""
-
-    session_id: int
-    participant_id: str
-    year: int
-    month: int
-    day: int
-    start_time: str
-    duration: float = Field(description="Seconds walked.")
-    score: float | None
-    feedback_type: str
-    threshold: float | None = Field(description="The goal, in the measure's unit.")
-
-
-class PaperFilter(Paging):
-    """Which sessions of a user are wanted."""
-
-    feedback_type: FeedbackType | None = None
 
 
 def sessions_of(user: User) -> QuerySet[TrainingSession]:
