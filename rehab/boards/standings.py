@@ -135,8 +135,11 @@ class Stored:
         rows = self.find_rows().values_list(*COLUMNS)
         above = list(rows.filter(key__gt=me.key).order_by("key")[:n])
         below = list(rows.filter(key__lt=me.key).order_by("-key")[:n])
-        others = {row[1] for row in (*above, *below)} | {me.figure}
-        sizes = dict(self._counts.filter(figure__in=others).values_list("figure", "rows"))
+        figures = {me.figure, *(row[1] for row in (*above, *below))}
+        sizes: dict[int, int] = {}
+        if len(figures) > 1:  # on a large board neighbors are mostly equals
+            alike = self._counts.filter(figure__in=figures)
+            sizes = dict(alike.values_list("figure", "rows"))
         up: list[Placed] = [me]
         for row in above:
             up.append(self._next(row, up[-1], -sizes.get(row[1], 1), -1))

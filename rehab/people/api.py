@@ -6,6 +6,7 @@ from datetime import datetime
 from typing import Annotated, Any
 
 from django.core.exceptions import ValidationError
+from django.db import IntegrityError, transaction
 from django.db.models import QuerySet
 from django.http import HttpRequest
 from django.shortcuts import get_object_or_404
@@ -138,7 +139,11 @@ def store(patient: Patient, values: dict[str, Any]) -> Patient:
         patient.full_clean()
     except ValidationError as problem:
         raise Rejected(say_errors(problem.message_dict)) from problem
-    patient.save()
+    try:
+        with transaction.atomic():
+            patient.save()
+    except IntegrityError as problem:  # somebody else was quicker
+        raise Rejected({"code": "This code has just been taken."}) from problem
     return patient
 
 

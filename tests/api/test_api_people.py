@@ -100,3 +100,10 @@ def test_researchers_read_no_patient(world):
         status, problem = program.get(path)
         assert status == 403
         assert "Clinic lead or Physical therapist" in problem["message"]
+
+
+def test_of_two_who_take_a_code_at_once_one_is_refused(pt, monkeypatch):
+    monkeypatch.setattr(Patient, "full_clean", lambda self: None)  # neither sees the other yet
+    assert pt.post("/patients", code="K1", nickname="Rosa")[0] == 201
+    status, problem = pt.post("/patients", code="K1", nickname="Joon")
+    assert (status, problem["fields"]["code"]) == (409, "This code has just been taken.")

@@ -444,7 +444,16 @@ def test_pages_and_admin_never_ask_for_rows_of_everywhere():
     root = Path(site_urls.__file__).resolve().parent.parent / "rehab"
     answering = [
         file
-        for name in ("views", "admin", "admin_base", "api", "consumers", "forms")
+        for name in (
+            "views",
+            "admin",
+            "admin_base",
+            "api",
+            "api_base",
+            "schemas",
+            "consumers",
+            "forms",
+        )
         for file in root.rglob(f"{name}.py")
     ]
     answering += root.rglob("views/*.py")
