@@ -172,8 +172,11 @@ def test_without_the_setting_it_is_silent_until_somebody_asks(
         feet.walk(1.0)
         until_step(page, 1)
         assert page.evaluate("heard") == []
+        page.click(".pause")
         page.click(".sound")
         page.wait_for_selector(".sound[aria-pressed=true]")
+        page.click("text=Go on")
+        page.wait_for_selector("body:not([data-look=paused])")
         feet.walk(1.0)
         until_step(page, 2)
         assert [hz for hz, _ in page.evaluate("heard")] == [440, 660]
