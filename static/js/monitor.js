@@ -144,6 +144,7 @@ function drawLast() {
   // What the patient sees is gain × value, and the goal is compared with that.
   const scaled = gain && gain !== 1 ? ` × ${gain.toFixed(2)} = ${(gain * value).toFixed(2)}` : "";
   show("value", value === null || value === undefined ? "" : `${value.toFixed(2)}${scaled} ${session.unit}`);
+  show("extras", Object.entries(last.extra ?? {}).map(([name, number]) => `${name} ${+number.toPrecision(3)}`).join("\n"));
   const points = last.points ? `, ${last.points > 0 ? "+" : "−"}${Math.abs(last.points)}` : "";
   const why = last.valid ? `${session.phase.name}: no goal yet` : `does not count: ${(last.reasons ?? []).join(", ") || "no value"}`;
   show("verdict", valid ? (last.hit ? "hit" : "below") + points : why);

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, ViewportSize, expect
 
 from tests.browsers import SIZES, chromium
 from tests.servers import ROOT, Server, serve
@@ -55,6 +55,12 @@ def test_a_session_from_raw_signals_on_the_tablet(server: Server, browser: Brows
     page = context.new_page()
     page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
     page.goto(walk.path)
+    therapist = browser.new_context(
+        base_url=server.url, viewport=ViewportSize(width=1440, height=900)
+    )
+    therapist.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
+    monitor = therapist.new_page()
+    monitor.goto(f"{walk.path}monitor/")
     command = f"-m rehab.sources synthetic --signals --speed 20 --strides {STRIDES} --seed 5"
     source = subprocess.Popen(
         [sys.executable, *command.split(), "--server", server.url],
@@ -81,3 +87,11 @@ def test_a_session_from_raw_signals_on_the_tablet(server: Server, browser: Brows
     assert sum(bool(step["valid"]) for step in stored.values()) > STRIDES // 2
     assert 0.5 < json.loads(stored[int(number)]["extra"])["stance_s"] < 0.9
     context.close()
+    # The therapist sees what else was measured of the last stride.
+    newest = stored[max(stored)]
+    expect(monitor.locator("[data-show=number]")).to_have_text(f"no. {newest['number']}")
+    extras = monitor.locator("[data-show=extras]").inner_text().splitlines()
+    measured = json.loads(newest["extra"])
+    assert [line.split()[0] for line in extras] == list(measured)
+    assert float(extras[0].split()[1]) == pytest.approx(next(iter(measured.values())), rel=0.01)
+    therapist.close()
