@@ -6,7 +6,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, Page, sync_playwright
 
 SIZES = {
     "phone": (390, 844),
@@ -26,3 +26,44 @@ def chromium() -> Iterator[Browser]:
         )
         yield browser
         browser.close()
+
+
+# Every visible text of the page: its words, size, and contrast with what is painted behind it.
+READ_TEXTS = """() => {
+  const channel = (c) => (c /= 255) <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
+  const light = ([r, g, b]) => 0.2126 * channel(r) + 0.7152 * channel(g) + 0.0722 * channel(b);
+  const numbers = (color) => color.match(/[\\d.]+/g).map(Number);
+  const behind = (element) => {
+    for (let node = element; node; node = node.parentElement) {
+      const color = numbers(getComputedStyle(node).backgroundColor);
+      if (color.length < 4 || color[3] === 1) return color;
+    }
+    return [255, 255, 255];
+  };
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  const texts = [];
+  while (walker.nextNode()) {
+    const element = walker.currentNode.parentElement;
+    const words = walker.currentNode.textContent.trim();
+    if (!words || !element.checkVisibility() || element.closest("[aria-hidden=true]")) continue;
+    const style = getComputedStyle(element);
+    const [a, b] = [light(numbers(style.color)), light(behind(element))];
+    const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    texts.push({ words, size: parseFloat(style.fontSize), contrast });
+  }
+  return texts;
+}"""
+
+
+def can_be_read(page: Page) -> None:
+    """Fail where a patient's page cannot be read from 1.5 m, or tapped by a stiff hand."""
+    texts = page.evaluate(READ_TEXTS)
+    assert len(texts) > 5
+    for text in texts:
+        assert text["size"] >= 32, text
+        assert text["contrast"] >= 7, text
+    for control in page.locator("button:visible, a:visible").all():
+        box = control.bounding_box()
+        assert box is not None, control
+        assert box["height"] >= 72, control
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")

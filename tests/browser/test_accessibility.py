@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
 
-from tests.browsers import SIZES, chromium
-from tests.servers import ROOT, Server, clean_environment, serve
+from tests.browsers import SIZES
+from tests.servers import ROOT, Server, clean_environment
 from tests.walk_seed import Walk, feet_of, make_walks
 
 pytestmark = pytest.mark.browser
@@ -56,18 +56,6 @@ PT_PAGES = [
     "/nowhere/",
 ]
 PATIENT_PAGES = ["/sessions/{session}/scores/", "/sessions/{kept}/scores/", "/tablet/"]
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with serve(tmp_path_factory.mktemp("data")) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as running:
-        yield running
 
 
 @pytest.fixture(scope="module")

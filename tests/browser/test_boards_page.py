@@ -10,8 +10,7 @@ import sys
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.test_scores_page import READ_TEXTS
-from tests.browsers import SIZES, chromium
+from tests.browsers import SIZES, can_be_read, chromium
 from tests.servers import ROOT, clean_environment, serve
 
 pytestmark = pytest.mark.browser
@@ -142,15 +141,3 @@ def walk_a_demo(pt: Page, tablet: Page) -> None:
     pt.click("[data-end]")
     pt.click("text=End session")
     tablet.wait_for_url("**/scores/")
-
-
-def can_be_read(page: Page) -> None:
-    """From 1.5 m, and tapped by a stiff hand."""
-    texts = page.evaluate(READ_TEXTS)
-    assert len(texts) > 5
-    for text in texts:
-        assert text["size"] >= 32, text
-        assert text["contrast"] >= 7, text
-    for control in page.locator("button:visible, a:visible").all():
-        assert control.bounding_box()["height"] >= 72
-    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")

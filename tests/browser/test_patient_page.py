@@ -15,8 +15,8 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 from playwright.sync_api import TimeoutError as PlaywrightTimeout
 from websockets.sync.client import connect
 
-from tests.browsers import SIZES, chromium
-from tests.servers import ROOT, Server, serve
+from tests.browsers import SIZES
+from tests.servers import ROOT, Server
 from tests.walk_seed import Walk, feet_of, make_walks
 from tests.wire import Wire
 
@@ -48,18 +48,6 @@ RECORD = """async (path) => {
     onLink: (state) => links.push(state),
   });
 }"""
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with serve(tmp_path_factory.mktemp("data")) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as running:
-        yield running
 
 
 @contextmanager

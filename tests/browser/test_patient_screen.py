@@ -8,8 +8,8 @@ from contextlib import contextmanager
 import pytest
 from playwright.sync_api import Browser, Page
 
-from tests.browsers import SIZES, chromium
-from tests.servers import Server, serve
+from tests.browsers import SIZES
+from tests.servers import Server
 from tests.walk_seed import Walk, feet_of, make_walks
 
 pytestmark = pytest.mark.browser
@@ -43,18 +43,6 @@ READS_FORWARD = """(selector) => {
   };
   return left(0) < left(2);
 }"""
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with serve(tmp_path_factory.mktemp("data")) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as running:
-        yield running
 
 
 @contextmanager

@@ -10,8 +10,8 @@ from contextlib import contextmanager
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browsers import SIZES, chromium
-from tests.servers import ROOT, Server, clean_environment, serve
+from tests.browsers import SIZES, can_be_read
+from tests.servers import ROOT, Server, clean_environment
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -32,38 +32,6 @@ print(walk(rosa, "negative", strides(12, 3), now=timezone.now()).pk)
 BLUE = "rgb(10, 63, 168)"
 TABLETS = ("tablet-portrait", "tablet-landscape")
 
-# Every visible text of the page: its words, size, and contrast with what is painted behind it.
-READ_TEXTS = """() => {
-  const channel = (c) => (c /= 255) <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
-  const light = ([r, g, b]) => 0.2126 * channel(r) + 0.7152 * channel(g) + 0.0722 * channel(b);
-  const numbers = (color) => color.match(/[\\d.]+/g).map(Number);
-  const behind = (element) => {
-    for (let node = element; node; node = node.parentElement) {
-      const color = numbers(getComputedStyle(node).backgroundColor);
-      if (color.length < 4 || color[3] === 1) return color;
-    }
-    return [255, 255, 255];
-  };
-  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
-  const texts = [];
-  while (walker.nextNode()) {
-    const element = walker.currentNode.parentElement;
-    const words = walker.currentNode.textContent.trim();
-    if (!words || !element.checkVisibility() || element.closest("[aria-hidden=true]")) continue;
-    const style = getComputedStyle(element);
-    const [a, b] = [light(numbers(style.color)), light(behind(element))];
-    const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
-    texts.push({ words, size: parseFloat(style.fontSize), contrast });
-  }
-  return texts;
-}"""
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory) -> Iterator[Server]:
-    with serve(tmp_path_factory.mktemp("data")) as running:
-        yield running
-
 
 @pytest.fixture(scope="module")
 def sessions(server) -> tuple[str, str]:
@@ -78,12 +46,6 @@ def sessions(server) -> tuple[str, str]:
     )
     positive, negative = done.stdout.split()
     return positive, negative
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as running:
-        yield running
 
 
 @contextmanager
@@ -174,11 +136,4 @@ def test_with_reduced_motion_the_score_is_there_at_once(server, sessions, browse
 def test_everything_can_be_read_at_arms_length_and_more(server, sessions, browser, size, which):
     with tablet(browser, server, size, still=True) as page:
         page.goto(f"/sessions/{sessions[which]}/scores/")
-        texts = page.evaluate(READ_TEXTS)
-        assert len(texts) > 5
-        for text in texts:
-            assert text["size"] >= 32, text
-            assert text["contrast"] >= 7, text
-        for control in page.locator("button:visible, a:visible").all():
-            assert control.bounding_box()["height"] >= 72
-        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        can_be_read(page)

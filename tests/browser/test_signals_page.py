@@ -8,30 +8,17 @@ import re
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Browser, ViewportSize, expect
 
-from tests.browsers import SIZES, chromium
-from tests.servers import ROOT, Server, serve
+from tests.browsers import SIZES
+from tests.servers import ROOT, Server
 from tests.walk_seed import make_walks
 
 pytestmark = pytest.mark.browser
 
 STRIDES = 24
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with serve(tmp_path_factory.mktemp("data")) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as running:
-        yield running
 
 
 def steps_of(server: Server, session: int) -> list[sqlite3.Row]:

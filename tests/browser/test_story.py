@@ -13,7 +13,7 @@ from itertools import product
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browsers import SIZES, chromium
+from tests.browsers import SIZES
 from tests.servers import ROOT, Server, clean_environment, serve
 
 pytestmark = pytest.mark.browser
@@ -61,12 +61,6 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
             check=True,
             capture_output=True,
         )
-        yield running
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as running:
         yield running
 
 
