@@ -14,7 +14,10 @@ from robot.bases.kobuki import KobukiBase
 from robot.motion import HOME, STILL, Twist
 from tests.robot.fake_kobuki import FakeKobuki
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pty")
+pytestmark = [
+    pytest.mark.realtime,
+    pytest.mark.skipif(sys.platform == "win32", reason="no pty"),
+]
 
 TICK_S = 0.02
 
