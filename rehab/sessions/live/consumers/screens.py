@@ -74,11 +74,11 @@ class ScreenConsumer(Socket):
             self.viewer = viewer
             if isinstance(self.actor, Device) or self.audience is Audience.MONITOR:
                 live.announce_presence()
-            await self.say(shown)
-            if after is not None:
-                await self._send_missed(live, viewer, after, shown["number"])
-            viewer.wake()
             try:
+                await self.say(shown)
+                if after is not None:
+                    await self._send_missed(live, viewer, after, shown["number"])
+                viewer.wake()
                 await viewer.pump()
             except Unseen:
                 raise Closing(
@@ -99,7 +99,7 @@ class ScreenConsumer(Socket):
             entries = (history_entry(self.audience, plan, step) for step in steps)
             texts = [to_text(entry) for entry in entries if entry is not None]
             if texts:
-                await viewer.send_frame("steps", texts)
+                await viewer.send_past(texts)
             after = steps[-1].number
 
     async def heard(self, text: str | None) -> None:
