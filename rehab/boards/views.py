@@ -13,6 +13,7 @@ from rehab.boards.ranking import By, Entry, cut, rank, ranking_of, read_figures
 from rehab.boards.rows import Row, date_rows, share
 from rehab.boards.showing import Shown, show_after, show_waiting
 from rehab.people.access import actor_of, for_roles
+from rehab.people.language import speak_to
 from rehab.people.models import Boards
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
@@ -36,6 +37,7 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
     A session that still runs has no place. In a blinded study there is nothing to compare.
     """
     session = find_session(request, session_id)
+    speak_to(session.patient)
     if State(session.state) in OPEN:
         return redirect("walk", session_id=session.pk)
     boards = (

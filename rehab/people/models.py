@@ -6,6 +6,7 @@ import secrets
 from typing import Any, ClassVar
 from zoneinfo import available_timezones
 
+from django.conf import settings
 from django.contrib.auth.base_user import BaseUserManager
 from django.contrib.auth.models import AbstractUser, UserManager
 from django.core.exceptions import ValidationError
@@ -19,7 +20,7 @@ from rehab.people.scope import ClinicRow, Scope, ScopedManager, ScopedModel
 from rehab.training.steps import Side
 
 SIDES = [(Side.LEFT.value, "Left"), (Side.RIGHT.value, "Right")]
-LANGUAGES = [("en", "English"), ("es", "Español")]
+LANGUAGES = settings.LANGUAGES
 # Neither 0 and O nor 1, I and L: read aloud and typed without doubt.
 UNAMBIGUOUS = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
 
@@ -87,6 +88,12 @@ class User(AbstractUser):
         Clinic, on_delete=models.PROTECT, related_name="users", null=True, blank=True
     )
     role = models.CharField(max_length=16, choices=Role.choices)
+    language = models.CharField(
+        max_length=8,
+        choices=LANGUAGES,
+        blank=True,
+        help_text="Of the pages that this account opens; empty: the clinic's.",
+    )
 
     everywhere = AccountManager()
     objects: ClassVar[VisibleAccounts] = VisibleAccounts()  # type: ignore[assignment]

@@ -57,7 +57,7 @@ T = TypeVar("T", bound=TokenRow)
 def find_holder(model: type[T], token: str) -> T | None:
     """Give the row that this token belongs to; None for an unknown or revoked one."""
     held = model.everywhere.filter(token_hash=hash_token(token), revoked_at__isnull=True)
-    holder: T | None = held.first()
+    holder: T | None = held.select_related("clinic").first()  # whose language its pages have
     if holder is not None:
         now = timezone.now()
         if holder.last_seen_at is None or now - holder.last_seen_at > SEEN_EVERY:

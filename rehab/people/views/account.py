@@ -13,6 +13,7 @@ from django.views.decorators.http import require_http_methods, require_safe
 from rehab.people import factors, passkeys
 from rehab.people.access import for_roles, person
 from rehab.people.forms import NewPasswordForm
+from rehab.people.models import LANGUAGES
 from rehab.people.roles import Role
 
 
@@ -24,6 +25,7 @@ def show_account(request: HttpRequest) -> HttpResponse:
     user = person(request)
     context = {
         "owner": user,
+        "languages": LANGUAGES,
         "authenticators": factors.authenticators_of(user),
         "is_required": factors.is_required(user),
         "codes_left": factors.recovery_codes_left(user),
