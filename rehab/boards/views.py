@@ -6,6 +6,8 @@ import time
 
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.utils.translation import gettext_lazy as _
+from django.utils.translation import pgettext
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_POST, require_safe
 
@@ -22,9 +24,9 @@ from rehab.training.changes import OPEN, State
 
 SHOWN_S = 20  # a board on a tablet that waits, before the next one
 TITLES = {
-    By.POINTS: "Your points",
-    By.KEPT: "Points you kept",
-    By.RATE: "Your steps at the goal",
+    By.POINTS: _("Your points"),
+    By.KEPT: _("Points you kept"),
+    By.RATE: _("Your steps at the goal"),
 }
 
 
@@ -88,8 +90,8 @@ def own_boards(request: HttpRequest, session: TrainingSession) -> list[Shown]:
     same = [own for own in figures if own.valence == session.valence]
     by = ranking_of(valence)
     places = {
-        ("same", "This type", by): rank(same, by, -(valence.miss_points or 0)),
-        ("all", "All types", By.RATE): rank(figures, By.RATE),
+        ("same", pgettext("board", "This type"), by): rank(same, by, -(valence.miss_points or 0)),
+        ("all", pgettext("board", "All types"), By.RATE): rank(figures, By.RATE),
     }
     shown = {key: cut(entries, session.pk) for key, entries in places.items()}
     wanted = {entry.session_id for entries in shown.values() for entry in entries}
@@ -103,7 +105,7 @@ def own_boards(request: HttpRequest, session: TrainingSession) -> list[Shown]:
     return [
         Shown(
             slug=slug,
-            title=TITLES[kind],
+            title=str(TITLES[kind]),
             label=label,
             rows=date_rows(write_rows(entries, kind), facts, session, session.clinic),
             kept=kind is By.KEPT,
