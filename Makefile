@@ -27,7 +27,7 @@ run_tests = { $(1) -m pytest $(2) -m '$(3) and not realtime' \
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help run test test-main test-postgres test-pure check format bench screenshots setup \
+.PHONY: help run test test-main test-postgres test-pure check format bench screenshots messages setup \
 	constraints clean
 
 help: ## Say what can be made
@@ -76,6 +76,14 @@ bench: setup ## Measure speed (tests/bench)
 
 screenshots: setup ## Take pictures of the pages into screenshots/
 	$(PYTHON) -m pytest -m screenshots tests/screenshots $(ARGS)
+
+messages: setup ## Collect the pages' words into locale/ and compile the translations
+	msgfmt --version >/dev/null 2>&1 || { echo 'Collecting words takes gettext.' \
+	    'Cure: apt-get install gettext' >&2; exit 1; }
+	for domain in django djangojs; do $(PYTHON) manage.py makemessages --all --no-obsolete \
+	    --add-location file --verbosity 0 --domain $$domain \
+	    --ignore tests --ignore node_modules || exit; done
+	$(PYTHON) manage.py compilemessages --ignore $(VENV) --verbosity 0
 
 setup: $(VENV)/.dev $(VENV)/.twin $(LIBRARIES) ## Install all that development needs
 

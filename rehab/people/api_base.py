@@ -101,7 +101,7 @@ def check_roles(call: Callable[..., Any]) -> Callable[..., Any]:
             f"The call {call!r} does not declare who may make it. Put @for_roles(…) from "
             "rehab.people.access under its route."
         )
-    allowed = " or ".join(role.label for role in Role if role in roles)
+    allowed = " or ".join(str(role.label) for role in Role if role in roles)
 
     @wraps(call)
     def checked(request: HttpRequest, **values: Any) -> Any:

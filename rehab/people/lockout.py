@@ -17,6 +17,7 @@ from django.conf import settings
 from django.db.models import Max
 from django.http import HttpRequest, HttpResponse
 from django.utils import timezone
+from django.utils.translation import ngettext
 
 from rehab.people.models import User
 
@@ -73,8 +74,12 @@ def wait_of(request: HttpRequest, **credentials: str) -> str:
     last = tries.aggregate(last=Max("attempt_time"))["last"] or timezone.now()
     left_s = (last + settings.AXES_COOLOFF_TIME - timezone.now()).total_seconds()
     minutes = max(1, -int(-left_s // 60))
-    wait = "a minute" if minutes == 1 else f"{minutes} minutes"
-    return f"Too many wrong tries. Try again in {wait}, or ask your clinic’s lead to unlock you."
+    return ngettext(
+        "Too many wrong tries. Try again in a minute, or ask your clinic’s lead to unlock you.",
+        "Too many wrong tries. Try again in %(minutes)d minutes, or ask your clinic’s lead to "
+        "unlock you.",
+        minutes,
+    ) % {"minutes": minutes}
 
 
 def forgive(user: User) -> None:

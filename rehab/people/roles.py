@@ -5,15 +5,16 @@ from __future__ import annotations
 from enum import Flag, auto
 
 from django.db.models import TextChoices
+from django.utils.translation import gettext_lazy as _
 
 
 class Role(TextChoices):
     """What a person is to GARRY. A device is no person: see `stations.models.Device`."""
 
-    HOST = "host", "Host"
-    LEAD = "lead", "Clinic lead"
-    PT = "pt", "Physical therapist"
-    RESEARCHER = "researcher", "Researcher"
+    HOST = "host", _("Host")
+    LEAD = "lead", _("Clinic lead")
+    PT = "pt", _("Physical therapist")
+    RESEARCHER = "researcher", _("Researcher")
 
 
 class Right(Flag):

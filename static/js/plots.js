@@ -1,7 +1,22 @@
 // Drawings of strides against the goal for the PT: a strip, the last twenty, the share of hits.
 // Shape repeats the meaning of color: hits are solid, misses hollow, missing ones hatched.
 
+import { _, number } from "garry/language";
+
 const LOW = 0.5, HIGH = 1.5;
+const REMARKS = {
+  rest: _("rest"),
+  pain: _("pain"),
+  dizziness: _("dizziness"),
+  near_fall: _("near fall"),
+  fall: _("fall"),
+  handrail: _("handrail"),
+  verbal_cue: _("verbal cue"),
+  borg: _("Borg"),
+};
+
+// Says what the PT noted, and how much of it.
+export const sayRemark = (kind, value) => (REMARKS[kind] ?? kind) + (value === null ? "" : ` ${number(value)}`);
 
 function sizeOf(svg) {
   const { width, height } = svg.getBoundingClientRect();
@@ -16,7 +31,7 @@ export function drawStrip(svg, strides, marks) {
   const dx = (width - 60) / Math.max(shown.length - 1, 60);
   const x = (index) => 46 + index * dx;
   let drawing = `<rect class="above" x="40" y="${y(HIGH)}" width="${width - 40}" height="${y(1) - y(HIGH)}"/>`;
-  for (const share of [0.5, 1, 1.5]) drawing += `<text x="0" y="${y(share) + 5}">${share * 100} %</text>`;
+  for (const share of [0.5, 1, 1.5]) drawing += `<text x="0" y="${y(share) + 5}">${number(share * 100)} %</text>`;
   drawing += `<path class="goal" d="M40 ${y(1)}H${width}"/>`;
   shown.forEach(({ performance, hit, valid }, index) => {
     const newest = index === shown.length - 1;
@@ -31,12 +46,11 @@ export function drawStrip(svg, strides, marks) {
     const at = next < 0 ? x(shown.length) : x(next) - dx / 2;
     if (kind === "goal") {
       const cloth = Math.min(at, width - 56);
-      drawing += `<path class="flag" d="M${at} 4V${height - 8}"/><path class="cloth" d="M${cloth} 2h54v20h-54z"/><text class="on-cloth" x="${cloth + 27}" y="17">${value.toFixed(2)}</text>`;
+      drawing += `<path class="flag" d="M${at} 4V${height - 8}"/><path class="cloth" d="M${cloth} 2h54v20h-54z"/><text class="on-cloth" x="${cloth + 27}" y="17">${number(value, 2)}</text>`;
     } else {
       level = after === before ? level + 1 : 0;
       before = after;
-      const words = kind.replace("_", " ") + (value === null ? "" : ` ${value}`);
-      drawing += `<path class="remark" d="M${at} ${height - 4}l-6 -9h12z"/><text class="remark-words" x="${Math.min(Math.max(at, 80), width - 40)}" y="${height - 16 - 13 * level}">${words}</text>`;
+      drawing += `<path class="remark" d="M${at} ${height - 4}l-6 -9h12z"/><text class="remark-words" x="${Math.min(Math.max(at, 80), width - 40)}" y="${height - 16 - 13 * level}">${sayRemark(kind, value)}</text>`;
     }
   }
   svg.innerHTML = drawing;
@@ -59,7 +73,7 @@ export function drawTwenty(svg, strides) {
     const size = Math.min(Math.max(4, Math.abs(performance - 1) * scale), middle - 22);
     if (hit) drawing += `<rect class="hit" x="${left}" y="${middle - size}" width="${wide}" height="${size}" rx="4"/>`;
     else drawing += `<rect class="miss" x="${left + 1.5}" y="${middle}" width="${wide - 3}" height="${Math.min(size, height - middle - 4)}" rx="4"/>`;
-    if (index === strides.length - 1) drawing += `<text class="newest" x="${left + wide}" y="${hit ? middle - size - 8 : Math.min(middle + size + 17, height - 4)}">${Math.round(100 * performance)}</text>`;
+    if (index === strides.length - 1) drawing += `<text class="newest" x="${left + wide}" y="${hit ? middle - size - 8 : Math.min(middle + size + 17, height - 4)}">${number(100 * performance)}</text>`;
   });
   svg.innerHTML = drawing + `<path class="goal" d="M0 ${middle}H${width}"/>`;
 }
@@ -68,5 +82,5 @@ export function drawRing(svg, rate, wanted) {
   const around = 2 * Math.PI * 62;
   const arc = rate === null || rate === undefined ? "" : `<circle class="arc" cx="80" cy="80" r="62" stroke-dasharray="${around * rate} ${around}" transform="rotate(-90 80 80)"/>`;
   const tick = wanted ? `<g transform="rotate(${wanted * 360} 80 80)"><path class="tick-edge" d="M80 4v28"/><path class="tick" d="M80 2v32"/></g>` : "";
-  svg.innerHTML = `<circle class="track" cx="80" cy="80" r="62"/>${arc}${tick}<text class="rate" x="80" y="80" dy=".36em">${arc ? `${Math.round(100 * rate)} %` : "–"}</text>`;
+  svg.innerHTML = `<circle class="track" cx="80" cy="80" r="62"/>${arc}${tick}<text class="rate" x="80" y="80" dy=".36em">${arc ? `${number(100 * rate)} %` : "–"}</text>`;
 }

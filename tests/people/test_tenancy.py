@@ -229,6 +229,9 @@ def fill(
         elif wanted == {"app_label"}:
             yield Route(name, reverse(name, kwargs={"app_label": "rehab"}))
             return
+        elif wanted == {"language"}:
+            yield Route(name, reverse(name, kwargs={"language": "es"}))
+            return
         elif wanted == {"url"}:
             yield Route(name, reverse("admin:index") + "no-such-page")
             return

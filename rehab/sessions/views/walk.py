@@ -9,6 +9,7 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.views.decorators.clickjacking import xframe_options_sameorigin
 
 from rehab.people.access import actor_of, for_roles
+from rehab.people.language import speak_to
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ENDED, State
@@ -22,6 +23,7 @@ def show_walk(request: HttpRequest, session_id: int) -> HttpResponse:
     sessions = TrainingSession.objects.visible_to(actor_of(request)).select_related("patient")
     session = get_object_or_404(sessions, pk=session_id)
     mirror = "mirror" in request.GET
+    speak_to(session.patient)
     if State(session.state) in ENDED and not mirror:
         return redirect("scores", session_id=session.pk)
     alone = not request.user.is_authenticated
