@@ -59,6 +59,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
         Role.PT: Right.ALL,
         Role.RESEARCHER: Right.VIEW,
     },
+    "Preset": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "Gesture": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "GestureStep": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "TrainingSession": {
@@ -69,6 +70,11 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Step": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "SessionEvent": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "SessionMetric": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
+    "SessionCorrection": {
+        Role.LEAD: Right.VIEW | Right.ADD,
+        Role.PT: Right.VIEW | Right.ADD,
+        Role.RESEARCHER: Right.VIEW,
+    },
     "Leaderboard": {
         Role.HOST: Right.ALL,
         Role.LEAD: Right.ALL,
