@@ -8,70 +8,203 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-
     dependencies = [
-        ('rehab', '0001_initial'),
+        ("rehab", "0001_initial"),
     ]
 
     operations = [
         migrations.AddField(
-            model_name='trainingsession',
-            name='left_out',
-            field=models.BooleanField(default=False, editable=False, help_text='Corrected: in no figure, board or trend.'),
+            model_name="trainingsession",
+            name="left_out",
+            field=models.BooleanField(
+                default=False, editable=False, help_text="Corrected: in no figure, board or trend."
+            ),
         ),
         migrations.CreateModel(
-            name='SessionCorrection',
+            name="SessionCorrection",
             fields=[
-                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('part', models.CharField(choices=[('patient', 'Who walked'), ('counts', 'Counts'), ('note', 'Note')], max_length=16, verbose_name='what')),
-                ('old', models.TextField(blank=True, verbose_name='before')),
-                ('new', models.TextField(blank=True, verbose_name='after')),
-                ('reason', models.TextField(verbose_name='reason')),
-                ('at', models.DateTimeField(verbose_name='at')),
-                ('by', models.ForeignKey(null=True, on_delete=django.db.models.deletion.SET_NULL, related_name='+', to=settings.AUTH_USER_MODEL, verbose_name='by')),
-                ('session', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='corrections', to='rehab.trainingsession')),
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                (
+                    "part",
+                    models.CharField(
+                        choices=[("patient", "Who walked"), ("counts", "Counts"), ("note", "Note")],
+                        max_length=16,
+                        verbose_name="what",
+                    ),
+                ),
+                ("old", models.TextField(blank=True, verbose_name="before")),
+                ("new", models.TextField(blank=True, verbose_name="after")),
+                ("reason", models.TextField(verbose_name="reason")),
+                ("at", models.DateTimeField(verbose_name="at")),
+                (
+                    "by",
+                    models.ForeignKey(
+                        null=True,
+                        on_delete=django.db.models.deletion.SET_NULL,
+                        related_name="+",
+                        to=settings.AUTH_USER_MODEL,
+                        verbose_name="by",
+                    ),
+                ),
+                (
+                    "session",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.PROTECT,
+                        related_name="corrections",
+                        to="rehab.trainingsession",
+                    ),
+                ),
             ],
             options={
-                'verbose_name': 'correction',
-                'verbose_name_plural': 'corrections',
-                'ordering': ['session', 'pk'],
-                'abstract': False,
-                'base_manager_name': 'everywhere',
-                'default_manager_name': 'everywhere',
+                "verbose_name": "correction",
+                "verbose_name_plural": "corrections",
+                "ordering": ["session", "pk"],
+                "abstract": False,
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
             },
             managers=[
-                ('everywhere', django.db.models.manager.Manager()),
+                ("everywhere", django.db.models.manager.Manager()),
             ],
         ),
         migrations.CreateModel(
-            name='Preset',
+            name="Preset",
             fields=[
-                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('name', models.CharField(max_length=64, verbose_name='name')),
-                ('valence', models.CharField(choices=[('positive', 'Positive'), ('negative', 'Negative'), ('binary', 'Binary'), ('explicit', 'Explicit')], max_length=16, verbose_name='feedback type')),
-                ('goal_by', models.CharField(choices=[('value', 'W/kg'), ('percent', '% of baseline')], default='value', max_length=8, verbose_name='goal is given as')),
-                ('goal_value', models.FloatField(blank=True, null=True, verbose_name='goal, W/kg')),
-                ('goal_percent', models.FloatField(blank=True, null=True, verbose_name='goal, % of baseline')),
-                ('wanted_hits', models.PositiveSmallIntegerField(blank=True, null=True, validators=[django.core.validators.MinValueValidator(1), django.core.validators.MaxValueValidator(100)], verbose_name='wanted hits, % of the steps')),
-                ('minutes', models.PositiveSmallIntegerField(blank=True, null=True, validators=[django.core.validators.MinValueValidator(1), django.core.validators.MaxValueValidator(240)], verbose_name='planned minutes')),
-                ('robot', models.CharField(choices=[('normal', 'Normal'), ('gentle', 'Gentle'), ('off', 'Off')], default='normal', max_length=16, verbose_name='robot')),
-                ('robot_above', models.CharField(default='(usual)', max_length=64, verbose_name='after five strong seconds')),
-                ('robot_below', models.CharField(default='(usual)', max_length=64, verbose_name='after five weak seconds')),
-                ('source', models.CharField(blank=True, choices=[('', 'As last time'), ('live', 'Live sensor'), ('synthetic good', 'Simulated patient, good'), ('synthetic poor', 'Simulated patient, poor'), ('synthetic fatiguing', 'Simulated patient, fatiguing'), ('synthetic dropout', 'Simulated patient, dropout')], max_length=64, verbose_name='steps come from')),
-                ('clinic', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='presets', to='rehab.clinic')),
-                ('protocol', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='presets', to='rehab.protocol', verbose_name='protocol')),
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("name", models.CharField(max_length=64, verbose_name="name")),
+                (
+                    "valence",
+                    models.CharField(
+                        choices=[
+                            ("positive", "Positive"),
+                            ("negative", "Negative"),
+                            ("binary", "Binary"),
+                            ("explicit", "Explicit"),
+                        ],
+                        max_length=16,
+                        verbose_name="feedback type",
+                    ),
+                ),
+                (
+                    "goal_by",
+                    models.CharField(
+                        choices=[("value", "W/kg"), ("percent", "% of baseline")],
+                        default="value",
+                        max_length=8,
+                        verbose_name="goal is given as",
+                    ),
+                ),
+                ("goal_value", models.FloatField(blank=True, null=True, verbose_name="goal, W/kg")),
+                (
+                    "goal_percent",
+                    models.FloatField(blank=True, null=True, verbose_name="goal, % of baseline"),
+                ),
+                (
+                    "wanted_hits",
+                    models.PositiveSmallIntegerField(
+                        blank=True,
+                        null=True,
+                        validators=[
+                            django.core.validators.MinValueValidator(1),
+                            django.core.validators.MaxValueValidator(100),
+                        ],
+                        verbose_name="wanted hits, % of the steps",
+                    ),
+                ),
+                (
+                    "minutes",
+                    models.PositiveSmallIntegerField(
+                        blank=True,
+                        null=True,
+                        validators=[
+                            django.core.validators.MinValueValidator(1),
+                            django.core.validators.MaxValueValidator(240),
+                        ],
+                        verbose_name="planned minutes",
+                    ),
+                ),
+                (
+                    "robot",
+                    models.CharField(
+                        choices=[("normal", "Normal"), ("gentle", "Gentle"), ("off", "Off")],
+                        default="normal",
+                        max_length=16,
+                        verbose_name="robot",
+                    ),
+                ),
+                (
+                    "robot_above",
+                    models.CharField(
+                        default="(usual)", max_length=64, verbose_name="after five strong seconds"
+                    ),
+                ),
+                (
+                    "robot_below",
+                    models.CharField(
+                        default="(usual)", max_length=64, verbose_name="after five weak seconds"
+                    ),
+                ),
+                (
+                    "source",
+                    models.CharField(
+                        blank=True,
+                        choices=[
+                            ("", "As last time"),
+                            ("live", "Live sensor"),
+                            ("synthetic good", "Simulated patient, good"),
+                            ("synthetic poor", "Simulated patient, poor"),
+                            ("synthetic fatiguing", "Simulated patient, fatiguing"),
+                            ("synthetic dropout", "Simulated patient, dropout"),
+                        ],
+                        max_length=64,
+                        verbose_name="steps come from",
+                    ),
+                ),
+                (
+                    "clinic",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.CASCADE,
+                        related_name="presets",
+                        to="rehab.clinic",
+                    ),
+                ),
+                (
+                    "protocol",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.CASCADE,
+                        related_name="presets",
+                        to="rehab.protocol",
+                        verbose_name="protocol",
+                    ),
+                ),
             ],
             options={
-                'verbose_name': 'preset',
-                'verbose_name_plural': 'presets',
-                'ordering': ['name'],
-                'abstract': False,
-                'base_manager_name': 'everywhere',
-                'default_manager_name': 'everywhere',
-                'constraints': [models.UniqueConstraint(fields=('clinic', 'name'), name='preset_name_once_per_clinic', violation_error_message='A preset of this name exists. Choose another name.')],
+                "verbose_name": "preset",
+                "verbose_name_plural": "presets",
+                "ordering": ["name"],
+                "abstract": False,
+                "base_manager_name": "everywhere",
+                "default_manager_name": "everywhere",
+                "constraints": [
+                    models.UniqueConstraint(
+                        fields=("clinic", "name"),
+                        name="preset_name_once_per_clinic",
+                        violation_error_message="A preset of this name exists. Choose another name.",
+                    )
+                ],
             },
             managers=[
-                ('everywhere', django.db.models.manager.Manager()),
+                ("everywhere", django.db.models.manager.Manager()),
             ],
         ),
     ]

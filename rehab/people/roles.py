@@ -39,7 +39,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "RecoveryCode": {},
     "Patient": {Role.LEAD: Right.EDIT, Role.PT: Right.EDIT},
     "Station": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
-    "Device": {Role.LEAD: Right.EDIT, Role.PT: Right.VIEW},
+    "Device": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
     "Pairing": {},
     "Measure": {
         Role.HOST: Right.EDIT,

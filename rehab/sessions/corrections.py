@@ -114,9 +114,7 @@ class CorrectionForm(forms.Form):
         )
         super().__init__(*args, **options)
         fields: dict[str, Any] = self.fields
-        fields["patient"].queryset = Patient.objects.visible_to(by).filter(
-            clinic=session.clinic_id
-        )
+        fields["patient"].queryset = Patient.objects.visible_to(by).filter(clinic=session.clinic_id)
 
     def clean_note(self) -> str:
         """Refuse the patient's name in the note."""
