@@ -5,6 +5,7 @@ from rehab.gestures.models import Gesture, GestureStep
 from rehab.people.factors import Authenticator, RecoveryCode
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.tokens import ApiToken
+from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.models import (
     Measure,
     Protocol,
@@ -14,6 +15,7 @@ from rehab.sessions.models import (
     Step,
     TrainingSession,
 )
+from rehab.sessions.presets import Preset
 from rehab.stations.models import Device, Station
 
 __all__ = [
@@ -28,9 +30,11 @@ __all__ = [
     "Leaderboard",
     "Measure",
     "Patient",
+    "Preset",
     "Protocol",
     "ProtocolPhase",
     "RecoveryCode",
+    "SessionCorrection",
     "SessionEvent",
     "SessionMetric",
     "Station",

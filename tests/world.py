@@ -18,6 +18,7 @@ from rehab.people.roles import Role
 from rehab.people.tokens import ApiToken
 from rehab.sessions.live.actor import Row, SessionActor
 from rehab.sessions.live.writer import Job, commit
+from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.models import (
     Measure,
     Protocol,
@@ -27,6 +28,7 @@ from rehab.sessions.models import (
     Step,
     TrainingSession,
 )
+from rehab.sessions.presets import Preset
 from rehab.sessions.services import create_session
 from rehab.stations.models import Device, Pairing, Station
 from rehab.training.changes import Change, ChangeKind
@@ -164,6 +166,21 @@ def build_world(name: str) -> World:
         step,
         patient,
         session,
+        SessionCorrection.everywhere.create(
+            session=session,
+            part="note",
+            new=mark(name, SessionCorrection),
+            reason=mark(name, SessionCorrection),
+            by=people[Role.PT],
+            at=NOW,
+        ),
+        Preset.everywhere.create(
+            clinic=clinic,
+            name=mark(name, Preset),
+            valence="binary",
+            goal_value=1.5,
+            protocol=protocol,
+        ),
         Step.everywhere.get(session=session, number=3),
         SessionEvent.everywhere.filter(session=session).first(),
         SessionMetric.everywhere.filter(session=session).first(),

@@ -40,7 +40,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "RecoveryCode": {},
     "Patient": {Role.LEAD: Right.EDIT, Role.PT: Right.EDIT},
     "Station": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
-    "Device": {Role.LEAD: Right.EDIT, Role.PT: Right.VIEW},
+    "Device": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
     "Pairing": {},
     "Measure": {
         Role.HOST: Right.EDIT,
@@ -60,6 +60,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
         Role.PT: Right.ALL,
         Role.RESEARCHER: Right.VIEW,
     },
+    "Preset": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "Gesture": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "GestureStep": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "TrainingSession": {
@@ -70,6 +71,11 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Step": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "SessionEvent": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "SessionMetric": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
+    "SessionCorrection": {
+        Role.LEAD: Right.VIEW | Right.ADD,
+        Role.PT: Right.VIEW | Right.ADD,
+        Role.RESEARCHER: Right.VIEW,
+    },
     "Leaderboard": {
         Role.HOST: Right.ALL,
         Role.LEAD: Right.ALL,

@@ -157,6 +157,7 @@ class TrainingSession(ClinicRow):
     ``plan`` is what every step is scored with; the columns beside it are there to be found by.
     ``state``, ``goal``, ``started_at``, ``ended_at`` and ``active_s`` follow from the log and are
     written together with its changes (``active_s`` of a running session is that of its last one).
+    Only a correction alters ``patient`` and ``left_out`` (``corrections.py``).
     """
 
     scope = Scope(clinic="clinic", station="station")
@@ -197,6 +198,9 @@ class TrainingSession(ClinicRow):
     started_at = models.DateTimeField(null=True, blank=True)
     ended_at = models.DateTimeField(null=True, blank=True)
     active_s = models.FloatField("walked (s)", default=0.0, help_text="Time without pauses.")
+    left_out = models.BooleanField(
+        default=False, editable=False, help_text="Corrected: in no figure, board or trend."
+    )
     # Its row in the original GARRY's database, where it was imported from there: without steps.
     original_id = models.BigIntegerField("imported session", null=True, editable=False)
     original = models.JSONField(null=True, editable=False)

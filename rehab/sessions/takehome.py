@@ -30,7 +30,8 @@ def sum_up_for_home(
     user: User, sessions: QuerySet[TrainingSession], now: datetime
 ) -> dict[str, Any]:
     """Give the words and figures of somebody's finished sessions; ``now`` is the clinic's clock."""
-    walked = sessions.filter(metrics__slug="hit_rate").order_by("created_at", "pk").distinct()
+    counted = sessions.filter(metrics__slug="hit_rate", left_out=False)
+    walked = counted.order_by("created_at", "pk").distinct()
     last = walked.last()
     alike = walked.filter(measure=last.measure) if last else walked
     first = alike.first()

@@ -20,4 +20,5 @@ urlpatterns = [
     path("sessions/<int:session_id>/", walk.show_walk, name="walk"),
     path("sessions/<int:session_id>/monitor/", monitor.show_monitor, name="monitor"),
     path("sessions/<int:session_id>/details/", history.show_session, name="session"),
+    path("sessions/<int:session_id>/correct/", history.correct, name="correct"),
 ]
