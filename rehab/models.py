@@ -14,7 +14,8 @@ from rehab.sessions.models import (
     Step,
     TrainingSession,
 )
-from rehab.stations.models import Device, Station
+from rehab.sessions.visits import Visit
+from rehab.stations.models import Device, LeaveTries, Station
 
 __all__ = [
     "ApiToken",
@@ -26,6 +27,7 @@ __all__ = [
     "Gesture",
     "GestureStep",
     "Leaderboard",
+    "LeaveTries",
     "Measure",
     "Patient",
     "Protocol",
@@ -37,4 +39,5 @@ __all__ = [
     "Step",
     "TrainingSession",
     "User",
+    "Visit",
 ]

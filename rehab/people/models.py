@@ -12,6 +12,7 @@ from django.core.exceptions import ValidationError
 from django.core.validators import MaxValueValidator, MinValueValidator
 from django.db import models
 from django.db.models import Q
+from django.utils.translation import gettext_lazy as _
 
 from rehab.people.aliases import draw_alias
 from rehab.people.roles import Role
@@ -133,6 +134,14 @@ class ScreenSide(models.TextChoices):
     CENTER = "center", "all of it in the middle, smaller"
 
 
+class ScreenText(models.TextChoices):
+    """How large the patient's page writes."""
+
+    NORMAL = "normal", _("normal")
+    LARGE = "large", _("large")
+    LARGEST = "largest", _("largest")
+
+
 class Boards(models.TextChoices):
     """Which leaderboards a patient has agreed to stand on; each includes those before it."""
 
@@ -166,6 +175,9 @@ class Patient(ClinicRow):
     language = models.CharField(max_length=8, choices=LANGUAGES, default="en")
     screen_side = models.CharField(
         "thermometer", max_length=8, choices=ScreenSide.choices, default=ScreenSide.RIGHT
+    )
+    screen_text = models.CharField(
+        _("size of words"), max_length=8, choices=ScreenText.choices, default=ScreenText.NORMAL
     )
     screen_still = models.BooleanField(
         "calm page", default=False, help_text="No confetti, and nothing moves but the level."
