@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from datetime import datetime
 from itertools import groupby
@@ -72,7 +73,7 @@ def _sum_up(plan: SessionPlan, review: Review, point: Point | None) -> list[tupl
     return [
         (_("Hit rate"), say_rate(figures["hit_rate"]), wanted),
         (
-            _("Mean %(measure)s with feedback") % {"measure": plan.measure.name},
+            _("Mean with feedback"),
             say_quantity(walked.mean if walked else None, unit),
             against,
         ),
@@ -186,7 +187,8 @@ def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
     if not numbers:
         return {}
     known = [value for value in (*shown, *goals) if value is not None]
-    top: float = 1.08 * max(known, default=1.0) or 1.0
+    highest: float = max(known, default=1.0)
+    top = 1.08 * highest if highest > 0 else 1.0
     first, span = numbers[0], max(1, numbers[-1] - numbers[0])
 
     def x(number: float) -> float:
@@ -231,14 +233,18 @@ def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
             }
             for phase in chart["phases"]
         ],
-        "levels": [
-            {"y": round(y(top * share), 1), "words": say_number(top * share, 1)}
-            for share in (0.25, 0.5, 0.75)
-        ],
+        "levels": [{"y": round(y(value), 1), "words": f"{value:g}"} for value in _even_values(top)],
         "first": numbers[0],
         "last": numbers[-1],
         "strides": len(numbers),
     }
+
+
+def _even_values(top: float) -> list[float]:
+    """Give values that are easy to say, three to seven of them below the top."""
+    size = 10.0 ** math.floor(math.log10(top))
+    step = next(step for step in (size / 5, size / 2, size, 2 * size) if top / step < 8)
+    return [round(step * count, 10) for count in range(1, math.ceil(top / step))]
 
 
 def moment_of(session: TrainingSession) -> datetime:

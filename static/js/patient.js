@@ -52,7 +52,7 @@ const live = connect(body.dataset.socket, {
     else note();
   },
 });
-const showRobot = createControls(body, live, (asking) => {
+const { showRobot, keepFocus } = createControls(body, live, (asking) => {
   page.asking = asking;
   redraw();
 });
@@ -77,10 +77,12 @@ function draw() {
   const now = look(session, page);
   const theme = now === "feedback" ? session.phase.theme : "calm";
   if (body.dataset.theme !== theme) body.dataset.theme = theme;
-  if (body.dataset.look !== now) body.dataset.look = now;
+  const changed = body.dataset.look !== now;
+  if (changed) body.dataset.look = now;
   if (now !== "paused" && now !== "ask") page.asking = false;
   drawFeedback(now, session, why);
   if (session) showRobot(session);
+  if (changed) keepFocus();
   if (now !== "feedback") fitCalm();
   if (now === "feedback") {
     const { last, steps } = session;

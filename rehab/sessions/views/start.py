@@ -89,7 +89,11 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
         "form": SessionForm(initial=initial, patient=patient, by=user),
         "last": initial,
         "visits": visits,
-        "soon": [(days, today + timedelta(days=days)) for days in SOON_DAYS],
+        "soon": [
+            (days, today + timedelta(days=days))
+            for days in SOON_DAYS
+            if days or all(row.patient != patient for row in lists["today"])
+        ],
         "at": usual_time(user, patient, lists["now"]),
     }
     return render(request, "sessions/start.html", context)
