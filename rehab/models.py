@@ -16,7 +16,8 @@ from rehab.sessions.models import (
     TrainingSession,
 )
 from rehab.sessions.presets import Preset
-from rehab.stations.models import Device, Station
+from rehab.sessions.visits import Visit
+from rehab.stations.models import Device, LeaveTries, Station
 
 __all__ = [
     "ApiToken",
@@ -28,6 +29,7 @@ __all__ = [
     "Gesture",
     "GestureStep",
     "Leaderboard",
+    "LeaveTries",
     "Measure",
     "Patient",
     "Preset",
@@ -41,4 +43,5 @@ __all__ = [
     "Step",
     "TrainingSession",
     "User",
+    "Visit",
 ]

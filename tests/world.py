@@ -30,7 +30,8 @@ from rehab.sessions.models import (
 )
 from rehab.sessions.presets import Preset
 from rehab.sessions.services import create_session
-from rehab.stations.models import Device, Pairing, Station
+from rehab.sessions.visits import Visit
+from rehab.stations.models import Device, LeaveTries, Pairing, Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.steps import Measurement, Side
@@ -198,6 +199,8 @@ def build_world(name: str) -> World:
             user=people[Role.PT], kind="app", name=mark(name, Authenticator), material="-"
         ),
         RecoveryCode.everywhere.create(user=people[Role.PT], digest=mark(name, RecoveryCode)),
+        LeaveTries.everywhere.create(station=station, who=f"tablet {device.pk}", open_at=NOW),
+        Visit.everywhere.create(clinic=clinic, patient=patient, day=NOW.date()),
         Pairing.everywhere.create(
             code=f"P{clinic.pk}",
             secret_hash=f"pairing-{name}",

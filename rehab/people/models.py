@@ -158,6 +158,14 @@ class ScreenSide(models.TextChoices):
     CENTER = "center", _("all of it in the middle, smaller")
 
 
+class ScreenText(models.TextChoices):
+    """How large the patient's page writes."""
+
+    NORMAL = "normal", _("normal")
+    LARGE = "large", _("large")
+    LARGEST = "largest", _("largest")
+
+
 class Boards(models.TextChoices):
     """Which leaderboards a patient has agreed to stand on; each includes those before it."""
 
@@ -197,6 +205,9 @@ class Patient(ClinicRow):
     language = models.CharField(_("language"), max_length=8, choices=LANGUAGES, default="en")
     screen_side = models.CharField(
         _("thermometer"), max_length=8, choices=ScreenSide.choices, default=ScreenSide.RIGHT
+    )
+    screen_text = models.CharField(
+        _("size of words"), max_length=8, choices=ScreenText.choices, default=ScreenText.NORMAL
     )
     screen_still = models.BooleanField(
         _("calm page"), default=False, help_text=_("No confetti, and nothing moves but the level.")

@@ -42,6 +42,8 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Station": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
     "Device": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
     "Pairing": {},
+    "LeaveTries": {},
+    "Visit": {Role.LEAD: Right.ALL, Role.PT: Right.ALL},
     "Measure": {
         Role.HOST: Right.EDIT,
         Role.LEAD: Right.EDIT,

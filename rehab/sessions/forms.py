@@ -65,8 +65,8 @@ class ScreenForm(forms.ModelForm):
 
     class Meta:
         model = Patient
-        fields: ClassVar = ["screen_side", "screen_still", "screen_sounds"]
-        widgets: ClassVar = {"screen_side": forms.RadioSelect}
+        fields: ClassVar = ["screen_side", "screen_text", "screen_still", "screen_sounds"]
+        widgets: ClassVar = {"screen_side": forms.RadioSelect, "screen_text": forms.RadioSelect}
 
 
 def list_recordings() -> list[Path]:

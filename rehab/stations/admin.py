@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from django import forms
 from django.contrib import admin
 from django.contrib.admin import RelatedOnlyFieldListFilter
+from django.core.exceptions import ValidationError
 from django.db.models import Prefetch, QuerySet
 from django.http import HttpRequest
 from django.urls import reverse
@@ -14,8 +16,9 @@ from django.utils.html import format_html_join
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.admin_base import ScopedAdmin, ScopedOptions, TokenAdmin
+from rehab.people.admin_base import ClinicForm, ScopedAdmin, ScopedOptions, TokenAdmin
 from rehab.stations.models import Device, Station
+from rehab.stations.pins import LONGEST, set_pin
 from rehab.stations.presence import say_state
 
 
@@ -48,11 +51,39 @@ class DeviceRows(ScopedOptions, admin.TabularInline):
         return say_state(device, timezone.now())
 
 
+class StationForm(ClinicForm):
+    """A station with its PIN, which is written and never read."""
+
+    pin = forms.CharField(
+        label=_("new PIN to leave the patient’s page"),
+        required=False,
+        max_length=LONGEST,
+        widget=forms.PasswordInput(attrs={"inputmode": "numeric", "autocomplete": "new-password"}),
+        help_text=_(
+            "Four to eight digits, asked for at this station’s tablet. Empty: stays as it is."
+        ),
+    )
+    no_pin = forms.BooleanField(label=_("no PIN: leaving asks a plain question"), required=False)
+
+    def clean(self) -> dict[str, Any] | None:
+        """Take the PIN; only its hash is kept."""
+        data = super().clean()
+        pin = self.cleaned_data.get("pin", "")
+        try:
+            if pin or self.cleaned_data.get("no_pin"):
+                set_pin(self.instance, pin)
+        except ValueError as problem:
+            raise ValidationError({"pin": str(problem)}) from problem
+        return data
+
+
 @admin.register(Station)
 class StationAdmin(ScopedAdmin):
     """Stations of the clinic, each with what belongs there."""
 
-    list_display = ("name", "tablets", "sources", "robots")
+    form = StationForm
+    fields = ("name", "pin", "no_pin")
+    list_display = ("name", "tablets", "sources", "robots", "has_pin")
     search_fields = ("name", "devices__name")
     inlines = (DeviceRows,)
 
@@ -92,6 +123,11 @@ class StationAdmin(ScopedAdmin):
             if device.kind == kind
         ]
         return format_html_join(", ", "{}: {}", found) or gettext("none")
+
+    @admin.display(description=_("PIN to leave"), boolean=True)
+    def has_pin(self, station: Station) -> bool:
+        """Whether leaving the patient's page asks for a PIN."""
+        return bool(station.pin_hash)
 
 
 @admin.register(Device)

@@ -71,7 +71,14 @@ def may_read(actor: Actor, model: type[Model], clinic: str) -> bool:
     if model.__name__ == "ApiToken":
         return actor.role == "lead"
     if actor.role == "researcher":
-        return model.__name__ not in {"Patient", "User", "Clinic", "Station", "Device"}
+        return model.__name__ not in {
+            "Patient",
+            "User",
+            "Clinic",
+            "Station",
+            "Device",
+            "Visit",
+        }
     return actor.role in {"lead", "pt"}
 
 
