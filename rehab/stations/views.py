@@ -15,7 +15,7 @@ from rehab.stations.models import Station
 from rehab.stations.pairing import PairingRefused, approve
 
 
-@for_roles(Role.LEAD, Role.PT)
+@for_roles(Role.LEAD, Role.PT, patients=False)
 @require_http_methods(["GET", "HEAD", "POST"])
 def pair(request: HttpRequest) -> HttpResponse:
     """Approve the tablet that shows a code, for a station of the person's own clinic."""

@@ -16,7 +16,7 @@ from rehab.people.forms import NewPasswordForm
 from rehab.people.roles import Role
 
 
-@for_roles(*Role)
+@for_roles(*Role, patients=False)
 @never_cache
 @require_safe
 def show_account(request: HttpRequest) -> HttpResponse:
@@ -32,7 +32,7 @@ def show_account(request: HttpRequest) -> HttpResponse:
     return render(request, "people/account.html", context)
 
 
-@for_roles(*Role)
+@for_roles(*Role, patients=False)
 @never_cache
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
