@@ -5,11 +5,13 @@ need now, without words. Clinics that exist go on without consent to research un
 it; new ones begin with it.
 """
 
+from typing import Any
+
 from django.db import migrations
 from django.utils import timezone
 
 
-def carry_over(apps, schema_editor):
+def carry_over(apps: Any, schema_editor: Any) -> None:
     Clinic, Patient, Consent = (
         apps.get_model("rehab", name) for name in ("Clinic", "Patient", "Consent")
     )

@@ -50,7 +50,10 @@ class ClinicAdmin(ScopedAdmin):
     """Clinics: the host adds them, a lead keeps the details of the own one."""
 
     list_display = ("name", "language", "time_zone")
-    fields = ("name", "language", "time_zone", "boards_across", "second_factor_required")
+    fields = (
+        *("name", "language", "time_zone", "boards_across", "second_factor_required"),
+        *("research_needs_consent", "keep_months", "keep_log_months"),
+    )
 
 
 class NewAccountForm(AdminUserCreationForm):
@@ -150,7 +153,7 @@ class PatientAdmin(ScopedAdmin):
     list_display = ("nickname", "code", "paretic_side", "language", "boards", "created_at")
     list_filter = ("paretic_side", "language", "boards")
     search_fields = ("nickname", "code")
-    readonly_fields = ("pseudonym", "alias", "created_at")
+    readonly_fields = ("pseudonym", "alias", "created_at", "ended_at", "erased_at")
     fields = (
         "code",
         "nickname",
@@ -162,6 +165,8 @@ class PatientAdmin(ScopedAdmin):
         "blinded",
         "pseudonym",
         "created_at",
+        "ended_at",
+        "erased_at",
     )
     actions = ("draw_aliases",)
 

@@ -86,13 +86,19 @@ class AuditEntry(ScopedModel):
     )
     through = models.CharField(_("by which program or device"), max_length=64, blank=True)
     act = models.CharField(_("what"), max_length=16, choices=Act.choices)
+    # The log outlives what it tells of: a row that goes takes nothing from it.
     patient = models.ForeignKey(
-        Patient, on_delete=models.PROTECT, related_name="+", null=True, verbose_name=_("whose")
+        Patient,
+        on_delete=models.DO_NOTHING,
+        db_constraint=False,
+        related_name="+",
+        null=True,
+        verbose_name=_("whose"),
     )
     about = models.CharField(_("where in GARRY"), max_length=200, blank=True)
     address = models.CharField(_("from"), max_length=45, blank=True)
 
-    everywhere = models.Manager.from_queryset(Appended)()
+    everywhere: ClassVar[Any] = models.Manager.from_queryset(Appended)()
     objects: ClassVar[VisibleEntries] = VisibleEntries()
 
     class Meta(ScopedModel.Meta):

@@ -102,7 +102,7 @@ def doer() -> tuple[User | None, str]:
     return None, "" if tablet is None else str(tablet)[:64]
 
 
-def track(*tracked: type[ScopedModel]) -> None:
+def track(*tracked: type[Any]) -> None:
     """Keep the history of these models from the start of the process on."""
     for model in tracked:
         pre_save.connect(_look, sender=model)
@@ -194,4 +194,5 @@ def clinic_id_of(row: ScopedModel) -> int | None:
     owner: Any = row
     for step in row.scope.clinic.split("__"):
         owner = getattr(owner, step)
-    return owner.pk if isinstance(owner, Model) else owner
+    key: int | None = owner.pk if isinstance(owner, Model) else owner
+    return key

@@ -49,6 +49,8 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
         patients = patients.filter(nickname__icontains=words) | patients.filter(
             code__icontains=words
         )
+    else:  # whose programme has ended is found by name or code
+        patients = patients.filter(ended_at=None)
     context = {"patients": patients[:SHOWN], "open": open_sessions(user), "q": words}
     return render(request, "sessions/start.html", context)
 
@@ -59,10 +61,11 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Offer a patient the session like last time, another one, or the past ones."""
     user = person(request)
     patient = get_object_or_404(patients_of(user), pk=patient_id)
+    listed = patients_of(user).filter(ended_at=None)
     first_station(patient.clinic)
     initial = like_last_time(patient, user)
     context = {
-        "patients": patients_of(user)[:SHOWN],
+        "patients": listed[:SHOWN],
         "patient": patient,
         "open": open_sessions(user),
         "open_here": open_sessions(user).filter(patient=patient),

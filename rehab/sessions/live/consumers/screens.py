@@ -172,8 +172,8 @@ class ScreenConsumer(Socket):
                 session.stop_robot(by, timezone.now(), device)
         elif by is not None:
             self.start(_until_stored([s.arm_robot(by, timezone.now()) for s in sessions]))
-        act = Act.ROBOT_STOP if order == "stop" else Act.ROBOT_ARM
         if by is not None or order == "stop":  # beside the socket: no robot waits for the log
+            act = Act(f"robot_{order}")
             self.runtime.do_beside(note(act, self.actor, live.id, self.scope))
 
     async def _refuse(self, mark: str, code: str, message: str) -> None:
