@@ -12,13 +12,16 @@ from django.db.models import Model
 
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.gestures.models import Gesture, GestureStep
+from rehab.people.audit import AuditEntry
+from rehab.people.consent import Consent, ConsentText, Purpose, give
 from rehab.people.factors import Authenticator, RecoveryCode
+from rehab.people.history import HistoryEntry
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.tokens import ApiToken
+from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.live.actor import Row, SessionActor
 from rehab.sessions.live.writer import Job, commit
-from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.models import (
     Measure,
     Protocol,
@@ -126,6 +129,9 @@ def build_world(name: str) -> World:
         paretic_side="left",
         boards="clinic",
     )
+    text = ConsentText.everywhere.create(clinic=clinic, version=1, text=mark(name, ConsentText))
+    for purpose in (Purpose.BOARDS, Purpose.RESEARCH):
+        give(patient, purpose, people[Role.PT], NOW)
     session = create_session(
         patient,
         valence="positive",
@@ -188,6 +194,10 @@ def build_world(name: str) -> World:
         board,
         BoardEntry.everywhere.get(board=board),
         BoardCount.everywhere.get(board=board),
+        text,
+        Consent.everywhere.filter(patient=patient).last(),
+        AuditEntry.everywhere.create(clinic=clinic, act="view", about=mark(name, AuditEntry)),
+        HistoryEntry.everywhere.get(noun="Patient", row=patient.pk),
         ApiToken.everywhere.create(
             clinic=clinic,
             user=people[Role.PT],

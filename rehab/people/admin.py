@@ -54,7 +54,10 @@ class ClinicAdmin(ScopedAdmin):
 
     list_display = ("name", "language", "time_zone", "second_factor_required", "boards_across")
     search_fields = ("name",)
-    fields = ("name", "language", "time_zone", "boards_across", "second_factor_required")
+    fields = (
+        *("name", "language", "time_zone", "boards_across", "second_factor_required"),
+        *("research_needs_consent", "keep_months", "keep_log_months"),
+    )
 
 
 class NewAccountForm(AdminUserCreationForm):
@@ -187,8 +190,10 @@ class PatientAdmin(ScopedAdmin):
         "blinded",
         "pseudonym",
         "created_at",
+        "ended_at",
+        "erased_at",
     )
-    readonly_fields = ("alias", "pseudonym", "created_at")
+    readonly_fields = ("alias", "pseudonym", "created_at", "ended_at", "erased_at")
     actions = row_actions = ("draw_aliases",)
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Patient]:

@@ -8,13 +8,15 @@ from django import forms
 from django.contrib import admin, messages
 from django.db import models
 from django.db.models import QuerySet
-from django.http import HttpRequest, HttpResponse, HttpResponseBase
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import redirect
+from django.template.response import TemplateResponse
 from django.utils import timezone
-from django.utils.translation import gettext
+from django.utils.translation import gettext, ngettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import person
+from rehab.people.changes import changes_of
 from rehab.people.roles import Right, Role, rights_of
 from rehab.people.scope import ScopedModel, visible
 from rehab.people.tokens import TokenRow
@@ -167,6 +169,23 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
                 gone.append(words % named)
         return (gone, *others)
 
+    def history_view(
+        self, request: HttpRequest, object_id: str, extra_context: Any = None
+    ) -> HttpResponse:
+        """Tell who changed what of a row, to those who may see the row."""
+        row = self.get_object(request, object_id)
+        if row is None or not self.has_view_permission(request, row):
+            raise Http404
+        parts = [inline.model for inline in self.get_inline_instances(request, row)]
+        context = {
+            **self.admin_site.each_context(request),
+            "title": gettext("Changes: %(row)s") % {"row": row},
+            "object": row,
+            "opts": self.opts,
+            "changes": changes_of(request.user, row, parts),
+        }
+        return TemplateResponse(request, "people/changes.html", context)
+
 
 class TokenAdmin(ScopedAdmin):
     """Pages of rows that are known by a token. It is shown once, when it is made."""
@@ -193,12 +212,16 @@ class TokenAdmin(ScopedAdmin):
     @admin.action(description=_("Revoke tokens"), permissions=["change"])
     def revoke_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:
         """Close the door to the chosen rows."""
-        count = holders.filter(revoked_at__isnull=True).update(revoked_at=timezone.now())
-        messages.success(request, gettext("Tokens revoked: %(count)s.") % {"count": count})
+        open_ones = list(holders.filter(revoked_at__isnull=True))
+        for holder in open_ones:  # one by one: it is kept who did it
+            holder.revoked_at = timezone.now()
+            holder.save(update_fields=["revoked_at"])
+        said = ngettext("%(count)d token revoked.", "%(count)d tokens revoked.", len(open_ones))
+        messages.success(request, said % {"count": len(open_ones)})
 
     def _show(self, request: HttpRequest, holder: TokenRow, token: str) -> None:
-        words = gettext("Token of %(holder)s, shown this one time only: %(token)s")
-        messages.warning(request, words % {"holder": holder, "token": token})
+        said = gettext("Token of %(holder)s, shown this one time only: %(token)s")
+        messages.warning(request, said % {"holder": holder, "token": token})
 
 
 class ReadOnlyAdmin(ScopedAdmin):

@@ -19,7 +19,7 @@ from rehab.stations.pins import PinRefused, check_pin
 from rehab.stations.tablets import COOKIE
 
 
-@for_roles(Role.LEAD, Role.PT)
+@for_roles(Role.LEAD, Role.PT, patients=False)
 @require_http_methods(["GET", "HEAD", "POST"])
 def pair(request: HttpRequest) -> HttpResponse:
     """Approve the tablet that shows a code, for a station of the person's own clinic."""
