@@ -1,6 +1,7 @@
 """Gathers the rooms' models, nothing else."""
 
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.people.factors import Authenticator, RecoveryCode
 from rehab.people.models import Clinic, Patient, User
@@ -23,6 +24,8 @@ __all__ = [
     "BoardEntry",
     "Clinic",
     "Device",
+    "FeedbackBand",
+    "FeedbackType",
     "Gesture",
     "GestureStep",
     "Leaderboard",

@@ -52,8 +52,7 @@ class Repertoire:
 
     def find(self, name: str) -> tuple[Gesture | None, str]:
         """Give the gesture of that name, or why there is none."""
-        if name in self._came:
-            gesture = self._came[name]
-            return gesture, "" if gesture else BAD_GESTURE
-        gesture = self.own.get(name)
-        return gesture, "" if gesture else UNKNOWN_GESTURE
+        gesture = self.own.get(name) or self._came.get(name)
+        if gesture is not None:
+            return gesture, ""
+        return None, BAD_GESTURE if name in self._came else UNKNOWN_GESTURE

@@ -61,6 +61,8 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     },
     "Gesture": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "GestureStep": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
+    "FeedbackType": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
+    "FeedbackBand": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "TrainingSession": {
         Role.LEAD: Right.VIEW,
         Role.PT: Right.VIEW,

@@ -6,13 +6,13 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.views.decorators.http import require_http_methods
 
+from rehab.feedback.valences import valences_of
 from rehab.people.access import for_roles, person
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.forms import SessionForm, like_last_time, minutes_of
 from rehab.sessions.models import Protocol
 from rehab.stations.builtin import first_station
-from rehab.training.valences import VALENCES
 
 # Where the person who set the session up goes on.
 PLACES = ("walk", "monitor")
@@ -37,7 +37,7 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
     context = {
         "patient": patient,
         "form": form,
-        "valences": VALENCES.values(),
+        "valences": valences_of(patient.clinic_id).values(),
         "lengths": lengths,
     }
     return render(request, "sessions/setup.html", context)
