@@ -12,10 +12,12 @@ class RehabConfig(AppConfig):
     default_auto_field = "django.db.models.BigAutoField"
 
     def ready(self) -> None:
-        """Register the checks, the shared rows of every database, and what boards listen to."""
+        """Register the checks, the shared rows of every database, and what listens."""
         from rehab import checks  # noqa: F401
         from rehab.boards.watching import watch
         from rehab.sessions.defaults import install_defaults
+        from rehab.sessions.rewording import listen
 
         post_migrate.connect(install_defaults, sender=self)
         watch()
+        listen()

@@ -59,7 +59,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         "start_time",
         "duration",
         "patient",
-        "valence",
+        "types",
         "goal_value",
         "score",
         "hit_rate",
@@ -74,7 +74,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         "date",
         "start_time",
         "duration",
-        "valence",
+        "types",
         "goal_value",
         "score",
         "hit_rate",
@@ -136,6 +136,11 @@ class TrainingSessionAdmin(ScopedAdmin):
         """Give the walked time in minutes and seconds."""
         minutes, seconds = divmod(round(session.active_s), 60)
         return f"{minutes}:{seconds:02d}"
+
+    @admin.display(description="feedback type", ordering="valence")
+    def types(self, session: TrainingSession) -> str:
+        """Give the feedback type, and those it was changed to."""
+        return session.types_words
 
     @admin.display(description="goal", ordering="goal")
     def goal_value(self, session: TrainingSession) -> str | None:

@@ -289,6 +289,7 @@ def phase_event(fold: SessionFold, *, switched: bool = False) -> LiveEvent:
 
 def change_event(fold: SessionFold, kind: ChangeKind, value: Value = None) -> LiveEvent:
     """Give the event of any change that a person made."""
+    told: Message
     match kind:
         case ChangeKind.GOAL:
             value, told = fold.goal, {"goal": fold.goal}

@@ -156,9 +156,9 @@ class TrainingSession(ClinicRow):
     """One sitting of one patient, who is the same from its creation to its end.
 
     ``plan`` is what every step is scored with; the columns beside it are there to be found by.
-    ``state``, ``goal``, ``started_at``, ``ended_at``, ``changed_to`` and ``active_s`` follow from the
-    log and are written together with its changes (``active_s`` of a running session is that of its
-    last one). ``valence`` is the feedback type it began with.
+    ``state``, ``goal``, ``started_at``, ``ended_at``, ``changed_to`` and ``active_s`` follow from
+    the log and are written together with its changes (``active_s`` of a running session is that of
+    its last one). ``valence`` is the feedback type it began with.
     """
 
     scope = Scope(clinic="clinic", station="station")
@@ -314,7 +314,7 @@ class SessionEvent(ScopedModel):
     Rows are only added.
 
     ``data``: what the robot reported; which device stopped it where that was no person; as
-    ``value`` (and ``old``) what a change was to that is no number: a name, or words with their type.
+    ``value`` (and ``old``) what a change was to that is no number: a name, or words and their type.
     """
 
     scope = Scope(clinic="session__clinic", station="session__station")

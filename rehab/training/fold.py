@@ -299,9 +299,10 @@ class SessionFold:
 
 
 def _needed(change: Change) -> float:
-    if isinstance(change.value, bool) or not isinstance(change.value, int | float):
+    value: object = change.value  # JSON knows true and false beside numbers
+    if isinstance(value, bool) or not isinstance(value, int | float):
         raise InvalidSetting(f"The change '{change.kind}' needs a value, and that is a number.")
-    return change.value
+    return value
 
 
 def _switch(value: float) -> bool:

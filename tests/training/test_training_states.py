@@ -54,7 +54,7 @@ NUMBERS = {
     K.ROBOT_INTENSITY: 0.0,
     K.WORDS_SHOWN: 0.0,
 }
-VALUES: dict[K, Value] = {
+VALUES: dict[ChangeKind, Value] = {
     **NUMBERS,
     K.VALENCE: "negative",
     K.CHART_STYLE: "line",

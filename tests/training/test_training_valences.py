@@ -199,15 +199,12 @@ def test_a_clinic_words_and_pays_a_valence_in_its_own_way() -> None:
         ("positive", {"bands": (Band(0, "x" * 61), Band(1, "y"))}, "at most 60 characters"),
         ("positive", {"bands": (Band(0, "a"),)}, "begin at 1, the goal"),
         ("explicit", {"bands": tuple(Band(n, "a") for n in range(13))}, "at most 12 bands"),
-        ("happy", {}, "no valence"),
     ],
 )
 def test_no_edit_makes_another_rule_set_of_a_valence(
     slug: str, changes: dict[str, object], why: str
 ) -> None:
     with pytest.raises(InvalidSetting, match=why):
-        if slug == "happy":
-            edit_valence(slug, hit_points=1, miss_points=0, bands=(), cue=Cue())
         edited(slug, **changes)
 
 

@@ -11,6 +11,7 @@ from django.db.models import Count, Sum
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
 from django.utils import timezone
+from django.utils.translation import gettext
 from django.views.decorators.http import require_safe
 
 from rehab.people.access import for_roles, person
@@ -151,6 +152,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
                 "hit_rate_words": say_rate(phase["hit_rate"]),
                 "mean_words": say_number(phase["mean"]),
                 "performance_words": say_rate(phase["mean_performance"]),
+                "type_words": gettext(VALENCES[phase["valence"]].label) if phase["valence"] else "",
             }
             for phase in review.figures["phases"]
         ],
