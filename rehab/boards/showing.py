@@ -9,6 +9,7 @@ from datetime import datetime
 from django.utils import timezone
 
 from rehab.boards import entries
+from rehab.boards.building import builder
 from rehab.boards.choosing import choose
 from rehab.boards.figures import keeps, read_figures, read_own, standing_on
 from rehab.boards.models import Leaderboard
@@ -18,6 +19,7 @@ from rehab.people.models import Clinic, Patient
 from rehab.sessions.models import TrainingSession
 
 OWN = "These are your own sessions."
+BUILT = "This board is being built."
 FEW = "Fewer than {} people so far."
 
 
@@ -101,6 +103,9 @@ class Viewer:
         board, patient = self.board, self.patient
         if board.is_own:
             return self._show_own("")
+        if self.stored and board.is_being_built:
+            builder.wake()  # whoever was at it may have been stopped
+            return self._show_own(f"{BUILT} {OWN}" if patient else BUILT)
         standings = self._standings()
         people = f"{standings.count} patient{'' if standings.count == 1 else 's'} on it now."
         if standings.count < board.min_participants:
