@@ -19,6 +19,7 @@ from django.utils.decorators import method_decorator
 from django.views.decorators.clickjacking import xframe_options_sameorigin
 from django.views.decorators.http import require_safe
 
+from rehab.boards import entries
 from rehab.boards.forms import LeaderboardForm
 from rehab.boards.models import Leaderboard
 from rehab.boards.showing import Viewer
@@ -126,6 +127,8 @@ class LeaderboardAdmin(ScopedAdmin):
     ) -> HttpResponse:
         """Show the form; patients to see the preview as stand beside it."""
         context["seen_as"] = self._walkers(request)[:SEEN_AS]
+        board: Leaderboard | None = kwargs.get("obj")
+        context["built"] = None if board is None else entries.measure_progress(board)
         return super().render_change_form(request, context, *args, **kwargs)
 
     @method_decorator(require_safe)
