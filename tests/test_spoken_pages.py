@@ -43,7 +43,7 @@ class Pseudo(gettext.NullTranslations):
         self._catalog: dict[str, str] = {}
 
     def gettext(self, message: str) -> str:
-        context, _, text = message.rpartition("\x04")
+        text = message.rpartition("\x04")[2]
         return f"⟦{text}⟧" if text else ""
 
     def ngettext(self, msgid1: str, msgid2: str, n: int) -> str:
@@ -87,9 +87,8 @@ class Page(HTMLParser):
                 self.numbers += [(f"{tag} {name}", one) for one in re.split(r"[ ,]+", value)]
             elif name.startswith("data-") and re.fullmatch(r"-?\d+,\d+", value):
                 self.numbers.append((f"{tag} {name}", value))
-            elif tag == "input" and given.get("type") == "number":
-                if name in {"min", "max", "step", "value"} and value not in {"", "any"}:
-                    self.numbers.append((f"{tag} {name}", value))
+            elif given.get("type") == "number" and name in {"min", "max", "step", "value"}:
+                self.numbers += [(f"{tag} {name}", value)] * (value not in {"", "any"})
         self._json = tag == "script" and given.get("type") in {"application/json", "importmap"}
         silent = tag in {"script", "style", "code", "pre"} or given.get("translate") == "no"
         if tag == "option" and given.get("lang"):
@@ -123,20 +122,21 @@ def world() -> World:
     again = TrainingSession.everywhere.get(pk=world.session.pk)
     again.pk, again.state = None, State.READY.value
     again.save()
-    world.rows[State] = again
     return world
 
 
 @pytest.fixture
 def bracketed(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
     """Have pages in a language that shows what was not marked."""
-    monkeypatch.setitem(trans_real._translations, "es", Pseudo())
+    monkeypatch.setitem(vars(trans_real)["_translations"], "es", Pseudo())
 
 
 def paths(world: World, admin: bool) -> Iterator[tuple[str, str]]:
     """Give the pages of one clinic, by name."""
     keys = {"patient_id": [world.patient.pk]}
-    keys["session_id"] = [world.session.pk, world.rows[State].pk]
+    keys["session_id"] = list(
+        TrainingSession.everywhere.filter(patient=world.patient).values_list("pk", flat=True)
+    )
     for name, _, pattern in walk(get_resolver()):
         if name in MACHINE or name.startswith("api") or admin != name.startswith("admin:"):
             continue
