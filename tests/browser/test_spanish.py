@@ -1,4 +1,4 @@
-"""A session in Spanish: a Spanish-speaking therapist and patient, and one where only the latter is."""
+"""A session of a patient who speaks Spanish, with a therapist who does, and with one who does not."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ READ = """() => {
       if (element.checkVisibility() || element.closest("svg")) said.push(words);
   }
   for (const name of ["aria-label", "title", "placeholder", "alt"])
-    for (const element of document.querySelectorAll(`[${name}]`)) said.push(element.getAttribute(name));
+    for (const element of document.querySelectorAll(`[${name}]`))
+      said.push(element.getAttribute(name));
   return [document.title, ...said];
 }"""
 
