@@ -1,4 +1,4 @@
-"""A session of a patient who speaks Spanish, with a therapist who does, and with one who does not."""
+"""A session of a patient who speaks Spanish, with a therapist who does and one who does not."""
 
 from __future__ import annotations
 
