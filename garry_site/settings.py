@@ -82,7 +82,7 @@ INSTALLED_APPS = [
     "rehab",  # before daphne: its own `runserver` wins
     "daphne",
     "channels",
-    "django.contrib.admin",
+    "rehab.site.GarryAdmin",  # django.contrib.admin with our front page
     "django.contrib.auth",
     "django.contrib.contenttypes",
     "django.contrib.sessions",

@@ -3,7 +3,8 @@
 from rehab.boards import admin as boards
 from rehab.gestures import admin as gestures
 from rehab.people import admin as people
+from rehab.people import log_admin as logs
 from rehab.sessions import admin as sessions
 from rehab.stations import admin as stations
 
-__all__ = ["boards", "gestures", "people", "sessions", "stations"]
+__all__ = ["boards", "gestures", "logs", "people", "sessions", "stations"]

@@ -80,6 +80,7 @@ def read_figures(user: User, session: TrainingSession) -> list[Figures]:
         session__patient=session.patient_id,
         session__state=State.FINISHED.value,
         session__simulated=session.simulated,
+        session__left_out=False,
         slug__in=("hit_rate", "score", "best_streak"),
     )
     found: dict[tuple[int, str], dict[str, float]] = defaultdict(dict)

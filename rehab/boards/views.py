@@ -6,6 +6,7 @@ import time
 
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 from django.utils.translation import pgettext
 from django.views.decorators.cache import never_cache
@@ -15,8 +16,9 @@ from rehab.boards.ranking import By, Entry, cut, rank, ranking_of, read_figures
 from rehab.boards.rows import Row, date_rows, share
 from rehab.boards.showing import Shown, show_after, show_waiting
 from rehab.people.access import actor_of, for_roles
+from rehab.people.consent import Purpose, withdraw
 from rehab.people.language import speak_to
-from rehab.people.models import Boards
+from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.words import SPACE, say_number
@@ -59,8 +61,8 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
 def leave_boards(request: HttpRequest, session_id: int) -> HttpResponse:
     """Take the session's patient off all boards, at once. Only a therapist brings one back."""
     session = find_session(request, session_id)
-    session.patient.boards = Boards.OWN
-    session.patient.save(update_fields=["boards"])
+    by = request.user if isinstance(request.user, User) else None
+    withdraw(session.patient, Purpose.BOARDS, by, timezone.now())
     return redirect("scores", session_id=session.pk)
 
 

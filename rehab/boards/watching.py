@@ -13,6 +13,7 @@ from django.utils import timezone
 from rehab.boards import entries
 from rehab.boards.models import Leaderboard
 from rehab.people.models import Clinic, Patient
+from rehab.sessions.corrections import Part, SessionCorrection
 from rehab.sessions.models import SessionMetric, TrainingSession, figures_stored
 from rehab.training.changes import State
 
@@ -23,6 +24,7 @@ def watch() -> None:
     post_save.connect(on_patient, sender=Patient)
     post_save.connect(on_session, sender=TrainingSession)
     post_delete.connect(on_session, sender=TrainingSession)
+    post_save.connect(on_correction, sender=SessionCorrection)
     post_save.connect(on_figure, sender=SessionMetric)
     post_delete.connect(on_figure, sender=SessionMetric)
     post_save.connect(on_board, sender=Leaderboard)
@@ -59,6 +61,14 @@ def on_session(instance: TrainingSession, **_signal: Any) -> None:
     """A session was corrected or removed."""
     if instance.state == State.FINISHED:
         entries.refresh_patients({instance.patient_id})
+
+
+@unless_restored
+def on_correction(instance: SessionCorrection, **_signal: Any) -> None:
+    """A session was given to whoever walked it: the one whom it was put down to has one less."""
+    if instance.part == Part.PATIENT:
+        before = Patient.everywhere.filter(pseudonym=instance.old)
+        entries.refresh_patients(set(before.values_list("pk", flat=True)))
 
 
 @unless_restored

@@ -107,6 +107,7 @@ def check_roles(call: Callable[..., Any]) -> Callable[..., Any]:
     def checked(request: HttpRequest, **values: Any) -> Any:
         if caller(request).role not in roles:
             raise HttpError(403, f"This call is for other roles: {allowed}.")
+        request.call = call  # type: ignore[attr-defined]  # for the audit log
         return call(request, **values)
 
     return checked

@@ -107,3 +107,15 @@ def check_own_password(request: HttpRequest, user: User, password: str) -> str:
         wait = lockout.wait_of(request, username=user.username)
         raise ValidationError(wait or WRONG_PASSWORD)
     return password
+
+
+class ConsentTextForm(forms.Form):
+    """The words that patients agree to."""
+
+    text = forms.CharField(
+        label=_("Words"), max_length=10_000, widget=forms.Textarea(attrs={"rows": 18})
+    )
+
+    def clean_text(self) -> str:
+        """Keep line ends as everybody else writes them."""
+        return str(self.cleaned_data["text"]).replace("\r\n", "\n")

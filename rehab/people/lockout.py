@@ -27,14 +27,20 @@ Credentials = Mapping[str, Any] | None
 
 
 def client_address(request: HttpRequest) -> str:
-    """Give the address that a request comes from, as the outermost of our own proxies saw it.
+    """Give the address that a request comes from."""
+    return find_address(
+        request.META.get("HTTP_X_FORWARDED_FOR", ""), request.META.get("REMOTE_ADDR", "")
+    )
+
+
+def find_address(forwarded: str, remote: str) -> str:
+    """Give the address of a client, as the outermost of our own proxies saw it.
 
     What stands further left in X-Forwarded-For was written by the client and is not believed.
     Of an IPv6 address the network counts: whoever has one has 2^64 of them.
     """
-    forwarded = request.META.get("HTTP_X_FORWARDED_FOR", "")
     seen = [word.strip() for word in forwarded.split(",") if word.strip()]
-    seen.append(request.META.get("REMOTE_ADDR", ""))
+    seen.append(remote)
     try:
         address = ip_address(seen[max(0, len(seen) - 1 - settings.PROXIES)])
     except ValueError:

@@ -61,6 +61,29 @@ class Clinic(ScopedModel):
             "password. Whoever has none is led to set one up first; you as well."
         ),
     )
+    research_needs_consent = models.BooleanField(
+        _("research needs consent"),
+        default=True,
+        help_text=_(
+            "Researchers see the sessions of those patients only who have agreed to research."
+        ),
+    )
+    keep_months = models.PositiveSmallIntegerField(
+        _("keep patients (months)"),
+        null=True,
+        blank=True,
+        validators=[MinValueValidator(1), MaxValueValidator(1200)],
+        help_text=_(
+            "So long after the last session a patient's name, code and all that leads to the "
+            "person are erased for good. Empty: never."
+        ),
+    )
+    keep_log_months = models.PositiveSmallIntegerField(
+        _("keep the logs (months)"),
+        default=36,
+        validators=[MinValueValidator(12), MaxValueValidator(1200)],
+        help_text=_("How long it is kept who looked at, changed and took out what."),
+    )
     created_at = models.DateTimeField(_("created at"), auto_now_add=True)
 
     class Meta(ScopedModel.Meta):
@@ -112,6 +135,7 @@ class User(AbstractUser):
         blank=True,
         help_text=_("Of the pages that this account opens; empty: the clinic's."),
     )
+    program = ""  # the name of the API token, where one speaks for this person
 
     everywhere = AccountManager()
     objects: ClassVar[VisibleAccounts] = VisibleAccounts()  # type: ignore[assignment]
@@ -158,6 +182,14 @@ class ScreenSide(models.TextChoices):
     CENTER = "center", _("all of it in the middle, smaller")
 
 
+class ScreenText(models.TextChoices):
+    """How large the patient's page writes."""
+
+    NORMAL = "normal", _("normal")
+    LARGE = "large", _("large")
+    LARGEST = "largest", _("largest")
+
+
 class Boards(models.TextChoices):
     """Which leaderboards a patient has agreed to stand on; each includes those before it."""
 
@@ -165,6 +197,24 @@ class Boards(models.TextChoices):
     TOTAL = "total", _("Counts in totals, stands in no row")
     CLINIC = "clinic", _("Boards of this clinic")
     ACROSS = "across", _("Boards of this clinic and across clinics")
+
+
+class Ending(models.TextChoices):
+    """Why a patient's programme has ended."""
+
+    DONE = "done", _("The programme is complete")
+    WISH = "wish", _("The patient wishes to stop")
+    HEALTH = "health", _("Health")
+    MOVED = "moved", _("Goes on elsewhere")
+    OTHER = "other", _("Another reason")
+
+
+class Erasing(models.TextChoices):
+    """Why all that leads to a patient was erased."""
+
+    ASKED = "asked", _("The patient asks for it")
+    MISTAKE = "mistake", _("Was entered by mistake")
+    RETENTION = "retention", _("Kept long enough")
 
 
 class Patient(ClinicRow):
@@ -198,6 +248,9 @@ class Patient(ClinicRow):
     screen_side = models.CharField(
         _("thermometer"), max_length=8, choices=ScreenSide.choices, default=ScreenSide.RIGHT
     )
+    screen_text = models.CharField(
+        _("size of words"), max_length=8, choices=ScreenText.choices, default=ScreenText.NORMAL
+    )
     screen_still = models.BooleanField(
         _("calm page"), default=False, help_text=_("No confetti, and nothing moves but the level.")
     )
@@ -229,6 +282,14 @@ class Patient(ClinicRow):
         null=True, editable=False, help_text=_("The participant of the original GARRY's database.")
     )
     created_at = models.DateTimeField(_("created at"), auto_now_add=True)
+    ended_at = models.DateTimeField(_("programme ended"), null=True, editable=False)
+    ended_because = models.CharField(
+        _("why it ended"), max_length=8, choices=Ending.choices, blank=True, editable=False
+    )
+    erased_at = models.DateTimeField(_("erased"), null=True, editable=False)
+    erased_because = models.CharField(
+        _("why it was erased"), max_length=9, choices=Erasing.choices, blank=True, editable=False
+    )
 
     class Meta(ClinicRow.Meta):
         verbose_name = _("patient")
@@ -251,6 +312,21 @@ class Patient(ClinicRow):
             if kwargs.get("update_fields") is not None:
                 kwargs["update_fields"] = {*kwargs["update_fields"], "alias"}
         super().save(*args, **kwargs)
+
+    def clean(self) -> None:
+        """Refuse boards with others before the patient has agreed to them."""
+        if self.boards == Boards.OWN or self.simulated:
+            return
+        agreed = self.pk and self.consents.filter(purpose="boards", withdrawn_at=None).exists()
+        if not agreed:
+            raise ValidationError(
+                {
+                    "boards": _(
+                        "Boards with others need the patient's consent to boards. Note it on the "
+                        "patient's consent page first."
+                    )
+                }
+            )
 
     def draw_alias(self) -> None:
         """Give the patient another animal name, one that nobody on this server has."""

@@ -39,9 +39,15 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Authenticator": {},
     "RecoveryCode": {},
     "Patient": {Role.LEAD: Right.EDIT, Role.PT: Right.EDIT},
+    "Consent": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
+    "ConsentText": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
+    "AuditEntry": {Role.LEAD: Right.VIEW},
+    "HistoryEntry": dict.fromkeys(Role, Right.VIEW),
     "Station": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
-    "Device": {Role.LEAD: Right.EDIT, Role.PT: Right.VIEW},
+    "Device": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
     "Pairing": {},
+    "LeaveTries": {},
+    "Visit": {Role.LEAD: Right.ALL, Role.PT: Right.ALL},
     "Measure": {
         Role.HOST: Right.EDIT,
         Role.LEAD: Right.EDIT,
@@ -60,6 +66,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
         Role.PT: Right.ALL,
         Role.RESEARCHER: Right.VIEW,
     },
+    "Preset": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "Gesture": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "GestureStep": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "TrainingSession": {
@@ -70,6 +77,11 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Step": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "SessionEvent": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "SessionMetric": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
+    "SessionCorrection": {
+        Role.LEAD: Right.VIEW | Right.ADD,
+        Role.PT: Right.VIEW | Right.ADD,
+        Role.RESEARCHER: Right.VIEW,
+    },
     "Leaderboard": {
         Role.HOST: Right.ALL,
         Role.LEAD: Right.ALL,

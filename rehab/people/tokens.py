@@ -125,5 +125,5 @@ def find_caller(token: str) -> User | None:
     is_alive = user.is_active and user.clinic_id == holder.clinic_id
     if not is_alive or not may_lend(user.role, holder.role):
         return None
-    user.role = holder.role
+    user.role, user.program = holder.role, holder.name
     return user

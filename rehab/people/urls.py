@@ -2,7 +2,7 @@
 
 from django.urls import path
 
-from rehab.people.views import account, home, language, second_factor, sign_in
+from rehab.people.views import account, consent, home, language, second_factor, sign_in
 
 urlpatterns = [
     path("", home.home, name="home"),
@@ -18,5 +18,7 @@ urlpatterns = [
     path("account/second-factor/app/", second_factor.add_app, name="add-app"),
     path("account/second-factor/passkey/", second_factor.add_passkey, name="add-passkey"),
     path("account/second-factor/remove/", second_factor.remove, name="remove-authenticator"),
+    path("patients/<int:patient_id>/consent/", consent.show_consent, name="consent"),
+    path("consent/words/", consent.write_words, name="consent-text"),
     path("account/recovery-codes/", second_factor.renew_codes, name="recovery-codes"),
 ]

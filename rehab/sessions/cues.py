@@ -27,6 +27,12 @@ def list_gestures(by: User) -> list[tuple[str, Any]]:
     ]
 
 
+def name_gestures(by: User) -> set[str]:
+    """Give every choice that can be made, without its words."""
+    composed = Gesture.objects.visible_to(by).values_list("name", flat=True)
+    return {USUAL, NOTHING, *GESTURES, *ORIGINALS, *composed}
+
+
 def to_cue(above: str, below: str, valence: str) -> Cue:
     """Give the cue for two choices."""
     usual = find_valence(valence).cue

@@ -10,10 +10,14 @@ from typing import Any, ClassVar
 from django import forms
 from django.conf import settings
 from django.core.exceptions import ValidationError
+from django.db import transaction
 from django.db.models import QuerySet
+from django.utils import timezone
+from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
-from rehab.people.models import SIDES, Patient, User
+from rehab.people.consent import Purpose, give, join_boards
+from rehab.people.models import SIDES, Boards, Patient, User
 from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
 from rehab.sessions.models import Protocol, SessionEvent, TrainingSession
 from rehab.sessions.services import create_session
@@ -50,14 +54,36 @@ class PatientForm(forms.ModelForm):
         self._by = by
         self.fields["paretic_side"].required = True
         self.fields["nickname"].widget.attrs["autofocus"] = True
+        if self.instance.pk is None:
+            self.fields["agrees"] = forms.MultipleChoiceField(
+                label=_("What the patient agrees to"),
+                choices=Purpose.choices,
+                required=False,
+                widget=forms.CheckboxSelectMultiple,
+                help_text=_(
+                    "Read the clinic's words to the patient first. It can change any time."
+                ),
+            )
 
     def clean_code(self) -> str:
         """Refuse a code that is taken, and say by whom."""
         code: str = self.cleaned_data["code"]
         others = Patient.objects.visible_to(self._by).filter(code=code).exclude(pk=self.instance.pk)
         if (other := others.first()) is not None:
-            raise ValidationError(f"Code {code} already exists: it is {other.nickname}'s.")
+            said = _("Code %(code)s already exists: it is %(nickname)s's.")
+            raise ValidationError(said % {"code": code, "nickname": other.nickname})
         return code
+
+    def save(self, commit: bool = True) -> Patient:
+        """Store the patient, and what a new one agrees to."""
+        with transaction.atomic():
+            patient: Patient = super().save(commit)
+            for purpose in map(Purpose, self.cleaned_data.get("agrees", [])):
+                if purpose is Purpose.BOARDS:
+                    join_boards(patient, Boards.CLINIC, self._by, timezone.now())
+                else:
+                    give(patient, purpose, self._by, timezone.now())
+        return patient
 
 
 class ScreenForm(forms.ModelForm):
@@ -65,8 +91,8 @@ class ScreenForm(forms.ModelForm):
 
     class Meta:
         model = Patient
-        fields: ClassVar = ["screen_side", "screen_still", "screen_sounds"]
-        widgets: ClassVar = {"screen_side": forms.RadioSelect}
+        fields: ClassVar = ["screen_side", "screen_text", "screen_still", "screen_sounds"]
+        widgets: ClassVar = {"screen_side": forms.RadioSelect, "screen_text": forms.RadioSelect}
 
 
 def list_recordings() -> list[Path]:

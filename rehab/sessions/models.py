@@ -11,6 +11,7 @@ from django.db.models import F, Q
 from django.dispatch import Signal
 from django.utils import timezone
 
+from rehab.people.consent import PatientScope
 from rehab.people.models import SIDES, Clinic, Patient, User
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
 from rehab.stations.models import Station
@@ -157,9 +158,10 @@ class TrainingSession(ClinicRow):
     ``plan`` is what every step is scored with; the columns beside it are there to be found by.
     ``state``, ``goal``, ``started_at``, ``ended_at`` and ``active_s`` follow from the log and are
     written together with its changes (``active_s`` of a running session is that of its last one).
+    Only a correction alters ``patient`` and ``left_out`` (``corrections.py``).
     """
 
-    scope = Scope(clinic="clinic", station="station")
+    scope = PatientScope(clinic="clinic", station="station")
 
     clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="sessions")
     patient = models.ForeignKey(Patient, on_delete=models.PROTECT, related_name="sessions")
@@ -197,6 +199,9 @@ class TrainingSession(ClinicRow):
     started_at = models.DateTimeField(null=True, blank=True)
     ended_at = models.DateTimeField(null=True, blank=True)
     active_s = models.FloatField("walked (s)", default=0.0, help_text="Time without pauses.")
+    left_out = models.BooleanField(
+        default=False, editable=False, help_text="Corrected: in no figure, board or trend."
+    )
     # Its row in the original GARRY's database, where it was imported from there: without steps.
     original_id = models.BigIntegerField("imported session", null=True, editable=False)
     original = models.JSONField(null=True, editable=False)
@@ -228,7 +233,9 @@ class TrainingSession(ClinicRow):
 class Step(ScopedModel):
     """A scored stride. Rows are only ever added."""
 
-    scope = Scope(clinic="session__clinic", station="session__station")
+    scope = PatientScope(
+        clinic="session__clinic", station="session__station", patient="session__patient"
+    )
 
     session = models.ForeignKey(TrainingSession, on_delete=models.PROTECT, related_name="steps")
     number = models.PositiveIntegerField()
@@ -294,7 +301,9 @@ class SessionEvent(ScopedModel):
     ``data``: what the robot reported; which device stopped it where that was no person.
     """
 
-    scope = Scope(clinic="session__clinic", station="session__station")
+    scope = PatientScope(
+        clinic="session__clinic", station="session__station", patient="session__patient"
+    )
 
     session = models.ForeignKey(TrainingSession, on_delete=models.PROTECT, related_name="events")
     after_number = models.PositiveIntegerField(help_text="The last step before it; 0 for none.")
@@ -319,7 +328,9 @@ figures_stored = Signal()
 class SessionMetric(ScopedModel):
     """A figure of an ended session: what boards and reports rank and compare."""
 
-    scope = Scope(clinic="session__clinic", station="session__station")
+    scope = PatientScope(
+        clinic="session__clinic", station="session__station", patient="session__patient"
+    )
 
     session = models.ForeignKey(TrainingSession, on_delete=models.CASCADE, related_name="metrics")
     slug = models.CharField(

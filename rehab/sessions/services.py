@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from asgiref.sync import async_to_sync
+from django.utils.translation import gettext as _
 
 from rehab.people.models import Patient, User
 from rehab.sessions.cues import find_composed
@@ -47,6 +48,11 @@ def create_session(
     session. Raises InvalidSetting for a plan that could not be walked and CrossClinic where
     patient, station and the rest are not of one clinic; nothing is stored then.
     """
+    if patient.ended_at is not None:
+        said = _(
+            "%(patient)s's programme has ended. Reopen it on the page “Consent and data” first."
+        )
+        raise InvalidSetting(said % {"patient": patient.nickname})
     measure = measure or Measure.everywhere.get(clinic=None, slug=A2.slug)
     if phases is None:
         if protocol is None:

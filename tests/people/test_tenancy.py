@@ -68,10 +68,20 @@ def may_read(actor: Actor, model: type[Model], clinic: str) -> bool:
         return model.__name__ in HOST_SEES
     if actor.clinic != clinic:
         return False
-    if model.__name__ == "ApiToken":
+    if model.__name__ in {"ApiToken", "AuditEntry"}:
         return actor.role == "lead"
-    if actor.role == "researcher":
-        return model.__name__ not in {"Patient", "User", "Clinic", "Station", "Device"}
+    if actor.role == "researcher":  # the world's change is one of a patient
+        hidden = {
+            "Patient",
+            "User",
+            "Clinic",
+            "Station",
+            "Device",
+            "Consent",
+            "ConsentText",
+            "Visit",
+        }
+        return model.__name__ not in {*hidden, "HistoryEntry"}
     return actor.role in {"lead", "pt"}
 
 

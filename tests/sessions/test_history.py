@@ -335,7 +335,7 @@ def test_a_session_without_a_stride_says_so(client, patient):
 def test_thousands_of_strides_are_told_by_few_queries(client, patient, django_assert_num_queries):
     session = walk(patient, "binary", strides(2000, 1000))
     client.get(reverse("start"))
-    with django_assert_num_queries(7):
+    with django_assert_num_queries(8):
         page = client.get(reverse("session", kwargs={"session_id": session.pk})).content.decode()
     assert len(read_json(page, "session")["strides"]["number"]) == 3000
     assert len(page) < 150_000

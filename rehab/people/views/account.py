@@ -18,7 +18,7 @@ from rehab.people.models import LANGUAGES
 from rehab.people.roles import Role
 
 
-@for_roles(*Role)
+@for_roles(*Role, patients=False)
 @never_cache
 @require_safe
 def show_account(request: HttpRequest) -> HttpResponse:
@@ -35,7 +35,7 @@ def show_account(request: HttpRequest) -> HttpResponse:
     return render(request, "people/account.html", context)
 
 
-@for_roles(*Role)
+@for_roles(*Role, patients=False)
 @never_cache
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])

@@ -31,7 +31,7 @@ def owner(request: HttpRequest) -> User:
     return user
 
 
-@for_roles(*Role, setting_up=True)
+@for_roles(*Role, setting_up=True, patients=False)
 @never_cache
 @require_safe
 def choose(request: HttpRequest) -> HttpResponse:
@@ -45,7 +45,7 @@ def choose(request: HttpRequest) -> HttpResponse:
     return render(request, "people/set_up.html", context)
 
 
-@for_roles(*Role, setting_up=True)
+@for_roles(*Role, setting_up=True, patients=False)
 @never_cache
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
@@ -66,7 +66,7 @@ def add_app(request: HttpRequest) -> HttpResponse:
     return render(request, "people/add_app.html", context)
 
 
-@for_roles(*Role, setting_up=True)
+@for_roles(*Role, setting_up=True, patients=False)
 @never_cache
 @require_http_methods(["GET", "HEAD", "POST"])
 def add_passkey(request: HttpRequest) -> HttpResponse:
@@ -100,7 +100,7 @@ def _added(request: HttpRequest, user: User, new: list[str]) -> HttpResponse:
     return _show(request, new, then)
 
 
-@for_roles(*Role)
+@for_roles(*Role, patients=False)
 @never_cache
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
@@ -125,7 +125,7 @@ def _show(request: HttpRequest, new: list[str], then: str) -> HttpResponse:
     return render(request, "people/recovery_codes.html", {"codes": new, "then": then})
 
 
-@for_roles(*Role)
+@for_roles(*Role, patients=False)
 @never_cache
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
