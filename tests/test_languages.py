@@ -126,13 +126,14 @@ def test_the_catalogs_have_every_marked_word(tmp_path):
 UNMARKED = {"GARRY", "W/kg", "W", "kg", "min", "s"}
 SAID = {"aria-label", "title", "placeholder", "alt", "label"}
 BLOCK = re.compile(
-    r"{% (blocktranslate|comment)\b.*?{% end\1 %}|{#.*?#}|{% block page_class %}[^{]*", re.DOTALL
+    r"{% (blocktranslate|comment)\b.*?{% end\1 %}|{#.*?#}|{% block page_class %}.*?{% endblock %}", re.DOTALL
 )
 TAG = re.compile(r"{%.*?%}|{{.*?}}", re.DOTALL)
-# Filters whose words or formats are English whatever the page's language.
+# Filters whose words or formats are English whatever the page's language. What a machine reads, in
+# an attribute, stands in single quotes: yesno:'true,false'.
 SPEAKS = re.compile(
     r"""\|(?:default|default_if_none|add):["'][^"']*[A-Za-z]{2}"""
-    r"""|\|pluralize|\|yesno(?!:["']true,false)|\|(?:date|time):["'](?![A-Z_]+_FORMAT|[cHi:]+["'])"""
+    r"""|\|pluralize|\|yesno(?!:'|:_)|\|(?:date|time):["'](?![A-Z_]+_FORMAT|[cHi:]+["']|Y-m-d["'])"""
     r"""|{% now ["'](?![A-Z_]+_FORMAT)"""
 )
 
