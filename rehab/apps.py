@@ -18,7 +18,9 @@ class RehabConfig(AppConfig):
         from rehab.models import TRACKED
         from rehab.people.history import track
         from rehab.sessions.defaults import install_defaults
+        from rehab.sessions.rewording import listen
 
         post_migrate.connect(install_defaults, sender=self)
         watch()
         track(*TRACKED)
+        listen()

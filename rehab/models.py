@@ -1,6 +1,7 @@
 """Gathers the rooms' models, and says of which it is kept who changed them."""
 
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.people.audit import AuditEntry
 from rehab.people.consent import Consent, ConsentText
@@ -49,6 +50,8 @@ __all__ = [
     "Consent",
     "ConsentText",
     "Device",
+    "FeedbackBand",
+    "FeedbackType",
     "Gesture",
     "GestureStep",
     "HistoryEntry",

@@ -72,7 +72,7 @@ class OriginalTalk:
     def follow(self, message: Mapping[str, Any], now_s: float) -> None:
         """Take a message of the server; what is not told in it is not published."""
         match message:
-            case {"type": "welcome", "valence": str(valence)}:
+            case {"type": "welcome" | "cue", "valence": str(valence)}:
                 self._valence = valence
             case {"type": "step"}:
                 with suppress(BadMessage):

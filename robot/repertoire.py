@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from robot.gestures import BadGesture, Gesture
+from robot.gestures import GESTURES, ORIGINALS, BadGesture, Gesture
 from robot.motion import Limits
 from robot.trial import admit_gesture
 
@@ -43,7 +43,8 @@ class Repertoire:
                     raise BadGesture(f"This robot has a gesture {gesture.name} of its own.")
             except BadGesture as problem:
                 name = data.get("name") if isinstance(data, dict) else None
-                if isinstance(name, str):
+                # A name that every robot knows means that gesture, whatever else comes under it.
+                if isinstance(name, str) and name not in GESTURES and name not in ORIGINALS:
                     self._came[name] = None
                 problems.append(f"gesture {name}: {problem}")
             else:

@@ -11,6 +11,7 @@ from django.contrib.auth.models import AnonymousUser
 from django.db.models import Model
 
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.people.audit import AuditEntry
 from rehab.people.consent import Consent, ConsentText, Purpose, give
@@ -122,6 +123,14 @@ def build_world(name: str) -> World:
     )
     gesture = Gesture.everywhere.create(clinic=clinic, name=mark(name, Gesture))
     step = GestureStep.everywhere.create(gesture=gesture, position=1, hold_s=1.0)
+    feedback = FeedbackType.everywhere.create(
+        clinic=clinic, slug="negative", hit_points=0, miss_points=-1, cue_below="droop"
+    )
+    said = {"en": mark(name, FeedbackType)}
+    FeedbackBand.everywhere.create(feedback_type=feedback, from_percent=0, words=said)
+    band = FeedbackBand.everywhere.create(
+        feedback_type=feedback, from_percent=100, words={"en": mark(name, FeedbackBand)}
+    )
     patient = Patient.everywhere.create(
         clinic=clinic,
         code=mark(name, Patient),
@@ -171,6 +180,8 @@ def build_world(name: str) -> World:
         phase,
         gesture,
         step,
+        feedback,
+        band,
         patient,
         session,
         SessionCorrection.everywhere.create(

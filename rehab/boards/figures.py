@@ -113,6 +113,8 @@ def _read(board: Leaderboard, rows: QuerySet[SessionMetric], period: Period) -> 
     rows = rows.filter(session__left_out=False)
     if not board.include_simulated:
         rows = rows.filter(session__simulated=False)
+    if board.types != Leaderboard.Types.ALL or {board.metric, board.tie_breaker} & TYPED:
+        rows = rows.filter(session__changed_to="")  # one of several types is of none
     if board.slugs:
         rows = rows.filter(session__valence__in=board.slugs)
     if period.began is not None:

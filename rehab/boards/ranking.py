@@ -33,13 +33,16 @@ class By(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """What boards know of a session. ``streak`` is its longest row of hits."""
+    """What boards know of a session. ``streak`` is its longest row of hits; ``mixed`` one whose
+    feedback type was changed on its way: it ranks by its hit rate alone.
+    """
 
     session_id: int
     valence: str
     hit_rate: float
     score: float | None
     streak: float
+    mixed: bool = False
 
     def stake(self, cost: int) -> int:
         """Give the points that could have been lost, at ``cost`` points a miss.
@@ -83,14 +86,14 @@ def read_figures(user: User, session: TrainingSession) -> list[Figures]:
         session__left_out=False,
         slug__in=("hit_rate", "score", "best_streak"),
     )
-    found: dict[tuple[int, str], dict[str, float]] = defaultdict(dict)
-    for session_id, valence, slug, value in rows.values_list(
-        "session_id", "session__valence", "slug", "value"
+    found: dict[tuple[int, str, bool], dict[str, float]] = defaultdict(dict)
+    for session_id, valence, changed_to, slug, value in rows.values_list(
+        "session_id", "session__valence", "session__changed_to", "slug", "value"
     ).order_by():
-        found[session_id, valence][slug] = value
+        found[session_id, valence, bool(changed_to)][slug] = value
     return [
-        Figures(pk, valence, own["hit_rate"], own.get("score"), own.get("best_streak", 0.0))
-        for (pk, valence), own in found.items()
+        Figures(pk, valence, own["hit_rate"], own.get("score"), own.get("best_streak", 0.0), mixed)
+        for (pk, valence, mixed), own in found.items()
         if "hit_rate" in own
     ]
 

@@ -85,16 +85,21 @@ def find_session(request: HttpRequest, session_id: int) -> TrainingSession:
 
 
 def own_boards(request: HttpRequest, session: TrainingSession) -> list[Shown]:
-    """Give the two boards that are always there: own sessions of this type, and of all types."""
+    """Give the boards that are always there: own sessions of this type, and of all types.
+
+    A session whose type was changed on its way is of no type, and stands on the second alone.
+    """
     actor = actor_of(request)
     valence = session.to_plan().valence
     figures = read_figures(actor, session)
-    same = [own for own in figures if own.valence == session.valence]
+    same = [own for own in figures if own.valence == session.valence and not own.mixed]
     by = ranking_of(valence)
     places = {
         ("same", pgettext("board", "This type"), by): rank(same, by, -(valence.miss_points or 0)),
         ("all", pgettext("board", "All types"), By.RATE): rank(figures, By.RATE),
     }
+    if session.changed_to:
+        del places["same", "This type", by]
     shown = {key: cut(entries, session.pk) for key, entries in places.items()}
     wanted = {entry.session_id for entries in shown.values() for entry in entries}
     facts = {

@@ -25,6 +25,6 @@ def carry_over(apps: Any, schema_editor: Any) -> None:
 
 
 class Migration(migrations.Migration):
-    dependencies = [("rehab", "0002_privacy")]
+    dependencies = [("rehab", "0002_clinics_own")]
 
     operations = [migrations.RunPython(carry_over, migrations.RunPython.noop)]

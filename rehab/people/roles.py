@@ -69,6 +69,8 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Preset": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "Gesture": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "GestureStep": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
+    "FeedbackType": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
+    "FeedbackBand": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "TrainingSession": {
         Role.LEAD: Right.VIEW,
         Role.PT: Right.VIEW,

@@ -244,7 +244,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         "date",
         "start_time",
         "patient",
-        "valence",
+        "types",
         "goal_value",
         "score",
         "hit_rate",
@@ -262,7 +262,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         "date",
         "start_time",
         "duration",
-        "valence",
+        "types",
         "goal_value",
         "score",
         "hit_rate",
@@ -346,6 +346,11 @@ class TrainingSessionAdmin(ScopedAdmin):
         """Give the walked time in minutes and seconds."""
         minutes, seconds = divmod(round(session.active_s), 60)
         return f"{minutes}:{seconds:02d}"
+
+    @admin.display(description=_("feedback type"), ordering="valence")
+    def types(self, session: TrainingSession) -> str:
+        """Give the feedback type, and those it was changed to."""
+        return session.types_words
 
     @admin.display(description=_("goal"), ordering="goal")
     def goal_value(self, session: TrainingSession) -> str | None:

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from django.utils.translation import gettext_lazy as _
+
+from rehab.feedback.valences import valences_of
+from rehab.gestures.choices import gesture_choices
 from rehab.gestures.models import Gesture
 from rehab.people.models import Patient, User
 from rehab.training.measures import InvalidSetting
-from rehab.training.valences import Cue, find_valence
+from rehab.training.valences import Cue
 from robot.gestures import GESTURES, ORIGINALS, BadGesture
 from robot.trial import admit_gesture
 
@@ -17,13 +21,10 @@ USUAL, NOTHING = "(usual)", "(nothing)"  # choices beside gestures, none of whic
 
 def list_gestures(by: User) -> list[tuple[str, Any]]:
     """Give the choices with their words."""
-    composed = Gesture.objects.visible_to(by).values_list("name", flat=True)
     return [
-        (USUAL, "As usual for the feedback type"),
-        (NOTHING, "Nothing"),
-        *((gesture.name, gesture.label) for gesture in GESTURES.values()),
-        *([("Composed here", [(name, name) for name in composed])] if composed else []),
-        ("Of the paper, up to 10 s", [(one.name, one.label) for one in ORIGINALS.values()]),
+        (USUAL, _("As usual for the feedback type")),
+        (NOTHING, _("Nothing")),
+        *gesture_choices(by),
     ]
 
 
@@ -33,9 +34,9 @@ def name_gestures(by: User) -> set[str]:
     return {USUAL, NOTHING, *GESTURES, *ORIGINALS, *composed}
 
 
-def to_cue(above: str, below: str, valence: str) -> Cue:
-    """Give the cue for two choices."""
-    usual = find_valence(valence).cue
+def to_cue(above: str, below: str, valence: str, patient: Patient) -> Cue:
+    """Give the cue for two choices, by what is usual in the patient's clinic."""
+    usual = valences_of(patient.clinic_id)[valence].cue
     return Cue(_gesture(above, usual.above), _gesture(below, usual.below))
 
 
@@ -43,9 +44,9 @@ def _gesture(choice: str, usual: str | None) -> str | None:
     return usual if choice == USUAL else None if choice == NOTHING else choice
 
 
-def to_choices(cue: Cue, valence: str, by: User) -> tuple[str, str]:
+def to_choices(cue: Cue, valence: str, patient: Patient, by: User) -> tuple[str, str]:
     """Give the choices for a cue; the usual one for a gesture that is not to be had any more."""
-    usual = find_valence(valence).cue
+    usual = valences_of(patient.clinic_id)[valence].cue
     composed = Gesture.objects.visible_to(by).values_list("name", flat=True)
     known = {None, *GESTURES, *ORIGINALS, *composed}
     return _choice(cue.above, usual.above, known), _choice(cue.below, usual.below, known)
@@ -73,3 +74,15 @@ def find_composed(patient: Patient, cue: Cue) -> Iterator[dict[str, Any]]:
         except BadGesture as problem:
             raise InvalidSetting(f"Gesture {name}: {problem}") from problem
         yield data
+
+
+def quiet_cue(cue: Cue, usual: Cue, chosen: Cue) -> Cue:
+    """Give the cue of a type that a session may be changed to.
+
+    What was silenced for the session, where its type would usually have a gesture, stays silent:
+    no change of the feedback makes a robot move that was told to stand still.
+    """
+    return Cue(
+        None if usual.above and not chosen.above else cue.above,
+        None if usual.below and not chosen.below else cue.below,
+    )

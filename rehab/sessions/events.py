@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Protocol
 
-from rehab.training.changes import ChangeKind
+from django.utils.translation import gettext, override
+
+from rehab.training.changes import ChangeKind, State, Value
 from rehab.training.fold import SessionFold
 from rehab.training.phases import Phase, find_phase_kind
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import Reason, ScoredStep
+from rehab.training.valences import VALENCES, Valence
 
 Message = dict[str, Any]
+
+# Changes that a PT's chart points out; a phase it shows by itself.
+MARKED_CHANGES = frozenset(ChangeKind) - {
+    ChangeKind.START,
+    ChangeKind.FINISH,
+    ChangeKind.ABORT,
+    ChangeKind.PHASE,
+}
 
 
 class Audience(StrEnum):
@@ -73,8 +85,23 @@ class StoredStep(Protocol):
     def reasons(self) -> Sequence[str]: ...
 
 
-def step_event(fold: SessionFold, phase: Phase, step: ScoredStep, *, live: bool) -> LiveEvent:
-    """Give the event of a step that was just scored in this phase.
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What a step is told by: as it was when the step came, whatever has changed since."""
+
+    phase: Phase
+    valence: Valence
+    words_shown: bool
+    chart_style: str
+
+    @classmethod
+    def now(cls, fold: SessionFold) -> Told:
+        """Give what the next step is told by."""
+        return cls(fold.phase, fold.valence, fold.words_shown, fold.chart_style.value)
+
+
+def step_event(fold: SessionFold, told: Told, step: ScoredStep, *, live: bool) -> LiveEvent:
+    """Give the event of a step that was just scored.
 
     ``live`` is False for a step that came too late to be shown as one.
     """
@@ -84,7 +111,7 @@ def step_event(fold: SessionFold, phase: Phase, step: ScoredStep, *, live: bool)
     def build(audience: Audience) -> Message | None:
         match audience:
             case Audience.PATIENT:
-                shown = _patient_step(plan, phase, step, score, streak, live=live)
+                shown = _patient_step(plan, told, step, score, streak, live=live)
                 return None if shown is None else shown | walked
             case Audience.MONITOR:
                 rate = {
@@ -95,7 +122,7 @@ def step_event(fold: SessionFold, phase: Phase, step: ScoredStep, *, live: bool)
                 totals = {"score": score, "streak": streak, **rate, **walked}
                 return _monitor_step(step, live=live) | totals
             case Audience.ROBOT:
-                return _robot_step(plan, phase, step, live=live)
+                return _robot_step(told.phase, step, live=live)
 
     return LiveEvent(step.number, build)
 
@@ -111,7 +138,7 @@ def describe_walked(fold: SessionFold) -> Message:
 
 def _patient_step(
     plan: SessionPlan,
-    phase: Phase,
+    told: Told,
     step: StoredStep,
     score: int | None,
     streak: int,
@@ -120,18 +147,19 @@ def _patient_step(
 ) -> Message | None:
     if step.side != plan.trained_side:
         return None
-    if not phase.feedback:
+    if not told.phase.feedback:
         return {"kind": "calm", "number": step.number}
     if step.performance is None or step.hit is None:
         return {"kind": "missing", "number": step.number, "live": live}
-    valence, band = plan.valence, plan.valence.band(step.performance)
+    valence, band = told.valence, told.valence.band(step.performance)
     return {
         "kind": "step",
         "number": step.number,
         "live": live,
         "performance": round(step.performance, 4),
         "hit": step.hit,
-        "words": band.words,
+        "words": band.words if told.words_shown else "",
+        "chart": told.chart_style,
         "emblem": valence.emblem(step.hit),
         "confetti": band.confetti,
         "points": step.points,
@@ -163,7 +191,7 @@ def _monitor_step(step: ScoredStep, *, live: bool) -> Message:
     }
 
 
-def _robot_step(plan: SessionPlan, phase: Phase, step: ScoredStep, *, live: bool) -> Message | None:
+def _robot_step(phase: Phase, step: ScoredStep, *, live: bool) -> Message | None:
     if not live or not phase.feedback or step.performance is None:
         return None
     return {
@@ -177,25 +205,49 @@ def _robot_step(plan: SessionPlan, phase: Phase, step: ScoredStep, *, live: bool
     }
 
 
-def describe_phase(plan: SessionPlan, index: int) -> Message:
-    """Give a phase as pages show it."""
+def describe_phase(plan: SessionPlan, index: int, valence: Valence) -> Message:
+    """Give a phase as pages show it, with the feedback type that is in force there."""
     phase = plan.phases[index]
+    calm_words = ""
+    if not phase.feedback:
+        with override(plan.language):
+            calm_words = gettext(find_phase_kind(phase.kind).calm_words)
     return {
         "index": index,
         "count": len(plan.phases),
         "kind": phase.kind,
         "name": phase.name,
         "feedback": phase.feedback,
-        "calm_words": "" if phase.feedback else find_phase_kind(phase.kind).calm_words,
-        "theme": plan.valence.slug if phase.feedback else "calm",
+        "calm_words": calm_words,
+        "theme": valence.slug if phase.feedback else "calm",
         "strides": phase.strides,
         "seconds": phase.seconds,
     }
 
 
+def describe_now(fold: SessionFold) -> Message:
+    """Give the phase that the next step falls in, and how its points stand."""
+    return {
+        "phase": describe_phase(fold.plan, fold.phase_index, fold.valence),
+        "has_points": fold.valence.has_points,
+        "score": fold.score,
+        **describe_walked(fold),
+    }
+
+
+def describe_types(fold: SessionFold) -> Message:
+    """Give which feedback type is in force and which comes next, and which it may be."""
+    return {
+        "valence": fold.valence.slug,
+        "next_valence": fold.next_valence,
+        "types": [{"slug": one.slug, "label": one.label} for one in fold.valences.values()],
+    }
+
+
 def describe_cue(fold: SessionFold) -> Message:
-    """Give the robot's order for this session."""
-    cue = fold.plan.valence.cue
+    """Give the robot's order for this session, as of now."""
+    cue = fold.valence.cue
+    named = {cue.above, cue.below}
     return {
         "above": cue.above,
         "below": cue.below,
@@ -203,44 +255,84 @@ def describe_cue(fold: SessionFold) -> Message:
         "window_s": 5.0,
         "rest_s": 5.0,
         "intensity": fold.robot_intensity,
-        "gestures": list(fold.plan.gestures),
+        "gestures": [one for one in fold.plan.gestures if one.get("name") in named],
+    }
+
+
+def describe_state(fold: SessionFold) -> Message:
+    """Give where the session stands, and who paused it."""
+    paused = fold.state is State.PAUSED and fold.pause_reason is not None
+    return {
+        "state": fold.state.value,
+        "pause_reason": fold.pause_reason.value if paused and fold.pause_reason else "",
     }
 
 
 def state_event(fold: SessionFold) -> LiveEvent:
     """Give the event that a session started, paused, went on or ended."""
-    state = fold.state.value
-    return _same_for_all(fold, {"kind": "state", "state": state}, {"type": "state", "state": state})
+    page = {"kind": "state", **describe_state(fold)}
+    robot = {"type": "state", "state": fold.state.value}
+    return _to_each(fold, patient=page, monitor=page, robot=robot)
 
 
-def phase_event(fold: SessionFold) -> LiveEvent:
-    """Give the event that a phase began."""
-    phase = {"kind": "phase", "phase": describe_phase(fold.plan, fold.phase_index)}
-    phase |= describe_walked(fold)
+def phase_event(fold: SessionFold, *, switched: bool = False) -> LiveEvent:
+    """Give the event that a phase began; ``switched`` where it has another feedback type."""
+    phase = {"kind": "phase", **describe_now(fold)}
+    streak = {"streak": fold.feedback.streak if fold.valence.rewards else None}
     monitor = phase | {"goal": fold.goal, "gain": fold.gain, "obstacle": fold.obstacle}
-    return _to_each(fold, patient=phase, monitor=monitor)
+    monitor |= describe_types(fold)
+    if not switched:
+        return _to_each(fold, patient=phase | streak, monitor=monitor)
+    monitor["mark"] = type_mark(fold.last_number, fold.valence.slug)
+    return _to_each(fold, patient=phase | streak, monitor=monitor, robot=_cue(fold))
 
 
-def change_event(fold: SessionFold, kind: ChangeKind) -> LiveEvent:
+def change_event(fold: SessionFold, kind: ChangeKind, value: Value = None) -> LiveEvent:
     """Give the event of any change that a person made."""
+    told: Message
     match kind:
+        case ChangeKind.GOAL:
+            value, told = fold.goal, {"goal": fold.goal}
+        case ChangeKind.GAIN:
+            value, told = fold.gain, {"gain": fold.gain}
+        case ChangeKind.ACTIVATION_THRESHOLD:
+            value, told = fold.activation_threshold, {"value": fold.activation_threshold}
+        case ChangeKind.ROBOT_INTENSITY:
+            value, told = fold.robot_intensity, {"value": fold.robot_intensity}
+        case ChangeKind.VALENCE:
+            told = describe_types(fold)
+        case ChangeKind.WORDS:
+            told = {}
+        case ChangeKind.WORDS_SHOWN:
+            value, told = float(fold.words_shown), {"value": fold.words_shown}
+        case ChangeKind.CHART_STYLE:
+            value, told = fold.chart_style.value, {"value": fold.chart_style.value}
         case ChangeKind.PHASE:
             return phase_event(fold)
-        case ChangeKind.GOAL:
-            return _to_each(fold, monitor={"kind": "goal", "goal": fold.goal})
-        case ChangeKind.GAIN:
-            return _to_each(fold, monitor={"kind": "gain", "gain": fold.gain})
-        case ChangeKind.ACTIVATION_THRESHOLD:
-            threshold = {"kind": "activation_threshold", "value": fold.activation_threshold}
-            return _to_each(fold, monitor=threshold, robot=_cue(fold))
-        case ChangeKind.ROBOT_INTENSITY:
-            intensity = {"kind": "robot_intensity", "value": fold.robot_intensity}
-            return _to_each(fold, monitor=intensity, robot=_cue(fold))
-    return state_event(fold)
+        case _:
+            return state_event(fold)
+    monitor = {"kind": kind.value, **told, "mark": change_mark(fold.last_number, kind, value)}
+    if kind in (ChangeKind.ACTIVATION_THRESHOLD, ChangeKind.ROBOT_INTENSITY):
+        return _to_each(fold, monitor=monitor, robot=_cue(fold))
+    return _to_each(fold, monitor=monitor)
+
+
+def change_mark(after: int, kind: ChangeKind, value: Value) -> Message:
+    """Give a change as a PT's chart points it out; of edited words only whose they are."""
+    return {
+        "after": after,
+        "kind": kind.value,
+        "value": value.get("valence") if isinstance(value, Mapping) else value,
+    }
+
+
+def type_mark(after: int, slug: str) -> Message:
+    """Give the moment from which another feedback type was in force, for a PT's chart."""
+    return {"after": after, "kind": "type", "value": VALENCES[slug].label}
 
 
 def _cue(fold: SessionFold) -> Message:
-    return {"type": "cue", "cue": describe_cue(fold)}
+    return {"type": "cue", "cue": describe_cue(fold), "valence": fold.valence.slug}
 
 
 def presence_event(fold: SessionFold, presence: Message) -> LiveEvent:
@@ -277,10 +369,6 @@ def source_goal_event(fold: SessionFold, goal: float) -> LiveEvent:
     return _to_each(fold, monitor={"kind": "source_goal", "goal": goal})
 
 
-def _same_for_all(fold: SessionFold, page: Message, robot: Message) -> LiveEvent:
-    return _to_each(fold, patient=page, monitor=page, robot=robot)
-
-
 def _to_each(fold: SessionFold, **messages: Message) -> LiveEvent:
     return LiveEvent(fold.last_number, lambda audience: messages.get(audience.value))
 
@@ -315,24 +403,22 @@ def snapshot(
     """Give all that a page of this audience shows, as of the last committed step.
 
     ``about`` says whose session it is; ``recent`` are the latest steps, oldest first; ``robot`` has
-    the robot's latest status and decision; ``marks`` are goal changes and remarks.
+    the robot's latest status and decision; ``marks`` are changes and remarks.
     """
     plan, recent = fold.plan, list(recent)
     entries = (history_entry(audience, plan, step) for step in recent)
     message: Message = {
         "type": "snapshot",
         "number": fold.last_number,
-        "state": fold.state.value,
+        **describe_state(fold),
         "completed": fold.completed,
         "about": about,
-        "phase": describe_phase(plan, fold.phase_index),
-        **describe_walked(fold),
+        **describe_now(fold),
         "unit": plan.measure.unit,
-        "has_points": plan.valence.has_points,
-        "score": fold.score,
         "streak": fold.feedback.streak
-        if plan.valence.rewards or audience is Audience.MONITOR
+        if fold.valence.rewards or audience is Audience.MONITOR
         else None,
+        "chart": fold.chart_style.value,
         "target": {"hit_rate": plan.target.hit_rate, "duration_s": plan.target.duration_s},
         "presence": presence if audience is Audience.MONITOR else _near(presence),
         "robot_stopped": robot_stopped,
@@ -342,7 +428,8 @@ def snapshot(
         message["last"] = _last_step(fold, recent)
     if audience is Audience.MONITOR:
         message |= {
-            "valence": plan.valence.slug,
+            **describe_types(fold),
+            "words_shown": fold.words_shown,
             "trained_side": plan.trained_side,
             "marks": list(marks),
             "goal": fold.goal,
@@ -354,16 +441,22 @@ def snapshot(
             "judged": fold.feedback.judged,
             "obstacle": fold.obstacle,
             "robot": dict(robot),
-            "phases": [describe_phase(plan, index) for index in range(len(plan.phases))],
+            "phases": [
+                describe_phase(plan, index, fold.valence) for index in range(len(plan.phases))
+            ],
         }
     return message
 
 
 def _last_step(fold: SessionFold, recent: Sequence[StoredStep]) -> Message | None:
     """Give what the patient was last shown of a step; None before the first."""
-    plan = fold.plan
+    plan, told = fold.plan, Told.now(fold)
+    switched_after = fold.switches[-1][0] if fold.switches else 0
     for step in reversed(recent):
+        if step.number <= switched_after:
+            return None  # it meant something else
         if step.side == plan.trained_side and Reason.PAUSED not in step.reasons:
             score, streak = fold.score, fold.feedback.streak
-            return _patient_step(plan, plan.phases[step.phase], step, score, streak, live=False)
+            told = replace(told, phase=plan.phases[step.phase])
+            return _patient_step(plan, told, step, score, streak, live=False)
     return None

@@ -200,7 +200,7 @@ class SessionForm(forms.Form):
             target=Target(
                 hit_rate=hits / 100 if hits else None, duration_s=minutes * 60 if minutes else None
             ),
-            cue=to_cue(data["robot_above"], data["robot_below"], data["valence"]),
+            cue=to_cue(data["robot_above"], data["robot_below"], data["valence"], self.patient),
             robot_intensity=ROBOT_LEVELS[data["robot"]],
             station=data["station"],
             created_by=self.by,
@@ -289,7 +289,7 @@ def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
     if last.runs and not patient.simulated:
         source = LIVE  # one trial with a simulator makes nobody a simulated patient
     hits, seconds = plan.target.hit_rate, plan.target.duration_s
-    above, below = to_choices(plan.valence.cue, last.valence, by)
+    above, below = to_choices(plan.valence.cue, last.valence, patient, by)
     return {
         "valence": last.valence,
         "goal_by": "percent" if plan.goal.needs_baseline else "value",

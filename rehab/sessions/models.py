@@ -10,6 +10,7 @@ from django.db import models
 from django.db.models import F, Q
 from django.dispatch import Signal
 from django.utils import timezone
+from django.utils.translation import gettext as _
 
 from rehab.people.consent import PatientScope
 from rehab.people.models import SIDES, Clinic, Patient, User
@@ -156,9 +157,9 @@ class TrainingSession(ClinicRow):
     """One sitting of one patient, who is the same from its creation to its end.
 
     ``plan`` is what every step is scored with; the columns beside it are there to be found by.
-    ``state``, ``goal``, ``started_at``, ``ended_at`` and ``active_s`` follow from the log and are
-    written together with its changes (``active_s`` of a running session is that of its last one).
-    Only a correction alters ``patient`` and ``left_out`` (``corrections.py``).
+    ``state``, ``goal``, ``started_at``, ``ended_at``, ``changed_to`` and ``active_s`` follow from
+    the log and are written together with its changes (``active_s`` of a running session is that of
+    its last one). ``valence`` is the feedback type it began with. Only a correction alters ``patient`` and ``left_out`` (``corrections.py``).
     """
 
     scope = PatientScope(clinic="clinic", station="station")
@@ -181,6 +182,10 @@ class TrainingSession(ClinicRow):
         max_length=16,
         choices=[(valence.slug, valence.label) for valence in VALENCES.values()],
         db_index=True,
+    )
+    # Follows from the log, as the columns below `state` do.
+    changed_to = models.CharField(
+        max_length=64, blank=True, editable=False, help_text="Types after the first, in order."
     )
     trained_side = models.CharField(max_length=8, choices=SIDES)
     source = models.CharField(max_length=200, blank=True, help_text="Where its steps come from.")
@@ -228,6 +233,22 @@ class TrainingSession(ClinicRow):
     def to_plan(self) -> SessionPlan:
         """Give the plan as the rules know it."""
         return SessionPlan.from_json(self.plan)
+
+    @property
+    def later_types(self) -> list[str]:
+        """The feedback types that it was changed to on its way."""
+        return self.changed_to.split(",") if self.changed_to else []
+
+    @property
+    def types_words(self) -> str:
+        """Its feedback type, and those it was changed to, in words."""
+        names = [_(VALENCES[slug].label) for slug in (self.valence, *self.later_types)]
+        if len(names) == 1:
+            return names[0]
+        return _("%(first)s, changed to %(others)s") % {
+            "first": names[0],
+            "others": ", ".join(names[1:]),
+        }
 
 
 class Step(ScopedModel):
@@ -298,7 +319,8 @@ class SessionEvent(ScopedModel):
     """What was done to a session, noted of it, or done by its robot, ordered against its steps.
     Rows are only added.
 
-    ``data``: what the robot reported; which device stopped it where that was no person.
+    ``data``: what the robot reported; which device stopped it where that was no person; as
+    ``value`` (and ``old``) what a change was to that is no number: a name, or words and their type.
     """
 
     scope = PatientScope(

@@ -2,36 +2,52 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
+
 from rehab.people.models import User
+from rehab.sessions.events import MARKED_CHANGES
 from rehab.sessions.live.actor import read_log
 from rehab.sessions.models import Remark, RobotEntry, SessionEvent, Step, TrainingSession
 from rehab.sessions.trend import figures_of
 from rehab.sessions.words import say_duration, say_number, say_quantity, say_rate
-from rehab.training.changes import ChangeKind
+from rehab.training.changes import ChangeKind, PauseReason
 from rehab.training.figures import describe_session
 from rehab.training.fold import SessionFold
 from rehab.training.plans import SessionPlan, name_robot_level
+from rehab.training.valences import VALENCES
 
 # What a robot did is counted; in the list it would hide what people did.
 COUNTED = (RobotEntry.DECISION.value, RobotEntry.GESTURE.value)
+STYLES = {"points": _("points"), "line": _("line")}
+PAUSED_BY = {
+    PauseReason.THERAPIST.value: _("by the therapist"),
+    PauseReason.PATIENT.value: _("on the patient’s page"),
+    PauseReason.RESTART.value: _("by a restart of the server"),
+}
 NAMES = {
-    ChangeKind.START: "Started",
-    ChangeKind.PAUSE: "Paused",
-    ChangeKind.RESUME: "Resumed",
-    ChangeKind.FINISH: "Finished",
-    ChangeKind.ABORT: "Ended early",
-    ChangeKind.GOAL: "Goal",
-    ChangeKind.GAIN: "Gain",
-    ChangeKind.PHASE: "Phase",
-    ChangeKind.ACTIVATION_THRESHOLD: "Robot threshold",
-    ChangeKind.ROBOT_INTENSITY: "Robot",
-    RobotEntry.STOP: "Robot stopped",
-    RobotEntry.ARM: "Robot armed",
-    Remark.BORG: "Exertion (Borg)",
+    ChangeKind.START: _("Started"),
+    ChangeKind.PAUSE: _("Paused"),
+    ChangeKind.RESUME: _("Resumed"),
+    ChangeKind.FINISH: _("Finished"),
+    ChangeKind.ABORT: _("Ended early"),
+    ChangeKind.GOAL: _("Goal"),
+    ChangeKind.GAIN: _("Gain"),
+    ChangeKind.PHASE: _("Phase"),
+    ChangeKind.ACTIVATION_THRESHOLD: _("Robot threshold"),
+    ChangeKind.ROBOT_INTENSITY: _("Robot"),
+    ChangeKind.VALENCE: _("Feedback type of the next phase"),
+    ChangeKind.WORDS: _("Words edited"),
+    ChangeKind.WORDS_SHOWN: _("Words"),
+    ChangeKind.CHART_STYLE: _("Chart"),
+    RobotEntry.STOP: _("Robot stopped"),
+    RobotEntry.ARM: _("Robot armed"),
+    Remark.BORG: _("Exertion (Borg)"),
 }
 
 
@@ -74,7 +90,7 @@ def review_session(user: User, session: TrainingSession) -> Review:
     if session.original_id is not None:  # no log: what the original added up is all there is
         stored = figures_of(user, [session]).get(session.pk, {})
         figures |= {"score": stored.get("score"), "active_s": session.active_s}
-    return Review(figures, moments, gestures, draw(user, session, plan, moments))
+    return Review(figures, moments, gestures, draw(user, session, fold, moments))
 
 
 def say_event(event: SessionEvent, plan: SessionPlan) -> str:
@@ -94,7 +110,21 @@ def say_event(event: SessionEvent, plan: SessionPlan) -> str:
             return f"{name} {say_number(event.value, 0)}"
         case ChangeKind.PHASE:
             return f"{name}: {plan.phases[int(event.value or 0)].name}"
+        case ChangeKind.VALENCE:
+            return f"{name}: {_name_type(event.data.get('value'))}"
+        case ChangeKind.WORDS:
+            return f"{name}: {_name_type(event.data.get('value', {}).get('valence'))}"
+        case ChangeKind.WORDS_SHOWN:
+            return f"{name}: {gettext('on') if event.value else gettext('off')}"
+        case ChangeKind.CHART_STYLE:
+            return f"{name}: {STYLES.get(event.data.get('value', ''), '')}"
+        case ChangeKind.PAUSE if event.data.get("value") in PAUSED_BY:
+            return f"{name} {PAUSED_BY[event.data['value']]}"
     return str(name)
+
+
+def _name_type(slug: Any) -> str:
+    return gettext(VALENCES[slug].label) if slug in VALENCES else str(slug or "")
 
 
 def sum_up(plan: SessionPlan, review: Review) -> list[dict[str, str]]:
@@ -111,7 +141,9 @@ def sum_up(plan: SessionPlan, review: Review) -> list[dict[str, str]]:
         (
             "Score",
             say_number(figures["score"], 0),
-            "points" if plan.valence.has_points else "this type has no points",
+            gettext("points")
+            if plan.valence.has_points or figures["score"] is not None
+            else gettext("this type has no points"),
         ),
         (
             "Goal",
@@ -129,13 +161,14 @@ def sum_up(plan: SessionPlan, review: Review) -> list[dict[str, str]]:
 
 
 def draw(
-    user: User, session: TrainingSession, plan: SessionPlan, moments: list[Moment]
+    user: User, session: TrainingSession, fold: SessionFold, moments: list[Moment]
 ) -> dict[str, Any]:
     """Give the chart's data: strides of the trained leg by column, phases, and what was changed.
 
     ``shown`` is gain × value, also where no goal was known yet; ``hit`` is None where nothing was
     judged. A stride that does not count has no value, only its reasons.
     """
+    plan = fold.plan
     steps = (
         Step.objects.visible_to(user)
         .filter(session=session, side=session.trained_side)
@@ -152,19 +185,34 @@ def draw(
             column.append(entry)
     runs = groupby(zip(columns.pop("phase"), columns["number"], strict=True), lambda pair: pair[0])
     phases = [(plan.phases[index], [number for _, number in run]) for index, run in runs]
+    types = _types_by_run(fold, [run for _, run in phases])
     return {
         "unit": plan.measure.unit,
         "strides": columns,
         "phases": [
-            {"name": phase.name, "feedback": phase.feedback, "from": run[0], "to": run[-1]}
-            for phase, run in phases
+            {
+                "name": phase.name + changed,
+                "feedback": phase.feedback,
+                "from": run[0],
+                "to": run[-1],
+            }
+            for (phase, run), changed in zip(phases, types, strict=True)
         ],
         "marks": [
             {"after": moment.event.after_number, "kind": moment.event.kind, "words": moment.words}
             for moment in moments
-            if moment.event.kind in {"goal", "gain", "pause", "resume"}
+            if moment.event.kind in MARKED_CHANGES
         ],
     }
+
+
+def _types_by_run(fold: SessionFold, runs: Sequence[list[int]]) -> list[str]:
+    """Give the feedback type that begins with each run of strides, to stand behind its name."""
+    ends = [0, *(run[-1] for run in runs)]
+    return [
+        "".join(f" · {_name_type(slug)}" for after, slug in fold.switches if end <= after < run[0])
+        for end, run in zip(ends, runs, strict=False)
+    ]
 
 
 def _short(value: float | None) -> float | None:

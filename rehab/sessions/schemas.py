@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Annotated, Literal
 
 from ninja import Field, Schema
-from pydantic import AfterValidator
+from pydantic import AfterValidator, field_validator
 
 from rehab.people.api import PatientName, Short
 from rehab.people.api_base import Given, Key, Moment, Paging, Whole, Words, left_out
@@ -37,7 +37,10 @@ class SessionOut(Schema):
     id: int
     patient: PatientName
     state: str
-    feedback_type: str = Field(alias="valence")
+    feedback_type: str = Field(alias="valence", description="The one that it began with.")
+    changed_to: list[str] = Field(
+        alias="later_types", description="Types that it was changed to on its way, in order."
+    )
     goal: float | None
     measure: str = Field(alias="measure.name")
     unit: str = Field(alias="measure.unit")
@@ -100,9 +103,19 @@ class ChangeGiven(Given):
     """What is to be changed of a session, as on the therapist's page."""
 
     kind: ChangeKind = Field(strict=False)
-    value: float | None = Field(
-        None, description="The new goal, gain, threshold or phase; nothing for the others."
+    value: float | str | None = Field(
+        None,
+        description="The new goal, gain, threshold, intensity or phase; 1 or 0 for words shown; "
+        "the name of a valence or chart style; nothing for the others.",
     )
+
+    @field_validator("kind")
+    @classmethod
+    def check_kind(cls, kind: ChangeKind) -> ChangeKind:
+        """Refuse what is edited in the admin."""
+        if kind is ChangeKind.WORDS:
+            raise ValueError("Words are edited with their feedback type, in the admin.")
+        return kind
 
 
 class StepOut(Schema):

@@ -8,18 +8,19 @@ from dataclasses import replace
 from asgiref.sync import async_to_sync
 from django.utils.translation import gettext as _
 
+from rehab.feedback.valences import valences_of
 from rehab.people.models import Patient, User
-from rehab.sessions.cues import find_composed
+from rehab.sessions.cues import find_composed, quiet_cue
 from rehab.sessions.live import runtime
 from rehab.sessions.models import Measure, Protocol, TrainingSession
 from rehab.stations.models import Station
-from rehab.training.changes import ChangeKind
+from rehab.training.changes import ChangeKind, PauseReason, Value
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.plans import DEFAULT_ACTIVATION_THRESHOLD, SessionPlan
 from rehab.training.steps import Side
-from rehab.training.valences import Cue, find_valence
+from rehab.training.valences import Cue, Valence, find_valence
 
 
 def create_session(
@@ -44,6 +45,7 @@ def create_session(
     """Create a session that is ready to start, with everything it will be scored with.
 
     Phases are given, or come from the protocol; the robot's cue is given, or the feedback type's.
+    Feedback is the clinic's own, in the patient's language.
     ``runs`` are arguments of `python -m rehab.sources` for a source that the server runs beside the
     session. Raises InvalidSetting for a plan that could not be walked and CrossClinic where
     patient, station and the rest are not of one clinic; nothing is stored then.
@@ -63,9 +65,19 @@ def create_session(
         raise InvalidSetting(
             f"Which leg is trained? Set the paretic side of {patient}, or choose a leg."
         )
-    rules = find_valence(valence)
-    if cue is not None:
-        rules = replace(rules, cue=cue)
+    find_valence(valence)
+    known = valences_of(patient.clinic_id, patient.language)
+    usual = known.pop(valence)
+    rules = usual if cue is None else replace(usual, cue=cue)
+    composed = {one["name"]: one for one in find_composed(patient, rules.cue)}
+    alternatives: list[Valence] = []
+    for other in known.values():
+        their_cue = quiet_cue(other.cue, usual.cue, rules.cue)
+        try:
+            composed |= {one["name"]: one for one in find_composed(patient, their_cue)}
+        except InvalidSetting:  # a gesture that is gone: it hinders no session of another type
+            their_cue = Cue()
+        alternatives.append(replace(other, cue=their_cue))
     plan = SessionPlan(
         measure=measure.to_rule(),
         valence=rules,
@@ -75,7 +87,9 @@ def create_session(
         target=target or Target(),
         activation_threshold=activation_threshold,
         robot_intensity=robot_intensity,
-        gestures=tuple(find_composed(patient, rules.cue)),
+        gestures=tuple(composed.values()),
+        alternatives=tuple(alternatives),
+        language=patient.language,
     )
     session = TrainingSession(
         clinic_id=patient.clinic_id,
@@ -100,17 +114,19 @@ def create_session(
 
 
 def change_session(
-    session: TrainingSession, kind: ChangeKind, value: float | None = None, by: User | None = None
+    session: TrainingSession, kind: ChangeKind, value: Value = None, by: User | None = None
 ) -> None:
     """Start, pause, steer or end a session from a page; committed when this returns.
 
     Raises InvalidSetting where the change is refused (nothing has happened then), NotStored where
     it could not be committed, and OwnedElsewhere where another process runs the session.
     """
+    if kind is ChangeKind.PAUSE and by is not None:
+        value = PauseReason.THERAPIST.value
     async_to_sync(_change)(session.pk, kind, value, by)
 
 
-async def _change(session_id: int, kind: ChangeKind, value: float | None, by: User | None) -> None:
+async def _change(session_id: int, kind: ChangeKind, value: Value, by: User | None) -> None:
     serves = runtime.peek() is not None  # else a command: what it starts must not outlive it
     here = runtime.current()
     try:

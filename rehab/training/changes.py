@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 from rehab.training.measures import InvalidSetting
 
@@ -31,14 +33,34 @@ class ChangeKind(StrEnum):
     PHASE = "phase"
     ACTIVATION_THRESHOLD = "activation_threshold"
     ROBOT_INTENSITY = "robot_intensity"
+    VALENCE = "valence"  # of the next phase with feedback
+    WORDS = "words"  # the bands of a valence, as the clinic edited them
+    WORDS_SHOWN = "words_shown"
+    CHART_STYLE = "chart_style"
+
+
+class PauseReason(StrEnum):
+    """Why a session is paused."""
+
+    THERAPIST = "therapist"
+    PATIENT = "patient"
+    RESTART = "restart"  # of the server
+
+
+Value = float | str | Mapping[str, Any] | None
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One change. ``value``: the new goal, gain, threshold, intensity or phase index, or None."""
+    """One change.
+
+    ``value``: the new goal, gain, threshold, intensity, phase index, 1 or 0 for words shown or not;
+    a valence's slug, a chart style or a reason to pause by name; the valence and bands of words.
+    None for the others.
+    """
 
     kind: ChangeKind
-    value: float | None = None
+    value: Value = None
 
 
 class Refused(InvalidSetting):
@@ -60,6 +82,10 @@ TRANSITIONS: dict[ChangeKind, tuple[frozenset[State], State | None]] = {
     ChangeKind.PHASE: (OPEN, None),
     ChangeKind.ACTIVATION_THRESHOLD: (OPEN, None),
     ChangeKind.ROBOT_INTENSITY: (OPEN, None),
+    ChangeKind.VALENCE: (OPEN, None),
+    ChangeKind.WORDS: (OPEN, None),
+    ChangeKind.WORDS_SHOWN: (OPEN, None),
+    ChangeKind.CHART_STYLE: (OPEN, None),
 }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rehab.training.fold import SessionFold
+from rehab.training.fold import Block, SessionFold
 from rehab.training.metrics import measure_session
 from rehab.training.tallies import Tally
 
@@ -28,7 +28,8 @@ def describe_session(fold: SessionFold) -> dict[str, Any]:
 
     ``strides``, ``valid``, ``invalid`` and ``missing`` count the trained leg in every phase;
     ``hits``, ``hit_rate`` and ``score`` only feedback phases (DESIGN.md section 5). ``phases`` has
-    one entry for all that are alike in name, kind, feedback and gain, with its single blocks.
+    one entry for all that are alike in name, kind, feedback, gain and valence (of feedback), with
+    its single blocks: a phase in which the gain was changed has as many entries as it had gains.
     """
     whole, feedback = describe_tally(fold.trained), describe_tally(fold.feedback)
     return {
@@ -47,17 +48,27 @@ def describe_session(fold: SessionFold) -> dict[str, Any]:
 def describe_phases(fold: SessionFold) -> list[dict[str, Any]]:
     """Give the figures of phases, those alike together, in the plan's order."""
     entries: dict[tuple[Any, ...], tuple[dict[str, Any], Tally, list[dict[str, Any]]]] = {}
-    for index, (phase, tally) in enumerate(zip(fold.plan.phases, fold.phases, strict=True)):
-        head = {
-            "name": phase.name,
-            "kind": phase.kind,
-            "feedback": phase.feedback,
-            "gain": phase.gain,
-        }
-        _, total, blocks = entries.setdefault(tuple(head.values()), (head, Tally(), []))
-        total.merge(tally)
-        blocks.append({"phase": index, **describe_tally(tally)})
+    for index, phase in enumerate(fold.plan.phases):
+        for block, tally in _blocks_of(fold, index):
+            head = {
+                "name": phase.name,
+                "kind": phase.kind,
+                "feedback": phase.feedback,
+                "gain": block.gain,
+                "valence": block.valence,
+            }
+            _, total, blocks = entries.setdefault(tuple(head.values()), (head, Tally(), []))
+            total.merge(tally)
+            blocks.append({"phase": index, **describe_tally(tally)})
     return [
         {**head, **describe_tally(total), "blocks": blocks}
         for head, total, blocks in entries.values()
     ]
+
+
+def _blocks_of(fold: SessionFold, index: int) -> list[tuple[Block, Tally]]:
+    """Give a phase's blocks in the order in which they were walked, or one as it was planned."""
+    walked = [(block, tally) for block, tally in fold.blocks.items() if block.phase == index]
+    phase = fold.plan.phases[index]
+    planned = Block(index, phase.gain, fold.plan.valence.slug if phase.feedback else "")
+    return walked or [(planned, Tally())]

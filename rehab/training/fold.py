@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import NamedTuple
 
-from rehab.training.changes import Change, ChangeKind, Refused, State, next_state
+from rehab.training.changes import Change, ChangeKind, PauseReason, Refused, State, next_state
 from rehab.training.goals import MIN_BASELINE_STRIDES
 from rehab.training.measures import InvalidSetting, check_gain
-from rehab.training.plans import SessionPlan, check_activation_threshold, check_robot_intensity
+from rehab.training.plans import (
+    ChartStyle,
+    SessionPlan,
+    check_activation_threshold,
+    check_robot_intensity,
+)
 from rehab.training.scoring import RULES_VERSION, judge
 from rehab.training.steps import (
     InvalidMeasurement,
@@ -19,11 +26,20 @@ from rehab.training.steps import (
     find_reasons,
 )
 from rehab.training.tallies import Tally
+from rehab.training.valences import Valence, bands_from_json
 
 # Strides further apart than this were not walked without a break, or a clock jumped: no more than
 # so much counts as walked. Recorded strides last 1-2 s, gaps between recorded trials 3.2-5.2 s
 # (gait.md 1.3).
 MAX_GAP_S = 10.0
+
+
+class Block(NamedTuple):
+    """What was alike while some strides of a phase were walked; no valence without feedback."""
+
+    phase: int
+    gain: float
+    valence: str
 
 
 class SessionFold:
@@ -45,6 +61,16 @@ class SessionFold:
         self.trained = Tally()  # every step of the trained leg
         self.feedback = Tally()  # those in feedback phases: what score and hit rate count
         self.phases = tuple(Tally() for _ in plan.phases)
+        self.blocks: dict[Block, Tally] = {}  # the same strides, apart where gain or type changed
+        # What may be in force, as it is worded now; which is, and which will be with the next
+        # feedback; after which step it changed to which.
+        self.valences = {one.slug: one for one in (plan.valence, *plan.alternatives)}
+        self.valence: Valence = plan.valence
+        self.next_valence = ""
+        self.switches: list[tuple[int, str]] = []
+        self.words_shown = True
+        self.chart_style = ChartStyle.POINTS
+        self.pause_reason: PauseReason | None = None
         self._joined = False  # whether the time since the last step was walked
         self._begin(0)
 
@@ -61,8 +87,17 @@ class SessionFold:
 
     @property
     def score(self) -> int | None:
-        """Points of the session; None under a valence without points."""
-        return self.feedback.points if self.plan.valence.has_points else None
+        """Points of the session, of all its valences; None where none of them had points."""
+        walked = (self.plan.valence.slug, *self.changed_to)
+        paid = any(self.valences[slug].has_points for slug in walked)
+        return self.feedback.points if paid else None
+
+    @property
+    def changed_to(self) -> tuple[str, ...]:
+        """The valences that it was changed to on its way, in their order, each once."""
+        others = dict.fromkeys(slug for _, slug in self.switches)
+        others.pop(self.plan.valence.slug, None)
+        return tuple(others)
 
     def tally_of(self, kind: str) -> Tally:
         """Give the sums over all phases of one kind."""
@@ -123,7 +158,7 @@ class SessionFold:
         elif value is not None and goal is not None and measurement.side == plan.trained_side:
             shown, performance, hit = judge(plan.measure, value, self.gain, goal)
             if self.phase.feedback:
-                points = plan.valence.points(hit)
+                points = self.valence.points(hit)
         return ScoredStep(
             number=measurement.number,
             time_s=measurement.time_s,
@@ -146,6 +181,9 @@ class SessionFold:
         self.trained.add(step)
         if running:
             self.phases[self.phase_index].add(step)
+            valence = self.valence.slug if self.phase.feedback else ""
+            block = Block(self.phase_index, self.gain, valence)
+            self.blocks.setdefault(block, Tally()).add(step)
             if self.phase.feedback:
                 self.feedback.add(step)
             self.phase_strides += 1
@@ -175,6 +213,10 @@ class SessionFold:
         self.gain = self.phase.gain
         self.obstacle = ""  # why the plan cannot go on, in words for the PT
         self.completed = False  # the last phase has reached its limit
+        if self.next_valence and self.phase.feedback:
+            self.valence = self.valences[self.next_valence]
+            self.next_valence = ""
+            self.switches.append((self.last_number, self.valence.slug))
 
     def _goal_from_baseline(self) -> float | None:
         if self.baseline_mean is None:
@@ -205,7 +247,47 @@ class SessionFold:
                 self._enter(self._phase_index(_needed(change)))
             case ChangeKind.PAUSE:
                 self._joined = False
+                known = [reason for reason in PauseReason if reason == change.value]
+                self.pause_reason = known[0] if known else None
+            case ChangeKind.RESUME:
+                self.pause_reason = None
+            case ChangeKind.VALENCE:
+                self._plan_valence(change.value)
+            case ChangeKind.WORDS:
+                self._reword(change.value)
+            case ChangeKind.WORDS_SHOWN:
+                self.words_shown = _switch(_needed(change))
+            case ChangeKind.CHART_STYLE:
+                self.chart_style = _style(change.value)
         self.state = state
+
+    def _plan_valence(self, slug: object) -> None:
+        """Note the valence of the next phase with feedback; the one in force undoes that."""
+        if not isinstance(slug, str) or slug not in self.valences:
+            known = ", ".join(self.valences)
+            raise InvalidSetting(
+                f"The feedback type of this session can be changed to one of: {known}."
+            )
+        if slug == self.valence.slug:
+            self.next_valence = ""
+        elif any(phase.feedback for phase in self.plan.phases[self.phase_index + 1 :]):
+            self.next_valence = slug
+        else:
+            raise Refused(
+                "The feedback type changes with a phase, and no phase with feedback follows. "
+                "End this session and set up another one."
+            )
+
+    def _reword(self, value: object) -> None:
+        """Take other bands for a valence. What a step earns stays as it was planned."""
+        given = value if isinstance(value, Mapping) else {}
+        slug = given.get("valence")
+        if not isinstance(slug, str) or slug not in self.valences:
+            raise InvalidSetting("Words are given with their valence, one of the session's.")
+        worded = replace(self.valences[slug], bands=bands_from_json(given.get("bands")))
+        self.valences[slug] = worded
+        if self.valence.slug == slug:
+            self.valence = worded
 
     def _phase_index(self, value: float) -> int:
         if not 0 <= value < len(self.plan.phases) or value != int(value):
@@ -217,6 +299,20 @@ class SessionFold:
 
 
 def _needed(change: Change) -> float:
-    if change.value is None:
-        raise InvalidSetting(f"The change '{change.kind}' needs a value.")
-    return change.value
+    value: object = change.value  # JSON knows true and false beside numbers
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InvalidSetting(f"The change '{change.kind}' needs a value, and that is a number.")
+    return value
+
+
+def _switch(value: float) -> bool:
+    if value not in (0, 1):
+        raise InvalidSetting("Words are shown (1) or not (0).")
+    return value == 1
+
+
+def _style(value: object) -> ChartStyle:
+    try:
+        return ChartStyle(value)  # type: ignore[arg-type]  # whatever it is, it is looked up
+    except ValueError:
+        raise InvalidSetting(f"A chart's style is one of: {', '.join(ChartStyle)}.") from None

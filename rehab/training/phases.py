@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from rehab.training.marking import gettext_noop
 from rehab.training.measures import InvalidSetting, check_gain
 
 
@@ -18,7 +19,7 @@ class PhaseKind:
     slug: str
     label: str
     feedback: bool
-    calm_words: str = "Just keep walking."
+    calm_words: str = gettext_noop("Just keep walking.")
 
 
 # The lab's protocol (HEBB_03): baseline, familiarization, training blocks with catch blocks between
@@ -26,10 +27,10 @@ class PhaseKind:
 PHASE_KINDS: dict[str, PhaseKind] = {
     kind.slug: kind
     for kind in (
-        PhaseKind("baseline", "Baseline", False, "Just walk as you usually do."),
+        PhaseKind("baseline", "Baseline", False, gettext_noop("Just walk as you usually do.")),
         PhaseKind("familiarization", "Familiarization", True),
         PhaseKind("training", "Training", True),
-        PhaseKind("catch", "Catch", False, "Just walk as you usually do."),
+        PhaseKind("catch", "Catch", False, gettext_noop("Just walk as you usually do.")),
         PhaseKind("washout", "Washout", False),
         PhaseKind("retention", "Retention", False),
     )

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
+from enum import StrEnum
 from typing import Any
 
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import InvalidSetting, Measure
 from rehab.training.phases import Phase
 from rehab.training.steps import Side
-from rehab.training.valences import Band, Confetti, Cue, Valence
+from rehab.training.valences import Cue, Valence, bands_from_json
 
 # The paper's default (P 3.4.1): the robot answers windows of at least 90 % of the goal.
 DEFAULT_ACTIVATION_THRESHOLD = 0.90
@@ -34,6 +35,13 @@ def check_robot_intensity(intensity: float) -> float:
     return float(intensity)
 
 
+class ChartStyle(StrEnum):
+    """How the patient's page draws the latest strides."""
+
+    POINTS = "points"
+    LINE = "line"
+
+
 def name_robot_level(intensity: float | None) -> str:
     """Give the level's name; empty for none."""
     return next((name for name, value in ROBOT_LEVELS.items() if value == intensity), "")
@@ -43,7 +51,9 @@ def name_robot_level(intensity: float | None) -> str:
 class SessionPlan:
     """What is measured, how it is paid, in which phases, towards which goal, how a robot answers.
 
-    ``gestures`` are those that somebody composed and the cue names, as they travel to the robot.
+    ``alternatives`` are the valences that it may be changed to on its way, as they are then.
+    ``gestures`` are those that somebody composed and a cue names, as they travel to the robot.
+    ``language`` is the one that its words are in.
     Raises InvalidSetting for a plan that could not be walked: no phase, a goal outside the
     measure's bounds, a goal from a baseline that does not come before the first feedback.
     """
@@ -57,6 +67,8 @@ class SessionPlan:
     activation_threshold: float = DEFAULT_ACTIVATION_THRESHOLD
     robot_intensity: float = 1.0
     gestures: tuple[dict[str, Any], ...] = ()
+    alternatives: tuple[Valence, ...] = ()
+    language: str = "en"
 
     def __post_init__(self) -> None:
         if not self.phases:
@@ -79,20 +91,10 @@ class SessionPlan:
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> SessionPlan:
-        """Rebuild a plan from ``to_json``'s data."""
-        valence = data["valence"]
+        """Rebuild a plan from ``to_json``'s data, also of a plan that knew less than today's."""
         return cls(
             measure=Measure(**data["measure"]),
-            valence=Valence(
-                **valence
-                | {
-                    "bands": tuple(
-                        Band(**band | {"confetti": Confetti(band["confetti"])})
-                        for band in valence["bands"]
-                    ),
-                    "cue": Cue(**valence["cue"]),
-                }
-            ),
+            valence=_read_valence(data["valence"]),
             phases=tuple(Phase(**phase) for phase in data["phases"]),
             trained_side=Side(data["trained_side"]),
             goal=GoalRule(**data["goal"]),
@@ -100,4 +102,11 @@ class SessionPlan:
             activation_threshold=data["activation_threshold"],
             robot_intensity=data["robot_intensity"],
             gestures=tuple(data["gestures"]),
+            alternatives=tuple(_read_valence(one) for one in data.get("alternatives", ())),
+            language=data.get("language", "en"),
         )
+
+
+def _read_valence(data: dict[str, Any]) -> Valence:
+    parts = {"bands": bands_from_json(data["bands"]), "cue": Cue(**data["cue"])}
+    return Valence(**data | parts)

@@ -6,14 +6,19 @@ All of it is data. Pages and robots know no valence: they draw and do what these
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
+from typing import Any
 
+from rehab.training.marking import gettext_noop
 from rehab.training.measures import InvalidSetting
 
 # More would say no more, and overflow where points are stored.
 POINTS_MAX = 1000
+BANDS_MAX = 12
+WORDS_MAX = 60  # characters; longer ones fit no tablet in a size that is read from a treadmill
 
 
 class Emblem(StrEnum):
@@ -80,6 +85,10 @@ class Valence:
             raise InvalidSetting(f"{self.label}: the first band begins at 0, each next one higher.")
         if self.has_points and 1 not in starts:
             raise InvalidSetting(f"{self.label}: one band must begin at 1, the goal.")
+        if len(self.bands) > BANDS_MAX:
+            raise InvalidSetting(f"{self.label}: at most {BANDS_MAX} bands.")
+        if any(len(band.words) > WORDS_MAX for band in self.bands):
+            raise InvalidSetting(f"{self.label}: words have at most {WORDS_MAX} characters.")
 
     @property
     def has_points(self) -> bool:
@@ -108,58 +117,70 @@ class Valence:
         points = self.points(hit) or 0
         return Emblem.GAIN if points > 0 else Emblem.LOSS if points < 0 else Emblem.NEUTRAL
 
+    def keeps_character(self, hit_points: int | None, miss_points: int | None) -> bool:
+        """Say whether these points would leave it the rule set that it is.
+
+        Who names a type in a study must be able to trust it: what rewards hits goes on to do so,
+        what takes nothing never does, and what has no points gets none.
+        """
+        if not self.has_points or hit_points is None or miss_points is None:
+            return (hit_points, miss_points) == (self.hit_points, self.miss_points)
+        return bool(hit_points) == bool(self.hit_points) and bool(miss_points) == bool(
+            self.miss_points
+        )
+
 
 # Band limits: product.md 4.1 (they split the recorded strides usefully; the original's did not).
 POSITIVE = Valence(
     slug="positive",
-    label="Positive",
+    label=gettext_noop("Positive"),
     hue="blue",
     hit_points=1,
     miss_points=0,
     bands=(
-        Band(0, "On to the next step."),
-        Band(0.75, "Nearly there. Keep walking."),
-        Band(1, "You reached the goal!", Confetti.LITTLE),
-        Band(1.1, "Strong push!", Confetti.MUCH),
-        Band(1.25, "What a push!", Confetti.MOST),
+        Band(0, gettext_noop("On to the next step.")),
+        Band(0.75, gettext_noop("Nearly there. Keep walking.")),
+        Band(1, gettext_noop("You reached the goal!"), Confetti.LITTLE),
+        Band(1.1, gettext_noop("Strong push!"), Confetti.MUCH),
+        Band(1.25, gettext_noop("What a push!"), Confetti.MOST),
     ),
     cue=Cue(above="celebrate"),
 )
 NEGATIVE = Valence(
     slug="negative",
-    label="Negative",
+    label=gettext_noop("Negative"),
     hue="apricot",
     hit_points=0,
     miss_points=-1,
     bands=(
-        Band(0, "Far below the goal."),
-        Band(0.75, "Below the goal."),
-        Band(1, "No points lost."),
+        Band(0, gettext_noop("Far below the goal.")),
+        Band(0.75, gettext_noop("Below the goal.")),
+        Band(1, gettext_noop("No points lost.")),
     ),
     cue=Cue(below="droop"),
 )
 BINARY = Valence(
     slug="binary",
-    label="Binary",
+    label=gettext_noop("Binary"),
     hue="rose",
     hit_points=1,
     miss_points=-1,
     bands=(
-        Band(0, "Far below the goal."),
-        Band(0.75, "Below the goal."),
-        Band(1, "You reached the goal!", Confetti.LITTLE),
-        Band(1.1, "Strong push!", Confetti.MUCH),
-        Band(1.25, "What a push!", Confetti.MOST),
+        Band(0, gettext_noop("Far below the goal.")),
+        Band(0.75, gettext_noop("Below the goal.")),
+        Band(1, gettext_noop("You reached the goal!"), Confetti.LITTLE),
+        Band(1.1, gettext_noop("Strong push!"), Confetti.MUCH),
+        Band(1.25, gettext_noop("What a push!"), Confetti.MOST),
     ),
     cue=Cue(above="celebrate", below="droop"),
 )
 EXPLICIT = Valence(
     slug="explicit",
-    label="Explicit",
+    label=gettext_noop("Explicit"),
     hue="graphite",
     hit_points=None,
     miss_points=None,
-    bands=(Band(0, "Your push, this step."),),
+    bands=(Band(0, gettext_noop("Your push, this step.")),),
     cue=Cue(),
 )
 
@@ -176,3 +197,51 @@ def find_valence(slug: str) -> Valence:
         raise InvalidSetting(
             f"There is no valence {slug!r}. Known valences: {', '.join(VALENCES)}."
         ) from None
+
+
+def edit_valence(
+    slug: str,
+    *,
+    hit_points: int | None,
+    miss_points: int | None,
+    bands: Sequence[Band],
+    cue: Cue,
+) -> Valence:
+    """Give a valence as somebody made it anew. Raises InvalidSetting where it would be no such."""
+    usual = find_valence(slug)
+    if not usual.keeps_character(hit_points, miss_points):
+        hit = "pays for a hit" if usual.hit_points else "pays nothing for a hit"
+        miss = "takes for a miss" if usual.miss_points else "takes nothing for a miss"
+        rule = f"{hit} and {miss}" if usual.has_points else "has no points"
+        raise InvalidSetting(f"{usual.label} feedback {rule}. Choose another type for other rules.")
+    if not usual.has_points and cue != Cue():
+        raise InvalidSetting(f"{usual.label} feedback only informs: its robot stands still.")
+    return replace(
+        usual, hit_points=hit_points, miss_points=miss_points, bands=tuple(bands), cue=cue
+    )
+
+
+def bands_to_json(bands: Sequence[Band]) -> list[dict[str, Any]]:
+    """Give bands as plain JSON data."""
+    return [
+        {"from_performance": b.from_performance, "words": b.words, "confetti": b.confetti.value}
+        for b in bands
+    ]
+
+
+def bands_from_json(data: Any) -> tuple[Band, ...]:
+    """Rebuild bands from ``bands_to_json``'s data. Raises InvalidSetting for anything else."""
+    try:
+        return tuple(_band_from_json(entry) for entry in data)
+    except (KeyError, TypeError, ValueError):
+        raise InvalidSetting(
+            "A band has from_performance (a number), words (a text) and confetti "
+            f"({', '.join(Confetti)})."
+        ) from None
+
+
+def _band_from_json(entry: Mapping[str, Any]) -> Band:
+    start, words = entry["from_performance"], entry["words"]
+    if not isinstance(words, str) or isinstance(start, bool) or not isinstance(start, int | float):
+        raise TypeError
+    return Band(start, words, Confetti(entry["confetti"]))

@@ -367,7 +367,6 @@ def test_a_composed_gesture_needs_no_new_robot(stage):
     ("data", "words"),
     [
         (FAR, "goes 0.40 m away"),
-        (FAR | {"name": "celebrate"}, "knows celebrate already"),
         (FAR | {"steps": 3}, "list of steps"),
         (WAVE | {"steps": [{"turn_rad": math.nan}]}, "not finite"),
         (WAVE | {"steps": [{"turn_rad": 1.0}]}, "It ends turned by 57°"),
@@ -386,6 +385,15 @@ def test_a_gesture_that_does_not_validate_here_moves_nothing(make, data, words):
     assert stage.robot.bad_messages == 1
     assert stage.base.read().pose == HOME
     assert stage.of("gesture") == []
+
+
+@pytest.mark.parametrize("broken", [FAR, WAVE, {"steps": 3}])
+def test_what_comes_under_a_built_in_name_does_not_take_the_gesture_away(stage, broken):
+    stage.hear(type="cue", cue=CUE | {"gestures": [broken | {"name": "celebrate"}]})
+    stage.walk(*[1.2] * 6)
+    decision = stage.of("decision")[0]
+    assert (decision["gesture"], decision["reason"]) == ("celebrate", "")
+    assert "celebrate" in stage.robot.last_bad
 
 
 def test_a_robot_s_own_gesture_is_not_replaced(stage):

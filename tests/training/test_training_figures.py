@@ -72,6 +72,18 @@ def test_only_phases_alike_are_taken_together(other) -> None:
     assert [[block["phase"] for block in phase["blocks"]] for phase in phases] == [[0, 2], [1]]
 
 
+def test_a_gain_that_was_changed_within_a_phase_has_figures_of_its_own() -> None:
+    fold = start(make_plan(make_phase("training")))
+    walk(fold, [4.0, 4.0])
+    fold.change(Change(ChangeKind.GAIN, 0.9))
+    walk(fold, [4.0])
+    phases = describe_session(fold)["phases"]
+    assert [(one["gain"], one["strides"], one["hits"]) for one in phases] == [
+        (1.0, 2, 2),
+        (0.9, 1, 0),
+    ]
+
+
 @pytest.mark.parametrize("valence", VALENCES)
 def test_an_empty_session_can_be_told(valence: str) -> None:
     figures = describe_session(SessionFold(make_plan(valence=valence)))

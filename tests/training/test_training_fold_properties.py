@@ -6,24 +6,28 @@ import copy
 import json
 import math
 from collections.abc import Sequence
+from functools import partial
 
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from rehab.training.changes import Change, ChangeKind
+from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.fold import SessionFold
 from rehab.training.measures import InvalidSetting
 from rehab.training.metrics import measure_session
 from rehab.training.phases import PHASE_KINDS, make_phase
-from rehab.training.plans import SessionPlan
+from rehab.training.plans import ChartStyle, SessionPlan
 from rehab.training.scoring import PERFORMANCE_MAX
 from rehab.training.steps import InvalidMeasurement, Measurement, Reason, ScoredStep, Side
 from rehab.training.tallies import Tally
-from rehab.training.valences import VALENCES
-from tests.training.training_sessions import make_plan, start
+from rehab.training.valences import VALENCES, Band, Confetti, Valence, bands_to_json
+from tests.training.training_sessions import make_plan, others_than, start
 
 Log = list[Measurement | Change]
+
+ONE_BAND = (Band(0, "Go on."),)
+TWO_BANDS = (Band(0, "Not yet."), Band(1, "There.", Confetti.MOST))
 
 values = st.one_of(
     st.none(), st.floats(0, 20), st.floats(3, 5), st.sampled_from([math.nan, math.inf, -1.0, 4.0])
@@ -40,8 +44,21 @@ changes = st.builds(
         [kind for kind in ChangeKind if kind not in (ChangeKind.FINISH, ChangeKind.ABORT)]
     ),
     st.one_of(
-        st.none(), st.floats(0.5, 1.5), st.integers(-1, 3), st.floats(0, 15), st.just(math.nan)
+        st.none(),
+        st.floats(0.5, 1.5),
+        st.integers(-1, 3),
+        st.floats(0, 15),
+        st.just(math.nan),
+        st.sampled_from([*VALENCES, *ChartStyle, *PauseReason]),
     ),
+) | st.sampled_from([*VALENCES]).flatmap(
+    lambda slug: st.sampled_from(
+        [
+            Change(ChangeKind.VALENCE, slug),
+            Change(ChangeKind.WORDS, {"valence": slug, "bands": bands_to_json(ONE_BAND)}),
+            Change(ChangeKind.WORDS, {"valence": slug, "bands": bands_to_json(TWO_BANDS)}),
+        ]
+    )
 )
 happenings = st.lists(st.one_of(strides, strides, strides, strides, changes), max_size=60)
 
@@ -62,9 +79,11 @@ def plans(draw: st.DrawFn) -> SessionPlan:
         )
     )
     valence = draw(st.sampled_from(list(VALENCES)))
+    others = others_than(valence) if draw(st.integers(0, 3)) else ()  # none: a plan of before
+    plan = partial(make_plan, valence=valence, alternatives=others)
     if draw(st.booleans()):
-        return make_plan(make_phase("baseline", strides=50), *phases, valence=valence, percent=100)
-    return make_plan(*phases, valence=valence, goal=draw(st.floats(0, 15, exclude_min=True)))
+        return plan(make_phase("baseline", strides=50), *phases, percent=100)
+    return plan(*phases, goal=draw(st.floats(0, 15, exclude_min=True)))
 
 
 @st.composite
@@ -153,11 +172,15 @@ def test_every_figure_follows_from_the_scored_steps(session: tuple[SessionPlan, 
     assert fold.feedback == tally([step for step in walked if plan.phases[step.phase].feedback])
     for index, phase in enumerate(fold.phases):
         assert phase == tally([step for step in walked if step.phase == index])
-    if plan.valence.has_points:
+    if any(VALENCES[slug].has_points for slug in (plan.valence.slug, *fold.changed_to)):
         assert fold.score == sum(step.points or 0 for step in steps)
     else:
         assert fold.score is None
         assert all(step.points is None for step in steps)
+    for name in ("strides", "valid", "invalid", "missing", "judged", "hits", "points"):
+        for index, phase in enumerate(fold.phases):
+            parts = [part for block, part in fold.blocks.items() if block.phase == index]
+            assert sum(getattr(part, name) for part in parts) == getattr(phase, name)
     for total in (fold.trained, fold.feedback, *fold.phases):
         assert total.strides == total.valid + total.invalid + total.missing
         assert total.hits <= total.judged <= total.valid
@@ -167,7 +190,9 @@ def test_every_figure_follows_from_the_scored_steps(session: tuple[SessionPlan, 
 @given(sessions())
 def test_every_scored_step_keeps_its_promises(session: tuple[SessionPlan, Log]) -> None:
     plan, log = session
-    for step in walk_log(SessionFold(plan), log):
+    fold = SessionFold(plan)
+    steps = walk_log(fold, log)
+    for step in steps:
         assert step.valid == (not step.reasons)
         assert len(set(step.reasons)) == len(step.reasons)
         judged = step.valid and step.side == plan.trained_side and step.goal is not None
@@ -177,10 +202,53 @@ def test_every_scored_step_keeps_its_promises(session: tuple[SessionPlan, Log]) 
             assert abs(step.performance) <= PERFORMANCE_MAX
         else:
             assert (step.shown, step.performance, step.hit, step.points) == (None,) * 4
-        paid = judged and plan.phases[step.phase].feedback and plan.valence.has_points
-        assert (step.points is not None) == paid
+        valence = valence_at(fold, step)
+        expected = None
+        if judged and plan.phases[step.phase].feedback:
+            expected = valence.points(step.hit)
+        assert step.points == expected
         kept = (step.value, step.gain, step.shown, step.goal, step.performance)
         json.dumps(kept, allow_nan=False)
+
+
+def valence_at(fold: SessionFold, step: ScoredStep) -> Valence:
+    """Give the valence that was in force when a step came, by the switches alone."""
+    slug = fold.plan.valence.slug
+    for after, changed_to in fold.switches:
+        if step.number > after:
+            slug = changed_to
+    return VALENCES[slug]
+
+
+@given(sessions())
+def test_the_feedback_type_changes_with_a_phase_of_feedback_alone(
+    session: tuple[SessionPlan, Log],
+) -> None:
+    plan, log = session
+    fold = SessionFold(plan)
+    for entry in log:
+        before = (fold.valence.slug, fold.phase_index, len(fold.switches))
+        walk_log(fold, [entry])
+        assert fold.valence == fold.valences[fold.valence.slug]
+        if fold.valence.slug == before[0]:
+            continue
+        assert fold.phase.feedback
+        assert fold.phase_strides == 0
+        by_hand = isinstance(entry, Change) and entry.kind is ChangeKind.PHASE
+        assert fold.phase_index != before[1] or by_hand
+        assert len(fold.switches) == before[2] + 1
+    assert fold.next_valence != fold.valence.slug
+    assert {fold.valence.slug, *fold.changed_to} <= {plan.valence.slug, *fold.valences}
+
+
+@given(sessions())
+def test_words_and_drawing_alter_no_score(session: tuple[SessionPlan, Log]) -> None:
+    plan, log = session
+    spoken = (ChangeKind.WORDS, ChangeKind.WORDS_SHOWN, ChangeKind.CHART_STYLE)
+    quiet = [e for e in log if not (isinstance(e, Change) and e.kind in spoken)]
+    one, other = SessionFold(plan), SessionFold(plan)
+    assert walk_log(one, log) == walk_log(other, quiet)
+    assert measure_session(one) == measure_session(other)
 
 
 @given(sessions())

@@ -7,12 +7,14 @@ import math
 
 import pytest
 
+from rehab.training.changes import Change, ChangeKind
+from rehab.training.fold import SessionFold
 from rehab.training.goals import Target
 from rehab.training.measures import A2, InvalidSetting, Measure
 from rehab.training.phases import PHASE_KINDS, make_phase
 from rehab.training.plans import SessionPlan
 from rehab.training.valences import VALENCES
-from tests.training.training_sessions import SWAY, make_plan
+from tests.training.training_sessions import SWAY, make_plan, others_than
 
 
 @pytest.mark.parametrize("measure", [A2, SWAY], ids=lambda measure: measure.slug)
@@ -27,11 +29,26 @@ def test_a_plan_survives_being_stored(valence: str, measure: Measure) -> None:
         activation_threshold=1.0,
         robot_intensity=0.5,
         gestures=({"name": "wave", "steps": [{"turn_rad": 0.5}, {"turn_rad": -0.5}]},),
+        alternatives=others_than(valence),
+        language="es",
     )
     again = SessionPlan.from_json(json.loads(json.dumps(plan.to_json(), allow_nan=False)))
     assert again == plan
     assert type(again.trained_side) is type(plan.trained_side)
     assert type(again.valence.bands[0].confetti) is type(plan.valence.bands[0].confetti)
+
+
+def test_a_plan_from_before_alternatives_is_read_and_cannot_be_changed() -> None:
+    plan = make_plan(make_phase("baseline"), make_phase("training"))
+    stored = {
+        name: value
+        for name, value in json.loads(json.dumps(plan.to_json())).items()
+        if name not in {"alternatives", "language"}
+    }
+    again = SessionPlan.from_json(stored)
+    assert again == plan
+    with pytest.raises(InvalidSetting, match="can be changed to one of: binary"):
+        SessionFold(again).change(Change(ChangeKind.VALENCE, "positive"))
 
 
 def test_a_plan_needs_a_phase() -> None:

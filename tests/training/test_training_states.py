@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import copy
 import math
+from typing import Any
 
 import pytest
 
-from rehab.training.changes import Change, ChangeKind, Refused, State, next_state
+from rehab.training.changes import (
+    Change,
+    ChangeKind,
+    PauseReason,
+    Refused,
+    State,
+    Value,
+    next_state,
+)
 from rehab.training.fold import SessionFold
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import make_phase
+from rehab.training.valences import BINARY, NEGATIVE, bands_to_json
 from tests.training.training_sessions import make_plan, step_at, walk
 
 K, S = ChangeKind, State
@@ -31,21 +41,29 @@ LEADS_TO = {
     **{(K.ABORT, state): S.ABORTED for state in (S.READY, S.RUNNING, S.PAUSED)},
     **{
         (kind, state): state
-        for kind in (K.GOAL, K.GAIN, K.PHASE, K.ACTIVATION_THRESHOLD, K.ROBOT_INTENSITY)
+        for kind in K
+        if kind not in (K.START, K.PAUSE, K.RESUME, K.FINISH, K.ABORT)
         for state in (S.READY, S.RUNNING, S.PAUSED)
     },
 }
-VALUES = {
+NUMBERS = {
     K.GOAL: 3.0,
     K.GAIN: 0.9,
     K.PHASE: 1.0,
     K.ACTIVATION_THRESHOLD: 1.2,
     K.ROBOT_INTENSITY: 0.0,
+    K.WORDS_SHOWN: 0.0,
+}
+VALUES: dict[ChangeKind, Value] = {
+    **NUMBERS,
+    K.VALENCE: "negative",
+    K.CHART_STYLE: "line",
+    K.WORDS: {"valence": "binary", "bands": bands_to_json(BINARY.bands)},
 }
 
 
 def session_in(state: State) -> SessionFold:
-    plan = make_plan(make_phase("training"), make_phase("washout"))
+    plan = make_plan(make_phase("baseline"), make_phase("training"), alternatives=(NEGATIVE,))
     return SessionFold.replay(plan, [Change(kind) for kind in WAY_TO[state]])
 
 
@@ -77,9 +95,33 @@ def test_steps_come_only_while_running_or_paused(state: State) -> None:
 
 
 @pytest.mark.parametrize("kind", VALUES)
-def test_a_change_that_needs_a_value_says_so(kind: ChangeKind) -> None:
-    with pytest.raises(InvalidSetting, match=f"'{kind}' needs a value"):
-        session_in(S.RUNNING).change(Change(kind))
+@pytest.mark.parametrize("value", [None, True, [], {}, {"valence": []}, "", math.nan])
+def test_a_change_without_its_value_is_refused(kind: ChangeKind, value: Any) -> None:
+    fold = session_in(S.RUNNING)
+    before = copy.deepcopy(vars(fold))
+    wanted = f"'{kind}' needs a value" if kind in NUMBERS and value is None else None
+    with pytest.raises(InvalidSetting, match=wanted):
+        fold.change(Change(kind, value))
+    assert vars(fold) == before
+
+
+@pytest.mark.parametrize("kind", VALUES)
+def test_the_same_change_again_alters_nothing(kind: ChangeKind) -> None:
+    fold = session_in(S.RUNNING)
+    fold.change(Change(kind, VALUES[kind]))
+    before = copy.deepcopy(vars(fold))
+    fold.change(Change(kind, VALUES[kind]))
+    assert vars(fold) == before
+
+
+def test_a_pause_has_a_reason_until_the_session_goes_on() -> None:
+    fold = session_in(S.RUNNING)
+    fold.change(Change(K.PAUSE, "restart"))
+    assert fold.pause_reason is PauseReason.RESTART
+    fold.change(Change(K.RESUME))
+    assert fold.pause_reason is None
+    fold.change(Change(K.PAUSE))  # as logs have it that are older than reasons
+    assert fold.pause_reason is None
 
 
 @pytest.mark.parametrize(
@@ -90,11 +132,17 @@ def test_a_change_that_needs_a_value_says_so(kind: ChangeKind) -> None:
         (K.GAIN, 2.0, "0.5 to 1.5"),
         (K.ACTIVATION_THRESHOLD, 90.0, "0.9 for 90 %"),
         *((K.ROBOT_INTENSITY, value, r"gentle \(0.5\)") for value in (-1, 0.3, 2, math.nan)),
+        (K.WORDS_SHOWN, 0.5, "shown"),
+        (K.CHART_STYLE, "bars", "points, line"),
+        (K.VALENCE, "happy", "binary, negative"),
+        (K.WORDS, {"valence": "positive", "bands": []}, "one of the session's"),
+        (K.WORDS, {"valence": "binary", "bands": []}, "begins at 0"),
+        (K.WORDS, {"valence": "binary", "bands": [{"words": "Go"}]}, "from_performance"),
         *((K.PHASE, value, "0 to 1") for value in (-1, 0.5, 2, 1e308, math.nan, math.inf)),
     ],
 )
 def test_a_value_out_of_bounds_is_refused_with_the_cure(
-    kind: ChangeKind, value: float, cure: str
+    kind: ChangeKind, value: Any, cure: str
 ) -> None:
     fold = session_in(S.RUNNING)
     before = copy.deepcopy(vars(fold))
@@ -105,6 +153,7 @@ def test_a_value_out_of_bounds_is_refused_with_the_cure(
 
 def test_a_change_holds_from_the_next_step_on() -> None:
     fold = session_in(S.RUNNING)
+    fold.change(Change(K.PHASE, 1.0))
     (before,) = walk(fold, [4.0])
     fold.change(Change(K.GOAL, 5.0))
     fold.change(Change(K.GAIN, 1.5))

@@ -8,11 +8,12 @@ import math
 import pytest
 
 from rehab.training.changes import Change, ChangeKind
+from rehab.training.figures import describe_phases
 from rehab.training.phases import make_phase
 from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import Measurement, Reason, ScoredStep, Side
-from rehab.training.valences import VALENCES
-from tests.training.training_sessions import make_plan, start, walk
+from rehab.training.valences import VALENCES, Cue
+from tests.training.training_sessions import make_plan, others_than, start, walk
 
 GOAL = 4.0
 HIT, MISS = 5.0, 3.0
@@ -123,6 +124,30 @@ def test_the_gain_changes_what_is_shown_and_so_what_is_earned(valence: str) -> N
     nearly, enough = walk(fold, [4.70, 4.71])
     assert figures(nearly) == (0.85 * 4.70, 0.85 * 4.70 / GOAL, False, EARNED[valence][1])
     assert figures(enough) == (0.85 * 4.71, 0.85 * 4.71 / GOAL, True, EARNED[valence][0])
+
+
+@pytest.mark.parametrize("later", list(EARNED))
+def test_after_a_change_of_type_steps_earn_what_they_earn_in_that_one(
+    valence: str, later: str
+) -> None:
+    phases = (make_phase("training"), make_phase("catch"), make_phase("training"))
+    fold = start(make_plan(*phases, valence=valence, alternatives=others_than(valence)))
+    fold.change(Change(ChangeKind.VALENCE, later))
+    before = walk(fold, [HIT, MISS])
+    fold.change(Change(ChangeKind.PHASE, 1))
+    calm = walk(fold, [HIT, MISS])
+    fold.change(Change(ChangeKind.PHASE, 2))
+    after = walk(fold, [HIT, MISS])
+    assert tuple(step.points for step in before) == EARNED[valence]
+    assert tuple(step.points for step in calm) == (None, None)
+    assert tuple(step.points for step in after) == EARNED[later]
+    paid = [step.points for step in (*before, *after) if step.points is not None]
+    assert fold.score == (sum(paid) if paid else None)
+    assert fold.changed_to == (() if later == valence else (later,))
+    training = [phase for phase in describe_phases(fold) if phase["feedback"]]
+    assert [phase["valence"] for phase in training] == list(dict.fromkeys((valence, later)))
+    if later == "explicit":
+        assert fold.valence.cue == Cue()  # the robot stands still
 
 
 def test_only_explicit_has_no_score(valence: str) -> None:

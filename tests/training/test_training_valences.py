@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import json
 import math
 import re
 
@@ -11,6 +12,7 @@ import pytest
 
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import (
+    POINTS_MAX,
     POSITIVE,
     VALENCES,
     Band,
@@ -18,6 +20,9 @@ from rehab.training.valences import (
     Cue,
     Emblem,
     Valence,
+    bands_from_json,
+    bands_to_json,
+    edit_valence,
     find_valence,
 )
 
@@ -162,3 +167,54 @@ def test_a_pt_may_word_a_valence_anew() -> None:
 def test_an_unknown_valence_is_refused_with_the_known_ones() -> None:
     with pytest.raises(InvalidSetting, match=r"'happy'.*positive, negative, binary, explicit"):
         find_valence("happy")
+
+
+def edited(slug: str, **changes: object) -> Valence:
+    usual = VALENCES[slug]
+    parts = {
+        name: getattr(usual, name) for name in ("hit_points", "miss_points", "bands", "cue")
+    } | changes
+    return edit_valence(slug, **parts)
+
+
+def test_a_clinic_words_and_pays_a_valence_in_its_own_way() -> None:
+    bands = (Band(0, "Go on."), Band(1, "There!", Confetti.MOST))
+    mine = edited("positive", hit_points=5, bands=bands, cue=Cue(above="nod"))
+    assert (mine.label, mine.hue) == (VALENCES["positive"].label, VALENCES["positive"].hue)
+    assert (mine.points(True), mine.points(False), mine.band(1.3).words) == (5, 0, "There!")
+
+
+@pytest.mark.parametrize(
+    ("slug", "changes", "why"),
+    [
+        ("positive", {"miss_points": -1}, "pays for a hit and takes nothing for a miss"),
+        ("positive", {"hit_points": 0}, "pays for a hit"),
+        ("negative", {"hit_points": 1}, "pays nothing for a hit and takes for a miss"),
+        ("negative", {"miss_points": 0}, "takes for a miss"),
+        ("binary", {"miss_points": 0}, "pays for a hit and takes for a miss"),
+        ("binary", {"hit_points": None, "miss_points": None}, "pays for a hit"),
+        ("explicit", {"hit_points": 1, "miss_points": 0}, "has no points"),
+        ("explicit", {"cue": Cue(above="celebrate")}, "stands still"),
+        ("positive", {"hit_points": POINTS_MAX + 1}, f"0 to {POINTS_MAX} points"),
+        ("positive", {"bands": (Band(0, "x" * 61), Band(1, "y"))}, "at most 60 characters"),
+        ("positive", {"bands": (Band(0, "a"),)}, "begin at 1, the goal"),
+        ("explicit", {"bands": tuple(Band(n, "a") for n in range(13))}, "at most 12 bands"),
+    ],
+)
+def test_no_edit_makes_another_rule_set_of_a_valence(
+    slug: str, changes: dict[str, object], why: str
+) -> None:
+    with pytest.raises(InvalidSetting, match=why):
+        edited(slug, **changes)
+
+
+@pytest.mark.parametrize("slug", VALENCES)
+def test_bands_survive_being_stored(slug: str) -> None:
+    bands = VALENCES[slug].bands
+    assert bands_from_json(json.loads(json.dumps(bands_to_json(bands)))) == bands
+
+
+@pytest.mark.parametrize("data", [None, 1, ["x"], [{}], [{"from_performance": "0", "words": ""}]])
+def test_what_are_no_bands_is_refused(data: object) -> None:
+    with pytest.raises(InvalidSetting, match="from_performance"):
+        bands_from_json(data)

@@ -12,7 +12,7 @@ from rehab.training.measures import A2, Measure
 from rehab.training.phases import Phase, make_phase
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import Measurement, ScoredStep, Side
-from rehab.training.valences import find_valence
+from rehab.training.valences import VALENCES, Valence, find_valence
 
 STRIDE_S = 1.0
 
@@ -37,6 +37,11 @@ def make_plan(
         goal=GoalRule(percent_of_baseline=percent) if percent else GoalRule(value=goal),
         **settings,
     )
+
+
+def others_than(valence: str) -> tuple[Valence, ...]:
+    """Give the valences that a session of this one may be changed to."""
+    return tuple(other for slug, other in VALENCES.items() if slug != valence)
 
 
 def start(plan: SessionPlan) -> SessionFold:

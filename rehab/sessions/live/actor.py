@@ -8,6 +8,7 @@ from datetime import datetime
 from typing import Any, NamedTuple
 
 from rehab.people.models import User
+from rehab.sessions.events import MARKED_CHANGES, change_mark
 from rehab.sessions.models import (
     Remark,
     RobotEntry,
@@ -16,7 +17,7 @@ from rehab.sessions.models import (
     Step,
     TrainingSession,
 )
-from rehab.training.changes import ENDED, Change, ChangeKind, State
+from rehab.training.changes import ENDED, Change, ChangeKind, State, Value
 from rehab.training.fold import SessionFold
 from rehab.training.metrics import measure_session
 from rehab.training.steps import Measurement, ScoredStep, Side
@@ -31,7 +32,7 @@ class StepRow(NamedTuple):
 
 
 Row = StepRow | SessionEvent | SessionMetric
-MARKED = frozenset({ChangeKind.GOAL.value, *(remark.value for remark in Remark)})
+MARKED = frozenset({*MARKED_CHANGES, *(remark.value for remark in Remark)})
 MARKS = 100  # the newest; more would hide the strides
 Summary = dict[str, Any]
 
@@ -66,8 +67,11 @@ class SessionActor:
 
     def mark(self, event: SessionEvent) -> None:
         """Keep an event at hand for those who join later."""
-        mark = {"after": event.after_number, "kind": event.kind, "value": event.value}
-        self.marks.append(mark)
+        kind, value = event.kind, event.data.get("value", event.value)
+        if kind in MARKED_CHANGES:
+            self.marks.append(change_mark(event.after_number, ChangeKind(kind), value))
+        else:
+            self.marks.append({"after": event.after_number, "kind": kind, "value": value})
 
     def take(self, measurement: Measurement, received_at: datetime) -> StepRow:
         """Score one stride and give its row. Raises what ``SessionFold.step`` raises."""
@@ -84,10 +88,9 @@ class SessionActor:
             session=self.session,
             after_number=self.fold.last_number,
             kind=change.kind.value,
-            old=old,
-            value=change.value,
             by=by,
             at=at,
+            **_to_columns(old, change.value),
         )
         if event.kind in MARKED:
             self.mark(event)
@@ -133,9 +136,10 @@ class SessionActor:
             "active_s": self.fold.active_s,
             "started_at": self.session.started_at,
             "ended_at": self.session.ended_at,
+            "changed_to": ",".join(self.fold.changed_to),
         }
 
-    def _current(self, kind: ChangeKind) -> float | None:
+    def _current(self, kind: ChangeKind) -> float | str | None:
         match kind:
             case ChangeKind.GOAL:
                 return self.fold.goal
@@ -147,7 +151,20 @@ class SessionActor:
                 return self.fold.activation_threshold
             case ChangeKind.ROBOT_INTENSITY:
                 return self.fold.robot_intensity
+            case ChangeKind.VALENCE:
+                return self.fold.next_valence or self.fold.valence.slug
+            case ChangeKind.WORDS_SHOWN:
+                return float(self.fold.words_shown)
+            case ChangeKind.CHART_STYLE:
+                return self.fold.chart_style.value
         return None
+
+
+def _to_columns(old: Value, value: Value) -> dict[str, Any]:
+    """Give a change's values as the log keeps them: numbers in columns, all else in ``data``."""
+    if value is None or isinstance(value, int | float):
+        return {"old": old, "value": value}
+    return {"data": {"value": value} if old is None else {"value": value, "old": old}}
 
 
 def read_log(session: TrainingSession) -> Iterator[Measurement | Change]:
@@ -166,7 +183,7 @@ def read_log(session: TrainingSession) -> Iterator[Measurement | Change]:
 
 
 def _to_change(event: SessionEvent) -> Change:
-    return Change(ChangeKind(event.kind), event.value)
+    return Change(ChangeKind(event.kind), event.data.get("value", event.value))
 
 
 def to_measurement(step: Step) -> Measurement:

@@ -124,14 +124,20 @@ def read_plain(text: str) -> tuple[float | None, float | None] | None:
     return (value if math.isfinite(value) else None, goal if math.isfinite(goal) else None)
 
 
-def read_change(message: dict[str, Any]) -> tuple[ChangeKind, float | None]:
+# What is changed to a name, and what is changed elsewhere than on a session's pages.
+NAMED = frozenset({ChangeKind.VALENCE, ChangeKind.CHART_STYLE})
+ELSEWHERE = frozenset({ChangeKind.WORDS})
+
+
+def read_change(message: dict[str, Any]) -> tuple[ChangeKind, float | str | None]:
     """Read what a person wants changed. Raises BadFrame."""
-    try:
-        kind = ChangeKind(message.get("kind", ""))
-    except ValueError:
-        known = ", ".join(kind.value for kind in ChangeKind)
-        raise BadFrame(f'"kind" is one of: {known}.') from None
-    return kind, _optional_number(message, "value")
+    known = [kind for kind in ChangeKind if kind not in ELSEWHERE]
+    kind = message.get("kind")
+    if kind not in known:
+        raise BadFrame(f'"kind" is one of: {", ".join(known)}.')
+    if kind in NAMED:
+        return ChangeKind(kind), read_name(message, "value")
+    return ChangeKind(kind), _optional_number(message, "value")
 
 
 def read_name(message: dict[str, Any], name: str) -> str:

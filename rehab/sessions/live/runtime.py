@@ -28,7 +28,7 @@ from rehab.sessions.live.children import Children
 from rehab.sessions.live.session import RECENT, LiveSession
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.models import RobotEntry, SessionEvent, Step, TrainingSession
-from rehab.training.changes import ENDED, OPEN, Change, ChangeKind, State
+from rehab.training.changes import ENDED, OPEN, Change, ChangeKind, PauseReason, State, Value
 
 log = logging.getLogger(__name__)
 
@@ -111,7 +111,7 @@ class Runtime:
                 socket.close_soon(4012)
 
     async def change(
-        self, session_id: int, kind: ChangeKind, value: float | None, by: User | None
+        self, session_id: int, kind: ChangeKind, value: Value, by: User | None
     ) -> None:
         """Start, pause, steer or end a session; committed when this returns.
 
@@ -149,7 +149,8 @@ class Runtime:
             try:
                 live = await self.session(session_id)
                 if live.actor.fold.state is State.RUNNING:
-                    await live.change(Change(ChangeKind.PAUSE), None, timezone.now())
+                    pause = Change(ChangeKind.PAUSE, PauseReason.RESTART.value)
+                    await live.change(pause, None, timezone.now())
             except Exception:  # one broken session keeps no server from starting
                 log.exception("Session %s could not be recovered", session_id)
         return len(left)

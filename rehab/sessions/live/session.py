@@ -13,6 +13,7 @@ from rehab.sessions.events import (
     Audience,
     LiveEvent,
     Message,
+    Told,
     change_event,
     phase_event,
     presence_event,
@@ -21,6 +22,7 @@ from rehab.sessions.events import (
     robot_stopped_event,
     snapshot,
     step_event,
+    type_mark,
 )
 from rehab.sessions.live.actor import Row, SessionActor
 from rehab.sessions.live.hub import Channel, Viewer
@@ -33,7 +35,15 @@ from rehab.training.steps import Measurement, ScoredStep
 RECENT = 60  # strides that a page's chart may begin with
 LOGGED = {"decision": RobotEntry.DECISION, "gesture": RobotEntry.GESTURE}  # of a robot's reports
 # What a source hears nothing of.
-UNTOLD = {ChangeKind.GAIN, ChangeKind.ACTIVATION_THRESHOLD, ChangeKind.ROBOT_INTENSITY}
+UNTOLD = {
+    ChangeKind.GAIN,
+    ChangeKind.ACTIVATION_THRESHOLD,
+    ChangeKind.ROBOT_INTENSITY,
+    ChangeKind.VALENCE,
+    ChangeKind.WORDS,
+    ChangeKind.WORDS_SHOWN,
+    ChangeKind.CHART_STYLE,
+}
 
 
 class NotStored(RuntimeError):
@@ -84,6 +94,9 @@ class LiveSession:
         self.robot_stopped = robot_stopped  # until a person arms it again
         self.robot_reports: Message = {"status": None, "decision": None}  # the latest
         self.tablets = 0
+        self.stride_at: datetime | None = (
+            getattr(recent[-1], "received_at", None) if recent else None
+        )
         self.committed = actor.fold.last_number
         self.asked_for = True  # since the last sweep of idle sessions
         self.unwritten = 0
@@ -122,12 +135,14 @@ class LiveSession:
     def take(self, measurement: Measurement, received_at: datetime, *, late: bool = False) -> None:
         """Score a stride and queue it for the log. Raises what ``SessionFold.step`` raises."""
         fold = self.actor.fold
-        phase, index, goal, had_obstacle = fold.phase, fold.phase_index, fold.goal, fold.obstacle
+        index, goal, had_obstacle = fold.phase_index, fold.goal, fold.obstacle
+        told_by, switches = Told.now(fold), len(fold.switches)
         row = self.actor.take(measurement, received_at)
-        events = [step_event(fold, phase, row.step, live=not late)]
+        self.stride_at = received_at
+        events = [step_event(fold, told_by, row.step, live=not late)]
         moved = (fold.phase_index, fold.goal, fold.obstacle) != (index, goal, had_obstacle)
         if moved:
-            events.append(phase_event(fold))
+            events.append(phase_event(fold, switched=len(fold.switches) > switches))
         told: list[Message] = []
         if fold.phase_index != index:
             told.append(self._source_change(ChangeKind.PHASE))
@@ -143,9 +158,12 @@ class LiveSession:
         """
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         fold = self.actor.fold
-        goal = fold.goal
+        goal, switches = fold.goal, len(fold.switches)
         rows = self.actor.change(change, by, at)
-        events = [change_event(fold, change.kind)]
+        if len(fold.switches) > switches:
+            events = [phase_event(fold, switched=True)]
+        else:
+            events = [change_event(fold, change.kind, change.value)]
         told = []
         if change.kind not in UNTOLD:
             told.append(self._source_change(change.kind))
@@ -293,7 +311,7 @@ class LiveSession:
                 self.recent,
                 robot=self.robot_reports,
                 robot_stopped=self.robot_stopped,
-                marks=self.actor.marks,
+                marks=self._marks(),
             )
             viewer = Viewer(self.channel, audience, send)
             self.channel.viewers.add(viewer)
@@ -302,6 +320,11 @@ class LiveSession:
             self._joining -= 1
             if not self._joining:
                 self._admits.set()
+
+    def _marks(self) -> list[Message]:
+        """Give what a PT's chart points out, in the order of the steps."""
+        switches = [type_mark(after, slug) for after, slug in self.actor.fold.switches]
+        return sorted([*self.actor.marks, *switches], key=lambda mark: mark["after"])
 
     async def admission(self) -> None:
         """Wait while a viewer joins. Whoever takes steps or changes asks first."""

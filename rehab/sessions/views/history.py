@@ -165,6 +165,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
                 "hit_rate_words": say_rate(phase["hit_rate"]),
                 "mean_words": say_number(phase["mean"]),
                 "performance_words": say_rate(phase["mean_performance"]),
+                "type_words": gettext(VALENCES[phase["valence"]].label) if phase["valence"] else "",
             }
             for phase in review.figures["phases"]
         ],

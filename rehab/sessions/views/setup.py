@@ -10,6 +10,7 @@ from django.urls import reverse
 from django.utils.translation import gettext
 from django.views.decorators.http import require_http_methods
 
+from rehab.feedback.valences import valences_of
 from rehab.people.access import for_roles, person
 from rehab.people.models import Patient
 from rehab.people.roles import Role
@@ -17,7 +18,6 @@ from rehab.sessions.forms import SessionForm, like_last_time, minutes_of
 from rehab.sessions.models import Protocol
 from rehab.sessions.presets import Preset, keep_preset
 from rehab.stations.builtin import first_station
-from rehab.training.valences import VALENCES
 
 # Where the person who set the session up goes on.
 PLACES = ("walk", "monitor")
@@ -58,7 +58,7 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
     context = {
         "patient": patient,
         "form": form,
-        "valences": VALENCES.values(),
+        "valences": valences_of(patient.clinic_id).values(),
         "lengths": lengths,
         "presets": presets,
         "preset": chosen,

@@ -50,7 +50,7 @@ class RobotConsumer(DeviceSocket):
             cue, state = describe_cue(fold), fold.state.value
             stopped, watched = live.robot_stopped, live.is_watched
             welcome = {"type": "welcome", "session": live.id, "state": state, "cue": cue}
-            welcome["valence"] = fold.plan.valence.slug
+            welcome["valence"] = fold.valence.slug
             await self.say(welcome | {"stopped": stopped, "watched": watched})
             try:
                 await viewer.pump()

@@ -29,7 +29,7 @@ from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.past import read_steps
 from rehab.sessions.live.session import LiveSession, NotStored
 from rehab.stations.models import Device
-from rehab.training.changes import ENDED, ChangeKind
+from rehab.training.changes import ENDED, ChangeKind, PauseReason
 from rehab.training.measures import InvalidSetting
 
 
@@ -41,6 +41,7 @@ class ScreenConsumer(Socket):
     devices: ClassVar[frozenset[str]] = frozenset()
     # What may be changed from such a page: by people, and by the station's tablet on its own.
     changes: ClassVar[frozenset[ChangeKind]]
+    pauses_as: ClassVar[PauseReason]
     robot_orders: ClassVar[tuple[str, ...]] = ("stop",)
     tablet_changes: ClassVar[frozenset[ChangeKind]] = frozenset()
     viewer: Viewer | None = None
@@ -126,6 +127,8 @@ class ScreenConsumer(Socket):
     async def _change(self, message: Message) -> None:
         mark = read_name(message, "id")
         kind, value = read_change(message)
+        if kind is ChangeKind.PAUSE:
+            value = self.pauses_as.value
         live, by = self.live, self.actor if isinstance(self.actor, User) else None
         if live is None:
             raise Closing(4004, "no_session", "The session is not open. Connect again.")
@@ -197,6 +200,7 @@ class PatientConsumer(ScreenConsumer):
     devices = frozenset({Device.Kind.TABLET.value})
     changes = frozenset({ChangeKind.START, ChangeKind.PAUSE, ChangeKind.RESUME, ChangeKind.FINISH})
     tablet_changes = frozenset({ChangeKind.PAUSE})
+    pauses_as = PauseReason.PATIENT
 
 
 class MonitorConsumer(ScreenConsumer):
@@ -204,6 +208,7 @@ class MonitorConsumer(ScreenConsumer):
 
     audience = Audience.MONITOR
     changes = frozenset(ChangeKind)
+    pauses_as = PauseReason.THERAPIST
     robot_orders = ("stop", "arm")
 
 

@@ -1,0 +1,243 @@
+"""Admin of feedback types: all four at once, and for each one form with what a patient will see."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from csp.constants import SELF
+from csp.decorators import csp_replace
+from django import forms
+from django.contrib import admin, messages
+from django.core.exceptions import PermissionDenied
+from django.db import transaction
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import redirect, render
+from django.urls import URLPattern, path, reverse
+from django.utils.decorators import method_decorator
+from django.utils.translation import gettext as _
+from django.utils.translation import gettext_lazy, override
+from django.views.decorators.clickjacking import xframe_options_sameorigin
+from django.views.decorators.http import require_safe
+
+from rehab.feedback.forms import BandForm, BandFormSet, FeedbackTypeForm, word_fields
+from rehab.feedback.models import FeedbackBand, FeedbackType, words_edited
+from rehab.feedback.picture import show_bands
+from rehab.feedback.valences import usual_valence, valences_of
+from rehab.gestures.choices import gesture_choices
+from rehab.people.access import clinic_of, person
+from rehab.people.admin_base import ScopedAdmin, ScopedOptions
+from rehab.people.models import LANGUAGES
+from rehab.training.valences import BANDS_MAX, VALENCES
+
+READ = ("from_percent", "words", "confetti")
+
+
+class BandRows(ScopedOptions, admin.TabularInline):
+    """A type's bands on its page."""
+
+    model = FeedbackBand
+    form = BandForm
+    formset = BandFormSet
+    fields = ("from_percent", *word_fields(), "confetti")
+    ordering = ("from_percent",)
+    max_num = BANDS_MAX
+
+    def get_extra(self, request: HttpRequest, obj: Any = None, **options: Any) -> int:
+        """Give a type that is taken over its usual bands."""
+        usual = None if obj and obj.pk else VALENCES.get(request.GET.get("slug", ""))
+        return len(usual.bands) if usual else 0
+
+    def get_fields(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Give a field for each language to those who may write in it."""
+        return self.fields if self.has_change_permission(request) else READ
+
+
+@admin.register(FeedbackType)
+class FeedbackTypeAdmin(ScopedAdmin):
+    """Feedback types of the clinic."""
+
+    form = FeedbackTypeForm
+    change_list_template = "feedback/admin_list.html"
+    change_form_template = "feedback/admin_form.html"
+    delete_confirmation_template = "feedback/admin_reset.html"
+    inlines = (BandRows,)
+    fields = ("slug", "hit_points", "miss_points", "cue_above", "cue_below")
+
+    def get_fields(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Give the fields that say something of this type."""
+        slug = obj.slug if obj and obj.pk else request.GET.get("slug") or request.POST.get("slug")
+        form = FeedbackTypeForm(initial={"slug": slug})
+        return [name for name in self.fields if name in form.fields]
+
+    def get_urls(self) -> list[URLPattern]:
+        """Give the addresses, the preview's among them."""
+        preview = self.admin_site.admin_view(self.preview)
+        return [path("preview/", preview, name="rehab_feedbacktype_preview"), *super().get_urls()]
+
+    def formfield_for_dbfield(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
+        """Offer the gestures that this person's clinic has."""
+        if db_field.name in ("cue_above", "cue_below"):
+            choices = [("", gettext_lazy("Nothing")), *gesture_choices(person(request))]
+            label = db_field.verbose_name.capitalize()
+            return forms.ChoiceField(label=label, choices=choices, required=False)
+        return super().formfield_for_dbfield(db_field, request, **kwargs)
+
+    def get_changeform_initial_data(self, request: HttpRequest) -> dict[str, Any]:
+        """Begin with the defaults of the type that is taken over."""
+        usual = VALENCES.get(request.GET.get("slug", ""))
+        if usual is None:
+            return {}
+        return {
+            "slug": usual.slug,
+            "hit_points": usual.hit_points,
+            "miss_points": usual.miss_points,
+            "cue_above": usual.cue.above or "",
+            "cue_below": usual.cue.below or "",
+        }
+
+    def get_formset_kwargs(
+        self, request: HttpRequest, obj: Any, inline: Any, prefix: str
+    ) -> dict[str, Any]:
+        """Begin with the default bands."""
+        kwargs: dict[str, Any] = super().get_formset_kwargs(request, obj, inline, prefix)
+        slug = request.GET.get("slug", "")
+        if request.method == "GET" and obj.pk is None and slug in VALENCES:
+            kwargs["initial"] = initial_bands(slug)
+        return kwargs
+
+    def changelist_view(
+        self, request: HttpRequest, extra_context: dict[str, Any] | None = None
+    ) -> HttpResponse:
+        """Show all types, those that the clinic edited and those that are as usual."""
+        if not self.has_view_permission(request):
+            raise PermissionDenied
+        clinic = clinic_of(person(request))
+        rows = {row.slug: row for row in self.get_queryset(request)}
+        add = reverse("admin:rehab_feedbacktype_add")
+        types = [
+            {
+                "valence": valence,
+                "own": slug in rows,
+                "url": reverse("admin:rehab_feedbacktype_change", args=[rows[slug].pk])
+                if slug in rows
+                else f"{add}?slug={slug}",
+            }
+            for slug, valence in valences_of(clinic.pk, clinic.language).items()
+        ]
+        context = {
+            **self.admin_site.each_context(request),
+            "title": _("Feedback types"),
+            "opts": self.opts,
+            "types": types,
+            "may_add": self.has_add_permission(request),
+        }
+        return render(request, self.change_list_template, context | (extra_context or {}))
+
+    def add_view(
+        self, request: HttpRequest, form_url: str = "", extra_context: Any = None
+    ) -> HttpResponse:
+        """Take a type over: the list says which. One that is taken over already is changed."""
+        slug = request.GET.get("slug") or request.POST.get("slug")
+        if slug not in VALENCES:
+            return self.changelist_view(request)
+        own = self.get_queryset(request).filter(slug=slug).first()
+        if own is not None and request.method == "GET":
+            return redirect("admin:rehab_feedbacktype_change", own.pk)
+        context = {"title": _("Edit the feedback type"), **(extra_context or {})}
+        response: HttpResponse = super().add_view(request, form_url, context)
+        return response
+
+    def render_change_form(
+        self, request: HttpRequest, context: dict[str, Any], *args: Any, **kwargs: Any
+    ) -> HttpResponse:
+        """Show the form; which type it is and the languages to see it in stand beside it."""
+        obj = kwargs.get("obj")
+        slug = obj.slug if obj else request.GET.get("slug") or request.POST.get("slug")
+        context["usual"] = VALENCES.get(str(slug))
+        context["languages"] = LANGUAGES
+        context["show_save_and_add_another"] = False
+        return super().render_change_form(request, context, *args, **kwargs)
+
+    def save_related(self, request: HttpRequest, form: Any, formsets: Any, change: bool) -> None:
+        """Store the bands, then let the words reach the sessions that are open."""
+        super().save_related(request, form, formsets, change)
+        row = form.instance
+        self._announce(request, row, row.clinic_id, row.slug)
+
+    def delete_model(self, request: HttpRequest, obj: FeedbackType) -> None:
+        """Go back to the defaults, in sessions that are open as well."""
+        clinic_id, slug = obj.clinic_id, obj.slug
+        super().delete_model(request, obj)
+        self._announce(request, None, clinic_id, slug)
+
+    def _announce(
+        self, request: HttpRequest, row: FeedbackType | None, clinic_id: int, slug: str
+    ) -> None:
+        """Tell of edited words once they are stored: sessions are written beside this request."""
+
+        def tell() -> None:
+            told = words_edited.send(
+                FeedbackType, row=row, clinic_id=clinic_id, slug=slug, by=person(request)
+            )
+            for _receiver, problems in told:
+                for problem in problems or ():
+                    messages.warning(request, problem)
+
+        transaction.on_commit(tell)
+
+    @method_decorator(require_safe)
+    @method_decorator(xframe_options_sameorigin)
+    @method_decorator(csp_replace({"frame-ancestors": [SELF]}))
+    def preview(self, request: HttpRequest) -> HttpResponse:
+        """Show what a patient would see of each band that a form describes. Stores nothing.
+
+        Refuses whoever could not save it.
+        """
+        row = self.get_object(request, request.GET.get("row", "")) or None
+        may = self.has_change_permission if row else self.has_add_permission
+        if not may(request, *([row] if row else [])):
+            raise PermissionDenied
+        given = request.GET
+        language = given.get("seen_in", "")
+        if language not in dict(LANGUAGES):
+            language = clinic_of(person(request)).language
+        form = self.get_form(request, row, change=row is not None)(given, instance=row)
+        inline = self.get_inline_instances(request, row)[0]
+        rows: Any = inline.get_formset(request, row)
+        context: dict[str, Any] = {"language": language, "faults": []}
+        whole = form.is_valid()
+        bands = rows(given, instance=form.instance, prefix="bands")
+        if whole and bands.is_valid():
+            context["valence"] = form.instance.to_valence(language, bands.bands(language))
+            context["seen"] = list(show_bands(context["valence"]))
+        else:
+            context["faults"] = list(find_faults(form, bands))
+        with override(language):
+            return render(request, "feedback/preview.html", context)
+
+
+def initial_bands(slug: str) -> list[dict[str, Any]]:
+    """Give the default bands of a type as a form begins with them, worded in every language."""
+    worded = {language: usual_valence(slug, language) for language in word_fields().values()}
+    return [
+        {
+            "from_percent": round(100 * band.from_performance),
+            "confetti": band.confetti.value,
+            **{
+                name: worded[language].bands[index].words
+                for name, language in word_fields().items()
+            },
+        }
+        for index, band in enumerate(VALENCES[slug].bands)
+    ]
+
+
+def find_faults(form: Any, bands: Any) -> Any:
+    """Give what is wrong with a form: the field's label and the words."""
+    for name, problems in form.errors.items():
+        yield (form.fields[name].label if name in form.fields else "", " ".join(problems))
+    if not form.errors:
+        for row in bands.forms:
+            for name, problems in row.errors.items():
+                yield (row.fields[name].label if name in row.fields else "", " ".join(problems))
+        yield from (("", problem) for problem in bands.non_form_errors())

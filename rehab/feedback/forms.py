@@ -1,0 +1,119 @@
+"""The form that a feedback type is edited in: its points and gestures, and a row for each band."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from django import forms
+from django.core.exceptions import ValidationError
+from django.utils.translation import gettext_lazy as _
+
+from rehab.feedback.models import FeedbackBand, FeedbackType
+from rehab.people.admin_base import ClinicForm
+from rehab.people.models import LANGUAGES
+from rehab.training.measures import InvalidSetting
+from rehab.training.valences import VALENCES, WORDS_MAX, Band
+
+
+def word_fields() -> dict[str, str]:
+    """Give the names of the fields for words, each with its language."""
+    return {f"words_{language}": language for language, _name in LANGUAGES}
+
+
+class FeedbackTypeForm(ClinicForm):
+    """Points where the type has them; which type it is stands fast."""
+
+    class Meta:
+        model = FeedbackType
+        exclude = ("clinic",)
+        widgets = {"slug": forms.HiddenInput}
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        fixed = self.instance.pk is not None
+        slug = self.instance.slug if fixed else self.initial.get("slug") or self.data.get("slug")
+        self.usual = VALENCES.get(str(slug))
+        fields: dict[str, Any] = self.fields
+        if fixed and "slug" in fields:
+            fields["slug"].disabled = True
+        for name in self.idle_fields():
+            fields.pop(name, None)
+
+    def idle_fields(self) -> Iterator[str]:
+        """Give the fields that say nothing of this type: points it has not, and its robot's."""
+        usual = self.usual
+        if usual is None:
+            return
+        if not usual.hit_points:
+            yield "hit_points"
+        if not usual.miss_points:
+            yield "miss_points"
+        if not usual.has_points:
+            yield from ("cue_above", "cue_below")
+
+    def _post_clean(self) -> None:
+        # What the form does not ask is as the rules have it.
+        if self.usual is not None:
+            for name in ("hit_points", "miss_points"):
+                if name not in self.fields:
+                    setattr(self.instance, name, getattr(self.usual, name))
+        super()._post_clean()  # type: ignore[misc]  # Django's hook between form and model
+
+
+class BandForm(forms.ModelForm):
+    """A band with its words in each language."""
+
+    class Meta:
+        model = FeedbackBand
+        fields = ("from_percent", "confetti")
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        for name, language in word_fields().items():
+            if self.instance.pk is not None:
+                self.initial.setdefault(name, self.instance.words.get(language, ""))
+            self.fields[name].widget.attrs |= {"lang": language, "class": "vTextField"}
+
+    def clean(self) -> dict[str, Any]:
+        """Take the words together."""
+        cleaned: dict[str, Any] = super().clean() or self.cleaned_data
+        words = {language: cleaned.get(name, "") for name, language in word_fields().items()}
+        self.instance.words = {language: text for language, text in words.items() if text}
+        return cleaned
+
+
+for _field, _language in word_fields().items():
+    BandForm.base_fields[_field] = forms.CharField(
+        label=_("words, %(language)s") % {"language": dict(LANGUAGES)[_language]},
+        max_length=WORDS_MAX,
+        required=False,
+    )
+    BandForm.declared_fields[_field] = BandForm.base_fields[_field]
+
+
+class BandFormSet(forms.BaseInlineFormSet):
+    """The bands of one type, which must be a valence together with it."""
+
+    def kept(self) -> list[FeedbackBand]:
+        """Give the bands that would be stored, in their order."""
+        rows = [
+            form.instance
+            for form in self.forms
+            if form not in self.deleted_forms and (form.instance.pk or form.has_changed())
+        ]
+        return sorted(rows, key=lambda row: row.from_percent)
+
+    def bands(self, language: str) -> list[Band]:
+        """Give them as the rules know them, worded in a language."""
+        return [row.to_band(language) for row in self.kept()]
+
+    def clean(self) -> None:
+        """Refuse bands that the rules refuse, in the rules' own words."""
+        super().clean()
+        if any(self.errors):
+            return
+        try:
+            self.instance.to_valence("en", self.bands("en"))
+        except InvalidSetting as problem:
+            raise ValidationError(str(problem)) from problem

@@ -1,0 +1,134 @@
+"""What a clinic made of a feedback type. Without a row the defaults of the rules hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from django.core.exceptions import ValidationError
+from django.core.validators import MaxValueValidator
+from django.db import models
+from django.dispatch import Signal
+from django.utils.translation import gettext_lazy as _
+
+from rehab.feedback.wording import words_in
+from rehab.people.models import Clinic
+from rehab.people.scope import ClinicRow, Scope, ScopedModel
+from rehab.training.measures import InvalidSetting
+from rehab.training.valences import (
+    POINTS_MAX,
+    VALENCES,
+    Band,
+    Confetti,
+    Cue,
+    Valence,
+    edit_valence,
+)
+
+# Sent with ``row`` (a FeedbackType, or None where a clinic went back to the defaults),
+# ``clinic_id``, ``slug`` and ``by``. Receivers give the problems they met, in words.
+words_edited = Signal()
+
+
+class FeedbackType(ClinicRow):
+    """A clinic's own points, words, confetti and gestures for one of the rules' valences."""
+
+    scope = Scope(clinic="clinic")
+
+    clinic = models.ForeignKey(Clinic, on_delete=models.CASCADE, related_name="feedback_types")
+    slug = models.CharField(
+        _("feedback type"),
+        max_length=16,
+        choices=[(valence.slug, _(valence.label)) for valence in VALENCES.values()],
+    )
+    hit_points = models.SmallIntegerField(
+        _("points at the goal"),
+        null=True,
+        blank=True,
+        help_text=_("For a step at or above the goal, 1 to %(most)s.") % {"most": POINTS_MAX},
+    )
+    miss_points = models.SmallIntegerField(
+        _("points below the goal"),
+        null=True,
+        blank=True,
+        help_text=_("For a step below the goal, −1 to −%(most)s.") % {"most": POINTS_MAX},
+    )
+    cue_above = models.CharField(_("after five strong seconds"), max_length=32, blank=True)
+    cue_below = models.CharField(_("after five weak seconds"), max_length=32, blank=True)
+
+    class Meta(ClinicRow.Meta):
+        verbose_name = _("feedback type")
+        verbose_name_plural = _("feedback types")
+        ordering: ClassVar = ["pk"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(fields=["clinic", "slug"], name="feedback_type_once_per_clinic")
+        ]
+
+    def __str__(self) -> str:
+        return str(self.get_slug_display())
+
+    def clean(self) -> None:
+        """Refuse points and gestures that the rules refuse, in the rules' own words."""
+        try:
+            self.to_valence("en", VALENCES[self.slug].bands)
+        except KeyError:
+            raise ValidationError({"slug": _("There is no such feedback type.")}) from None
+        except InvalidSetting as problem:
+            raise ValidationError(str(problem)) from problem
+
+    def to_valence(self, language: str, bands: Sequence[Band] | None = None) -> Valence:
+        """Give it as the rules know it, worded in a language; its stored bands unless given.
+
+        Raises InvalidSetting for what the rules refuse.
+        """
+        if bands is None:
+            rows = sorted(self.bands.all(), key=lambda band: band.from_percent)
+            bands = [band.to_band(language) for band in rows]
+        return edit_valence(
+            self.slug,
+            hit_points=self.hit_points,
+            miss_points=self.miss_points,
+            bands=bands,
+            cue=Cue(self.cue_above or None, self.cue_below or None),
+        )
+
+
+class FeedbackBand(ScopedModel):
+    """What is said and set free from a performance upwards."""
+
+    scope = Scope(clinic="feedback_type__clinic")
+
+    feedback_type = models.ForeignKey(FeedbackType, on_delete=models.CASCADE, related_name="bands")
+    from_percent = models.PositiveSmallIntegerField(
+        _("from, % of the goal"), validators=[MaxValueValidator(1000)]
+    )
+    words = models.JSONField(default=dict, blank=True)
+    confetti = models.CharField(
+        max_length=8,
+        choices=[
+            (Confetti.NONE.value, _("none")),
+            (Confetti.LITTLE.value, _("a little")),
+            (Confetti.MUCH.value, _("much")),
+            (Confetti.MOST.value, _("the most")),
+        ],
+        default=Confetti.NONE.value,
+    )
+
+    class Meta(ScopedModel.Meta):
+        verbose_name = _("band")
+        verbose_name_plural = _("bands")
+        ordering: ClassVar = ["feedback_type", "from_percent"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(
+                fields=["feedback_type", "from_percent"], name="feedback_band_once_per_type"
+            )
+        ]
+
+    def __str__(self) -> str:
+        return str(_("from %(percent)s %%") % {"percent": self.from_percent})
+
+    def to_band(self, language: str) -> Band:
+        """Give it as the rules know it, worded in a language."""
+        start = self.from_percent / 100
+        usual = VALENCES[self.feedback_type.slug].band(start).words
+        return Band(start, words_in(language, self.words, usual), Confetti(self.confetti))

@@ -1,0 +1,70 @@
+"""What a patient sees in each band, as the preview draws it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+from rehab.training.valences import Band, Confetti, Valence
+
+SCALE = 1.5  # the thermometer's end
+TOP_Y, BOTTOM_Y = 30, 210  # where the scale ends and begins in the drawing; the goal lies at 90
+SPREAD = (0.618, 0.755)  # of two golden ratios: pieces of confetti that never clump
+# Dots that stand for an amount of confetti.
+AMOUNTS = {Confetti.NONE: 0, Confetti.LITTLE: 6, Confetti.MUCH: 14, Confetti.MOST: 26}
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A step of a band: where the level stands (of the scale, 0 to 1) and all that goes with it."""
+
+    begins: str
+    level: float
+    is_hit: bool
+    words: str
+    emblem: str
+    sign: str
+    confetti: Confetti
+
+    @property
+    def y(self) -> float:
+        """Give where the level stands in the drawing."""
+        return round(BOTTOM_Y - (BOTTOM_Y - TOP_Y) * self.level, 1)
+
+    @property
+    def pieces(self) -> list[tuple[float, float, int]]:
+        """Give place and color of each piece of confetti."""
+        return [
+            (round(20 + 360 * (n * SPREAD[0] % 1)), round(8 + 70 * (n * SPREAD[1] % 1)), n % 3)
+            for n in range(1, AMOUNTS[self.confetti] + 1)
+        ]
+
+
+def show_bands(valence: Valence) -> Iterator[Seen]:
+    """Give a typical step of each band; two of one that lies on both sides of the goal."""
+    ends = [band.from_performance for band in valence.bands[1:]]
+    for band, end in zip(valence.bands, [*ends, None], strict=True):
+        start = band.from_performance
+        last = end if end is not None else max(start + 0.2, 1.2)
+        for low, high in _sides(start, last):
+            yield _show(valence, band, (low + high) / 2)
+
+
+def _sides(start: float, end: float) -> Iterator[tuple[float, float]]:
+    marks = [start, 1.0, end] if start < 1 < end else [start, end]
+    yield from pairwise(marks)
+
+
+def _show(valence: Valence, band: Band, performance: float) -> Seen:
+    hit = performance >= 1
+    points = valence.points(hit) or 0
+    return Seen(
+        begins=f"{100 * band.from_performance:.0f}",
+        level=min(performance / SCALE, 1),
+        is_hit=hit,
+        words=band.words,
+        emblem=valence.emblem(hit).value,
+        sign=f"{'+' if points > 0 else '−'}{abs(points)}" if points else "",
+        confetti=band.confetti,
+    )
