@@ -126,7 +126,8 @@ def test_the_catalogs_have_every_marked_word(tmp_path):
 UNMARKED = {"GARRY", "W/kg", "W", "kg", "min", "s"}
 SAID = {"aria-label", "title", "placeholder", "alt", "label"}
 BLOCK = re.compile(
-    r"{% (blocktranslate|comment)\b.*?{% end\1 %}|{#.*?#}|{% block page_class %}.*?{% endblock %}", re.DOTALL
+    r"{% (blocktranslate|comment)\b.*?{% end\1 %}|{#.*?#}|{% block page_class %}.*?{% endblock %}",
+    re.DOTALL,
 )
 TAG = re.compile(r"{%.*?%}|{{.*?}}", re.DOTALL)
 # Filters whose words or formats are English whatever the page's language. What a machine reads, in
