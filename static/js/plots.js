@@ -1,6 +1,8 @@
 // Drawings of strides against the goal for the PT: a strip, the last twenty, the share of hits.
 // Shape repeats the meaning of color: hits are solid, misses hollow, missing ones hatched.
 
+import { badge, isRemark, say } from "garry/marks";
+
 const LOW = 0.5, HIGH = 1.5;
 
 function sizeOf(svg) {
@@ -9,7 +11,7 @@ function sizeOf(svg) {
   return [width, height];
 }
 
-export function drawStrip(svg, strides, marks) {
+export function drawStrip(svg, strides, marks, phases) {
   const [width, height] = sizeOf(svg);
   const y = (share) => height - 8 - (Math.min(Math.max(share, LOW), HIGH) - LOW) * (height - 20) / (HIGH - LOW);
   const shown = strides.slice(-Math.max(20, Math.floor((width - 60) / 4)));
@@ -24,22 +26,37 @@ export function drawStrip(svg, strides, marks) {
     else if (performance === null || performance === undefined) drawing += `<path class="gap" d="M${x(index)} ${height - 8}v-10"/>`;
     else drawing += `<circle class="${hit ? "hit" : "miss"}" cx="${x(index)}" cy="${y(performance)}" r="${newest ? 6 : 3.2}"/>`;
   });
-  let level = 0, before = null; // what was noted at the same stride stands above each other
-  for (const { after, kind, value } of marks) {
+  const parts = []; // names that somebody typed: set as text, never as markup
+  shown.forEach(({ phase }, index) => {
+    if (!index || phase === shown[index - 1].phase || phase === undefined) return;
+    const at = x(index) - dx / 2;
+    drawing += `<path class="bound" d="M${at} 4V${height - 8}"/><text class="part" x="${Math.min(at + 5, width - 80)}" y="${height - 12}"></text>`;
+    parts.push(phases[phase]?.name ?? "");
+  });
+  let level = 0, before = null; // what was done at the same stride stands above each other
+  for (const mark of marks) {
+    const { after, kind, value } = mark;
     if (!shown.length || after < shown[0].number) continue;
     const next = shown.findIndex(({ number }) => number > after);
     const at = next < 0 ? x(shown.length) : x(next) - dx / 2;
     if (kind === "goal") {
+      if (value === null) continue;
       const cloth = Math.min(at, width - 56);
       drawing += `<path class="flag" d="M${at} 4V${height - 8}"/><path class="cloth" d="M${cloth} 2h54v20h-54z"/><text class="on-cloth" x="${cloth + 27}" y="17">${value.toFixed(2)}</text>`;
+      continue;
+    }
+    level = after === before ? level + 1 : 0;
+    before = after;
+    if (!isRemark(mark)) {
+      const y = 36 + 19 * level, place = Math.min(at, width - 10);
+      drawing += `<g class="change"><title>${say(mark)}</title><path class="flag" d="M${at} ${y}V${height - 8}"/><circle cx="${place}" cy="${y}" r="9"/><text x="${place}" y="${y + 4}">${badge(mark)}</text></g>`;
     } else {
-      level = after === before ? level + 1 : 0;
-      before = after;
-      const words = kind.replace("_", " ") + (value === null ? "" : ` ${value}`);
+      const words = say(mark);
       drawing += `<path class="remark" d="M${at} ${height - 4}l-6 -9h12z"/><text class="remark-words" x="${Math.min(Math.max(at, 80), width - 40)}" y="${height - 16 - 13 * level}">${words}</text>`;
     }
   }
   svg.innerHTML = drawing;
+  svg.querySelectorAll(".part").forEach((part, index) => (part.textContent = parts[index]));
 }
 
 export function drawTwenty(svg, strides) {

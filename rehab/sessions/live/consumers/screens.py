@@ -59,6 +59,7 @@ class ScreenConsumer(Socket):
             raise Closing(4409, "busy", str(problem)) from None
         if isinstance(self.actor, Device):
             live.tablets += 1
+            live.tablet_heard_at = timezone.now()
         self.start(self._pump(live, _after(self.scope["query_string"])))
 
     @classmethod
@@ -71,10 +72,10 @@ class ScreenConsumer(Socket):
     async def _pump(self, live: LiveSession, after: int | None) -> None:
         """Send a snapshot, what was missed, then events; begin anew where the page lags."""
         while True:
-            shown, viewer = await live.join(self.audience, self.send)
+            shown, viewer = await live.join(self.audience, self.send, timezone.now())
             self.viewer = viewer
             if isinstance(self.actor, Device) or self.audience is Audience.MONITOR:
-                live.announce_presence()
+                live.announce_presence(timezone.now())
             await self.say(shown)
             if after is not None:
                 await self._send_missed(live, viewer, after, shown["number"])
@@ -113,6 +114,8 @@ class ScreenConsumer(Socket):
             case "seen":
                 if self.viewer is not None:
                     self.viewer.seen(read_whole(message, "frame", low=0))
+                if isinstance(self.actor, Device) and self.live is not None:
+                    self.live.tablet_heard_at = timezone.now()
             case "change":
                 await self._change(message)
             case "robot":
@@ -185,7 +188,7 @@ class ScreenConsumer(Socket):
                 live.channel.viewers.discard(self.viewer)
             if isinstance(self.actor, Device):
                 live.tablets -= 1
-                live.announce_presence()
+                live.announce_presence(timezone.now())
 
 
 class PatientConsumer(ScreenConsumer):
