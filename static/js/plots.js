@@ -13,7 +13,7 @@ function sizeOf(svg) {
 
 export function drawStrip(svg, strides, marks, phases) {
   const [width, height] = sizeOf(svg);
-  const y = (share) => height - 8 - (Math.min(Math.max(share, LOW), HIGH) - LOW) * (height - 20) / (HIGH - LOW);
+  const y = (share) => height - 8 - (Math.min(Math.max(share, LOW), HIGH) - LOW) * (height - 34) / (HIGH - LOW);
   const shown = strides.slice(-Math.max(20, Math.floor((width - 60) / 4)));
   const dx = (width - 60) / Math.max(shown.length - 1, 60);
   const x = (index) => 46 + index * dx;
@@ -33,7 +33,8 @@ export function drawStrip(svg, strides, marks, phases) {
     drawing += `<path class="bound" d="M${at} 4V${height - 8}"/><text class="part" x="${Math.min(at + 5, width - 80)}" y="${height - 12}"></text>`;
     parts.push(phases[phase]?.name ?? "");
   });
-  let level = 0, before = null; // what was done at the same stride stands above each other
+  let level = 0, before = null; // what was noted at the same stride stands above each other
+  let free = 0; // badges and flags stand in a row on top and never cover each other
   for (const mark of marks) {
     const { after, kind, value } = mark;
     if (!shown.length || after < shown[0].number) continue;
@@ -41,16 +42,18 @@ export function drawStrip(svg, strides, marks, phases) {
     const at = next < 0 ? x(shown.length) : x(next) - dx / 2;
     if (kind === "goal") {
       if (value === null) continue;
-      const cloth = Math.min(at, width - 56);
+      const cloth = Math.min(Math.max(at, free), width - 56);
+      free = cloth + 57;
       drawing += `<path class="flag" d="M${at} 4V${height - 8}"/><path class="cloth" d="M${cloth} 2h54v20h-54z"/><text class="on-cloth" x="${cloth + 27}" y="17">${value.toFixed(2)}</text>`;
       continue;
     }
-    level = after === before ? level + 1 : 0;
-    before = after;
     if (!isRemark(mark)) {
-      const y = 36 + 19 * level, place = Math.min(at, width - 10);
-      drawing += `<g class="change"><title>${say(mark)}</title><path class="flag" d="M${at} ${y}V${height - 8}"/><circle cx="${place}" cy="${y}" r="9"/><text x="${place}" y="${y + 4}">${badge(mark)}</text></g>`;
+      const place = Math.min(Math.max(at, free + 9), width - 10);
+      free = place + 11;
+      drawing += `<g class="change"><title>${say(mark)}</title><path class="flag" d="M${at} 21V${height - 8}"/><circle cx="${place}" cy="12" r="9"/><text x="${place}" y="16">${badge(mark)}</text></g>`;
     } else {
+      level = after === before ? level + 1 : 0;
+      before = after;
       const words = say(mark);
       drawing += `<path class="remark" d="M${at} ${height - 4}l-6 -9h12z"/><text class="remark-words" x="${Math.min(Math.max(at, 80), width - 40)}" y="${height - 16 - 13 * level}">${words}</text>`;
     }
