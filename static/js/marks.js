@@ -9,11 +9,11 @@ const KINDS = {
   gain: ["G", "gain", (value) => value.toFixed(2)],
   activation_threshold: ["A", "robot acts from", percent],
   robot_intensity: ["R", "robot", (value) => LEVELS[value] ?? value],
-  valence: ["N", "type of the next phase", (value) => value],
+  valence: ["N", "next type", (value) => value[0].toUpperCase() + value.slice(1)],
   type: ["T", "feedback type", (value) => value],
   words: ["E", "words edited", () => ""],
   words_shown: ["W", "words", (value) => (value ? "on" : "off")],
-  chart_style: ["C", "patient’s chart", (value) => value],
+  chart_style: ["C", "chart", (value) => value],
   pause: ["‖", "pause", () => ""],
   resume: ["▸", "went on", () => ""],
 };

@@ -30,7 +30,7 @@ export function drawStrip(svg, strides, marks, phases) {
   shown.forEach(({ phase }, index) => {
     if (!index || phase === shown[index - 1].phase || phase === undefined) return;
     const at = x(index) - dx / 2;
-    drawing += `<path class="bound" d="M${at} 4V${height - 8}"/><text class="part" x="${Math.min(at + 5, width - 80)}" y="${height - 12}"></text>`;
+    drawing += `<path class="bound" d="M${at} 4V${height - 8}"/><text class="part" x="${Math.min(at + 5, width - 80)}" y="40"></text>`;
     parts.push(phases[phase]?.name ?? "");
   });
   let level = 0, before = null; // what was noted at the same stride stands above each other

@@ -26,7 +26,7 @@ function ofSensor(there, last, heard, running) {
 }
 
 function ofTablets(count, heard) {
-  if (!count) return ["–", "none; this page shows its mirror"];
+  if (!count) return ["–", "none; only this mirror"];
   const many = count > 1 ? `${count} connected` : "connected";
   if (heard !== null && heard > SILENT_S.tablet) return ["!", `silent, last heard ${ago(heard)}`];
   return ["✓", heard === null ? many : `${many}, heard ${ago(heard)}`];
