@@ -23,6 +23,7 @@ from rehab.feedback.forms import BandForm, BandFormSet, FeedbackTypeForm, word_f
 from rehab.feedback.models import FeedbackBand, FeedbackType, words_edited
 from rehab.feedback.picture import show_bands
 from rehab.feedback.valences import usual_valence, valences_of
+from rehab.feedback.wording import FALLBACK
 from rehab.gestures.choices import gesture_choices
 from rehab.people.access import clinic_of, person
 from rehab.people.admin_base import ScopedAdmin, ScopedOptions
@@ -217,7 +218,9 @@ class FeedbackTypeAdmin(ScopedAdmin):
 
 
 def initial_bands(slug: str) -> list[dict[str, Any]]:
-    """Give the default bands of a type as a form begins with them, worded in every language."""
+    """Give the default bands of a type as a form begins with them, worded in each language that
+    somebody translated them to.
+    """
     worded = {language: usual_valence(slug, language) for language in word_fields().values()}
     return [
         {
@@ -226,6 +229,7 @@ def initial_bands(slug: str) -> list[dict[str, Any]]:
             **{
                 name: worded[language].bands[index].words
                 for name, language in word_fields().items()
+                if language == FALLBACK or worded[language].bands[index].words != band.words
             },
         }
         for index, band in enumerate(VALENCES[slug].bands)

@@ -74,6 +74,8 @@ class BandForm(forms.ModelForm):
             if self.instance.pk is not None:
                 self.initial.setdefault(name, self.instance.words.get(language, ""))
             self.fields[name].widget.attrs |= {"lang": language, "class": "vTextField"}
+            if self.instance.pk is not None:  # what is said where the clinic says nothing
+                self.fields[name].widget.attrs["placeholder"] = self.instance.usual_words(language)
 
     def clean(self) -> dict[str, Any]:
         """Take the words together."""

@@ -11,7 +11,7 @@ from django.db import models
 from django.dispatch import Signal
 from django.utils.translation import gettext_lazy as _
 
-from rehab.feedback.wording import words_in
+from rehab.feedback.wording import FALLBACK, words_in
 from rehab.people.models import Clinic
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
 from rehab.training.measures import InvalidSetting
@@ -129,6 +129,11 @@ class FeedbackBand(ScopedModel):
 
     def to_band(self, language: str) -> Band:
         """Give it as the rules know it, worded in a language."""
-        start = self.from_percent / 100
-        usual = VALENCES[self.feedback_type.slug].band(start).words
-        return Band(start, words_in(language, self.words, usual), Confetti(self.confetti))
+        words = self.words.get(language) or self.usual_words(language)
+        return Band(self.from_percent / 100, words, Confetti(self.confetti))
+
+    def usual_words(self, language: str) -> str:
+        """Give what is said in a language where the clinic wrote nothing in it."""
+        usual = VALENCES[self.feedback_type.slug].band(self.from_percent / 100).words
+        others = {FALLBACK: self.words.get(FALLBACK, "")}
+        return words_in(language, {} if language == FALLBACK else others, usual)

@@ -199,7 +199,7 @@ class PatientAdmin(ScopedAdmin):
     def get_queryset(self, request: HttpRequest) -> QuerySet[Patient]:
         """Give the visible patients with how often and when they were here last."""
         rows = super().get_queryset(request)
-        return rows.annotate(visits=Count("sessions"), last_visit=Max("sessions__created_at"))
+        return rows.annotate(walks=Count("sessions"), last_visit=Max("sessions__created_at"))
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Lead to where the patient walks, and to what was walked."""
@@ -208,10 +208,10 @@ class PatientAdmin(ScopedAdmin):
             (reverse("history", args=[row.pk]), _("Past sessions")),
         ]
 
-    @admin.display(description=_("sessions"), ordering="visits")
+    @admin.display(description=_("sessions"), ordering="walks")
     def session_count(self, patient: Any) -> int:
         """Count the sessions."""
-        count: int = patient.visits
+        count: int = patient.walks
         return count
 
     @admin.display(description=_("last here"), ordering="last_visit")

@@ -238,6 +238,8 @@ def describe_now(fold: SessionFold) -> Message:
 def describe_types(fold: SessionFold) -> Message:
     """Give which feedback type is in force and which comes next, and which it may be."""
     return {
+        "began": fold.plan.valence.slug,
+        "changed_to": list(fold.changed_to),
         "valence": fold.valence.slug,
         "next_valence": fold.next_valence,
         "types": [{"slug": one.slug, "label": one.label} for one in fold.valences.values()],

@@ -38,8 +38,8 @@ class FindForm(forms.Form):
     )
     score_min = NumberField(required=False, label=_("Score from"))
     score_max = NumberField(required=False, label=_("Score to"))
-    hits_min = NumberField(required=False, min_value=0, max_value=100, label=_("Hits, % from"))
-    hits_max = NumberField(required=False, min_value=0, max_value=100, label=_("Hits, % to"))
+    hits_min = NumberField(required=False, min_value=0, max_value=100, label=_("Hits from, %"))
+    hits_max = NumberField(required=False, min_value=0, max_value=100, label=_("Hits to, %"))
     goal_min = NumberField(required=False, min_value=0, label=_("Goal from"))
     goal_max = NumberField(required=False, min_value=0, label=_("Goal to"))
 

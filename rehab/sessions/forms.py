@@ -13,6 +13,7 @@ from django.core.exceptions import ValidationError
 from django.db import transaction
 from django.db.models import QuerySet
 from django.utils import timezone
+from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
@@ -21,6 +22,7 @@ from rehab.people.models import SIDES, Boards, Patient, User
 from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
 from rehab.sessions.models import Protocol, SessionEvent, TrainingSession
 from rehab.sessions.services import create_session
+from rehab.sessions.words import LEVELS, RECORDING, say_source
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
 from rehab.sources.synthetic import PROFILES
@@ -102,10 +104,10 @@ def list_recordings() -> list[Path]:
 
 
 def list_sources() -> list[tuple[str, str]]:
-    """Give what steps can come from, with its words."""
+    """Give what steps can come from, with the words that a session keeps (`words.say_source`)."""
     simulated = [(f"synthetic {name}", f"Simulated patient, {name}") for name in PROFILES]
     recordings = [
-        (f"recording {file.name}", f"Recording {file.name}") for file in list_recordings()
+        (f"recording {file.name}", f"{RECORDING}{file.name}") for file in list_recordings()
     ]
     return [(LIVE, "Live sensor"), *simulated, *recordings]
 
@@ -121,8 +123,8 @@ class NumberField(forms.FloatField):
 class SessionForm(forms.Form):
     """Everything a session of one patient needs. Nothing has to be typed."""
 
-    valence = forms.ChoiceField(choices=[(v.slug, v.label) for v in VALENCES.values()])
-    goal_by = forms.ChoiceField(choices=[("value", A2.unit), ("percent", "% of baseline")])
+    valence = forms.ChoiceField(choices=[(v.slug, _(v.label)) for v in VALENCES.values()])
+    goal_by = forms.ChoiceField(choices=[("value", A2.unit), ("percent", _("% of baseline"))])
     goal_value = NumberField(min_value=0.05, max_value=A2.goal_max, required=False)
     goal_percent = NumberField(min_value=50, max_value=200, required=False)
     wanted_hits = forms.IntegerField(min_value=1, max_value=100, required=False)
@@ -136,7 +138,8 @@ class SessionForm(forms.Form):
     source = forms.ChoiceField(widget=forms.RadioSelect)
     trained_side = forms.ChoiceField(choices=SIDES, widget=forms.RadioSelect)
     robot = forms.ChoiceField(
-        choices=[(level, level.capitalize()) for level in ROBOT_LEVELS], widget=forms.RadioSelect
+        choices=[(level, capfirst(LEVELS[level])) for level in ROBOT_LEVELS],
+        widget=forms.RadioSelect,
     )
     robot_above = forms.ChoiceField()
     robot_below = forms.ChoiceField()
@@ -147,7 +150,7 @@ class SessionForm(forms.Form):
         fields: dict[str, Any] = self.fields
         fields["protocol"].queryset = Protocol.objects.visible_to(by)
         fields["station"].queryset = Station.objects.visible_to(by)
-        fields["source"].choices = list_sources()
+        fields["source"].choices = [(name, say_source(words)) for name, words in list_sources()]
         fields["robot_above"].choices = fields["robot_below"].choices = list_gestures(by)
 
     def clean_station(self) -> Station:
@@ -158,22 +161,28 @@ class SessionForm(forms.Form):
         )
         if (session := busy.select_related("patient").first()) is not None:
             raise ValidationError(
-                f"{station} still has an open session of {session.patient}. End it first, or "
-                "choose another station."
+                _(
+                    "%(station)s still has an open session of %(patient)s. End it first, or choose "
+                    "another station."
+                ),
+                params={"station": station, "patient": session.patient},
             )
         return station
 
     def clean_source(self) -> str:
         """Refuse a recording that cannot be played, in its reader's own words."""
         source: str = self.cleaned_data["source"]
-        kind, _, name = source.partition(" ")
+        kind, _between, name = source.partition(" ")
         if kind == "recording":
             file = settings.DATA_DIR / "recordings" / name
             if holds_signals(file):
                 if self.patient.body_mass_kg is None:
                     raise ValidationError(
-                        f"{name} holds raw signals, and A2 is power per kilogram: give "
-                        f"{self.patient.nickname}'s body mass first."
+                        _(
+                            "%(file)s holds raw signals, and A2 is power per kilogram: give "
+                            "%(patient)s's body mass first."
+                        ),
+                        params={"file": name, "patient": self.patient.nickname},
                     )
                 return source
             try:
@@ -187,7 +196,7 @@ class SessionForm(forms.Form):
         data = self.cleaned_data
         by_value = data["goal_by"] == "value"
         hits, minutes = data["wanted_hits"], data["minutes"]
-        kind, _, name = data["source"].partition(" ")
+        kind, _between, name = data["source"].partition(" ")
         return create_session(
             self.patient,
             valence=data["valence"],
@@ -278,7 +287,7 @@ def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
             "protocol": protocol,
             "station": _free(stations),
             "source": (source := "synthetic good" if patient.simulated else LIVE),
-            "source_words": words[source],
+            "source_words": say_source(words[source]),
             "trained_side": patient.paretic_side or Side.LEFT.value,
             "robot": "normal",
             "robot_above": USUAL,
@@ -300,7 +309,7 @@ def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
         "protocol": last.protocol,
         "station": last.station or _free(stations),
         "source": source,
-        "source_words": words[source],
+        "source_words": say_source(words[source]),
         "trained_side": last.trained_side,
         "robot": name_robot_level(_last_intensity(last, by)),
         "robot_above": above,

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 from django.core.exceptions import ValidationError
 from django.core.validators import MaxValueValidator, MinValueValidator
 from django.db import models
+from django.utils.text import capfirst
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
@@ -16,7 +17,7 @@ from rehab.people.scope import ClinicRow, Scope
 from rehab.sessions.cues import USUAL, name_gestures
 from rehab.sessions.forms import LIVE, SessionForm
 from rehab.sessions.models import Protocol
-from rehab.sessions.words import say_quantity, say_rate
+from rehab.sessions.words import LEVELS, say_quantity, say_rate
 from rehab.sources.synthetic import PROFILES
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting
@@ -33,10 +34,12 @@ class Preset(ClinicRow):
 
     scope = Scope(clinic="clinic")
 
-    clinic = models.ForeignKey(Clinic, on_delete=models.CASCADE, related_name="presets")
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.CASCADE, related_name="presets", verbose_name=_("clinic")
+    )
     name = models.CharField(_("name"), max_length=64)
     valence = models.CharField(
-        _("feedback type"), max_length=16, choices=[(v.slug, v.label) for v in VALENCES.values()]
+        _("feedback type"), max_length=16, choices=[(v.slug, _(v.label)) for v in VALENCES.values()]
     )
     goal_by = models.CharField(
         _("goal is given as"),
@@ -64,7 +67,7 @@ class Preset(ClinicRow):
     robot = models.CharField(
         _("robot"),
         max_length=16,
-        choices=[(level, level.capitalize()) for level in ROBOT_LEVELS],
+        choices=[(level, capfirst(LEVELS[level])) for level in ROBOT_LEVELS],
         default="normal",
     )
     robot_above = models.CharField(_("after five strong seconds"), max_length=64, default=USUAL)
@@ -76,7 +79,7 @@ class Preset(ClinicRow):
         choices=[
             ("", _("As last time")),
             (LIVE, _("Live sensor")),
-            *((f"synthetic {name}", f"Simulated patient, {name}") for name in PROFILES),
+            *((f"synthetic {name}", _(f"Simulated patient, {name}")) for name in PROFILES),
         ],
     )
 

@@ -6,7 +6,7 @@ from django.utils.html import format_html
 from django.utils.safestring import SafeString
 from django.utils.translation import gettext as _
 
-from rehab.sessions.words import say_duration
+from rehab.sessions.words import say_duration, say_source
 
 register = template.Library()
 
@@ -28,3 +28,4 @@ def leg(side: str) -> str:
 
 
 register.filter("duration", say_duration)
+register.filter("source", say_source)

@@ -74,6 +74,8 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
         break;
       case "heartbeat":
         caughtUp();
+        confirm(0); // there is a page behind this socket, though it shows nothing new
+        if (message.presence) onEvent?.({ kind: "presence", presence: message.presence });
         break;
       case "done":
         answer(message.id);
@@ -91,7 +93,7 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
 
   // Confirms the newest frame, at most 20 times a second.
   function confirm(frame) {
-    if (confirming) confirming.frame = frame;
+    if (confirming) confirming.frame = Math.max(confirming.frame, frame);
     else {
       const mine = (confirming = { frame, socket });
       setTimeout(() => {

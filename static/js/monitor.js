@@ -1,16 +1,20 @@
 // The PT's page: shows what the server says, and asks it for changes. It computes no score.
 import { connect } from "garry/live";
+import { legend } from "garry/marks";
+import { quality } from "garry/presence";
 import { drawStrip, drawTwenty, drawRing } from "garry/plots";
 import { RobotPanel } from "garry/robot";
 
 const root = document.getElementById("monitor");
 const slots = new Map([...document.querySelectorAll("[data-show]")].map((slot) => [slot.dataset.show, slot]));
 const KEPT = 400; // strides on the strip
+const TYPES = ["began", "changed_to", "valence", "next_valence", "types"];
 const GAINS = [0.85, 0.9, 0.95, 1];
 
 let session = null; // the last snapshot, brought up to date by events
 let strides = [];
-let marks = []; // goal changes and remarks, each after a stride
+let marks = []; // changes and remarks, each after a stride
+let heardAt = 0; // when presence was told
 let last = null;
 
 const robot = new RobotPanel(document.querySelector(".robot"), show, (order) => live.say({ type: "robot", order }));
@@ -19,6 +23,7 @@ const live = connect(root.dataset.socket, {
     session = snapshot;
     strides = snapshot.steps.slice(-KEPT);
     marks = snapshot.marks;
+    heardAt = performance.now();
     last ??= strides.at(-1) ?? null;
     robot.begin(snapshot);
     draw();
@@ -33,7 +38,7 @@ const live = connect(root.dataset.socket, {
     if (!drawing) drawing = requestAnimationFrame(draw);
   },
   onLink(state, why) {
-    const note = document.querySelector(".link");
+    const note = document.querySelector(".notice.link");
     note.hidden = state === "open";
     note.textContent = state === "lost" ? "No connection to the server. What the patient walks is stored; this page comes back by itself." : why;
     if (state === "closed" && session && ["finished", "aborted"].includes(session.state)) location.assign(root.dataset.details);
@@ -42,6 +47,7 @@ const live = connect(root.dataset.socket, {
 let drawing = 0;
 
 function take(event) {
+  if (event.mark) marks.push(event.mark);
   switch (event.kind) {
     case "step":
       Object.assign(session, pick(event, ["active_s", "phase_s", "phase_strides"]));
@@ -51,16 +57,29 @@ function take(event) {
       strides.push(event);
       if (strides.length > KEPT) strides.shift();
       if (event.live) last = event;
+      Object.assign(session.presence, { stride_ago_s: 0, tablet_ago_s: waited(session.presence.tablet_ago_s) });
+      heardAt = performance.now();
       break;
     case "state":
-      session.state = event.state;
+      Object.assign(session, pick(event, ["state", "pause_reason"]));
       break;
     case "phase":
-      Object.assign(session, pick(event, ["phase", "goal", "gain", "obstacle", "active_s", "phase_s", "phase_strides"]));
+      Object.assign(session, pick(event, ["phase", "goal", "gain", "obstacle", "active_s", "phase_s", "phase_strides", ...TYPES]));
+      break;
+    case "valence":
+      Object.assign(session, pick(event, TYPES));
+      break;
+    case "words_shown":
+      session.words_shown = event.value;
+      break;
+    case "chart_style":
+      session.chart = event.value;
+      break;
+    case "words":
+      tell("The clinic’s words were edited; the patient reads them from the next step.");
       break;
     case "goal":
       session.goal = event.goal;
-      marks.push({ after: session.number, kind: "goal", value: event.goal });
       break;
     case "gain":
       session.gain = event.gain;
@@ -73,6 +92,7 @@ function take(event) {
       break;
     case "presence":
       session.presence = event.presence;
+      heardAt = performance.now();
       robot.take(event);
       break;
     case "remark":
@@ -86,6 +106,8 @@ function take(event) {
       robot.take(event);
   }
 }
+
+const waited = (seconds) => (seconds === null || seconds === undefined ? null : seconds + (performance.now() - heardAt) / 1000);
 
 function pick(from, names) {
   return Object.fromEntries(names.filter((name) => from[name] !== undefined).map((name) => [name, from[name]]));
@@ -113,7 +135,8 @@ function draw() {
   drawControls();
   const judged = strides.filter(({ performance }) => performance !== null).slice(-20);
   show("of-twenty", judged.length ? `${judged.filter(({ hit }) => hit).length} of ${judged.length} hit` : "");
-  drawStrip(document.getElementById("strip"), strides, marks);
+  drawStrip(document.getElementById("strip"), strides, marks, session.phases);
+  drawLegend();
   drawTwenty(document.getElementById("twenty"), strides.slice(-20));
   drawRing(document.getElementById("ring"), session.hit_rate, session.target.hit_rate);
   show("wanted", session.target.hit_rate ? `Wanted ${percent(session.target.hit_rate)}` : "No rate set");
@@ -153,15 +176,64 @@ function drawLast() {
   dot.classList.toggle("miss", !last.hit);
 }
 
+function drawLegend() {
+  const list = document.querySelector(".legend"), entries = legend(marks);
+  const text = entries.map((entry) => entry.join(" ")).join();
+  if (list.dataset.of === text) return;
+  list.dataset.of = text;
+  list.replaceChildren(
+    ...entries.map(([sign, words]) => {
+      const item = document.createElement("li");
+      item.append(Object.assign(document.createElement("b"), { textContent: sign }), ` ${words}`);
+      return item;
+    }),
+  );
+}
+
 function drawPresence() {
-  const { source, robot: base, tablets } = session.presence;
-  const words = { source: source ? "connected" : "not connected", robot: robot.presence.words, tablets: tablets ? "connected" : "this page’s mirror" };
-  const there = { source, robot: base, tablets: tablets > 0 };
+  if (!session) return;
+  const found = quality(session, strides, robot.presence, (performance.now() - heardAt) / 1000);
   for (const row of document.querySelectorAll("[data-presence]")) {
-    row.classList.toggle("there", there[row.dataset.presence]);
-    row.classList.toggle("low", row.dataset.presence === "robot" && robot.presence.low);
-    row.querySelector("small").textContent = words[row.dataset.presence];
+    const [sign, words] = found[row.dataset.presence];
+    row.classList.toggle("there", sign !== "–");
+    row.classList.toggle("low", sign === "!");
+    const text = `${sign} ${words}`, place = row.querySelector("small");
+    if (place.textContent !== text) place.textContent = text;
   }
+}
+setInterval(drawPresence, 1_000); // what is silent says nothing by itself
+
+const PAUSED = {
+  restart: "The server was restarted; nothing was lost. Go on when ready.",
+  patient: "Paused on the patient’s page. Go on when ready.",
+  therapist: "Paused by the therapist.",
+};
+
+function drawPause() {
+  const note = document.querySelector(".notice.why");
+  note.hidden = session.state !== "paused";
+  note.textContent = PAUSED[session.pause_reason] ?? "Paused.";
+}
+
+const label = (slug) => session.types.find((type) => type.slug === slug)?.label ?? slug;
+
+function press(group, value) {
+  for (const button of document.querySelectorAll(`[data-${group}] button`)) {
+    const on = button.value === String(value);
+    button.classList.toggle("on", on);
+    button.setAttribute("aria-pressed", on);
+  }
+}
+
+function drawTypes() {
+  const later = session.changed_to.map(label).join(", ");
+  show("types", label(session.began) + (later ? `, changed to ${later}` : ""));
+  const choice = document.querySelector("[data-type]"), wanted = session.next_valence || session.valence;
+  if (choice.options.length !== session.types.length) choice.replaceChildren(...session.types.map(({ slug, label: name }) => new Option(name, slug)));
+  if (choice.dataset.of !== wanted) choice.value = choice.dataset.of = wanted; // not while somebody chooses
+  choice.disabled = session.types.length < 2 || !session.phases.slice(session.phase.index + 1).some(({ feedback }) => feedback);
+  const next = session.phases.slice(session.phase.index + 1).find(({ feedback }) => feedback);
+  show("type-when", choice.disabled ? "no further phase with feedback" : session.next_valence ? `from ${next?.name ?? "the next phase"} on; now ${label(session.valence)}` : "of the next phase: as now");
 }
 
 const MAIN = {
@@ -171,6 +243,10 @@ const MAIN = {
 };
 
 function drawControls() {
+  drawPause();
+  drawTypes();
+  press("words", session.words_shown ? 1 : 0);
+  press("chart", session.chart);
   show("goal", session.goal === null ? "–" : session.goal.toFixed(2));
   show("threshold", percent(session.activation_threshold));
   for (const level of document.querySelectorAll("[data-levels] button")) {
@@ -206,7 +282,7 @@ function tell(words) {
 }
 
 function change(kind, value) {
-  live.change(kind, value).catch((problem) => tell(problem.message));
+  return live.change(kind, value).catch((problem) => tell(problem.message));
 }
 
 function note(what, value) {
@@ -243,6 +319,13 @@ document.addEventListener("click", (event) => {
   else if (remark !== undefined) note(remark);
   else if (button.parentElement.dataset.levels !== undefined) change("robot_intensity", Number(button.value));
   else if (button.parentElement.dataset.gains !== undefined) change("gain", Number(button.value));
+  else if (button.parentElement.dataset.words !== undefined) change("words_shown", Number(button.value));
+  else if (button.parentElement.dataset.chart !== undefined) change("chart_style", button.value);
+});
+
+document.querySelector("[data-type]").addEventListener("change", ({ target }) => {
+  target.dataset.of = ""; // what was refused goes back to what holds
+  if (session) change("valence", target.value).finally(drawTypes);
 });
 
 document.getElementById("exertion").addEventListener("close", ({ target }) => {

@@ -1,22 +1,10 @@
 // Drawings of strides against the goal for the PT: a strip, the last twenty, the share of hits.
 // Shape repeats the meaning of color: hits are solid, misses hollow, missing ones hatched.
 
-import { _, number } from "garry/language";
+import { number } from "garry/language";
+import { badge, isRemark, say } from "garry/marks";
 
 const LOW = 0.5, HIGH = 1.5;
-const REMARKS = {
-  rest: _("rest"),
-  pain: _("pain"),
-  dizziness: _("dizziness"),
-  near_fall: _("near fall"),
-  fall: _("fall"),
-  handrail: _("handrail"),
-  verbal_cue: _("verbal cue"),
-  borg: _("Borg"),
-};
-
-// Says what the PT noted, and how much of it.
-export const sayRemark = (kind, value) => (REMARKS[kind] ?? kind) + (value === null ? "" : ` ${number(value)}`);
 
 function sizeOf(svg) {
   const { width, height } = svg.getBoundingClientRect();
@@ -24,9 +12,9 @@ function sizeOf(svg) {
   return [width, height];
 }
 
-export function drawStrip(svg, strides, marks) {
+export function drawStrip(svg, strides, marks, phases) {
   const [width, height] = sizeOf(svg);
-  const y = (share) => height - 8 - (Math.min(Math.max(share, LOW), HIGH) - LOW) * (height - 20) / (HIGH - LOW);
+  const y = (share) => height - 8 - (Math.min(Math.max(share, LOW), HIGH) - LOW) * (height - 34) / (HIGH - LOW);
   const shown = strides.slice(-Math.max(20, Math.floor((width - 60) / 4)));
   const dx = (width - 60) / Math.max(shown.length - 1, 60);
   const x = (index) => 46 + index * dx;
@@ -39,21 +27,40 @@ export function drawStrip(svg, strides, marks) {
     else if (performance === null || performance === undefined) drawing += `<path class="gap" d="M${x(index)} ${height - 8}v-10"/>`;
     else drawing += `<circle class="${hit ? "hit" : "miss"}" cx="${x(index)}" cy="${y(performance)}" r="${newest ? 6 : 3.2}"/>`;
   });
+  const parts = []; // names that somebody typed: set as text, never as markup
+  shown.forEach(({ phase }, index) => {
+    if (!index || phase === shown[index - 1].phase || phase === undefined) return;
+    const at = x(index) - dx / 2;
+    drawing += `<path class="bound" d="M${at} 4V${height - 8}"/><text class="part" x="${Math.min(at + 5, width - 80)}" y="40"></text>`;
+    parts.push(phases[phase]?.name ?? "");
+  });
   let level = 0, before = null; // what was noted at the same stride stands above each other
-  for (const { after, kind, value } of marks) {
+  let free = 0; // badges and flags stand in a row on top and never cover each other
+  for (const mark of marks) {
+    const { after, kind, value } = mark;
     if (!shown.length || after < shown[0].number) continue;
     const next = shown.findIndex(({ number }) => number > after);
     const at = next < 0 ? x(shown.length) : x(next) - dx / 2;
     if (kind === "goal") {
-      const cloth = Math.min(at, width - 56);
+      if (value === null) continue;
+      const cloth = Math.min(Math.max(at, free), width - 56);
+      free = cloth + 57;
       drawing += `<path class="flag" d="M${at} 4V${height - 8}"/><path class="cloth" d="M${cloth} 2h54v20h-54z"/><text class="on-cloth" x="${cloth + 27}" y="17">${number(value, 2)}</text>`;
+      continue;
+    }
+    if (!isRemark(mark)) {
+      const place = Math.min(Math.max(at, free + 9), width - 10);
+      free = place + 11;
+      drawing += `<g class="change"><title>${say(mark)}</title><path class="flag" d="M${at} 21V${height - 8}"/><circle cx="${place}" cy="12" r="9"/><text x="${place}" y="16">${badge(mark)}</text></g>`;
     } else {
       level = after === before ? level + 1 : 0;
       before = after;
-      drawing += `<path class="remark" d="M${at} ${height - 4}l-6 -9h12z"/><text class="remark-words" x="${Math.min(Math.max(at, 80), width - 40)}" y="${height - 16 - 13 * level}">${sayRemark(kind, value)}</text>`;
+      const words = say(mark);
+      drawing += `<path class="remark" d="M${at} ${height - 4}l-6 -9h12z"/><text class="remark-words" x="${Math.min(Math.max(at, 80), width - 40)}" y="${height - 16 - 13 * level}">${words}</text>`;
     }
   }
   svg.innerHTML = drawing;
+  svg.querySelectorAll(".part").forEach((part, index) => (part.textContent = parts[index]));
 }
 
 export function drawTwenty(svg, strides) {

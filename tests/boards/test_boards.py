@@ -22,7 +22,7 @@ from rehab.boards.standings import Listed, Stored
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.models import SessionMetric, TrainingSession
 from rehab.stations.models import Device, Station
-from rehab.training.changes import ChangeKind
+from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.walks import strides, walk
 from tests.world import NOW
@@ -72,6 +72,54 @@ def see(session: TrainingSession, now=NOW):
 
 def told(shown) -> list[tuple[int | None, str, bool]]:
     return [(row.rank, row.value.replace("\N{NO-BREAK SPACE}", ""), row.you) for row in shown.rows]
+
+
+def walk_two_types(patient: Patient, **how) -> TrainingSession:
+    """Begin with positive feedback and go on with negative; hit every step."""
+    change = [Change(ChangeKind.VALENCE, "negative"), Change(ChangeKind.PHASE, 1)]
+    phases = (make_phase("training"), make_phase("training", "Later"))
+    walked = [*strides(10, 0), *change, *strides(10, 0)]
+    return walk(patient, "positive", walked, phases=phases, **how)
+
+
+@pytest.mark.parametrize(
+    ("fields", "stands"),
+    [
+        ({"types": "all", "metric": "hit_rate"}, True),
+        ({"types": "same", "metric": "hit_rate"}, False),
+        ({"types": "chosen", "valences": ["positive"], "metric": "hit_rate"}, False),
+        ({"types": "same", "metric": "score"}, False),
+        ({"types": "all", "metric": "hit_rate", "tie_breaker": "score"}, False),
+    ],
+)
+def test_a_session_of_two_types_stands_on_no_board_of_points_or_of_one_type(clinic, fields, stands):
+    board = board_of(clinic, **fields)
+    people = people_of(clinic, 6)
+    walk_down(people[1:])
+    session = walk_two_types(people[0])
+    assert (session.valence, session.changed_to) == ("positive", "negative")
+    assert BoardEntry.everywhere.filter(board=board, patient=people[0]).exists() == stands
+    entries.refresh(board)
+    assert BoardEntry.everywhere.filter(board=board, patient=people[0]).exists() == stands
+
+
+def test_a_session_of_two_types_is_compared_by_its_hits_alone(clinic):
+    person = patient_of(clinic, "A")
+    device = Device(
+        clinic=clinic,
+        station=Station.everywhere.create(clinic=clinic, name="S"),
+        kind="tablet",
+        name="t",
+    )
+    token = device.new_token()
+    device.save()
+    plain, mixed = walk(person, "positive", strides(9, 1)), walk_two_types(person)
+    TrainingSession.everywhere.update(station=device.station)
+    tablet = Client(headers={"Authorization": f"Bearer {token}"})
+    boards = tablet.get(reverse("scores", args=[mixed.pk])).context["boards"]
+    assert [(board.slug, len(board.rows)) for board in boards] == [("all", 2)]
+    boards = tablet.get(reverse("scores", args=[plain.pk])).context["boards"]
+    assert [(board.slug, len(board.rows)) for board in boards] == [("same", 1), ("all", 2)]
 
 
 # --- who stands on a board ----------------------------------------------------------------------

@@ -272,9 +272,9 @@ def test_phases_and_events_are_told(client, patient):
     session = walk(patient, "positive", walked, phases=phases)
     page = detail(client, session)
     rows = [words(row) for row in re.findall(r"<tr>.*?</tr>", page, re.DOTALL)]
-    assert "Baseline no 1.00 3 2 1 50 % 2.00 100 %" in rows
+    assert "Baseline none 1.00 3 2 1 50 % 2.00 100 %" in rows
     of_goal = (2.5 / 2.0 + 2.5 / 2.4 + 1.5 / 2.4 + 1.5 / 2.4) / 4
-    assert f"Training yes 1.00 4 4 2 50 % 2.00 {100 * of_goal:.0f} %" in rows
+    assert f"Training Positive 1.00 4 4 2 50 % 2.00 {100 * of_goal:.0f} %" in rows
     told = [words(item) for item in re.findall(r"<li class=\"\w+\"><time.*?</li>", page, re.DOTALL)]
     assert [line.split(" ", 1)[1] for line in told] == [
         "Started",
@@ -393,3 +393,45 @@ def test_days_follow_the_clinics_own_clock(world):
     assert say_day(there, date(2026, 11, 21)) == "today"
     assert say_day(there, date(2026, 11, 25)) == "Nov 21"
     assert say_day(there, date(2027, 1, 2)) == "Nov 21, 2026"
+
+
+def test_a_change_of_type_and_gain_is_told_wherever_the_session_is(client, patient):
+    phases = (make_phase("training", "First"), make_phase("training", "Last"))
+    walked: list[Walked] = [
+        HIT,
+        Change(ChangeKind.GAIN, 0.9),
+        HIT,
+        Change(ChangeKind.VALENCE, "negative"),
+        Change(ChangeKind.WORDS_SHOWN, 0.0),
+        Change(ChangeKind.CHART_STYLE, "line"),
+        Change(ChangeKind.PAUSE, "restart"),
+        Change(ChangeKind.RESUME),
+        Change(ChangeKind.PHASE, 1.0),
+        MISS,
+    ]
+    session = walk(patient, "positive", walked, phases=phases)
+    page = detail(client, session)
+    rows = [words(row) for row in re.findall(r"<tr>.*?</tr>", page, re.DOTALL)]
+    for row in ("First Positive 1.00 1", "First Positive 0.90 1", "Last Negative 1.00 1"):
+        assert any(found.startswith(row) for found in rows), row
+    told = words(page)
+    for line in (
+        "Positive, changed to Negative",
+        "Feedback type of the next phase: Negative after stride 2",
+        "Words: off after stride 2",
+        "Chart: line after stride 2",
+        "Paused by a restart of the server after stride 2",
+    ):
+        assert line in told
+    chart = json.loads(re.search(r'<script id="session"[^>]*>(.*?)</script>', page, re.DOTALL)[1])
+    assert [phase["name"] for phase in chart["phases"]] == ["First", "Last · Negative"]
+    assert {mark["kind"] for mark in chart["marks"]} == {
+        "gain",
+        "valence",
+        "words_shown",
+        "chart_style",
+        "pause",
+        "resume",
+    }
+    listed = client.get(reverse("history", args=[patient.pk])).content.decode()
+    assert "Positive, changed to Negative" in words(listed)

@@ -32,7 +32,7 @@ WAY_TO = {
     S.FINISHED: (K.START, K.FINISH),
     S.ABORTED: (K.ABORT,),
 }
-LEADS_TO = {
+LEADS_TO: dict[tuple[ChangeKind, State], State] = {
     (K.START, S.READY): S.RUNNING,
     (K.PAUSE, S.RUNNING): S.PAUSED,
     (K.RESUME, S.PAUSED): S.RUNNING,

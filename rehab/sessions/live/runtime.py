@@ -20,7 +20,7 @@ from django.db import DatabaseError, connection
 from django.utils import timezone
 
 from rehab.people.models import User
-from rehab.sessions.events import to_text
+from rehab.sessions.events import Audience, to_text
 from rehab.sessions.live import owners, sources
 from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.live.admission import find_unwelcome, keep_signed_in
@@ -164,8 +164,11 @@ class Runtime:
                 if live.robot is not None:
                     live.robot.tell({"type": "heartbeat", "watched": live.is_watched})
                 if ticks % SWEEP == 0:
+                    presence = live.presence(timezone.now())
+                    quality = to_text({"type": "heartbeat", "presence": presence})
                     for viewer in live.channel.viewers:
-                        viewer.beat(HEARTBEAT)
+                        monitors = viewer.audience is Audience.MONITOR
+                        viewer.beat(quality if monitors else HEARTBEAT)
                     if live.is_idle and not live.asked_for:
                         await self._close(live)
                     live.asked_for = False  # whoever gets it now has until the next sweep to join

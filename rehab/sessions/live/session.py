@@ -94,9 +94,8 @@ class LiveSession:
         self.robot_stopped = robot_stopped  # until a person arms it again
         self.robot_reports: Message = {"status": None, "decision": None}  # the latest
         self.tablets = 0
-        self.stride_at: datetime | None = (
-            getattr(recent[-1], "received_at", None) if recent else None
-        )
+        self.tablet_heard_at: datetime | None = None
+        self.stride_at: datetime | None = recent[-1].received_at if recent else None
         self.committed = actor.fold.last_number
         self.asked_for = True  # since the last sweep of idle sessions
         self.unwritten = 0
@@ -277,20 +276,22 @@ class LiveSession:
                 return {"type": "stop"}
         return {"type": kind.value}
 
-    def presence(self) -> Message:
-        """Say who is there."""
+    def presence(self, now: datetime) -> Message:
+        """Say who is there, and how long ago the sensor and a tablet were last heard."""
         return {
             "source": self.source is not None,
             "robot": self.robot is not None,
             "tablets": self.tablets,
+            "stride_ago_s": _ago_s(self.stride_at, now),
+            "tablet_ago_s": _ago_s(self.tablet_heard_at, now) if self.tablets else None,
         }
 
-    def announce_presence(self) -> None:
+    def announce_presence(self, now: datetime) -> None:
         """Tell the viewers who is there."""
-        self.channel.publish(presence_event(self.actor.fold, self.presence()))
+        self.channel.publish(presence_event(self.actor.fold, self.presence(now)))
 
     async def join(
-        self, audience: Audience, send: Callable[[str], Awaitable[None]]
+        self, audience: Audience, send: Callable[[str], Awaitable[None]], now: datetime
     ) -> tuple[Message, Viewer]:
         """Add a viewer. Give all that its page shows as of now; events follow from there.
 
@@ -307,7 +308,7 @@ class LiveSession:
                 audience,
                 self.actor.fold,
                 about,
-                self.presence(),
+                self.presence(now),
                 self.recent,
                 robot=self.robot_reports,
                 robot_stopped=self.robot_stopped,
@@ -347,6 +348,10 @@ def source_phase(live: LiveSession) -> Message:
         "feedback": phase.feedback,
         "gain": phase.gain,
     }
+
+
+def _ago_s(moment: datetime | None, now: datetime) -> float | None:
+    return None if moment is None else round(max(0.0, (now - moment).total_seconds()), 1)
 
 
 def _for_patient(about: Message) -> Message:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
+from django.utils.text import capfirst
 from django.views.decorators.http import require_safe
 
 from rehab.people.access import for_roles, person
 from rehab.people.roles import Role
 from rehab.sessions.live.messages import BORG_MAX
-from rehab.sessions.models import Remark, TrainingSession
+from rehab.sessions.models import EVENTS, Remark, TrainingSession
 from rehab.training.plans import ROBOT_LEVELS
 
 ICONS = {
@@ -22,10 +23,6 @@ ICONS = {
     Remark.VERBAL_CUE: "voice",
     Remark.BORG: "borg",
 }
-REMARKS = [
-    {"slug": what.value, "label": what.value.replace("_", " ").capitalize(), "icon": icon}
-    for what, icon in ICONS.items()
-]
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -38,7 +35,10 @@ def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
     )
     context = {
         "session": session,
-        "remarks": REMARKS,
+        "remarks": [
+            {"slug": what.value, "label": capfirst(EVENTS[what]), "icon": icon}
+            for what, icon in ICONS.items()
+        ],
         "borg": range(BORG_MAX + 1),
         "levels": ROBOT_LEVELS,
     }

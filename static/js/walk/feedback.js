@@ -90,6 +90,7 @@ export function createFeedback(body) {
   // Draws a look of the session; `why` says what ended the connection.
   return function draw(look, session, why) {
     if (session) set(time, timeLeft(session));
+    if (session) body.dataset.chart = session.chart;
     if (look === "feedback") {
       drawStep(session);
       drawTotals(session);

@@ -2,7 +2,7 @@
 // here. `look` says which of the page's pictures that is.
 
 const KEPT = 60; // strides, as many as a snapshot has
-const TOTALS = ["number", "score", "streak", "active_s", "phase_s", "phase_strides"];
+const TOTALS = ["number", "score", "streak", "active_s", "phase_s", "phase_strides", "has_points", "chart"];
 
 export function begin(snapshot) {
   const last = snapshot.last?.kind === "calm" ? null : snapshot.last;
@@ -23,8 +23,10 @@ export function apply(session, event) {
       break;
     case "state":
       session.state = event.state;
+      session.pause_reason = event.pause_reason;
       break;
     case "phase":
+      if (event.phase.theme !== session.phase.theme) session.last = null; // it meant something else
       session.phase = event.phase;
       break;
     case "presence":

@@ -19,6 +19,8 @@ export function wordsFor(look, session, name, why) {
     case "still":
       return ["Waiting for your next step.", safe];
     case "paused":
+      if (session.pause_reason === "restart") return ["Pause.", "The server was restarted; nothing was lost."];
+      if (session.pause_reason === "therapist") return ["Pause.", `Your therapist paused. ${safe}`];
       return ["Pause.", `Rest now. ${safe}`];
     case "ask":
       return ["End this session?", "You cannot walk on after that."];
@@ -63,8 +65,8 @@ export function partLeft({ phase, phase_s, phase_strides }) {
 // One line for screen readers: "Strong push. Plus 2. 128 points."
 export function spoken(step, session) {
   if (step.kind === "missing") return "Step not measured.";
-  const words = step.words.replace(/[!.]*$/, ".");
-  if (step.points === null) return step.shown === null ? words : `${words} ${step.shown} ${session.unit}.`;
-  const change = step.points ? ` ${step.points > 0 ? "Plus" : "Minus"} ${Math.abs(step.points)}.` : "";
-  return `${words}${change} ${count(session.score)} points.`;
+  const words = step.words && step.words.replace(/[!.]*$/, ".");
+  if (step.points === null) return [words, step.shown !== null && `${step.shown} ${session.unit}.`].filter(Boolean).join(" ");
+  const change = step.points && `${step.points > 0 ? "Plus" : "Minus"} ${Math.abs(step.points)}.`;
+  return [words, change, `${count(session.score)} points.`].filter(Boolean).join(" ");
 }

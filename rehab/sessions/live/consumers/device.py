@@ -5,6 +5,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import ClassVar
 
+from django.utils import timezone
+
 from rehab.sessions.events import Message
 from rehab.sessions.live.admission import (
     find_actor,
@@ -117,7 +119,7 @@ class DeviceSocket(Socket):
         self._leave_session()
         self.live = live
         setattr(live, self.slot, self)
-        live.announce_presence()
+        live.announce_presence(timezone.now())
         await self.attached(live)
 
     def tell(self, message: Message) -> None:
@@ -136,7 +138,7 @@ class DeviceSocket(Socket):
         live, self.live = self.live, None
         if live is not None and getattr(live, self.slot) is self:
             setattr(live, self.slot, None)
-            live.announce_presence()
+            live.announce_presence(timezone.now())
 
     def left(self) -> None:
         """Free the session for another device."""

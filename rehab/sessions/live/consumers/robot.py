@@ -44,7 +44,7 @@ class RobotConsumer(DeviceSocket):
     async def _pump(self, live: LiveSession) -> None:
         """Send the order and then steps. What a robot missed is past, and never made up for."""
         while self.live is live:
-            _, viewer = await live.join(Audience.ROBOT, self.send)
+            _, viewer = await live.join(Audience.ROBOT, self.send, timezone.now())
             self.viewer = viewer
             fold = live.actor.fold
             cue, state = describe_cue(fold), fold.state.value

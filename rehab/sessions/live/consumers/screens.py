@@ -60,6 +60,7 @@ class ScreenConsumer(Socket):
             raise Closing(4409, "busy", str(problem)) from None
         if isinstance(self.actor, Device):
             live.tablets += 1
+            live.tablet_heard_at = timezone.now()
         self.start(self._pump(live, _after(self.scope["query_string"])))
         self.runtime.do_beside(note(Act.VIEW, self.actor, session_id, self.scope))
 
@@ -73,10 +74,10 @@ class ScreenConsumer(Socket):
     async def _pump(self, live: LiveSession, after: int | None) -> None:
         """Send a snapshot, what was missed, then events; begin anew where the page lags."""
         while True:
-            shown, viewer = await live.join(self.audience, self.send)
+            shown, viewer = await live.join(self.audience, self.send, timezone.now())
             self.viewer = viewer
             if isinstance(self.actor, Device) or self.audience is Audience.MONITOR:
-                live.announce_presence()
+                live.announce_presence(timezone.now())
             try:
                 await self.say(shown)
                 if after is not None:
@@ -115,6 +116,8 @@ class ScreenConsumer(Socket):
             case "seen":
                 if self.viewer is not None:
                     self.viewer.seen(read_whole(message, "frame", low=0))
+                if isinstance(self.actor, Device) and self.live is not None:
+                    self.live.tablet_heard_at = timezone.now()
             case "change":
                 await self._change(message)
             case "robot":
@@ -190,7 +193,7 @@ class ScreenConsumer(Socket):
                 live.channel.viewers.discard(self.viewer)
             if isinstance(self.actor, Device):
                 live.tablets -= 1
-                live.announce_presence()
+                live.announce_presence(timezone.now())
 
 
 class PatientConsumer(ScreenConsumer):

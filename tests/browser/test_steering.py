@@ -1,0 +1,188 @@
+"""What a PT does while somebody walks reaches the tablet with the next step: each control of the
+monitor, and words edited in the admin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browsers import SIZES
+from tests.servers import Server, serve
+from tests.walk_seed import Walk, feet_of, make_walks
+
+pytestmark = pytest.mark.browser
+
+PATIENCE_MS = 30_000
+PHASES = [
+    {"kind": "training", "name": "First", "strides": 12},
+    {"kind": "training", "name": "Last"},
+]
+
+
+@contextmanager
+def pages(browser: Browser, server: Server, walk: Walk, path: str) -> Iterator[tuple[Page, Page]]:
+    """Open the tablet's page and one of the PT's."""
+    opened: list[Page] = []
+    complaints: list[str] = []
+    for address, size in ((walk.path, "tablet-portrait"), (path, "laptop")):
+        width, height = SIZES[size]
+        context = browser.new_context(
+            base_url=server.url,
+            viewport={"width": width, "height": height},
+            reduced_motion="reduce",
+        )
+        context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
+        context.set_default_timeout(PATIENCE_MS)
+        page = context.new_page()
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.goto(address)
+        opened.append(page)
+    yield opened[0], opened[1]
+    for page in opened:
+        page.context.close()
+    assert complaints == []
+
+
+def at_step(tablet: Page, number: int) -> None:
+    tablet.wait_for_function("n => document.body.dataset.step >= n", arg=number)
+
+
+def pressed(monitor: Page, control: str, value: str) -> None:
+    """Tap a control; wait until the server has it."""
+    button = monitor.locator(f"[{control}] [value='{value}']")
+    button.click()
+    expect(button).to_have_attribute("aria-pressed", "true")
+
+
+def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(server, browser):
+    (walk,) = make_walks(server, {"valence": "positive", "phases": PHASES})
+    where = f"/sessions/{walk.session}/monitor/"
+    with pages(browser, server, walk, where) as (tablet, monitor), feet_of(server, walk) as feet:
+        words, emblem = tablet.locator(".words"), tablet.locator(".emblem svg")
+        monitor.locator("[data-main]").click()
+        feet.hear("start")
+        feet.walk(1.0)
+        at_step(tablet, 1)
+        expect(words).to_have_text("You reached the goal!")
+
+        monitor.get_by_label("Goal up").click()
+        expect(monitor.locator("[data-show=goal]")).to_have_text("4.10")
+        expect(words).to_have_text("You reached the goal!")  # not before the next step
+        feet.walk(1.0)
+        at_step(tablet, 2)
+        expect(words).to_have_text("Nearly there. Keep walking.")
+
+        monitor.locator("[data-gains] [value='0.85']").click()
+        expect(monitor.locator("[data-gains] .on")).to_have_text("0.85")
+        feet.walk(0.9)
+        at_step(tablet, 3)
+        expect(words).to_have_text("On to the next step.")  # 0.85 × 3.6 of 4.1
+
+        pressed(monitor, "data-words", "0")
+        expect(words).to_have_text("On to the next step.")
+        feet.walk(1.3)
+        at_step(tablet, 4)
+        expect(words).to_have_text("")
+        expect(emblem).to_have_attribute("data-emblem", "gain")  # drawing and number stay
+        expect(tablet.locator(".key")).to_have_text("2")
+        pressed(monitor, "data-words", "1")
+
+        pressed(monitor, "data-chart", "line")
+        expect(tablet.locator("body")).to_have_attribute("data-chart", "points")
+        feet.walk(1.3)
+        at_step(tablet, 5)
+        expect(tablet.locator("body")).to_have_attribute("data-chart", "line")
+        expect(tablet.locator(".dots circle").first).to_be_hidden()
+        expect(words).to_have_text("You reached the goal!")
+
+        steer_the_robot(server, walk, monitor)
+
+        monitor.select_option("[data-type]", "negative")
+        expect(monitor.locator("[data-show=type-when]")).to_contain_text("from Last on")
+        feet.walk(1.3, 1.3, 1.3, 1.3, 1.3, 1.3)
+        at_step(tablet, 11)
+        expect(tablet.locator("body")).to_have_attribute("data-theme", "positive")
+        feet.walk(1.3)  # the twelfth ends the first phase
+        expect(tablet.locator("body")).to_have_attribute("data-theme", "negative")
+        expect(words).to_have_text("")  # what was said belongs to the type before
+        feet.walk(0.5)
+        at_step(tablet, 13)
+        expect(words).to_have_text("Far below the goal.")
+        expect(emblem).to_have_attribute("data-emblem", "loss")
+        expect(monitor.locator("[data-show=types]")).to_have_text("Positive, changed to Negative")
+
+        legend = monitor.locator(".legend")
+        for told in ("goal 4.10", "words on", "line", "robot gentle", "feedback type Negative"):
+            expect(legend).to_contain_text(told)
+        monitor.locator("[data-main]").click()
+        expect(monitor.locator(".notice.why")).to_have_text("Paused by the therapist.")
+        expect(tablet.locator(".sub")).to_contain_text("Your therapist paused.")
+        expect(monitor.locator("[data-presence=source]")).to_contain_text("✓ 13 of 13 valid")
+
+
+def steer_the_robot(server: Server, walk: Walk, monitor: Page) -> None:
+    pressed(monitor, "data-levels", "0.5")
+    monitor.get_by_label("Threshold up").click()
+    expect(monitor.locator("[data-show=threshold]")).to_have_text("95 %")
+
+
+def test_words_edited_in_the_admin_are_on_the_tablet_with_the_next_step(server, browser):
+    (walk,) = make_walks(server, {"valence": "positive"})
+    where = "/admin/rehab/feedbacktype/"
+    with pages(browser, server, walk, where) as (tablet, admin), feet_of(server, walk) as feet:
+        tablet.locator("[data-change=start]").click()
+        feet.hear("start")
+        feet.walk(1.15)
+        at_step(tablet, 1)
+        expect(tablet.locator(".words")).to_have_text("Strong push!")
+
+        expect(admin.locator(".feedback-types tbody tr")).to_have_count(4)
+        admin.get_by_role("link", name="Edit Positive").click()
+        seen = admin.frame_locator(".preview iframe")
+        expect(seen.locator("figure")).to_have_count(5)
+        admin.fill("#id_bands-3-words_en", "Like a spring!")
+        expect(seen.locator("figure").nth(3)).to_contain_text("Like a spring!")
+        admin.fill("#id_hit_points", "7")
+        expect(seen.locator("figure").nth(3)).to_contain_text("+7")
+        admin.fill("#id_bands-2-from_percent", "101")
+        expect(seen.locator(".faults")).to_contain_text("begin at 1, the goal")
+        admin.fill("#id_bands-2-from_percent", "100")
+        expect(seen.locator("figure")).to_have_count(5)
+        admin.click("[name=_save]")
+        expect(admin.locator(".feedback-types tbody tr").first).to_contain_text("edited here")
+
+        expect(tablet.locator(".words")).to_have_text("Strong push!")
+        feet.walk(1.15)
+        at_step(tablet, 2)
+        expect(tablet.locator(".words")).to_have_text("Like a spring!")
+        expect(tablet.locator(".key")).to_have_text("2")  # points are as they were set up
+
+        admin.get_by_role("link", name="Edit Positive").click()
+        admin.get_by_role("link", name="Back to the defaults").click()
+        admin.click("[type=submit][value='Back to the defaults']")
+        expect(admin.locator(".feedback-types tbody tr").first).to_contain_text("as usual")
+        feet.walk(1.15)
+        at_step(tablet, 3)
+        expect(tablet.locator(".words")).to_have_text("Strong push!")
+
+
+def test_after_a_crash_both_pages_say_why_it_is_paused(tmp_path, browser):
+    with serve(tmp_path) as server:
+        (walk,) = make_walks(server, {"valence": "positive"})
+        where = f"/sessions/{walk.session}/monitor/"
+        with pages(browser, server, walk, where) as (_, monitor), feet_of(server, walk) as feet:
+            monitor.locator("[data-main]").click()
+            feet.hear("start")
+            feet.walk(1.2, 1.2)
+    with serve(tmp_path) as server, pages(browser, server, walk, where) as (tablet, monitor):
+        expect(monitor.locator(".notice.why")).to_have_text(
+            "The server was restarted; nothing was lost. Go on when ready."
+        )
+        expect(tablet.locator(".sub")).to_have_text("The server was restarted; nothing was lost.")
+        monitor.locator("[data-main]").click()
+        expect(monitor.locator(".notice.why")).to_be_hidden()
+        expect(tablet.locator("body")).not_to_have_attribute("data-look", "paused")

@@ -1,0 +1,199 @@
+"""What a PT steers beside goal, gain and robot: feedback type, words, chart; what is told of it."""
+
+from __future__ import annotations
+
+import pytest
+from asgiref.sync import sync_to_async
+
+from rehab.sessions.live import runtime
+from rehab.sessions.models import SessionEvent, TrainingSession
+from rehab.training.phases import make_phase
+from rehab.training.valences import Cue
+from tests.sessions.live.test_robots import restart
+
+TWO = (make_phase("training", "First", strides=2), make_phase("training", "Last"))
+
+
+async def events_of(session, kind):
+    rows = SessionEvent.everywhere.filter(session=session, kind=kind).order_by("pk")
+    return [row async for row in rows]
+
+
+async def test_the_next_phase_has_the_other_feedback_type_for_everyone(place, begun):
+    session = await begun(place, *TWO, valence="positive")
+    robot, source = await place.robot().dial(), await place.source().dial()
+    tablet, monitor = place.tablet(session), place.monitor(session)
+    assert (await robot.hello())["valence"] == "positive"
+    await source.hello()
+    await tablet.watch()
+    shown = await monitor.watch()
+    assert (shown["valence"], shown["next_valence"], shown["changed_to"]) == ("positive", "", [])
+    assert [one["slug"] for one in shown["types"]] == [
+        "positive",
+        "negative",
+        "binary",
+        "explicit",
+    ]
+    assert (await monitor.change("valence", "negative"))["type"] == "done"
+    await monitor.until(lambda event: event.get("next_valence") == "negative")
+    await source.walk(2.0, 4.0)  # a miss and a hit of goal 3: the first phase ends
+    await tablet.until_step(2)
+    assert (tablet.last("step")["points"], tablet.last("step")["score"]) == (1, 1)
+    moved = await tablet.until(lambda event: event["kind"] == "phase")
+    assert (moved["phase"]["theme"], moved["has_points"], moved["streak"]) == (
+        "negative",
+        True,
+        None,
+    )
+    cue = await robot.hear("cue")
+    assert (cue["valence"], cue["cue"]["above"], cue["cue"]["below"]) == ("negative", None, "droop")
+    await source.walk(2.0)
+    step = await tablet.until_step(3)
+    assert (step["points"], step["score"], step["emblem"]) == (-1, 0, "loss")
+    told = await monitor.until(lambda event: event.get("mark", {}).get("kind") == "type")
+    assert (told["mark"], told["changed_to"]) == (
+        {"after": 2, "kind": "type", "value": "Negative"},
+        ["negative"],
+    )
+    row = await TrainingSession.everywhere.aget(pk=session.pk)
+    assert (row.valence, row.changed_to) == ("positive", "negative")
+    assert row.types_words == "Positive, changed to Negative"
+
+    await restart()
+    again = await place.monitor(session).watch()
+    assert (again["valence"], again["changed_to"], again["score"]) == ("negative", ["negative"], 0)
+    assert {"after": 2, "kind": "type", "value": "Negative"} in again["marks"]
+    assert (await (await place.robot().dial()).hello())["cue"]["below"] == "droop"
+    assert (await place.tablet(session).watch())["last"]["words"] == "Far below the goal."
+
+
+async def test_a_robot_that_was_silenced_stays_so_in_every_type(place, ready):
+    session = await ready(place, *TWO, valence="positive", cue=Cue())
+    plan = session.to_plan()
+    assert [one.cue.above for one in plan.alternatives] == [None] * 3
+    other = await ready(place, *TWO, valence="positive", at_station=False)
+    cues = {one.slug: one.cue for one in other.to_plan().alternatives}
+    assert cues == {
+        "negative": Cue(below="droop"),
+        "binary": Cue("celebrate", "droop"),
+        "explicit": Cue(),
+    }
+
+
+async def test_without_a_further_phase_the_type_stays(place, begun):
+    session = await begun(place)
+    monitor = place.monitor(session)
+    await monitor.watch()
+    answer = await monitor.change("valence", "negative")
+    assert answer["code"] == "refused"
+    assert "no phase with feedback follows" in answer["message"]
+    answer = await monitor.change("valence", "happy")
+    assert "can be changed to one of: binary, positive" in answer["message"]
+    assert await events_of(session, "valence") == []
+
+
+async def test_words_and_chart_hold_from_the_next_step_and_are_in_the_log(place, begun):
+    session = await begun(place)
+    source, tablet, monitor = (
+        await place.source().dial(),
+        place.tablet(session),
+        place.monitor(session),
+    )
+    await source.hello()
+    assert (await tablet.watch())["chart"] == "points"
+    assert (await monitor.watch())["words_shown"] is True
+    await source.walk(4.0)
+    for kind, value in (("words_shown", 0), ("chart_style", "line"), ("chart_style", "line")):
+        assert (await monitor.change(kind, value))["type"] == "done"
+    await source.walk(4.0)
+    before, after = await tablet.until_step(1), await tablet.until_step(2)
+    assert (before["words"], before["chart"]) == ("What a push!", "points")
+    assert (after["words"], after["chart"], after["emblem"], after["score"]) == (
+        "",
+        "line",
+        "gain",
+        2,
+    )
+    (words,) = await events_of(session, "words_shown")
+    assert (words.old, words.value, words.by_id, words.after_number) == (1, 0, place.pt.pk, 1)
+    assert [row.data for row in await events_of(session, "chart_style")] == [
+        {"value": "line", "old": "points"},
+        {"value": "line", "old": "line"},
+    ]
+    await restart()
+    again = await place.monitor(session).watch()
+    assert (again["words_shown"], again["chart"]) == (False, "line")
+    assert [mark["kind"] for mark in again["marks"]][:3] == [
+        "words_shown",
+        "chart_style",
+        "chart_style",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("kind", "value"), [("words", "Go!"), ("valence", None), ("valence", 3), ("chart_style", {})]
+)
+async def test_what_is_no_change_of_a_page_is_not_the_protocol(place, begun, kind, value):
+    monitor = place.monitor(await begun(place))
+    await monitor.watch()
+    await monitor.say({"type": "change", "kind": kind, "value": value, "id": "x"})
+    code, _ = await monitor.sent_away()
+    assert code == 4400
+
+
+async def test_a_tablet_changes_none_of_it(place, begun):
+    session = await begun(place)
+    tablet = place.tablet(session)
+    await tablet.watch()
+    for kind, value in (("words_shown", 0), ("chart_style", "line"), ("valence", "binary")):
+        await tablet.say({"type": "change", "kind": kind, "value": value, "id": kind})
+        assert (await tablet.hear("error"))["code"] == "refused"
+
+
+async def test_pages_hear_who_paused_a_session(place, begun):
+    session = await begun(place)
+    tablet, monitor = place.tablet(session), place.monitor(session)
+    await tablet.watch()
+    await monitor.watch()
+    await monitor.change("pause")
+    heard = await tablet.until(lambda event: event["kind"] == "state")
+    assert (heard["state"], heard["pause_reason"]) == ("paused", "therapist")
+    await monitor.change("resume")
+    await tablet.say({"type": "change", "kind": "pause", "id": "p"})
+    await monitor.until(lambda event: event.get("pause_reason") == "patient")
+    await monitor.change("resume")
+    await runtime.current().drain()
+    runtime._current = None
+    await runtime.current().recover()
+    shown = await place.monitor(session).watch()
+    assert (shown["state"], shown["pause_reason"]) == ("paused", "restart")
+    assert (await place.tablet(session).watch())["pause_reason"] == "restart"
+
+
+async def test_the_monitor_hears_how_long_sensor_and_tablet_are_silent(place, begun):
+    session = await begun(place)
+    monitor = place.monitor(session)
+    there = (await monitor.watch())["presence"]
+    assert (there["stride_ago_s"], there["tablets"], there["tablet_ago_s"]) == (None, 0, None)
+    source, tablet = await place.source().dial(), place.tablet(session)
+    await source.hello()
+    await source.walk(4.0)
+    seen = await tablet.watch()
+    assert seen["presence"] == {"source": True, "robot": False}  # no concern of the patient's
+    told = await monitor.until(
+        lambda event: event["kind"] == "presence" and event["presence"]["tablets"] == 1
+    )
+    assert told["presence"]["stride_ago_s"] >= 0
+    assert told["presence"]["tablet_ago_s"] >= 0
+
+
+async def test_a_plan_from_before_today_runs_on(place, begun):
+    session = await begun(place, *TWO, valence="positive")
+    await restart()
+    stored = await TrainingSession.everywhere.aget(pk=session.pk)
+    for name in ("alternatives", "language"):
+        del stored.plan[name]
+    await sync_to_async(stored.save)(update_fields=["plan"])
+    monitor = place.monitor(session)
+    assert [one["slug"] for one in (await monitor.watch())["types"]] == ["positive"]
+    assert (await monitor.change("valence", "negative"))["code"] == "refused"
