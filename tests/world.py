@@ -16,9 +16,9 @@ from rehab.people.factors import Authenticator, RecoveryCode
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.tokens import ApiToken
+from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.live.actor import Row, SessionActor
 from rehab.sessions.live.writer import Job, commit
-from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.models import (
     Measure,
     Protocol,

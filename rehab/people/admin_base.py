@@ -11,6 +11,7 @@ from django.db.models import QuerySet
 from django.http import HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import redirect
 from django.utils import timezone
+from django.utils.text import capfirst
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
@@ -117,6 +118,11 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
         """Give the form; a new row's clinic is the person's own, or none for a host."""
         form: Any = super().get_form(request, obj, change=change, **kwargs)
         return type(form)(form.__name__, (form,), {"new_clinic_id": person(request).clinic_id})
+
+    def changelist_view(self, request: HttpRequest, extra_context: Any = None) -> HttpResponse:
+        """Show the list under what it is a list of."""
+        title = capfirst(self.opts.verbose_name_plural)
+        return super().changelist_view(request, {"title": title} | (extra_context or {}))
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Give addresses and words of where one may want to go from a row's page."""

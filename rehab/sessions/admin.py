@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from django import forms
@@ -34,7 +35,7 @@ from rehab.sessions.models import (
 )
 from rehab.sessions.presets import Preset
 from rehab.sessions.trend import with_figures
-from rehab.sessions.words import at_clinic, say_quantity, say_rate
+from rehab.sessions.words import at_clinic
 from rehab.training.changes import OPEN, State
 
 PARKED = 10_000  # where phases wait while they change places; no protocol has as many
@@ -137,16 +138,7 @@ class ProtocolAdmin(ScopedAdmin):
         """Show the form; what is drawn of the protocol begins with what is stored."""
         row: Protocol | None = context.get("original")
         context["stride_s"] = STRIDE_S
-        context["phases"] = [
-            {
-                "name": phase.name,
-                "feedback": phase.feedback,
-                "gain": phase.gain,
-                "strides": phase.strides,
-                "seconds": phase.seconds,
-            }
-            for phase in (row.to_rules() if row else ())
-        ]
+        context["phases"] = [asdict(phase) for phase in (row.to_rules() if row else ())]
         return super().render_change_form(request, context, *args, **kwargs)
 
     @transaction.atomic
@@ -189,9 +181,8 @@ class ProtocolAdmin(ScopedAdmin):
             description=protocol.description,
         )
         copy.save()
-        for phase in protocol.phases.order_by("position"):
-            phase.pk, phase.protocol, phase._state.adding = None, copy, True
-            phase.save()
+        for position, phase in enumerate(protocol.to_rules(), 1):
+            ProtocolPhase(protocol=copy, position=position, **asdict(phase)).save()
         return copy
 
 
@@ -350,7 +341,7 @@ class TrainingSessionAdmin(ScopedAdmin):
     @admin.display(description=_("goal"), ordering="goal")
     def goal_value(self, session: TrainingSession) -> str | None:
         """Give the goal with its unit."""
-        return None if session.goal is None else say_quantity(session.goal, session.measure.unit)
+        return None if session.goal is None else f"{session.goal:.2f} {session.measure.unit}"
 
     @admin.display(description=_("score"), ordering="metric_score")
     def score(self, session: Any) -> int | None:
@@ -360,7 +351,7 @@ class TrainingSessionAdmin(ScopedAdmin):
     @admin.display(description=_("hit rate"), ordering="metric_hit_rate")
     def hit_rate(self, session: Any) -> str | None:
         """Give the share of hits."""
-        return None if session.metric_hit_rate is None else say_rate(session.metric_hit_rate)
+        return None if session.metric_hit_rate is None else f"{session.metric_hit_rate:.0%}"
 
     @admin.display(description=_("counts"), ordering="left_out", boolean=True)
     def counts(self, session: TrainingSession) -> bool:
