@@ -85,6 +85,7 @@ class AccountAdmin(ScopedOptions, UserAdmin):
         "is_active",
     )
     list_filter = ("role", "is_active", "last_login", ("clinic", admin.RelatedOnlyFieldListFilter))
+    list_select_related = ("clinic",)
     show_facets = admin.ShowFacets.NEVER
     add_form = NewAccountForm
     filter_horizontal = ()
@@ -193,7 +194,7 @@ class PatientAdmin(ScopedAdmin):
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Patient]:
         """Give the visible patients with how often and when they were here last."""
-        rows = super().get_queryset(request)
+        rows: QuerySet[Any] = super().get_queryset(request)
         return rows.annotate(visits=Count("sessions"), last_visit=Max("sessions__created_at"))
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:

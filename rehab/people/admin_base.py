@@ -8,7 +8,7 @@ from django import forms
 from django.contrib import admin, messages
 from django.db import models
 from django.db.models import QuerySet
-from django.http import HttpRequest, HttpResponse, HttpResponseBase
+from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect
 from django.utils import timezone
 from django.utils.text import capfirst
@@ -139,15 +139,15 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
                 actions = {name: actions[name] for name in actions if name in self.for_viewers}
             context["row_links"] = self.get_row_links(request, row)
             context["row_actions"] = [
-                (name, actions[name][2]) for name in self.row_actions if name in actions
+                (name, found[2]) for name in self.row_actions if (found := actions.get(name))
             ]
         return super().render_change_form(request, context, *args, **kwargs)
 
     def response_action(
-        self, request: HttpRequest, queryset: QuerySet[Any]
-    ) -> HttpResponseBase | None:
+        self, request: HttpRequest, queryset: QuerySet[Any], *args: Any
+    ) -> HttpResponse | None:
         """Do it; what was asked for on a row's own page leads back there."""
-        response = super().response_action(request, queryset)
+        response = super().response_action(request, queryset, *args)
         key = request.POST.get("stay", "")
         if key.isdecimal() and getattr(response, "url", "") == request.get_full_path():
             meta = self.opts
@@ -177,7 +177,7 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
 class TokenAdmin(ScopedAdmin):
     """Pages of rows that are known by a token. It is shown once, when it is made."""
 
-    readonly_fields = ("created_at", "last_seen_at", "revoked_at")
+    readonly_fields: tuple[str, ...] = ("created_at", "last_seen_at", "revoked_at")
     actions = row_actions = ("renew_tokens", "revoke_tokens")
 
     def save_model(self, request: HttpRequest, obj: Any, form: Any, change: bool) -> None:

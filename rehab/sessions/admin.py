@@ -278,7 +278,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         """Give a session with its corrections as this person may read them."""
         row = super().get_object(request, *args, **kwargs)
         if row is not None:
-            row.told = tell_corrections(row, person(request))  # type: ignore[attr-defined]
+            row.told = tell_corrections(row, person(request))
         return row
 
     def get_list_display(self, request: HttpRequest) -> Any:
@@ -440,6 +440,6 @@ class SessionCorrectionAdmin(ReadOnlyAdmin):
     list_filter = ("part", "at")
     list_select_related = ("session", "by")
 
-    def has_add_permission(self, request: HttpRequest) -> bool:
+    def has_add_permission(self, request: HttpRequest, obj: Any = None) -> bool:
         """Corrections are made in their own form."""
         return False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import pytest
 from django.test import Client
@@ -73,7 +74,7 @@ def log_of(session: TrainingSession) -> list[object]:
 
 
 def board_of(world: World) -> Leaderboard:
-    board = world.rows[Leaderboard]
+    board: Leaderboard = world.rows[Leaderboard]
     Leaderboard.everywhere.filter(pk=board.pk).update(types="all", metric="hit_rate")
     board.refresh_from_db()
     entries.refresh(board)
@@ -132,7 +133,7 @@ def test_what_is_left_out_is_in_no_board_trend_week_or_paper_and_comes_back(worl
     good = walk(rosa, "positive", strides(5, 5), days_ago=1)
     mine = TrainingSession.objects.visible_to(pt).filter(patient=rosa)
 
-    def figures() -> tuple[object, ...]:
+    def figures() -> tuple[Any, ...]:
         return (
             rows_of(board).get(rosa.pk),
             [point.session.pk for point in read_trend(pt, mine)],
