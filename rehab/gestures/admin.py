@@ -14,7 +14,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.gestures.picture import draw
-from rehab.people.admin_base import ScopedAdmin, ScopedOptions
+from rehab.people.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
 from robot.composed import MOVES_MAX, to_data
 from robot.gestures import TETHER_M, BadGesture
 from robot.trial import Trial, admit_gesture, try_gesture
@@ -22,7 +22,7 @@ from robot.trial import Trial, admit_gesture, try_gesture
 WINDOW_S = 5.0  # what takes longer is still running when the next decision comes
 
 
-class StepFormSet(forms.BaseInlineFormSet):
+class StepFormSet(RowFormSet):
     """The steps of one gesture, which must be one together."""
 
     def clean(self) -> None:

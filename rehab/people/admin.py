@@ -192,9 +192,9 @@ class PatientAdmin(ScopedAdmin):
     readonly_fields = ("alias", "pseudonym", "created_at")
     actions = row_actions = ("draw_aliases",)
 
-    def get_queryset(self, request: HttpRequest) -> QuerySet[Patient]:
+    def get_queryset(self, request: HttpRequest) -> QuerySet[Any]:
         """Give the visible patients with how often and when they were here last."""
-        rows: QuerySet[Any] = super().get_queryset(request)
+        rows = super().get_queryset(request)
         return rows.annotate(visits=Count("sessions"), last_visit=Max("sessions__created_at"))
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:

@@ -79,6 +79,16 @@ class ScopedOptions(admin.options.BaseModelAdmin):
         return not isinstance(obj, ScopedModel) or owns(request.user, obj)
 
 
+class RowFormSet(forms.BaseInlineFormSet):
+    """Rows of a table inside a page: each field is named by its column, for who cannot see it."""
+
+    def add_fields(self, form: Any, index: int | None) -> None:
+        """Name the fields."""
+        super().add_fields(form, index)
+        for field in form.fields.values():
+            field.widget.attrs["aria-label"] = field.label
+
+
 class ClinicForm(forms.ModelForm):
     """A form whose row belongs to a clinic that nobody chooses."""
 
@@ -177,7 +187,7 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
 class TokenAdmin(ScopedAdmin):
     """Pages of rows that are known by a token. It is shown once, when it is made."""
 
-    readonly_fields: tuple[str, ...] = ("created_at", "last_seen_at", "revoked_at")
+    readonly_fields: ClassVar[tuple[str, ...]] = ("created_at", "last_seen_at", "revoked_at")
     actions = row_actions = ("renew_tokens", "revoke_tokens")
 
     def save_model(self, request: HttpRequest, obj: Any, form: Any, change: bool) -> None:

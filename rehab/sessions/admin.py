@@ -18,7 +18,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import person
-from rehab.people.admin_base import ReadOnlyAdmin, ScopedAdmin, ScopedOptions
+from rehab.people.admin_base import ReadOnlyAdmin, RowFormSet, ScopedAdmin, ScopedOptions
 from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection, may_correct, tell_corrections
 from rehab.sessions.cues import list_gestures
@@ -67,7 +67,7 @@ class PhaseForm(forms.ModelForm):
         return super()._get_validation_exclusions() | {"position"}  # type: ignore[misc, no-any-return]
 
 
-class PhaseFormSet(forms.BaseInlineFormSet):
+class PhaseFormSet(RowFormSet):
     """The phases of one protocol, in the order of their numbers."""
 
     def clean(self) -> None:
