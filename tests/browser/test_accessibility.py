@@ -47,6 +47,7 @@ PT_PAGES = [
     "/patients/{patient}/sessions/",
     "/patients/{patient}/home/",
     "/sessions/{session}/details/",
+    "/sessions/{session}/report/",
     "/sessions/{walk}/monitor/",
     "/tablets/pair/",
     "/account/",
