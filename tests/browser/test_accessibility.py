@@ -53,6 +53,7 @@ PT_PAGES = [
     "/patients/{patient}/home/",
     "/sessions/{session}/details/",
     "/sessions/{session}/correct/",
+    "/sessions/{session}/report/",
     "/sessions/{walk}/monitor/",
     "/tablets/pair/",
     "/account/",

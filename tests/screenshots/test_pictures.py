@@ -42,9 +42,15 @@ PAGES = {
     "scores-kept": "/sessions/11/scores/",
     "past-sessions": "/patients/2/sessions/",
     "session-details": "/sessions/12/details/",
+    "report": "/sessions/12/report/",
+    "take-home": "/patients/2/home/",
     "start": "/start/",
     "patient": "/patients/2/",
     "new-patient": "/patients/new/",
+    "screen": "/patients/2/screen/",
+    "pairing": "/tablet/",
+    "pair": "/tablets/pair/",
+    "station": "/admin/rehab/station/1/change/",
     "set-up": "/patients/2/new/",
     "set-up-preset": "/patients/2/new/?preset=1",
     "correct": "/sessions/12/correct/",
@@ -52,20 +58,21 @@ PAGES = {
     "therapist": "/sessions/13/monitor/",  # last: by then there is something to see
 }
 
-# A gesture, and patient 2 with the sessions 4 to 12, walked over three weeks.
+# A gesture, patient 2 with the sessions 4 to 12, walked over three weeks, and who else is expected.
 VISITS = """
-from datetime import timedelta
+from datetime import time, timedelta
 from django.utils import timezone
 from rehab.people.first_start import first_clinic
 from rehab.gestures.models import Gesture
 from rehab.people.models import Patient, User
 from rehab.sessions.corrections import Part, correct_session
-from rehab.sessions.models import Protocol, TrainingSession
+from rehab.sessions.models import Protocol, SessionEvent, TrainingSession
 from rehab.sessions.presets import Preset
+from rehab.sessions.visits import plan_visit
 from rehab.stations.models import Device, Station
 from tests.walks import visit
 rosa = Patient.everywhere.create(
-    clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"
+    clinic=first_clinic(), code="K7-204", nickname="Rosa", paretic_side="left"
 )
 wave = Gesture.everywhere.create(clinic=first_clinic(), name="slow-wave")
 for position, (turn, way) in enumerate([(40, 0.12), (0, -0.12), (-80, 0.12), (0, -0.12), (40, 0)]):
@@ -73,7 +80,7 @@ for position, (turn, way) in enumerate([(40, 0.12), (0, -0.12), (-80, 0.12), (0,
 types = "explicit positive positive negative binary positive binary negative positive".split()
 for index, valence in enumerate(types):
     days_ago = 3 * (len(types) - 1 - index)
-    visit(rosa, valence, index + 1, days_ago, 360 + 70 * (index % 3), timezone.now())
+    last = visit(rosa, valence, index + 1, days_ago, 360 + 70 * (index % 3), timezone.now())
 lead = User.everywhere.get(username="pt")
 left_out = TrainingSession.everywhere.get(pk=11)
 changes = {Part.COUNTS: "no", Part.NOTE: "Walked with a cane from minute four on."}
@@ -112,6 +119,23 @@ for station, kind, name, seen in (
         created_at=timezone.now() - timedelta(days=1)
     )
     Device.everywhere.filter(name="Old tablet").update(revoked_at=timezone.now())
+for number, (kind, value) in enumerate([("borg", 3), ("rest", None), ("pain", None), ("borg", 5)]):
+    at = timezone.now() - timedelta(minutes=5 - number)
+    SessionEvent.everywhere.create(
+        session=last, kind=kind, value=value, after_number=90 * number, at=at
+    )
+today = timezone.now().date()
+plan_visit(rosa, today, time(9, 30))
+plan_visit(rosa, today + timedelta(7), time(9, 30))
+for name, code, side, at in (
+    ("Joon", "K7-211", "right", time(10, 15)),
+    ("Amara", "K7-230", "left", time(11, 0)),
+    ("Walter", "K7-118", "right", time(13, 30)),
+):
+    who = Patient.everywhere.create(
+        clinic=first_clinic(), code=code, nickname=name, paretic_side=side
+    )
+    plan_visit(who, today, at)
 """
 
 
