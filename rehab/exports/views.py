@@ -94,7 +94,7 @@ def note_export(request: HttpRequest, patient: Patient | None = None) -> None:
     audit.note(
         Act.EXPORT,
         person(request),
-        patient=patient and patient.pk,
+        patient=None if patient is None else patient.pk,
         about=request.path,
         address=client_address(request),
     )
