@@ -68,7 +68,9 @@ def is_silent(name: str) -> bool:
 def test_every_route_that_shows_patients_leaves_an_entry(world, monkeypatch):
     """A new page is in this test by itself; one that shows no patients says so and stands above."""
     shown = set()
-    people = [client_of(world, role, raise_request_exception=False) for role in Role if role != "host"]
+    people = [
+        client_of(world, role, raise_request_exception=False) for role in Role if role != "host"
+    ]
     for route in all_routes((world,)):
         for client in people:
             monkeypatch.setattr(audit, "recent", Recent())
