@@ -71,8 +71,8 @@ def describe(patient: Patient) -> dict[str, Any]:
         "simulated": patient.simulated,
         "participant_of_the_original": patient.original_id,
         "created_at": patient.created_at,
-        "programme_ended_at": patient.ended_at,
-        "programme_ended_because": patient.ended_because or None,
+        "program_ended_at": patient.ended_at,
+        "program_ended_because": patient.ended_because or None,
         "erased_at": patient.erased_at,
     }
 

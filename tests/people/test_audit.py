@@ -9,6 +9,7 @@ from django.contrib import admin
 from django.db import DatabaseError
 from django.test import Client
 from django.urls import get_resolver, reverse
+from django.utils import timezone
 
 from rehab.people import audit, sightings
 from rehab.people.audit import Act, AppendOnly, AuditEntry, Recent, shorten
@@ -139,7 +140,7 @@ def test_a_page_that_asks_again_and_again_is_noted_once_in_five_minutes(world, m
     client = client_of(world)
     url = reverse("session", kwargs={"session_id": world.session.pk})
     for minutes, count in ((0, 1), (1, 1), (4, 1), (5, 2), (9, 2), (10, 3)):
-        monkeypatch.setattr(sightings.timezone, "now", lambda m=minutes: NOW + timedelta(minutes=m))
+        monkeypatch.setattr(timezone, "now", lambda m=minutes: NOW + timedelta(minutes=m))
         client.get(url)
         assert entries().count() == count, minutes
 

@@ -1,9 +1,10 @@
-"""A programme that ends, a person who is erased, and what goes with time by itself."""
+"""A program that ends, a person who is erased, and what goes with time by itself."""
 
 from __future__ import annotations
 
 import io
 from datetime import UTC, datetime, timedelta
+from typing import Any
 
 import pytest
 from django.contrib.admin.models import LogEntry
@@ -20,11 +21,11 @@ from rehab.people.models import Ending, Erasing, Patient
 from rehab.people.roles import Role
 from rehab.sessions.endings import (
     StillOpen,
-    end_programme,
+    end_program,
     erase,
     months_before,
     overdue,
-    reopen_programme,
+    reopen_program,
 )
 from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
 from rehab.sessions.services import create_session
@@ -62,13 +63,13 @@ def start(world: World) -> TrainingSession:
     )
 
 
-# --- the programme --------------------------------------------------------------------------------
+# --- the program --------------------------------------------------------------------------------
 
 
-def test_an_ended_programme_leaves_the_lists_and_is_found_by_name(world):
+def test_an_ended_program_leaves_the_lists_and_is_found_by_name(world):
     client = client_of(world)
     key = {"patient_id": world.patient.pk}
-    client.post(reverse("end-programme", kwargs=key), {"because": "moved"})
+    client.post(reverse("end-program", kwargs=key), {"because": "moved"})
     world.patient.refresh_from_db()
     assert world.patient.ended_at is not None
     assert world.patient.ended_because == Ending.MOVED
@@ -78,9 +79,9 @@ def test_an_ended_programme_leaves_the_lists_and_is_found_by_name(world):
     assert address in found
 
 
-def test_an_ended_programme_cannot_be_started_until_it_is_reopened(world):
+def test_an_ended_program_cannot_be_started_until_it_is_reopened(world):
     client = client_of(world)
-    end_programme(world.patient, Ending.DONE, NOW)
+    end_program(world.patient, Ending.DONE, NOW)
     page = page_of(world, client)
     setup = reverse("setup", kwargs={"patient_id": world.patient.pk})
     assert f'action="{setup}"' not in page
@@ -97,12 +98,12 @@ def test_an_ended_programme_cannot_be_started_until_it_is_reopened(world):
 def test_who_has_an_open_session_is_neither_ended_nor_erased(world):
     start(world)
     for act in (
-        lambda: end_programme(world.patient, Ending.DONE, NOW),
+        lambda: end_program(world.patient, Ending.DONE, NOW),
         lambda: erase(world.patient, Erasing.ASKED, None, NOW),
     ):
         with pytest.raises(StillOpen, match="End it first"):
             act()
-    url = reverse("end-programme", kwargs={"patient_id": world.patient.pk})
+    url = reverse("end-program", kwargs={"patient_id": world.patient.pk})
     assert b"open session" in client_of(world).post(url, {"because": "done"}).content
     world.patient.refresh_from_db()
     assert world.patient.ended_at is None
@@ -110,7 +111,7 @@ def test_who_has_an_open_session_is_neither_ended_nor_erased(world):
 
 
 def test_the_page_asks_for_a_reason(world):
-    url = reverse("end-programme", kwargs={"patient_id": world.patient.pk})
+    url = reverse("end-program", kwargs={"patient_id": world.patient.pk})
     assert client_of(world).post(url, {"because": "bored"}).status_code == 200
     assert Patient.everywhere.get(pk=world.patient.pk).ended_at is None
 
@@ -120,7 +121,7 @@ def test_the_page_asks_for_a_reason(world):
 
 def everything_stored() -> str:
     """Give every row of every model, and the admin's own notes, as text."""
-    rows = [*scoped_models(), LogEntry]
+    rows: list[Any] = [*scoped_models(), LogEntry]
     return "\n".join(serialize("json", model._base_manager.all()) for model in rows)
 
 
@@ -181,13 +182,17 @@ def test_an_imported_session_still_tells_its_score_once_erased(world):
 
 def test_an_erased_patient_never_comes_back(world):
     erase(world.patient, Erasing.ASKED, None, NOW)
-    reopen_programme(world.patient)
+    reopen_program(world.patient)
     assert world.patient.ended_at == NOW
     client = client_of(world, Role.LEAD)
     consent = reverse("consent", kwargs={"patient_id": world.patient.pk})
     client.post(consent, {"purpose": "boards", "says": "clinic"})
     assert Patient.everywhere.get(pk=world.patient.pk).boards == "own"
     assert "Reopen" not in page_of(world, client)
+    details = reverse("mend-patient", kwargs={"patient_id": world.patient.pk})
+    given = {"nickname": "Rosa", "code": "R-1", "paretic_side": "left"}
+    assert b"This person is erased" in client.post(details, given).content
+    assert Patient.everywhere.get(pk=world.patient.pk).nickname == "Erased"
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
         patients = patients.filter(nickname__icontains=words) | patients.filter(
             code__icontains=words
         )
-    else:  # whose programme has ended is found by name or code
+    else:  # whose program has ended is found by name or code
         patients = patients.filter(ended_at=None)
     context = {"patients": patients[:SHOWN], "open": open_sessions(user), "q": words}
     return render(request, "sessions/start.html", context)

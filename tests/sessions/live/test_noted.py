@@ -1,6 +1,8 @@
-"""Who watches a session, or orders its robot about, stands in the audit log; no step waits for it."""
+"""Who watches a session or orders its robot stands in the audit log; no step waits for that."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import pytest
 from asgiref.sync import sync_to_async
@@ -21,7 +23,7 @@ def nothing_noted_yet(monkeypatch):
     monkeypatch.setattr(audit, "recent", Recent())
 
 
-async def noted(count: int) -> list[tuple[object, ...]]:
+async def noted(count: int) -> list[tuple[Any, ...]]:
     """Give the entries once there are so many."""
     names = ("act", "by", "through", "patient", "about")
     for _ in range(500):
