@@ -11,6 +11,7 @@ from django.db.models import QuerySet
 from django.http import Http404, HttpRequest, HttpResponse
 from django.template.response import TemplateResponse
 from django.utils import timezone
+from django.utils.text import capfirst
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy, ngettext
 
@@ -129,6 +130,7 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
             "title": _("Changes: %(row)s") % {"row": row},
             "object": row,
             "opts": self.opts,
+            "module_name": capfirst(self.opts.verbose_name_plural),
             "changes": changes_of(request.user, row, parts),
         }
         return TemplateResponse(request, "people/changes.html", context)

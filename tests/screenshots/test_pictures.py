@@ -32,6 +32,12 @@ PAGES = {
     "patient": "/patients/2/",
     "new-patient": "/patients/new/",
     "set-up": "/patients/2/new/",
+    "records": "/patients/2/records/",
+    "consent": "/patients/2/consent/",
+    "consent-words": "/consent/words/",
+    "export": "/export/",
+    "audit-log": "/admin/rehab/auditentry/",
+    "changes": "/admin/rehab/patient/2/history/",
     "therapist": "/sessions/13/monitor/",  # last: by then there is something to see
 }
 
