@@ -23,7 +23,7 @@ from rehab.people.consent import (
     withdraw,
     write_text,
 )
-from rehab.people.models import Boards, Patient
+from rehab.people.models import Boards, Clinic, Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
 from tests.world import World, build_world
@@ -60,6 +60,15 @@ def test_words_that_somebody_agreed_to_never_change(world):
     text.text = "Something else"
     with pytest.raises(FixedText, match="new version"):
         text.save()
+
+
+def test_a_clinic_begins_with_words_that_name_every_purpose_but_are_its_own_to_change():
+    clinic = Clinic.everywhere.create(name="New")
+    first = current_text(clinic)
+    assert first.version == 1
+    assert all(f"{purpose.label}:" in first.text for purpose in Purpose)
+    assert current_text(clinic) == first
+    assert ConsentText.everywhere.filter(clinic=clinic).count() == 1
 
 
 def test_new_words_are_a_new_version_and_old_consent_stays_with_the_old_ones(world):
