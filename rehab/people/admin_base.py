@@ -198,6 +198,7 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
             "title": gettext("Changes: %(row)s") % {"row": row},
             "object": row,
             "opts": self.opts,
+            "module_name": capfirst(self.opts.verbose_name_plural),
             "changes": changes_of(request.user, row, parts),
         }
         return TemplateResponse(request, "people/changes.html", context)

@@ -51,9 +51,7 @@ def create_session(
     patient, station and the rest are not of one clinic; nothing is stored then.
     """
     if patient.ended_at is not None:
-        said = _(
-            "%(patient)s's programme has ended. Reopen it on the page “Consent and data” first."
-        )
+        said = _("%(patient)s's program has ended. Reopen it on the page “Consent and data” first.")
         raise InvalidSetting(said % {"patient": patient.nickname})
     measure = measure or Measure.everywhere.get(clinic=None, slug=A2.slug)
     if phases is None:

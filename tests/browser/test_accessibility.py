@@ -51,6 +51,8 @@ PT_PAGES = [
     "/patients/{patient}/screen/",
     "/patients/{patient}/sessions/",
     "/patients/{patient}/home/",
+    "/patients/{patient}/records/",
+    "/patients/{patient}/consent/",
     "/sessions/{session}/details/",
     "/sessions/{session}/correct/",
     "/sessions/{session}/report/",

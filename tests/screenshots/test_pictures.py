@@ -55,6 +55,12 @@ PAGES = {
     "set-up-preset": "/patients/2/new/?preset=1",
     "correct": "/sessions/12/correct/",
     "corrected": "/sessions/11/details/",
+    "records": "/patients/2/records/",
+    "consent": "/patients/2/consent/",
+    "consent-words": "/consent/words/",
+    "export": "/export/",
+    "audit-log": "/admin/rehab/auditentry/",
+    "changes": "/admin/rehab/patient/2/history/",
     "therapist": "/sessions/13/monitor/",  # last: by then there is something to see
 }
 
