@@ -6,6 +6,7 @@ from datetime import date, datetime
 from zoneinfo import ZoneInfo
 
 from django.utils.dateformat import format as format_date
+from django.utils.translation import gettext
 
 from rehab.people.models import Clinic
 
@@ -38,7 +39,7 @@ def say_duration(seconds: float) -> str:
 def say_day(day: date, today: date) -> str:
     """Write a day as it is spoken of today."""
     if day == today:
-        return "today"
+        return gettext("today")
     return format_date(day, "M j" if day.year == today.year else "M j, Y")
 
 

@@ -23,6 +23,8 @@ PAGES = {
     "session": "/admin/rehab/trainingsession/1/change/",
     "protocol": "/admin/rehab/protocol/2/change/",
     "leaderboard": "/admin/rehab/leaderboard/add/",
+    "feedback": "/admin/rehab/feedbacktype/add/?slug=binary",
+    "feedback-types": "/admin/rehab/feedbacktype/",
     "gesture": "/admin/rehab/gesture/1/change/",
     "scores-points": "/sessions/12/scores/",
     "scores-kept": "/sessions/11/scores/",
