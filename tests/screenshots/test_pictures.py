@@ -37,6 +37,8 @@ PAGES = {
     "account-in-admin": "/admin/rehab/user/1/change/",
     "leaderboards": "/admin/rehab/leaderboard/",
     "leaderboard": "/admin/rehab/leaderboard/add/",
+    "feedback": "/admin/rehab/feedbacktype/add/?slug=binary",
+    "feedback-types": "/admin/rehab/feedbacktype/",
     "gesture": "/admin/rehab/gesture/1/change/",
     "scores-points": "/sessions/12/scores/",
     "scores-kept": "/sessions/11/scores/",
