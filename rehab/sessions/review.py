@@ -11,7 +11,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
-from rehab.sessions.events import MARKED_CHANGES
+from rehab.sessions.facts import MARKED_CHANGES
 from rehab.sessions.live.actor import read_log
 from rehab.sessions.models import Remark, RobotEntry, SessionEvent, Step, TrainingSession
 from rehab.sessions.trend import figures_of
