@@ -41,7 +41,7 @@ NAMES = {
     ChangeKind.PHASE: _("Phase"),
     ChangeKind.ACTIVATION_THRESHOLD: _("Robot threshold"),
     ChangeKind.ROBOT_INTENSITY: _("Robot"),
-    ChangeKind.VALENCE: _("Feedback type of the next phase"),
+    ChangeKind.VALENCE: _("Next feedback type"),
     ChangeKind.WORDS: _("Words edited"),
     ChangeKind.WORDS_SHOWN: _("Words"),
     ChangeKind.CHART_STYLE: _("Chart"),
