@@ -17,11 +17,17 @@ HOSTED = GARRY_HOSTED=1 GARRY_ALLOWED_HOSTS=garry.example \
 # A tool that has nothing to complain of says nothing.
 quiet = out=$$($(1) 2>&1) || { printf '%s\n' "$$out" >&2; exit 1; }
 
+# Tests share the cores, file by file; those of real time (a robot's 20 ms) then run alone. With ARGS
+# one of the two may have nothing to do (5).
+run_tests = { $(1) -m pytest $(2) -m '$(3) and not realtime' \
+	    -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS) || [ $$? = 5 ]; } && \
+	{ $(1) -m pytest $(2) -m '$(3) and realtime' $(ARGS) || [ $$? = 5 ]; }
+
 .SILENT:
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help run test test-main test-postgres test-pure check format bench screenshots setup \
+.PHONY: help run test test-main test-postgres test-pure check format bench screenshots messages setup \
 	constraints clean
 
 help: ## Say what can be made
@@ -33,23 +39,23 @@ run: $(VENV)/.server $(VENV)/.twin $(LIBRARIES) ## Serve at 127.0.0.1:8000 (GARR
 test: test-main test-postgres test-pure ## Run all tests, also on PostgreSQL and a newer Python if there
 
 test-main: setup ## Run the tests (ARGS='-k goal' picks some)
-	$(PYTHON) -m pytest $(ARGS)
+	$(call run_tests,$(PYTHON),,not bench and not screenshots)
 
 test-postgres: setup
 	url=$${DATABASE_URL:-postgres://postgres@127.0.0.1:5432/postgres}; \
 	if $(PYTHON) -c 'import psycopg, sys; psycopg.connect(sys.argv[1], connect_timeout=3)' \
 	    "$$url" 2>/dev/null; then \
 	    echo "Database tests again, on PostgreSQL at $${url##*@}"; \
-	    GARRY_DATABASE_URL=$$url $(PYTHON) -m pytest \
-	        -m 'database and not bench and not screenshots' $(ARGS); \
+	    GARRY_DATABASE_URL=$$url; export GARRY_DATABASE_URL; \
+	    $(call run_tests,$(PYTHON),,database and not bench and not screenshots); \
 	else echo "Database tests on PostgreSQL: skipped, none answers at $${url##*@} (DATABASE_URL)"; fi
 
 # No Django there: what pytest cannot know of this project is no error.
 test-pure: $(NEWER)/.test
 	if [ -x $(NEWER)/bin/python ] && [ -n '$(PURE_TESTS)' ]; then \
 	    echo "Pure packages again, on $$($(NEWER)/bin/python -V), without Django"; \
-	    $(NEWER)/bin/python -m pytest -o strict_config=false -W ignore::pytest.PytestConfigWarning \
-	        $(PURE_TESTS) $(ARGS); fi
+	    $(call run_tests,$(NEWER)/bin/python,-o strict_config=false -W ignore::pytest.PytestConfigWarning \
+	        $(PURE_TESTS),not bench); fi
 
 check: setup ## Check format, lint, types, imports, migrations and settings
 	$(VENV)/bin/ruff format --check --quiet --output-format concise
@@ -70,6 +76,14 @@ bench: setup ## Measure speed (tests/bench)
 
 screenshots: setup ## Take pictures of the pages into screenshots/
 	$(PYTHON) -m pytest -m screenshots tests/screenshots $(ARGS)
+
+messages: setup ## Collect the pages' words into locale/ and compile the translations
+	msgfmt --version >/dev/null 2>&1 || { echo 'Collecting words takes gettext.' \
+	    'Cure: apt-get install gettext' >&2; exit 1; }
+	for domain in django djangojs; do $(PYTHON) manage.py makemessages --all --no-obsolete \
+	    --add-location file --verbosity 0 --domain $$domain \
+	    --ignore tests --ignore node_modules || exit; done
+	$(PYTHON) manage.py compilemessages --ignore $(VENV) --verbosity 0
 
 setup: $(VENV)/.dev $(VENV)/.twin $(LIBRARIES) ## Install all that development needs
 

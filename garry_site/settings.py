@@ -82,7 +82,7 @@ INSTALLED_APPS = [
     "rehab",  # before daphne: its own `runserver` wins
     "daphne",
     "channels",
-    "django.contrib.admin",
+    "rehab.site.GarryAdmin",  # django.contrib.admin with our front page
     "django.contrib.auth",
     "django.contrib.contenttypes",
     "django.contrib.sessions",
@@ -104,6 +104,7 @@ MIDDLEWARE = [
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "rehab.stations.tablets.TabletMiddleware",
+    "rehab.people.language.LanguageMiddleware",
     "rehab.people.access.AccessMiddleware",
     "axes.middleware.AxesMiddleware",
 ]
@@ -117,6 +118,7 @@ TEMPLATES = [
         "OPTIONS": {
             "context_processors": [
                 "django.template.context_processors.request",
+                "django.template.context_processors.i18n",
                 "django.contrib.auth.context_processors.auth",
                 "django.contrib.messages.context_processors.messages",
                 "csp.context_processors.nonce",
@@ -230,7 +232,9 @@ AXES_VERBOSE = False
 
 # --- words, time, files -------------------------------------------------------------------------
 
-LANGUAGE_CODE = "en"
+LANGUAGE_CODE = "en"  # of programs and commands, and of browsers that know none of these
+LANGUAGES = [("en", "English"), ("es", "Español")]
+LOCALE_PATHS = [BASE_DIR / "locale"]
 USE_TZ = True
 TIME_ZONE = text("GARRY_TIME_ZONE", "UTC", "time zone of dates in admin and reports")
 if TIME_ZONE not in available_timezones():

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Callable
+from functools import wraps
 from typing import Any
 
+from django.core.exceptions import PermissionDenied, RequestDataTooBig, SuspiciousOperation
 from django.http import Http404, HttpRequest, HttpResponse
+from django.urls import URLPattern, re_path
+from django.views.decorators.csrf import csrf_exempt
 from ninja import NinjaAPI
 from ninja.errors import AuthenticationError, HttpError, ValidationError
 
@@ -25,6 +31,8 @@ api = NinjaAPI(
 api.add_decorator(check_roles)
 for router in (people.router, sessions.router, boards.router, people.paper, sessions.paper):
     api.add_router("", router)
+
+log = logging.getLogger(__name__)
 
 WORDS = "Give one line of text, without spaces around it."
 
@@ -80,9 +88,57 @@ def reject_shape(request: HttpRequest, problem: ValidationError) -> HttpResponse
     return refuse(request, 422, f"Not understood. {told}", fields)
 
 
-def urls() -> list[Any]:
+@api.exception_handler(PermissionDenied)
+def refuse_people(request: HttpRequest, problem: PermissionDenied) -> HttpResponse:
+    """Say what somebody may not do."""
+    return refuse(request, 403, str(problem) or "This is for other roles.")
+
+
+@api.exception_handler(SuspiciousOperation)
+def refuse_suspects(request: HttpRequest, problem: SuspiciousOperation) -> HttpResponse:
+    """Say what no honest program sends."""
+    if isinstance(problem, RequestDataTooBig):
+        return refuse(request, 413, "The body is too long. Send less at once.")
+    return refuse(request, 400, "Not understood. Look at the address, the headers and the body.")
+
+
+@api.exception_handler(Exception)
+def fail(request: HttpRequest, problem: Exception) -> HttpResponse:
+    """Say nothing of our own faults; the server's log has them."""
+    log.error("A call of the API failed: %s", request.path, exc_info=problem)
+    return refuse(request, 500, "The server failed. Try again, or tell who runs it.")
+
+
+@public
+@csrf_exempt
+def find_no_call(request: HttpRequest) -> HttpResponse:
+    """Answer at an address that no call has."""
+    return refuse(request, 404, "There is no such call. /api/v1/docs lists all.")
+
+
+def in_json(view: Callable[..., HttpResponse]) -> Callable[..., HttpResponse]:
+    """Say in the API's own shape that there is nothing here, or no such method."""
+
+    @public
+    @wraps(view)
+    def answered(request: HttpRequest, **names: Any) -> HttpResponse:
+        try:
+            response = view(request, **names)
+        except Http404:  # of the root
+            return find_no_call(request)
+        if response.status_code != 405:
+            return response
+        allowed = response["Allow"]
+        refused = refuse(request, 405, f"This address takes {allowed}. /api/v1/docs says more.")
+        refused["Allow"] = allowed
+        return refused
+
+    return answered
+
+
+def urls() -> list[URLPattern]:
     """Give the API's addresses. They guard themselves, so as to refuse in JSON."""
     patterns: list[Any] = api.urls[0]
     for pattern in patterns:
-        public(pattern.callback)
-    return patterns
+        pattern.callback = in_json(pattern.callback)
+    return [*patterns, re_path("", find_no_call, name="no-call")]

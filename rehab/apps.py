@@ -12,12 +12,15 @@ class RehabConfig(AppConfig):
     default_auto_field = "django.db.models.BigAutoField"
 
     def ready(self) -> None:
-        """Register the checks, the shared rows of every database, and what listens."""
+        """Register the checks, the shared rows of every database, and who listens to changes."""
         from rehab import checks  # noqa: F401
         from rehab.boards.watching import watch
+        from rehab.models import TRACKED
+        from rehab.people.history import track
         from rehab.sessions.defaults import install_defaults
         from rehab.sessions.rewording import listen
 
         post_migrate.connect(install_defaults, sender=self)
         watch()
+        track(*TRACKED)
         listen()

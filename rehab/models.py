@@ -1,11 +1,15 @@
-"""Gathers the rooms' models, nothing else."""
+"""Gathers the rooms' models, and says of which it is kept who changed them."""
 
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
+from rehab.people.audit import AuditEntry
+from rehab.people.consent import Consent, ConsentText
 from rehab.people.factors import Authenticator, RecoveryCode
+from rehab.people.history import HistoryEntry
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.tokens import ApiToken
+from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.models import (
     Measure,
     Protocol,
@@ -15,29 +19,59 @@ from rehab.sessions.models import (
     Step,
     TrainingSession,
 )
-from rehab.stations.models import Device, Station
+from rehab.sessions.presets import Preset
+from rehab.sessions.visits import Visit
+from rehab.stations.models import Device, LeaveTries, Station
+
+# People and settings. What happens in a session is a log by itself, and so is consent.
+TRACKED = (
+    Clinic,
+    User,
+    ApiToken,
+    Patient,
+    Station,
+    Device,
+    Measure,
+    Protocol,
+    ProtocolPhase,
+    Gesture,
+    GestureStep,
+    FeedbackType,
+    FeedbackBand,
+    Preset,
+    Leaderboard,
+)
 
 __all__ = [
+    "TRACKED",
     "ApiToken",
+    "AuditEntry",
     "Authenticator",
     "BoardCount",
     "BoardEntry",
     "Clinic",
+    "Consent",
+    "ConsentText",
     "Device",
     "FeedbackBand",
     "FeedbackType",
     "Gesture",
     "GestureStep",
+    "HistoryEntry",
     "Leaderboard",
+    "LeaveTries",
     "Measure",
     "Patient",
+    "Preset",
     "Protocol",
     "ProtocolPhase",
     "RecoveryCode",
+    "SessionCorrection",
     "SessionEvent",
     "SessionMetric",
     "Station",
     "Step",
     "TrainingSession",
     "User",
+    "Visit",
 ]

@@ -10,4 +10,5 @@ urlpatterns = [
     path("", include("rehab.stations.urls")),
     path("", include("rehab.sessions.urls")),
     path("", include("rehab.boards.urls")),
+    path("", include("rehab.exports.urls")),
 ]

@@ -29,6 +29,11 @@ LEAST_PACE = 0.2  # slower turns stick and shake (kobuki.md 3: below 0.33 rad/s)
 SLACK = 1.5  # a goal's time over its shortest possible: odometry, grip and latency cost some
 
 
+def gettext_noop(text: str) -> str:
+    """Mark a label: pages say it in their language; the robot's computer knows but one."""
+    return text
+
+
 class BadGesture(ValueError):
     """A gesture that a base could not perform; the message says what would be one."""
 
@@ -197,7 +202,7 @@ def stages(goals: Sequence[Goal], limits: Limits) -> list[tuple[tuple[Leg, ...],
 # is what a patient sees of a round base; it goes out ahead, never backwards (no rear bumper).
 CELEBRATE = Gesture(
     "celebrate",
-    "Celebrate: a step ahead and a wiggle",
+    gettext_noop("Celebrate: a step ahead and a wiggle"),
     (
         Goal(0.07, 0.0, 0.0, within_s=1.6),
         Goal(0.07, 0.0, 0.28, within_s=1.2),
@@ -207,7 +212,7 @@ CELEBRATE = Gesture(
 )
 DROOP = Gesture(
     "droop",
-    "Droop: turn away slowly and come back",
+    gettext_noop("Droop: turn away slowly and come back"),
     (
         Goal(0.0, 0.0, -0.45, within_s=2.5, pace=0.5, hold_s=0.5),
         Goal(0.0, 0.0, 0.0, within_s=2.0, pace=0.5),
@@ -215,7 +220,7 @@ DROOP = Gesture(
 )
 NOD = Gesture(
     "nod",
-    "Nod: a little ahead and back, twice",
+    gettext_noop("Nod: a little ahead and back, twice"),
     (
         Goal(0.04, 0.0, 0.0, within_s=1.2),
         Goal(0.0, 0.0, 0.0, within_s=1.2),
@@ -225,7 +230,7 @@ NOD = Gesture(
 )
 SWAY = Gesture(
     "sway",
-    "Sway: left, right and back",
+    gettext_noop("Sway: left, right and back"),
     (
         Goal(0.0, 0.0, 0.4, within_s=1.5),
         Goal(0.0, 0.0, -0.4, within_s=2.0),
@@ -244,7 +249,7 @@ _LEFT_RAD = _SPIN_RAD / 2
 _ASIDE = (_OUT_M * math.cos(_LEFT_RAD), _OUT_M * math.sin(_LEFT_RAD))
 ORIGINAL_POSITIVE = Gesture(
     "original_positive",
-    "The paper's positive: out, left, right, back",
+    gettext_noop("The paper's positive: out, left, right, back"),
     (
         Goal(_OUT_M, 0.0, 0.0, within_s=3.4, hold_s=1.0),
         Goal(_OUT_M, 0.0, _SPIN_RAD, within_s=4.5),
@@ -254,12 +259,12 @@ ORIGINAL_POSITIVE = Gesture(
 )
 ORIGINAL_NEGATIVE = Gesture(
     "original_negative",
-    "The paper's negative: spin left, spin right",
+    gettext_noop("The paper's negative: spin left, spin right"),
     (Goal(0.0, 0.0, _SPIN_RAD, within_s=4.5), Goal(0.0, 0.0, 0.0, within_s=4.5)),
 )
 ORIGINAL_BINARY = Gesture(
     "original_binary",
-    "The paper's binary: left and ahead, right and ahead, left, home",
+    gettext_noop("The paper's binary: left and ahead, right and ahead, left, home"),
     (
         Goal(0.0, 0.0, _LEFT_RAD, within_s=2.7),
         Goal(*_ASIDE, _LEFT_RAD, within_s=2.5),

@@ -21,21 +21,14 @@ from robot.activation import (
     Decision,
     read_number,
 )
-from robot.bases import BaseState, MobileBase, Mood
+from robot.bases import BaseState, MobileBase
 from robot.gestures import GESTURES, ORIGINALS, Gesture
 from robot.motion import DEFAULT_LIMITS, Limits
 from robot.player import BAD_ODOMETRY, OUT_OF_TIME, Player
 from robot.repertoire import Repertoire
-from robot.reports import Report, decision_report, gesture_report, status_report, stop_report
-from robot.safety import (
-    ANNOUNCE_S,
-    AWAY,
-    BATTERY_WARN_V,
-    STALLED,
-    STOPPED,
-    Safety,
-    battery_share,
-)
+from robot.reports import Report, decision_report, stop_report
+from robot.safety import ANNOUNCE_S, AWAY, STALLED, STOPPED, Safety
+from robot.voice import Voice
 
 Message = Mapping[str, Any]
 
@@ -43,10 +36,6 @@ Message = Mapping[str, Any]
 # and one may come 0.4 s late; what nobody hears should move no longer than 0.75 s, and the order to
 # stand still takes up to 0.05 s to the wheels.
 SILENCE_S = 0.65
-
-STATUS_MOVING_S = 0.25
-STATUS_IDLE_S = 1.0
-REPORTS_KEPT = 64  # while nobody fetches them the oldest are dropped: what is past is past
 
 # Codes: why a robot does not move, and how a gesture ended; safety.py has more.
 NO_LINK = "no_link"
@@ -70,8 +59,6 @@ class Performer:
 
     Attributes
     ----------
-    reports
-        What is to be sent, oldest first; whoever sends takes them from the left.
     decision
         The newest decision; None before there was one.
     bad_messages, last_bad
@@ -88,7 +75,7 @@ class Performer:
         self.player = Player(limits)
         self.repertoire = Repertoire(gestures, limits)
         self.activation = Activation(Cue())
-        self.reports: deque[Report] = deque(maxlen=REPORTS_KEPT)
+        self.voice = Voice(base)
         self.decision: Decision | None = None
         self.bad_messages = 0
         self.last_bad = ""
@@ -97,9 +84,11 @@ class Performer:
         self._is_welcome = False  # on this connection; nothing before it counts
         self._is_running = False
         self._heard_s = 0.0
-        self._told_s: float | None = None  # the last status
-        self._told: tuple[str, str] | None = None
-        self._mood: Mood | None = None
+
+    @property
+    def reports(self) -> deque[Report]:
+        """What is to be sent, oldest first; whoever sends takes them from the left."""
+        return self.voice.reports
 
     @property
     def is_linked(self) -> bool:
@@ -121,7 +110,7 @@ class Performer:
     def lose(self, reason: str) -> None:
         """Stand still at once: the server is not heard any more. A real base is disarmed."""
         self._is_welcome = self._is_running = False
-        self._told_s = None
+        self.voice.fall_silent()
         self.safety.lose()
         self._stand_still(reason)
         self.activation.forget()
@@ -138,13 +127,12 @@ class Performer:
         was = player.gesture
         self.base.drive(player.step(now_s, state.pose))
         if was is not None and not player.is_busy:
-            self._tell_gesture(was, "ended", player.outcome)
+            self.voice.tell_gesture(was, "ended", player.outcome)
             if player.outcome in (OUT_OF_TIME, BAD_ODOMETRY):
                 # What did not get there is held or blocked, and would be again in a moment.
                 self.safety.fail(STALLED, now_s)
                 self._stop_itself(STALLED)
-        self._show(state)
-        self._tell_status(now_s, state)
+        self._tell(now_s, state)
 
     def _take(self, message: Message, now_s: float) -> None:
         kind = message.get("type")
@@ -220,7 +208,7 @@ class Performer:
         self.player.halt(reason)
         self.base.stop()
         if gesture is not None:
-            self._tell_gesture(gesture, "ended", self.player.outcome)
+            self.voice.tell_gesture(gesture, "ended", self.player.outcome)
 
     def _stop(self) -> None:
         """Follow a person's stop."""
@@ -273,7 +261,7 @@ class Performer:
         self.player.start(gesture.scaled(intensity), now_s, pose, after_s, pace)
         self.safety.begin(now_s, state)
         self.activation.started(decision)
-        self._tell_gesture(gesture, "started", "")
+        self.voice.tell_gesture(gesture, "started", "")
 
     def _obstacle(self, gesture: Gesture, state: BaseState) -> str:
         """Say what keeps the base from performing a gesture; nothing where it may."""
@@ -302,41 +290,10 @@ class Performer:
             return "idle", NO_SESSION
         return "idle", reason if self._is_running else NOT_RUNNING
 
-    def _show(self, there: BaseState) -> None:
-        """Tell by the base's lights what it is about; sounds only where they are wanted."""
-        match self._state(there):
-            case "stopped", _:
-                mood = Mood.STOPPED
-            case "performing", _:
-                mood = Mood.MOVING
-            case "idle", "":
-                mood = Mood.READY
-            case _:
-                mood = Mood.WAITING
-        if mood is not self._mood:
-            self._mood = mood
-            is_loud = not self.activation.cue.is_quiet
-            self.base.show(mood, aloud=is_loud and mood in (Mood.MOVING, Mood.STOPPED))
-
-    def _tell_status(self, now_s: float, there: BaseState) -> None:
-        """Report the status where it has changed, and every so often, to a server that hears it."""
-        if not self._is_welcome:
-            return
-        state = self._state(there)
-        every_s = STATUS_MOVING_S if self.player.is_busy else STATUS_IDLE_S
-        due = self._told_s is None or not 0 <= now_s - self._told_s < every_s
-        if not due and state == self._told:
-            return
-        self._told_s, self._told = now_s, state
-        gesture = self.player.gesture
-        name = None if gesture is None else gesture.name
-        base, counters = self.base, {"refused_arms": self.safety.refused_arms, **self.base.counters}
-        volts = there.senses.battery_v
-        battery = (None, False) if volts is None else (battery_share(volts), volts < BATTERY_WARN_V)
-        self.reports.append(
-            status_report(base, *state, name, there, battery, self.bad_messages, counters)
-        )
-
-    def _tell_gesture(self, gesture: Gesture, phase: str, outcome: str) -> None:
-        is_open = not self.base.abilities.closed_loop
-        self.reports.append(gesture_report(gesture.name, phase, outcome, open_loop=is_open))
+    def _tell(self, now_s: float, there: BaseState) -> None:
+        """Show people what it is about, and report it to a server that hears it."""
+        state, player = self._state(there), self.player
+        self.voice.show(state, is_quiet=self.activation.cue.is_quiet)
+        if self._is_welcome:
+            counts = {"refused_arms": self.safety.refused_arms, **self.base.counters}
+            self.voice.tell_status(now_s, state, there, player.gesture, self.bad_messages, counts)

@@ -13,10 +13,14 @@ from django.db.models import Model
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
+from rehab.people.audit import AuditEntry
+from rehab.people.consent import Consent, ConsentText, Purpose, give
 from rehab.people.factors import Authenticator, RecoveryCode
+from rehab.people.history import HistoryEntry
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.tokens import ApiToken
+from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.live.actor import Row, SessionActor
 from rehab.sessions.live.writer import Job, commit
 from rehab.sessions.models import (
@@ -28,8 +32,10 @@ from rehab.sessions.models import (
     Step,
     TrainingSession,
 )
+from rehab.sessions.presets import Preset
 from rehab.sessions.services import create_session
-from rehab.stations.models import Device, Pairing, Station
+from rehab.sessions.visits import Visit
+from rehab.stations.models import Device, LeaveTries, Pairing, Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.steps import Measurement, Side
@@ -132,6 +138,9 @@ def build_world(name: str) -> World:
         paretic_side="left",
         boards="clinic",
     )
+    text = ConsentText.everywhere.create(clinic=clinic, version=1, text=mark(name, ConsentText))
+    for purpose in (Purpose.BOARDS, Purpose.RESEARCH):
+        give(patient, purpose, people[Role.PT], NOW)
     session = create_session(
         patient,
         valence="positive",
@@ -175,12 +184,31 @@ def build_world(name: str) -> World:
         band,
         patient,
         session,
+        SessionCorrection.everywhere.create(
+            session=session,
+            part="note",
+            new=mark(name, SessionCorrection),
+            reason=mark(name, SessionCorrection),
+            by=people[Role.PT],
+            at=NOW,
+        ),
+        Preset.everywhere.create(
+            clinic=clinic,
+            name=mark(name, Preset),
+            valence="binary",
+            goal_value=1.5,
+            protocol=protocol,
+        ),
         Step.everywhere.get(session=session, number=3),
         SessionEvent.everywhere.filter(session=session).first(),
         SessionMetric.everywhere.filter(session=session).first(),
         board,
         BoardEntry.everywhere.get(board=board),
         BoardCount.everywhere.get(board=board),
+        text,
+        Consent.everywhere.filter(patient=patient).last(),
+        AuditEntry.everywhere.create(clinic=clinic, act="view", about=mark(name, AuditEntry)),
+        HistoryEntry.everywhere.get(noun="Patient", row=patient.pk),
         ApiToken.everywhere.create(
             clinic=clinic,
             user=people[Role.PT],
@@ -192,6 +220,8 @@ def build_world(name: str) -> World:
             user=people[Role.PT], kind="app", name=mark(name, Authenticator), material="-"
         ),
         RecoveryCode.everywhere.create(user=people[Role.PT], digest=mark(name, RecoveryCode)),
+        LeaveTries.everywhere.create(station=station, who=f"tablet {device.pk}", open_at=NOW),
+        Visit.everywhere.create(clinic=clinic, patient=patient, day=NOW.date()),
         Pairing.everywhere.create(
             code=f"P{clinic.pk}",
             secret_hash=f"pairing-{name}",

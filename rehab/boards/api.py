@@ -61,7 +61,7 @@ class ShownOut(Schema):
 
 
 @router.get("/boards", response=answers(Page[BoardOut]))
-@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
+@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
 def list_boards(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
     """List the clinic's leaderboards."""
     return cut(Leaderboard.objects.visible_to(caller(request)).order_by("pk"), wanted)

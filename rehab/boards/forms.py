@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from django import forms
+from django.utils.translation import gettext_lazy as _
 
 from rehab.boards.models import Leaderboard
 from rehab.people.admin_base import ClinicForm
@@ -15,8 +16,8 @@ class LeaderboardForm(ClinicForm):
     """All of a board on one page; what is left as it is makes a safe one."""
 
     valences = forms.MultipleChoiceField(
-        label="Which types",
-        choices=[(valence.slug, valence.label) for valence in VALENCES.values()],
+        label=_("Which types"),
+        choices=[(valence.slug, _(valence.label)) for valence in VALENCES.values()],
         widget=forms.CheckboxSelectMultiple,
         required=False,
     )
@@ -29,5 +30,6 @@ class LeaderboardForm(ClinicForm):
             self.instance.chosen = [patient.pk for patient in group]
         fewest = cleaned.get("min_participants") or 0
         if cleaned.get("among") == Leaderboard.Among.GROUP and len(group or []) < fewest:
-            self.add_error("group", f"Choose at least {fewest} patients.")
+            few = _("Choose at least %(fewest)d patients.") % {"fewest": fewest}
+            self.add_error("group", few)
         return cleaned

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from django.core.exceptions import ValidationError
 from django.core.validators import MaxValueValidator, MinValueValidator
 from django.db import models
 from django.db.models import Exists, Q
+from django.utils.translation import gettext_lazy as _
 
 from rehab.boards.rules import find_faults
 from rehab.people.models import Boards, Clinic, Patient
@@ -17,19 +18,19 @@ from rehab.training.metrics import METRICS
 from rehab.training.valences import VALENCES
 
 METRIC_LABELS = {
-    "hit_rate": "Steps at the goal (%)",
-    "mean_performance": "Mean step, in % of the own goal",
-    "improvement_over_baseline": "Improvement over the own baseline (%)",
-    "retention_in_washout": "Improvement kept in the washout (%)",
-    "active_minutes": "Minutes walked",
-    "target_met": "Days on which the target was met",
+    "hit_rate": _("Steps at the goal (%)"),
+    "mean_performance": _("Mean step, in % of the own goal"),
+    "improvement_over_baseline": _("Improvement over the own baseline (%)"),
+    "retention_in_washout": _("Improvement kept in the washout (%)"),
+    "active_minutes": _("Minutes walked"),
+    "target_met": _("Days on which the target was met"),
 }
 
 
-def metric_choices() -> list[tuple[str, str]]:
+def metric_choices() -> list[tuple[str, Any]]:
     """Give what can be ranked by, the hit rate first."""
     slugs = sorted(METRICS, key=lambda slug: slug != "hit_rate")
-    return [(slug, METRIC_LABELS.get(slug, METRICS[slug].label)) for slug in slugs]
+    return [(slug, METRIC_LABELS.get(slug, _(METRICS[slug].label))) for slug in slugs]
 
 
 @dataclass(frozen=True)
@@ -51,149 +52,168 @@ class Leaderboard(ClinicRow):
     class Among(models.TextChoices):
         """Whose sessions are on the board."""
 
-        SELF = "self", "The patient's own sessions"
-        GROUP = "group", "A group of patients"
-        CLINIC = "clinic", "All patients of the clinic"
-        ACROSS = "across", "Patients of several clinics"
+        SELF = "self", _("The patient's own sessions")
+        GROUP = "group", _("A group of patients")
+        CLINIC = "clinic", _("All patients of the clinic")
+        ACROSS = "across", _("Patients of several clinics")
 
     class Types(models.TextChoices):
         """Which feedback types are on the board."""
 
-        SAME = "same", "Same as the session at hand"
-        CHOSEN = "chosen", "Chosen types"
-        ALL = "all", "All types"
+        SAME = "same", _("Same as the session at hand")
+        CHOSEN = "chosen", _("Chosen types")
+        ALL = "all", _("All types")
 
     class Entry(models.TextChoices):
         """What stands in a row."""
 
-        EACH = "each", "Each session"
-        BEST = "best", "Best session"
-        LATEST = "latest", "Latest session"
-        MEAN = "mean", "Mean of the last sessions"
-        SUM = "sum", "Sum over the period"
+        EACH = "each", _("Each session")
+        BEST = "best", _("Best session")
+        LATEST = "latest", _("Latest session")
+        MEAN = "mean", _("Mean of the last sessions")
+        SUM = "sum", _("Sum over the period")
 
     class Period(models.TextChoices):
         """Which sessions count."""
 
-        ALL = "all", "All time"
-        DAYS_30 = "days_30", "Last 30 days"
-        WEEK = "week", "This week"
-        MONTH = "month", "This month"
-        DATES = "dates", "Between two dates"
+        ALL = "all", _("All time")
+        DAYS_30 = "days_30", _("Last 30 days")
+        WEEK = "week", _("This week")
+        MONTH = "month", _("This month")
+        DATES = "dates", _("Between two dates")
 
     class Ties(models.TextChoices):
         """How equal figures are ranked."""
 
         STANDARD = "standard", "1, 2, 2, 4"
         DENSE = "dense", "1, 2, 2, 3"
-        EARLIER = "earlier", "1, 2, 3, 4: the earlier first"
+        EARLIER = "earlier", _("1, 2, 3, 4: the earlier first")
 
     class Display(models.TextChoices):
         """Which rows are shown."""
 
-        NEIGHBORS = "neighbors", "You and two on each side"
-        TOP = "top", "The best"
-        TOP_AND_ME = "top_and_me", "The best, and you"
-        TOTAL = "total", "One total, reached together"
+        NEIGHBORS = "neighbors", _("You and two on each side")
+        TOP = "top", _("The best")
+        TOP_AND_ME = "top_and_me", _("The best, and you")
+        TOTAL = "total", _("One total, reached together")
 
     class Names(models.TextChoices):
         """What patients are called."""
 
-        PSEUDONYM = "pseudonym", "Animal names"
-        INITIALS = "initials", "Initials"
-        CODE = "code", "Codes"
+        PSEUDONYM = "pseudonym", _("Animal names")
+        INITIALS = "initials", _("Initials")
+        CODE = "code", _("Codes")
 
     class Moment(models.TextChoices):
         """When it is shown."""
 
-        AFTER_SESSION = "after_session", "After a session"
-        WAITING = "waiting", "While the tablet waits"
-        PT_ONLY = "pt_only", "Only here, to therapists"
+        AFTER_SESSION = "after_session", _("After a session")
+        WAITING = "waiting", _("While the tablet waits")
+        PT_ONLY = "pt_only", _("Only here, to therapists")
 
     scope = BoardScope(clinic="clinic", shared=True, host=Q(clinic__isnull=True))
 
     clinic = models.ForeignKey(
-        Clinic, on_delete=models.CASCADE, related_name="leaderboards", null=True, blank=True
+        Clinic,
+        on_delete=models.CASCADE,
+        related_name="leaderboards",
+        null=True,
+        blank=True,
+        verbose_name=_("clinic"),
     )
-    name = models.CharField("name on the tablet", max_length=32)
-    active = models.BooleanField(default=True)
+    name = models.CharField(_("name on the tablet"), max_length=32)
+    active = models.BooleanField(_("active"), default=True)
     among = models.CharField(
-        "compare with", max_length=16, choices=Among.choices, default=Among.SELF
+        _("compare with"), max_length=16, choices=Among.choices, default=Among.SELF
     )
     group = models.ManyToManyField(
-        Patient, related_name="+", blank=True, verbose_name="patients of the group"
+        Patient, related_name="+", blank=True, verbose_name=_("patients of the group")
     )
     metric = models.CharField(
-        "measure", max_length=32, choices=metric_choices(), default="hit_rate"
+        _("measure"), max_length=32, choices=metric_choices(), default="hit_rate"
     )
-    higher_is_better = models.BooleanField("higher is better", default=True)
-    entry = models.CharField("a row is", max_length=16, choices=Entry.choices, default=Entry.EACH)
+    higher_is_better = models.BooleanField(_("higher is better"), default=True)
+    entry = models.CharField(
+        _("a row is"), max_length=16, choices=Entry.choices, default=Entry.EACH
+    )
     mean_of = models.PositiveSmallIntegerField(
-        "sessions in the mean", default=3, validators=[MinValueValidator(1)]
+        _("sessions in the mean"), default=3, validators=[MinValueValidator(1)]
     )
     types = models.CharField(
-        "feedback types", max_length=16, choices=Types.choices, default=Types.SAME
+        _("feedback types"), max_length=16, choices=Types.choices, default=Types.SAME
     )
-    valences = models.JSONField("which types", default=list, blank=True)
+    valences = models.JSONField(_("which types"), default=list, blank=True)
     min_valid_strides = models.PositiveIntegerField(
-        "fewest steps",
+        _("fewest steps"),
         default=100,
-        help_text="A session counts from so many valid steps with feedback on.",
+        help_text=_("A session counts from so many valid steps with feedback on."),
     )
     min_minutes = models.PositiveSmallIntegerField(
-        "or fewest minutes",
+        _("or fewest minutes"),
         null=True,
         blank=True,
-        help_text="A session with fewer steps counts as well if it was walked so long.",
+        help_text=_("A session with fewer steps counts as well if it was walked so long."),
     )
-    include_simulated = models.BooleanField("simulated sessions too", default=False)
-    period = models.CharField(max_length=16, choices=Period.choices, default=Period.DAYS_30)
-    period_from = models.DateField("from", null=True, blank=True)
-    period_to = models.DateField("to", null=True, blank=True)
+    include_simulated = models.BooleanField(_("simulated sessions too"), default=False)
+    period = models.CharField(
+        _("period"), max_length=16, choices=Period.choices, default=Period.DAYS_30
+    )
+    period_from = models.DateField(_("from"), null=True, blank=True)
+    period_to = models.DateField(_("to"), null=True, blank=True)
     frozen_on = models.DateField(
-        "frozen on",
+        _("frozen on"),
         null=True,
         blank=True,
-        help_text="The board stays as it was at the end of this day: for a report.",
+        help_text=_("The board stays as it was at the end of this day: for a report."),
     )
     display = models.CharField(
-        "rows", max_length=16, choices=Display.choices, default=Display.NEIGHBORS
+        _("rows"), max_length=16, choices=Display.choices, default=Display.NEIGHBORS
     )
     top_n = models.PositiveSmallIntegerField(
-        "how many of the best",
+        _("how many of the best"),
         default=10,
         validators=[MinValueValidator(1), MaxValueValidator(50)],
     )
     total_goal = models.PositiveIntegerField(
-        "goal of the total",
+        _("goal of the total"),
         null=True,
         blank=True,
         validators=[MinValueValidator(1)],
-        help_text="Draws a bar that fills up to it.",
+        help_text=_("Draws a bar that fills up to it."),
     )
-    show_ranks = models.BooleanField("show places", default=True)
+    show_ranks = models.BooleanField(_("show places"), default=True)
     ties = models.CharField(
-        "equal figures", max_length=16, choices=Ties.choices, default=Ties.STANDARD
+        _("equal figures"), max_length=16, choices=Ties.choices, default=Ties.STANDARD
     )
     tie_breaker = models.CharField(
-        "of equal figures, first",
+        _("of equal figures, first"),
         max_length=32,
         choices=metric_choices(),
         blank=True,
-        help_text="Who has more of this stands first; after that, who was earlier.",
+        help_text=_("Who has more of this stands first; after that, who was earlier."),
     )
-    names = models.CharField(max_length=16, choices=Names.choices, default=Names.PSEUDONYM)
+    names = models.CharField(
+        _("names"), max_length=16, choices=Names.choices, default=Names.PSEUDONYM
+    )
     min_participants = models.PositiveSmallIntegerField(
-        "fewest patients",
+        _("fewest patients"),
         default=5,
         validators=[MinValueValidator(5)],
-        help_text="With fewer, everyone sees the own sessions only.",
+        help_text=_("With fewer, everyone sees the own sessions only."),
     )
     moment = models.CharField(
-        "shown", max_length=16, choices=Moment.choices, default=Moment.AFTER_SESSION
+        _("shown"), max_length=16, choices=Moment.choices, default=Moment.AFTER_SESSION
+    )
+
+    built_to = models.BigIntegerField(
+        null=True,
+        editable=False,
+        help_text="The patient whom building its rows has come to; nothing once they are built.",
     )
 
     class Meta(ClinicRow.Meta):
+        verbose_name = _("leaderboard")
+        verbose_name_plural = _("leaderboards")
         ordering: ClassVar = ["name"]
         constraints: ClassVar = [
             models.UniqueConstraint(fields=["clinic", "name"], name="board_name_once_per_clinic"),
@@ -204,14 +224,15 @@ class Leaderboard(ClinicRow):
                 condition=~Q(period="dates")
                 | Q(period_from__isnull=False, period_to__gte=models.F("period_from")),
                 name="board_dates_in_order",
-                violation_error_message="Give both dates, the first not after the second.",
+                violation_error_message=_("Give both dates, the first not after the second."),
             ),
             models.CheckConstraint(
                 condition=Q(clinic__isnull=False, among__in=["self", "group", "clinic"])
                 | Q(clinic__isnull=True, among="across"),
                 name="board_across_is_the_hosts",
-                violation_error_message="Boards across clinics are the host's, and a host has no "
-                "other boards.",
+                violation_error_message=_(
+                    "Boards across clinics are the host's, and a host has no other boards."
+                ),
             ),
         ]
 
@@ -223,6 +244,11 @@ class Leaderboard(ClinicRow):
         faults = dict(find_faults(self))
         if faults:
             raise ValidationError(faults)
+
+    @property
+    def is_being_built(self) -> bool:
+        """Whether its rows are not yet what they should be: it is not shown then."""
+        return self.built_to is not None
 
     @property
     def is_own(self) -> bool:
@@ -262,7 +288,7 @@ class BoardEntry(ScopedModel):
     )
     patient = models.ForeignKey(Patient, on_delete=models.CASCADE, related_name="+", db_index=False)
     valence = models.CharField(
-        max_length=16, blank=True, choices=[(v.slug, v.label) for v in VALENCES.values()]
+        max_length=16, blank=True, choices=[(v.slug, _(v.label)) for v in VALENCES.values()]
     )
     figure = models.IntegerField(help_text="As it is shown: in whole numbers.")
     stake = models.IntegerField(null=True, help_text="What could be kept, where points are lost.")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from django.utils.translation import gettext as _
+
 from rehab.training.valences import VALENCES
 
 if TYPE_CHECKING:
@@ -28,51 +30,58 @@ def find_faults(board: Leaderboard) -> Iterator[tuple[str, str]]:
 def _faults_of_types(board: Leaderboard) -> Iterator[tuple[str, str]]:
     chosen = board.valences
     if not isinstance(chosen, list) or not all(slug in VALENCES for slug in chosen):
-        yield "valences", f"Give a list of these types: {', '.join(VALENCES)}."
+        yield (
+            "valences",
+            _("Give a list of these types: %(types)s.") % {"types": ", ".join(VALENCES)},
+        )
         return
     if board.types == board.Types.CHOSEN and not chosen:
-        yield "valences", "Choose at least one type."
+        yield "valences", _("Choose at least one type.")
     if board.metric not in TYPED or board.types == board.Types.SAME:
         return
     if board.types == board.Types.ALL or len(set(chosen)) > 1:
         yield (
             "metric",
-            "Points of different feedback types cannot be compared: negative ones are never "
-            "above 0. Choose the steps at the goal, or a single type.",
+            _(
+                "Points of different feedback types cannot be compared: negative ones are never "
+                "above 0. Choose the steps at the goal, or a single type."
+            ),
         )
     elif chosen == ["explicit"]:
-        yield "metric", "Explicit feedback has no points. Choose the steps at the goal."
+        yield "metric", _("Explicit feedback has no points. Choose the steps at the goal.")
 
 
 def _faults_of_rows(board: Leaderboard) -> Iterator[tuple[str, str]]:
     if board.is_own:
         if board.entry != board.Entry.EACH:
-            yield "entry", "A board of own sessions shows each of them. Choose “Each session”."
+            yield "entry", _("A board of own sessions shows each of them. Choose “Each session”.")
         if board.metric in COUNTED:
-            yield "metric", "This says nothing of a single session. Compare with other patients."
+            yield "metric", _("This says nothing of a single session. Compare with other patients.")
         if board.display == board.Display.TOTAL:
-            yield "display", "A total is reached together. Compare with other patients."
+            yield "display", _("A total is reached together. Compare with other patients.")
         return
     if board.entry == board.Entry.EACH:
-        yield "entry", "A board of several patients shows one row for each of them."
+        yield "entry", _("A board of several patients shows one row for each of them.")
     elif board.entry == board.Entry.SUM:
         if board.metric not in SUMMABLE:
-            yield "entry", "This cannot be added up. Choose best, latest or mean."
+            yield "entry", _("This cannot be added up. Choose best, latest or mean.")
     elif board.metric in COUNTED:
-        yield "entry", "This is counted over the period. Choose the sum."
+        yield "entry", _("This is counted over the period. Choose the sum.")
     elif board.display == board.Display.TOTAL:
-        yield "entry", "A total adds up what all have reached. Choose the sum."
+        yield "entry", _("A total adds up what all have reached. Choose the sum.")
 
 
 def _faults_of_places(board: Leaderboard) -> Iterator[tuple[str, str]]:
     if board.among == board.Among.ACROSS and board.names != board.Names.PSEUDONYM:
-        yield "names", "Across clinics there are animal names only."
+        yield "names", _("Across clinics there are animal names only.")
     if board.moment == board.Moment.WAITING:
         if board.is_own or board.display not in {board.Display.TOP, board.Display.TOTAL}:
             yield (
                 "display",
-                "A waiting tablet belongs to nobody yet. Show the best of several patients, or "
-                "their total.",
+                _(
+                    "A waiting tablet belongs to nobody yet. Show the best of several patients, or "
+                    "their total."
+                ),
             )
         elif board.types == board.Types.SAME:
-            yield "types", "A waiting tablet has no session at hand. Choose types, or all."
+            yield "types", _("A waiting tablet has no session at hand. Choose types, or all.")

@@ -7,8 +7,11 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 from django.utils import timezone
+from django.utils.translation import gettext as _
+from django.utils.translation import gettext_noop, ngettext
 
 from rehab.boards import entries
+from rehab.boards.building import builder
 from rehab.boards.choosing import choose
 from rehab.boards.figures import keeps, read_figures, read_own, standing_on
 from rehab.boards.models import Leaderboard
@@ -17,8 +20,8 @@ from rehab.boards.standings import Listed, Placed, Standings, Stored
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.models import TrainingSession
 
-OWN = "These are your own sessions."
-FEW = "Fewer than {} people so far."
+OWN = gettext_noop("These are your own sessions.")
+BUILT = gettext_noop("This board is being built.")
 
 
 @dataclass(frozen=True)
@@ -101,20 +104,29 @@ class Viewer:
         board, patient = self.board, self.patient
         if board.is_own:
             return self._show_own("")
+        if self.stored and board.is_being_built:
+            builder.wake()  # whoever was at it may have been stopped
+            return self._show_own(f"{_(BUILT)} {_(OWN)}" if patient else _(BUILT))
         standings = self._standings()
-        people = f"{standings.count} patient{'' if standings.count == 1 else 's'} on it now."
+        people = ngettext(
+            "%(count)d patient on it now.", "%(count)d patients on it now.", standings.count
+        ) % {"count": standings.count}
         if standings.count < board.min_participants:
-            few = f"{people} Under {board.min_participants}, all see their own sessions."
-            return self._show_own(f"{FEW.format(board.min_participants)} {OWN}", few)
+            fewest = {"fewest": board.min_participants}
+            why = _("Under %(fewest)d, all see their own sessions.") % fewest
+            few = _("Fewer than %(fewest)d people so far.") % fewest
+            return self._show_own(f"{few} {_(OWN)}", f"{people} {why}")
         if patient is not None and not standing_on(board).filter(pk=patient.pk).exists():
-            return self._show_own(OWN, f"{people} {patient.nickname} has not agreed to be on it.")
+            why = _("%(patient)s has not agreed to be on it.") % {"patient": patient.nickname}
+            return self._show_own(_(OWN), f"{people} {why}")
         me = standings.find(patient.pk) if patient else None
         if board.display == Leaderboard.Display.TOTAL:
             return self._shown(total=self._total(standings, me), shared=True, facts=people)
         rows = name_rows(board, choose(board, standings, me), patient.pk if patient else None)
         if rows:
             return self._shown(rows=rows, shared=True, facts=people)
-        return self._show_own(OWN, f"{people} Outside its first half, own sessions are shown.")
+        why = _("Outside its first half, own sessions are shown.")
+        return self._show_own(_(OWN), f"{people} {why}")
 
     def find_typical(self) -> int | None:
         """Give the patient in the middle of the first half; None for a board of own sessions."""

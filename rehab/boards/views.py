@@ -6,6 +6,9 @@ import time
 
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.utils import timezone
+from django.utils.translation import gettext_lazy as _
+from django.utils.translation import pgettext
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_POST, require_safe
 
@@ -13,7 +16,9 @@ from rehab.boards.ranking import By, Entry, cut, rank, ranking_of, read_figures
 from rehab.boards.rows import Row, date_rows, share
 from rehab.boards.showing import Shown, show_after, show_waiting
 from rehab.people.access import actor_of, for_roles
-from rehab.people.models import Boards
+from rehab.people.consent import Purpose, withdraw
+from rehab.people.language import speak_to
+from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.words import SPACE, say_number
@@ -21,9 +26,9 @@ from rehab.training.changes import OPEN, State
 
 SHOWN_S = 20  # a board on a tablet that waits, before the next one
 TITLES = {
-    By.POINTS: "Your points",
-    By.KEPT: "Points you kept",
-    By.RATE: "Your steps at the goal",
+    By.POINTS: _("Your points"),
+    By.KEPT: _("Points you kept"),
+    By.RATE: _("Your steps at the goal"),
 }
 
 
@@ -36,6 +41,7 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
     A session that still runs has no place. In a blinded study there is nothing to compare.
     """
     session = find_session(request, session_id)
+    speak_to(session.patient)
     if State(session.state) in OPEN:
         return redirect("walk", session_id=session.pk)
     boards = (
@@ -55,8 +61,8 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
 def leave_boards(request: HttpRequest, session_id: int) -> HttpResponse:
     """Take the session's patient off all boards, at once. Only a therapist brings one back."""
     session = find_session(request, session_id)
-    session.patient.boards = Boards.OWN
-    session.patient.save(update_fields=["boards"])
+    by = request.user if isinstance(request.user, User) else None
+    withdraw(session.patient, Purpose.BOARDS, by, timezone.now())
     return redirect("scores", session_id=session.pk)
 
 
@@ -89,8 +95,8 @@ def own_boards(request: HttpRequest, session: TrainingSession) -> list[Shown]:
     same = [own for own in figures if own.valence == session.valence and not own.mixed]
     by = ranking_of(valence)
     places = {
-        ("same", "This type", by): rank(same, by, -(valence.miss_points or 0)),
-        ("all", "All types", By.RATE): rank(figures, By.RATE),
+        ("same", pgettext("board", "This type"), by): rank(same, by, -(valence.miss_points or 0)),
+        ("all", pgettext("board", "All types"), By.RATE): rank(figures, By.RATE),
     }
     if session.changed_to:
         del places["same", "This type", by]
@@ -106,7 +112,7 @@ def own_boards(request: HttpRequest, session: TrainingSession) -> list[Shown]:
     return [
         Shown(
             slug=slug,
-            title=TITLES[kind],
+            title=str(TITLES[kind]),
             label=label,
             rows=date_rows(write_rows(entries, kind), facts, session, session.clinic),
             kept=kind is By.KEPT,

@@ -8,11 +8,11 @@ from typing import Any
 
 from django.db.models import Model
 from django.db.models.signals import m2m_changed, post_delete, post_save
-from django.utils import timezone
 
-from rehab.boards import entries
+from rehab.boards import building, entries
 from rehab.boards.models import Leaderboard
 from rehab.people.models import Clinic, Patient
+from rehab.sessions.corrections import Part, SessionCorrection
 from rehab.sessions.models import SessionMetric, TrainingSession, figures_stored
 from rehab.training.changes import State
 
@@ -23,6 +23,7 @@ def watch() -> None:
     post_save.connect(on_patient, sender=Patient)
     post_save.connect(on_session, sender=TrainingSession)
     post_delete.connect(on_session, sender=TrainingSession)
+    post_save.connect(on_correction, sender=SessionCorrection)
     post_save.connect(on_figure, sender=SessionMetric)
     post_delete.connect(on_figure, sender=SessionMetric)
     post_save.connect(on_board, sender=Leaderboard)
@@ -62,6 +63,14 @@ def on_session(instance: TrainingSession, **_signal: Any) -> None:
 
 
 @unless_restored
+def on_correction(instance: SessionCorrection, **_signal: Any) -> None:
+    """A session was given to whoever walked it: the one whom it was put down to has one less."""
+    if instance.part == Part.PATIENT:
+        before = Patient.everywhere.filter(pseudonym=instance.old)
+        entries.refresh_patients(set(before.values_list("pk", flat=True)))
+
+
+@unless_restored
 def on_figure(instance: SessionMetric, **_signal: Any) -> None:
     """A figure was corrected or removed."""
     on_figures({instance.session_id})
@@ -69,21 +78,19 @@ def on_figure(instance: SessionMetric, **_signal: Any) -> None:
 
 @unless_restored
 def on_board(instance: Leaderboard, **_signal: Any) -> None:
-    """A board was built or changed."""
-    entries.refresh(instance)
+    """A board was made or changed."""
+    building.rebuild(instance)
 
 
 def on_group(instance: Leaderboard, action: str, **_signal: Any) -> None:
     """A board's group was chosen."""
     if action.startswith("post_"):
-        entries.refresh(instance)
+        building.rebuild(instance)
 
 
 @unless_restored
 def on_clinic(instance: Clinic, created: bool, **_signal: Any) -> None:
     """A clinic takes part in boards across clinics, or no longer."""
-    if created:
-        return
-    patients = Patient.everywhere.filter(clinic=instance).values_list("pk", flat=True)
-    for board in entries.boards_of(None):
-        entries.refresh(board, set(patients), timezone.now())
+    if not created:
+        for board in entries.boards_of(None):
+            building.rebuild(board)

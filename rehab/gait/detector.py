@@ -10,6 +10,7 @@ from rehab.gait.contacts import Contact, ContactFinder
 from rehab.gait.filters import find_highest, find_lowest
 from rehab.gait.plausibility import STANCE_MAX_S, STANCE_MIN_S
 from rehab.gait.samples import FORCE, TIME, LegBuffer
+from rehab.gait.settings import Settings
 from rehab.gait.stances import Stance, StanceMeter
 from rehab.gait.strides import Flag, Reason, Stride
 
@@ -59,33 +60,37 @@ class Draft:
 class LegDetector:
     """Finds and measures the strides of one leg in a buffer that others fill.
 
-    Parameters are those of ``StrideDetector``.
+    Parameters
+    ----------
+    buffer
+        The leg's samples.
+    settings
+        How they are measured.
+    side
+        Which leg it is, if that is known.
     """
 
-    def __init__(
-        self,
-        buffer: LegBuffer,
-        rate_hz: float,
-        mass_kg: float,
-        look_ahead_s: float,
-        cutoff_hz: float,
-        contact_n: float,
-        release_n: float,
-        is_velocity: bool,
-        side: str | None,
-    ) -> None:
+    def __init__(self, buffer: LegBuffer, settings: Settings, side: str | None) -> None:
+        rate_hz = settings.rate_hz
         self.buffer = buffer
-        self.mass_kg = float(mass_kg)
+        self.mass_kg = float(settings.mass_kg)
         self.weight_n = self.mass_kg * GRAVITY_M_S2
         self.side = side
-        self.contacts = ContactFinder(buffer, rate_hz, self.weight_n, contact_n, release_n)
+        self.contacts = ContactFinder(
+            buffer, rate_hz, self.weight_n, settings.contact_n, settings.release_n
+        )
         self._samples = buffer.samples
         self.piece = int(PIECE_S * rate_hz)
         self._cycle_max = STRIDE_MAX_S * rate_hz
         self._meter = StanceMeter(
-            buffer, float(rate_hz), self.mass_kg, self.weight_n, cutoff_hz, is_velocity
+            buffer,
+            float(rate_hz),
+            self.mass_kg,
+            self.weight_n,
+            settings.cutoff_hz,
+            settings.is_velocity,
         )
-        self._wait = math.ceil(look_ahead_s * rate_hz - 1e-9)
+        self._wait = math.ceil(settings.look_ahead_s * rate_hz - 1e-9)
         self._pending: deque[Contact] = deque()
         self._previous: Contact | None = None  # the stance before, with its bounces
         self._left: tuple[int, float] | None = None  # where it really ended

@@ -14,7 +14,7 @@ from rehab.gait.detector import KEEP_S, Beside, Draft, LegDetector
 from rehab.gait.filters import find_highest
 from rehab.gait.kinetics import CUTOFF_HZ
 from rehab.gait.samples import FORCE, NAMES, POSITION, SampleBuffer, cut, read_chunk
-from rehab.gait.settings import check_settings
+from rehab.gait.settings import Settings
 from rehab.gait.stances import Stance
 from rehab.gait.strides import Flag, Reason, Stride
 
@@ -56,20 +56,18 @@ class TwoLegDetector:
         release_n: float = RELEASE_N,
         is_velocity: bool = False,
     ) -> None:
-        check_settings(rate_hz, mass_kg, look_ahead_s, cutoff_hz, contact_n, release_n)
+        settings = Settings(
+            rate_hz=rate_hz,
+            mass_kg=mass_kg,
+            look_ahead_s=look_ahead_s,
+            cutoff_hz=cutoff_hz,
+            contact_n=contact_n,
+            release_n=release_n,
+            is_velocity=is_velocity,
+        )
         self._samples = SampleBuffer(int(KEEP_S * rate_hz), legs=2)
         self._left, self._right = (
-            LegDetector(
-                buffer,
-                rate_hz,
-                mass_kg,
-                look_ahead_s,
-                cutoff_hz,
-                contact_n,
-                release_n,
-                is_velocity,
-                side,
-            )
+            LegDetector(buffer, settings, side)
             for buffer, side in zip(self._samples.legs, ("left", "right"), strict=True)
         )
         self._steps_m: dict[str | None, float | None] = {}

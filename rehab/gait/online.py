@@ -9,7 +9,7 @@ from rehab.gait.detector import KEEP_S, Beside, Draft, LegDetector
 from rehab.gait.kinetics import CUTOFF_HZ
 from rehab.gait.plausibility import check_load
 from rehab.gait.samples import NAMES, SampleBuffer, cut, read_chunk
-from rehab.gait.settings import check_settings
+from rehab.gait.settings import Settings
 from rehab.gait.strides import Reason, Stride
 
 
@@ -56,20 +56,18 @@ class StrideDetector:
         is_velocity: bool = False,
         side: str | None = None,
     ) -> None:
-        check_settings(rate_hz, mass_kg, look_ahead_s, cutoff_hz, contact_n, release_n)
+        settings = Settings(
+            rate_hz=rate_hz,
+            mass_kg=mass_kg,
+            look_ahead_s=look_ahead_s,
+            cutoff_hz=cutoff_hz,
+            contact_n=contact_n,
+            release_n=release_n,
+            is_velocity=is_velocity,
+        )
         self._samples = SampleBuffer(int(KEEP_S * rate_hz))
         (buffer,) = self._samples.legs
-        self._leg = LegDetector(
-            buffer,
-            rate_hz,
-            mass_kg,
-            look_ahead_s,
-            cutoff_hz,
-            contact_n,
-            release_n,
-            is_velocity,
-            side,
-        )
+        self._leg = LegDetector(buffer, settings, side)
 
     def feed(
         self,

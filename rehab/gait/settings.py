@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from rehab.gait.strides import GaitInputError
 
 RATE_MIN_HZ, RATE_MAX_HZ = 50.0, 5000.0
@@ -9,34 +11,47 @@ MASS_MIN_KG, MASS_MAX_KG = 10.0, 300.0
 LOOK_AHEAD_MAX_S = 0.2
 
 
-def check_settings(
-    rate_hz: float,
-    mass_kg: float | None,
-    look_ahead_s: float,
-    cutoff_hz: float,
-    contact_n: float,
-    release_n: float,
-) -> None:
-    """Raise GaitInputError, with the cure, for settings that nothing can be measured with."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """How strides are found and measured; parameters are those of ``StrideDetector``.
+
+    Raises GaitInputError, with the cure, for settings that nothing can be measured with.
+    """
+
+    rate_hz: float
+    mass_kg: float
+    look_ahead_s: float
+    cutoff_hz: float
+    contact_n: float
+    release_n: float
+    is_velocity: bool
+
+    def __post_init__(self) -> None:
+        check_mass(self.mass_kg)
+        check_rate(self.rate_hz)
+        if not 0 <= self.look_ahead_s <= LOOK_AHEAD_MAX_S:
+            raise GaitInputError(
+                f"A look-ahead of {self.look_ahead_s:g} s cannot be used. "
+                f"Give 0 to {LOOK_AHEAD_MAX_S:g} s."
+            )
+        if not 1 <= self.cutoff_hz <= self.rate_hz / 5:
+            raise GaitInputError(
+                f"A cut-off of {self.cutoff_hz:g} Hz cannot be used at {self.rate_hz:g} Hz. Give 1 "
+                f"to {self.rate_hz / 5:g} Hz; 6 Hz is the custom."
+            )
+        if not 0 < self.release_n < self.contact_n:
+            raise GaitInputError(
+                f"Contact at {self.contact_n:g} N and release at {self.release_n:g} N cannot be "
+                "told apart. Give a release above 0 N and a contact above the release."
+            )
+
+
+def check_mass(mass_kg: float | None) -> None:
+    """Raise GaitInputError, with the cure, for a body mass that nobody has, or that is missing."""
     if mass_kg is None or not MASS_MIN_KG <= mass_kg <= MASS_MAX_KG:
         raise GaitInputError(
             f"A body mass of {mass_kg} kg cannot be used. Weigh the patient and give "
             f"{MASS_MIN_KG:g} to {MASS_MAX_KG:g} kg: A2 is power by body mass."
-        )
-    check_rate(rate_hz)
-    if not 0 <= look_ahead_s <= LOOK_AHEAD_MAX_S:
-        raise GaitInputError(
-            f"A look-ahead of {look_ahead_s:g} s cannot be used. Give 0 to {LOOK_AHEAD_MAX_S:g} s."
-        )
-    if not 1 <= cutoff_hz <= rate_hz / 5:
-        raise GaitInputError(
-            f"A cut-off of {cutoff_hz:g} Hz cannot be used at {rate_hz:g} Hz. Give 1 to "
-            f"{rate_hz / 5:g} Hz; 6 Hz is the custom."
-        )
-    if not 0 < release_n < contact_n:
-        raise GaitInputError(
-            f"Contact at {contact_n:g} N and release at {release_n:g} N cannot be told apart. "
-            "Give a release above 0 N and a contact above the release."
         )
 
 

@@ -15,7 +15,7 @@ def gesture_choices(by: User) -> list[tuple[Any, Any]]:
     """Give the robot's own gestures, those composed in the clinic and the paper's."""
     composed = Gesture.objects.visible_to(by).values_list("name", flat=True)
     return [
-        *((gesture.name, gesture.label) for gesture in GESTURES.values()),
+        *((gesture.name, _(gesture.label)) for gesture in GESTURES.values()),
         *([(_("Composed here"), [(name, name) for name in composed])] if composed else []),
-        (_("Of the paper, up to 10 s"), [(one.name, one.label) for one in ORIGINALS.values()]),
+        (_("Of the paper, up to 10 s"), [(one.name, _(one.label)) for one in ORIGINALS.values()]),
     ]

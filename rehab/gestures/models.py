@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from django.core.exceptions import ValidationError
 from django.db import models
+from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
@@ -19,10 +20,16 @@ class Gesture(ClinicRow):
 
     scope = Scope(clinic="clinic")
 
-    clinic = models.ForeignKey(Clinic, on_delete=models.CASCADE, related_name="gestures")
-    name = models.SlugField(max_length=32, help_text="Letters, digits and hyphens: slow-wave.")
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.CASCADE, related_name="gestures", verbose_name=_("clinic")
+    )
+    name = models.SlugField(
+        _("name"), max_length=32, help_text=_("Letters, digits and hyphens: slow-wave.")
+    )
 
     class Meta(ClinicRow.Meta):
+        verbose_name = _("gesture")
+        verbose_name_plural = _("gestures")
         ordering: ClassVar = ["name"]
         constraints: ClassVar = [
             models.UniqueConstraint(fields=["clinic", "name"], name="gesture_name_once_per_clinic")
@@ -52,18 +59,30 @@ class GestureStep(ScopedModel):
 
     scope = Scope(clinic="gesture__clinic")
 
-    gesture = models.ForeignKey(Gesture, on_delete=models.CASCADE, related_name="steps")
-    position = models.PositiveSmallIntegerField("number", help_text="Empty: after the row above.")
-    turn_deg = models.FloatField("turn (°)", default=0.0, help_text="First; to the left above 0.")
-    forward_m = models.FloatField("forward (m)", default=0.0, help_text="Then; back below 0.")
-    hold_s = models.FloatField("pause (s)", default=0.0, help_text="At the end.")
-    pace = models.FloatField(default=1.0, help_text="Share of the full speed, 0.2 to 1.")
+    gesture = models.ForeignKey(
+        Gesture, on_delete=models.CASCADE, related_name="steps", verbose_name=_("gesture")
+    )
+    position = models.PositiveSmallIntegerField(
+        _("number"), help_text=_("Empty: after the row above.")
+    )
+    turn_deg = models.FloatField(
+        _("turn (°)"), default=0.0, help_text=_("First; to the left above 0.")
+    )
+    forward_m = models.FloatField(_("forward (m)"), default=0.0, help_text=_("Then; back below 0."))
+    hold_s = models.FloatField(_("pause (s)"), default=0.0, help_text=_("At the end."))
+    pace = models.FloatField(
+        _("pace"), default=1.0, help_text=_("Share of the full speed, 0.2 to 1.")
+    )
     within_s = models.FloatField(
-        "time (s)", null=True, blank=True, help_text="It stops if it takes longer. Empty: as usual."
+        _("time (s)"),
+        null=True,
+        blank=True,
+        help_text=_("It stops if it takes longer. Empty: as usual."),
     )
 
     class Meta(ScopedModel.Meta):
-        verbose_name = "step"
+        verbose_name = _("step")
+        verbose_name_plural = _("steps")
         ordering: ClassVar = ["gesture", "position"]
         constraints: ClassVar = [
             models.UniqueConstraint(
@@ -72,7 +91,7 @@ class GestureStep(ScopedModel):
         ]
 
     def __str__(self) -> str:
-        return f"Step {self.position}"
+        return str(_("Step %(number)d") % {"number": self.position})
 
     def to_move(self) -> Move:
         """Give the step as a robot knows it."""

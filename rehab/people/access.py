@@ -13,7 +13,7 @@ from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import PermissionDenied
 from django.http import HttpRequest, HttpResponseBase
 
-from rehab.people import entry
+from rehab.people import entry, history, sightings
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 
@@ -33,16 +33,19 @@ def public(view: Open) -> Open:
 
 
 def for_roles(
-    *roles: Role, tablets: bool = False, setting_up: bool = False
+    *roles: Role, tablets: bool = False, setting_up: bool = False, patients: bool = True
 ) -> Callable[[Open], Open]:
     """Open a view to signed-in people of these roles, to paired ``tablets``, and to people who
     have to set up a second factor before they are signed in (``setting_up``).
+
+    ``patients``: whether it may show anything of patients, so that opening it is noted.
     """
 
     def declare(view: Open) -> Open:
         view.access = frozenset(roles)  # type: ignore[attr-defined]
         view.tablets = tablets  # type: ignore[attr-defined]
         view.setting_up = setting_up  # type: ignore[attr-defined]
+        view.patients = patients  # type: ignore[attr-defined]
         return view
 
     return declare
@@ -73,14 +76,17 @@ def clinic_of(user: User) -> Clinic:
 
 
 class AccessMiddleware:
-    """Holds every view to what it declared. Sync and thread-safe: it keeps no state."""
+    """Holds every view to what it declared, and notes who saw what. Sync; it keeps no state."""
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
         self.get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponseBase:
-        """Pass the request on."""
-        return self.get_response(request)
+        """Pass the request on; what it changes is its doing, and what it shows is noted."""
+        with history.acting(request):
+            response = self.get_response(request)
+        sightings.note_request(request, response)
+        return response
 
     def process_view(
         self, request: HttpRequest, view: View, args: Any, kwargs: Any

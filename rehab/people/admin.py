@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import Any
+from zoneinfo import ZoneInfo
 
 from django.contrib import admin, messages
 from django.contrib.auth.admin import UserAdmin
@@ -10,10 +11,12 @@ from django.contrib.auth.forms import AdminUserCreationForm
 from django.contrib.auth.models import Group
 from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import ValidationError
-from django.db.models import QuerySet
+from django.db.models import Count, Max, QuerySet
 from django.http import HttpRequest, HttpResponseBase
 from django.shortcuts import redirect
 from django.urls import reverse
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
 
 from rehab.people import factors, lockout
 from rehab.people.access import person
@@ -49,8 +52,12 @@ admin.site.password_change = to_own_password  # type: ignore[assignment]
 class ClinicAdmin(ScopedAdmin):
     """Clinics: the host adds them, a lead keeps the details of the own one."""
 
-    list_display = ("name", "language", "time_zone")
-    fields = ("name", "language", "time_zone", "boards_across", "second_factor_required")
+    list_display = ("name", "language", "time_zone", "second_factor_required", "boards_across")
+    search_fields = ("name",)
+    fields = (
+        *("name", "language", "time_zone", "boards_across", "second_factor_required"),
+        *("research_needs_consent", "keep_months", "keep_log_months"),
+    )
 
 
 class NewAccountForm(AdminUserCreationForm):
@@ -63,7 +70,7 @@ class NewAccountForm(AdminUserCreationForm):
         """Refuse a name that any account has."""
         username: str = self.cleaned_data["username"]
         if User.is_taken(username):
-            raise ValidationError("This name is taken. Choose another one.")
+            raise ValidationError(gettext("This name is taken. Choose another one."))
         return username
 
 
@@ -71,30 +78,43 @@ class NewAccountForm(AdminUserCreationForm):
 class AccountAdmin(ScopedOptions, UserAdmin):
     """Accounts: a lead keeps those of the own clinic, a host all of them."""
 
-    list_display = ("username", "first_name", "last_name", "role", "clinic", "is_active")
-    list_filter = ("role", "is_active")
+    list_display = (
+        "username",
+        "first_name",
+        "last_name",
+        "role",
+        "clinic",
+        "last_login",
+        "is_active",
+    )
+    list_filter = ("role", "is_active", "last_login", ("clinic", admin.RelatedOnlyFieldListFilter))
+    list_select_related = ("clinic",)
+    show_facets = admin.ShowFacets.NEVER
     add_form = NewAccountForm
     filter_horizontal = ()
     ordering = ("username",)
     actions = ("unlock", "remove_second_factors")
 
-    @admin.action(description="Unlock after too many wrong tries", permissions=["change"])
+    @admin.action(description=_("Unlock after too many wrong tries"), permissions=["change"])
     def unlock(self, request: HttpRequest, accounts: QuerySet[User]) -> None:
         """Let the chosen accounts try again at once."""
         for account in accounts:
             lockout.forgive(account)
-        messages.success(request, f"{accounts.count()} account(s) may try again.")
+        words = gettext("Accounts that may try again: %(count)s.")
+        messages.success(request, words % {"count": accounts.count()})
 
-    @admin.action(description="Remove second factors (lost phone or key)", permissions=["change"])
+    @admin.action(
+        description=_("Remove second factors (lost phone or key)"), permissions=["change"]
+    )
     def remove_second_factors(self, request: HttpRequest, accounts: QuerySet[User]) -> None:
         """Take the chosen accounts back to their passwords alone."""
         for account in accounts:
             factors.forget_all(account)
-        messages.warning(
-            request,
-            f"{accounts.count()} account(s) sign in by password alone now, or set up a new second "
-            "factor where the clinic asks for one. If a phone was stolen, give a new password too.",
+        words = gettext(
+            "%(count)s account(s) sign in by password alone now, or set up a new second "
+            "factor where the clinic asks for one. If a phone was stolen, give a new password too."
         )
+        messages.warning(request, words % {"count": accounts.count()})
 
     def has_module_permission(self, request: HttpRequest) -> bool:
         """Whether accounts are on the front page."""
@@ -108,7 +128,7 @@ class AccountAdmin(ScopedOptions, UserAdmin):
             return [(None, {"fields": ("username", *passwords, *works)})]
         return [
             (None, {"fields": ("username", "password", *works, "is_active")}),
-            ("Person", {"fields": ("first_name", "last_name", "email")}),
+            (_("Person"), {"fields": ("first_name", "last_name", "email")}),
         ]
 
     def get_form(
@@ -139,7 +159,8 @@ class ApiTokenAdmin(TokenAdmin):
     """What lets programs use the API."""
 
     list_display = ("name", "user", "role", "created_at", "last_seen_at", "revoked_at")
-    list_filter = ("role",)
+    list_filter = ("role", "last_seen_at", "revoked_at")
+    search_fields = ("name", "user__username")
     fields = ("name", "user", "role", "created_at", "last_seen_at", "revoked_at")
 
 
@@ -147,10 +168,18 @@ class ApiTokenAdmin(TokenAdmin):
 class PatientAdmin(ScopedAdmin):
     """Patients of the clinic."""
 
-    list_display = ("nickname", "code", "paretic_side", "language", "boards", "created_at")
-    list_filter = ("paretic_side", "language", "boards")
+    list_display = (
+        "nickname",
+        "code",
+        "paretic_side",
+        "session_count",
+        "last_here",
+        "boards",
+        "simulated",
+    )
+    list_filter = ("paretic_side", "boards", "blinded", "simulated", "language", "created_at")
+    list_select_related = ("clinic",)
     search_fields = ("nickname", "code")
-    readonly_fields = ("pseudonym", "alias", "created_at")
     fields = (
         "code",
         "nickname",
@@ -162,14 +191,41 @@ class PatientAdmin(ScopedAdmin):
         "blinded",
         "pseudonym",
         "created_at",
+        "ended_at",
+        "erased_at",
     )
-    actions = ("draw_aliases",)
+    readonly_fields = ("alias", "pseudonym", "created_at", "ended_at", "erased_at")
+    actions = row_actions = ("draw_aliases",)
 
-    @admin.action(description="Draw new animal names for boards", permissions=["change"])
+    def get_queryset(self, request: HttpRequest) -> QuerySet[Any]:
+        """Give the visible patients with how often and when they were here last."""
+        rows = super().get_queryset(request)
+        return rows.annotate(walks=Count("sessions"), last_visit=Max("sessions__created_at"))
+
+    def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
+        """Lead to where the patient walks, and to what was walked."""
+        return [
+            (reverse("patient", args=[row.pk]), _("Start a session")),
+            (reverse("history", args=[row.pk]), _("Past sessions")),
+        ]
+
+    @admin.display(description=_("sessions"), ordering="walks")
+    def session_count(self, patient: Any) -> int:
+        """Count the sessions."""
+        count: int = patient.walks
+        return count
+
+    @admin.display(description=_("last here"), ordering="last_visit")
+    def last_here(self, patient: Any) -> Any:
+        """Give the day of the last session by the clinic's clock."""
+        zone = ZoneInfo(patient.clinic.time_zone)
+        return patient.last_visit and patient.last_visit.astimezone(zone).date()
+
+    @admin.action(description=_("Draw new animal names for boards"), permissions=["change"])
     def draw_aliases(self, request: HttpRequest, patients: QuerySet[Patient]) -> None:
         """Give the chosen patients other names on boards."""
         for patient in patients:
             patient.draw_alias()
             patient.save(update_fields=["alias"])
         names = ", ".join(f"{patient.nickname}: {patient.alias}" for patient in patients)
-        messages.success(request, f"New names on boards. {names}")
+        messages.success(request, gettext("New names on boards. %(names)s") % {"names": names})

@@ -8,10 +8,16 @@ from django import forms
 from django.contrib import admin, messages
 from django.db import models
 from django.db.models import QuerySet
-from django.http import HttpRequest
+from django.http import Http404, HttpRequest, HttpResponse
+from django.shortcuts import redirect
+from django.template.response import TemplateResponse
 from django.utils import timezone
+from django.utils.text import capfirst
+from django.utils.translation import gettext, ngettext
+from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import person
+from rehab.people.changes import changes_of
 from rehab.people.roles import Right, Role, rights_of
 from rehab.people.scope import ScopedModel, visible
 from rehab.people.tokens import TokenRow
@@ -75,6 +81,16 @@ class ScopedOptions(admin.options.BaseModelAdmin):
         return not isinstance(obj, ScopedModel) or owns(request.user, obj)
 
 
+class RowFormSet(forms.BaseInlineFormSet):
+    """Rows of a table inside a page: each field is named by its column, for who cannot see it."""
+
+    def add_fields(self, form: Any, index: int | None) -> None:
+        """Name the fields."""
+        super().add_fields(form, index)
+        for field in form.fields.values():
+            field.widget.attrs["aria-label"] = field.label
+
+
 class ClinicForm(forms.ModelForm):
     """A form whose row belongs to a clinic that nobody chooses."""
 
@@ -95,6 +111,9 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
 
     form = ClinicForm
     list_per_page = 50
+    show_facets = admin.ShowFacets.NEVER
+    row_actions: tuple[str, ...] = ()  # actions that a row's own page offers as well
+    for_viewers: tuple[str, ...] = ()  # those of them that alter nothing of the row
 
     def has_module_permission(self, request: HttpRequest) -> bool:
         """Whether the model is on the front page."""
@@ -112,12 +131,84 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
         form: Any = super().get_form(request, obj, change=change, **kwargs)
         return type(form)(form.__name__, (form,), {"new_clinic_id": person(request).clinic_id})
 
+    def changelist_view(self, request: HttpRequest, extra_context: Any = None) -> HttpResponse:
+        """Show the list under what it is a list of."""
+        title = capfirst(self.opts.verbose_name_plural)
+        return super().changelist_view(request, {"title": title} | (extra_context or {}))
+
+    def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
+        """Give addresses and words of where one may want to go from a row's page."""
+        return []
+
+    def render_change_form(
+        self, request: HttpRequest, context: dict[str, Any], *args: Any, **kwargs: Any
+    ) -> HttpResponse:
+        """Show the page, with ways to elsewhere and what can be done on top."""
+        row = context.get("original")
+        if row is not None:
+            actions = self.get_actions(request)
+            if not self._may(request, Right.CHANGE, row):
+                actions = {name: actions[name] for name in actions if name in self.for_viewers}
+            context["row_links"] = self.get_row_links(request, row)
+            context["row_actions"] = [
+                (name, found[2]) for name in self.row_actions if (found := actions.get(name))
+            ]
+        return super().render_change_form(request, context, *args, **kwargs)
+
+    def response_action(
+        self, request: HttpRequest, queryset: QuerySet[Any], *args: Any
+    ) -> HttpResponse | None:
+        """Do it; what was asked for on a row's own page leads back there."""
+        response = super().response_action(request, queryset, *args)
+        key = request.POST.get("stay", "")
+        if key.isdecimal() and getattr(response, "url", "") == request.get_full_path():
+            meta = self.opts
+            return redirect(f"admin:{meta.app_label}_{meta.model_name}_change", int(key))
+        return response
+
+    def get_deleted_objects(self, objs: Any, request: HttpRequest) -> Any:
+        """Give what goes too, and what stays behind without it."""
+        gone, *others = super().get_deleted_objects(objs, request)
+        keys = [row.pk for row in objs]
+        for relation in self.model._meta.related_objects:
+            left = relation.related_model
+            if relation.on_delete is not models.SET_NULL or not issubclass(left, ScopedModel):
+                continue
+            rows = left.objects.visible_to(request.user)
+            if count := rows.filter(**{f"{relation.field.name}__in": keys}).count():
+                words = gettext("Stays, without its %(what)s: %(things)s (%(count)s)")
+                named = {
+                    "what": relation.field.verbose_name,
+                    "things": left._meta.verbose_name_plural,
+                    "count": count,
+                }
+                gone.append(words % named)
+        return (gone, *others)
+
+    def history_view(
+        self, request: HttpRequest, object_id: str, extra_context: Any = None
+    ) -> HttpResponse:
+        """Tell who changed what of a row, to those who may see the row."""
+        row = self.get_object(request, object_id)
+        if row is None or not self.has_view_permission(request, row):
+            raise Http404
+        parts = [inline.model for inline in self.get_inline_instances(request, row)]
+        context = {
+            **self.admin_site.each_context(request),
+            "title": gettext("Changes: %(row)s") % {"row": row},
+            "object": row,
+            "opts": self.opts,
+            "module_name": capfirst(self.opts.verbose_name_plural),
+            "changes": changes_of(request.user, row, parts),
+        }
+        return TemplateResponse(request, "people/changes.html", context)
+
 
 class TokenAdmin(ScopedAdmin):
     """Pages of rows that are known by a token. It is shown once, when it is made."""
 
-    readonly_fields = ("created_at", "last_seen_at", "revoked_at")
-    actions = ("renew_tokens", "revoke_tokens")
+    readonly_fields: ClassVar[tuple[str, ...]] = ("created_at", "last_seen_at", "revoked_at")
+    actions = row_actions = ("renew_tokens", "revoke_tokens")
 
     def save_model(self, request: HttpRequest, obj: Any, form: Any, change: bool) -> None:
         """Save the row; a new one gets its token, shown this one time."""
@@ -126,7 +217,7 @@ class TokenAdmin(ScopedAdmin):
         if token:
             self._show(request, obj, token)
 
-    @admin.action(description="Give new tokens (old ones stop at once)", permissions=["change"])
+    @admin.action(description=_("Give new tokens (old ones stop at once)"), permissions=["change"])
     def renew_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:
         """Replace the tokens of the chosen rows."""
         for holder in holders:
@@ -135,14 +226,19 @@ class TokenAdmin(ScopedAdmin):
             holder.save()
             self._show(request, holder, token)
 
-    @admin.action(description="Revoke tokens", permissions=["change"])
+    @admin.action(description=_("Revoke tokens"), permissions=["change"])
     def revoke_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:
         """Close the door to the chosen rows."""
-        count = holders.filter(revoked_at__isnull=True).update(revoked_at=timezone.now())
-        messages.success(request, f"{count} token(s) revoked.")
+        open_ones = list(holders.filter(revoked_at__isnull=True))
+        for holder in open_ones:  # one by one: it is kept who did it
+            holder.revoked_at = timezone.now()
+            holder.save(update_fields=["revoked_at"])
+        said = ngettext("%(count)d token revoked.", "%(count)d tokens revoked.", len(open_ones))
+        messages.success(request, said % {"count": len(open_ones)})
 
     def _show(self, request: HttpRequest, holder: TokenRow, token: str) -> None:
-        messages.warning(request, f"Token of {holder}, shown this one time only: {token}")
+        said = gettext("Token of %(holder)s, shown this one time only: %(token)s")
+        messages.warning(request, said % {"holder": holder, "token": token})
 
 
 class ReadOnlyAdmin(ScopedAdmin):

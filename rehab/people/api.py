@@ -148,7 +148,7 @@ def store(patient: Patient, values: dict[str, Any]) -> Patient:
 
 
 @router.get("/me", response=answers(Me))
-@for_roles(*Role)
+@for_roles(*Role, patients=False)
 def show_me(request: HttpRequest) -> User:
     """Say whom the token or the browser speaks for."""
     return caller(request)

@@ -101,12 +101,13 @@ def check_roles(call: Callable[..., Any]) -> Callable[..., Any]:
             f"The call {call!r} does not declare who may make it. Put @for_roles(…) from "
             "rehab.people.access under its route."
         )
-    allowed = " or ".join(role.label for role in Role if role in roles)
+    allowed = " or ".join(str(role.label) for role in Role if role in roles)
 
     @wraps(call)
     def checked(request: HttpRequest, **values: Any) -> Any:
         if caller(request).role not in roles:
             raise HttpError(403, f"This call is for other roles: {allowed}.")
+        request.call = call  # type: ignore[attr-defined]  # for the audit log
         return call(request, **values)
 
     return checked

@@ -11,6 +11,7 @@ from django.conf import settings
 from django.db import models, transaction
 from django.db.models import Q
 from django.utils.crypto import salted_hmac
+from django.utils.translation import gettext_lazy as _
 
 from rehab.people.codes import RECOVERY_CODES, digest_of, new_recovery_code, step_of
 from rehab.people.models import User
@@ -24,8 +25,8 @@ class Authenticator(ScopedModel):
     class Kind(models.TextChoices):
         """What it is."""
 
-        APP = "app", "Authenticator app"
-        PASSKEY = "passkey", "Passkey"
+        APP = "app", _("Authenticator app")
+        PASSKEY = "passkey", _("Passkey")
 
     scope = Scope(clinic="user__clinic")
 
@@ -101,7 +102,7 @@ def add_app(user: User, secret: str, code: str, now: datetime) -> list[str] | No
     if step is None:
         return None
     kind = Authenticator.Kind.APP
-    return add(user, kind, kind.label, _vault().encrypt(secret.encode()).decode(), step)
+    return add(user, kind, str(kind.label), _vault().encrypt(secret.encode()).decode(), step)
 
 
 def remove(user: User, authenticator_id: int) -> bool:

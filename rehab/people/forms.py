@@ -9,14 +9,15 @@ from django.contrib.auth import authenticate
 from django.contrib.auth.forms import AuthenticationForm, PasswordChangeForm
 from django.core.exceptions import ValidationError
 from django.http import HttpRequest
+from django.utils.translation import gettext_lazy as _
 
 from rehab.people import lockout
 from rehab.people.models import User
 
-WRONG = "Name and password do not fit. Look at capitals, and try again."
-WRONG_PASSWORD = "That is not your password."  # noqa: S105
-WRONG_FIRST_CODE = "This code does not fit. Look at the app again."
-WRONG_CODE = "This code does not fit, or was used. Wait for the next one, and try again."
+WRONG = _("Name and password do not fit. Look at capitals, and try again.")
+WRONG_PASSWORD = _("That is not your password.")
+WRONG_FIRST_CODE = _("This code does not fit. Look at the app again.")
+WRONG_CODE = _("This code does not fit, or was used. Wait for the next one, and try again.")
 
 
 class SignInForm(AuthenticationForm):
@@ -47,7 +48,7 @@ class CodeField(forms.CharField):
 class CodeForm(forms.Form):
     """The code that takes somebody the second half of the way."""
 
-    code = CodeField(label="Code")
+    code = CodeField(label=_("Code"))
 
     def __init__(self, request: HttpRequest, user: User, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -66,14 +67,14 @@ class CodeForm(forms.Form):
 class AppForm(forms.Form):
     """The first code of an app that has just read the secret."""
 
-    code = CodeField(label="Code that the app shows")
+    code = CodeField(label=_("Code that the app shows"))
 
 
 class OwnPasswordForm(forms.Form):
     """The own password, asked for again before something that a passer-by must not do."""
 
     password = forms.CharField(
-        label="Your password",
+        label=_("Your password"),
         strip=False,
         widget=forms.PasswordInput(attrs={"autocomplete": "current-password"}),
     )
@@ -106,3 +107,15 @@ def check_own_password(request: HttpRequest, user: User, password: str) -> str:
         wait = lockout.wait_of(request, username=user.username)
         raise ValidationError(wait or WRONG_PASSWORD)
     return password
+
+
+class ConsentTextForm(forms.Form):
+    """The words that patients agree to."""
+
+    text = forms.CharField(
+        label=_("Words"), max_length=10_000, widget=forms.Textarea(attrs={"rows": 18})
+    )
+
+    def clean_text(self) -> str:
+        """Keep line ends as everybody else writes them."""
+        return str(self.cleaned_data["text"]).replace("\r\n", "\n")

@@ -17,6 +17,7 @@ from django.conf import settings
 from django.db.models import Max
 from django.http import HttpRequest, HttpResponse
 from django.utils import timezone
+from django.utils.translation import ngettext
 
 from rehab.people.models import User
 
@@ -26,14 +27,20 @@ Credentials = Mapping[str, Any] | None
 
 
 def client_address(request: HttpRequest) -> str:
-    """Give the address that a request comes from, as the outermost of our own proxies saw it.
+    """Give the address that a request comes from."""
+    return find_address(
+        request.META.get("HTTP_X_FORWARDED_FOR", ""), request.META.get("REMOTE_ADDR", "")
+    )
+
+
+def find_address(forwarded: str, remote: str) -> str:
+    """Give the address of a client, as the outermost of our own proxies saw it.
 
     What stands further left in X-Forwarded-For was written by the client and is not believed.
     Of an IPv6 address the network counts: whoever has one has 2^64 of them.
     """
-    forwarded = request.META.get("HTTP_X_FORWARDED_FOR", "")
     seen = [word.strip() for word in forwarded.split(",") if word.strip()]
-    seen.append(request.META.get("REMOTE_ADDR", ""))
+    seen.append(remote)
     try:
         address = ip_address(seen[max(0, len(seen) - 1 - settings.PROXIES)])
     except ValueError:
@@ -73,8 +80,12 @@ def wait_of(request: HttpRequest, **credentials: str) -> str:
     last = tries.aggregate(last=Max("attempt_time"))["last"] or timezone.now()
     left_s = (last + settings.AXES_COOLOFF_TIME - timezone.now()).total_seconds()
     minutes = max(1, -int(-left_s // 60))
-    wait = "a minute" if minutes == 1 else f"{minutes} minutes"
-    return f"Too many wrong tries. Try again in {wait}, or ask your clinic’s lead to unlock you."
+    return ngettext(
+        "Too many wrong tries. Try again in a minute, or ask your clinic’s lead to unlock you.",
+        "Too many wrong tries. Try again in %(minutes)d minutes, or ask your clinic’s lead to "
+        "unlock you.",
+        minutes,
+    ) % {"minutes": minutes}
 
 
 def forgive(user: User) -> None:

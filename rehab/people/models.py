@@ -6,20 +6,22 @@ import secrets
 from typing import Any, ClassVar
 from zoneinfo import available_timezones
 
+from django.conf import settings
 from django.contrib.auth.base_user import BaseUserManager
 from django.contrib.auth.models import AbstractUser, UserManager
 from django.core.exceptions import ValidationError
 from django.core.validators import MaxValueValidator, MinValueValidator
 from django.db import models
 from django.db.models import Q
+from django.utils.translation import gettext_lazy as _
 
 from rehab.people.aliases import draw_alias
 from rehab.people.roles import Role
 from rehab.people.scope import ClinicRow, Scope, ScopedManager, ScopedModel
 from rehab.training.steps import Side
 
-SIDES = [(Side.LEFT.value, "Left"), (Side.RIGHT.value, "Right")]
-LANGUAGES = [("en", "English"), ("es", "Español")]
+SIDES = [(Side.LEFT.value, _("Left")), (Side.RIGHT.value, _("Right"))]
+LANGUAGES = settings.LANGUAGES
 # Neither 0 and O nor 1, I and L: read aloud and typed without doubt.
 UNAMBIGUOUS = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
 
@@ -27,7 +29,10 @@ UNAMBIGUOUS = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
 def check_time_zone(name: str) -> None:
     """Refuse a name that is no time zone."""
     if name not in available_timezones():
-        raise ValidationError(f"{name!r} is no time zone. Give a name such as Europe/Madrid.")
+        raise ValidationError(
+            _("“%(name)s” is no time zone. Give a name such as Europe/Madrid."),
+            params={"name": name},
+        )
 
 
 class Clinic(ScopedModel):
@@ -35,24 +40,55 @@ class Clinic(ScopedModel):
 
     scope = Scope(clinic="pk", host=Q())
 
-    name = models.CharField(max_length=100, unique=True)
-    time_zone = models.CharField(max_length=64, default="UTC", validators=[check_time_zone])
-    language = models.CharField(max_length=8, choices=LANGUAGES, default="en")
+    name = models.CharField(_("name"), max_length=100, unique=True)
+    time_zone = models.CharField(
+        _("time zone"), max_length=64, default="UTC", validators=[check_time_zone]
+    )
+    language = models.CharField(_("language"), max_length=8, choices=LANGUAGES, default="en")
     boards_across = models.BooleanField(
-        "boards across clinics",
+        _("boards across clinics"),
         default=False,
-        help_text="Patients who agree may stand, by their animal names, on boards with patients "
-        "of other clinics.",
+        help_text=_(
+            "Patients who agree may stand, by their animal names, on boards with patients "
+            "of other clinics."
+        ),
     )
     second_factor_required = models.BooleanField(
-        "second factor required",
+        _("second factor required"),
         default=False,
-        help_text="Everybody who works here signs in with an app or a passkey besides the "
-        "password. Whoever has none is led to set one up first; you as well.",
+        help_text=_(
+            "Everybody who works here signs in with an app or a passkey besides the "
+            "password. Whoever has none is led to set one up first; you as well."
+        ),
     )
-    created_at = models.DateTimeField(auto_now_add=True)
+    research_needs_consent = models.BooleanField(
+        _("research needs consent"),
+        default=True,
+        help_text=_(
+            "Researchers see the sessions of those patients only who have agreed to research."
+        ),
+    )
+    keep_months = models.PositiveSmallIntegerField(
+        _("keep patients (months)"),
+        null=True,
+        blank=True,
+        validators=[MinValueValidator(1), MaxValueValidator(1200)],
+        help_text=_(
+            "So long after the last session a patient's name, code and all that leads to the "
+            "person are erased for good. Empty: never."
+        ),
+    )
+    keep_log_months = models.PositiveSmallIntegerField(
+        _("keep the logs (months)"),
+        default=36,
+        validators=[MinValueValidator(12), MaxValueValidator(1200)],
+        help_text=_("How long it is kept who looked at, changed and took out what."),
+    )
+    created_at = models.DateTimeField(_("created at"), auto_now_add=True)
 
     class Meta(ScopedModel.Meta):
+        verbose_name = _("clinic")
+        verbose_name_plural = _("clinics")
         ordering: ClassVar = ["name"]
 
     def __str__(self) -> str:
@@ -84,9 +120,22 @@ class User(AbstractUser):
     scope: ClassVar[Scope] = Scope(clinic="clinic", host=Q())
 
     clinic = models.ForeignKey(
-        Clinic, on_delete=models.PROTECT, related_name="users", null=True, blank=True
+        Clinic,
+        on_delete=models.PROTECT,
+        related_name="users",
+        null=True,
+        blank=True,
+        verbose_name=_("clinic"),
     )
-    role = models.CharField(max_length=16, choices=Role.choices)
+    role = models.CharField(_("role"), max_length=16, choices=Role.choices)
+    language = models.CharField(
+        _("language"),
+        max_length=8,
+        choices=LANGUAGES,
+        blank=True,
+        help_text=_("Of the pages that this account opens; empty: the clinic's."),
+    )
+    program = ""  # the name of the API token, where one speaks for this person
 
     everywhere = AccountManager()
     objects: ClassVar[VisibleAccounts] = VisibleAccounts()  # type: ignore[assignment]
@@ -100,7 +149,7 @@ class User(AbstractUser):
                 condition=Q(role=Role.HOST, clinic__isnull=True)
                 | (~Q(role=Role.HOST) & Q(clinic__isnull=False)),
                 name="user_clinic_fits_role",
-                violation_error_message="A host has no clinic; every other role needs one.",
+                violation_error_message=_("A host has no clinic; every other role needs one."),
             ),
             models.CheckConstraint(condition=Q(role__in=Role.values), name="user_role_is_known"),
         ]
@@ -128,18 +177,44 @@ def new_pseudonym() -> str:
 class ScreenSide(models.TextChoices):
     """Where the patient's page has the thermometer; for neglect and lost fields of vision."""
 
-    RIGHT = "right", "on the right (usual)"
-    LEFT = "left", "on the left"
-    CENTER = "center", "all of it in the middle, smaller"
+    RIGHT = "right", _("on the right (usual)")
+    LEFT = "left", _("on the left")
+    CENTER = "center", _("all of it in the middle, smaller")
+
+
+class ScreenText(models.TextChoices):
+    """How large the patient's page writes."""
+
+    NORMAL = "normal", _("normal")
+    LARGE = "large", _("large")
+    LARGEST = "largest", _("largest")
 
 
 class Boards(models.TextChoices):
     """Which leaderboards a patient has agreed to stand on; each includes those before it."""
 
-    OWN = "own", "None: sees own sessions only"
-    TOTAL = "total", "Counts in totals, stands in no row"
-    CLINIC = "clinic", "Boards of this clinic"
-    ACROSS = "across", "Boards of this clinic and across clinics"
+    OWN = "own", _("None: sees own sessions only")
+    TOTAL = "total", _("Counts in totals, stands in no row")
+    CLINIC = "clinic", _("Boards of this clinic")
+    ACROSS = "across", _("Boards of this clinic and across clinics")
+
+
+class Ending(models.TextChoices):
+    """Why a patient's program has ended."""
+
+    DONE = "done", _("The program is complete")
+    WISH = "wish", _("The patient wishes to stop")
+    HEALTH = "health", _("Health")
+    MOVED = "moved", _("Goes on elsewhere")
+    OTHER = "other", _("Another reason")
+
+
+class Erasing(models.TextChoices):
+    """Why all that leads to a patient was erased."""
+
+    ASKED = "asked", _("The patient asks for it")
+    MISTAKE = "mistake", _("Was entered by mistake")
+    RETENTION = "retention", _("Kept long enough")
 
 
 class Patient(ClinicRow):
@@ -147,57 +222,78 @@ class Patient(ClinicRow):
 
     scope = Scope(clinic="clinic")
 
-    clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="patients")
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.PROTECT, related_name="patients", verbose_name=_("clinic")
+    )
     code = models.CharField(
-        max_length=32, help_text="The clinic's own number for this patient, never a name."
+        _("code"),
+        max_length=32,
+        help_text=_("The clinic's own number for this patient, never a name."),
     )
     nickname = models.CharField(
-        max_length=32, help_text="What the screens say, so that patient and therapist can check."
+        _("nickname"),
+        max_length=32,
+        help_text=_("What the screens say, so that patient and therapist can check."),
     )
     pseudonym = models.CharField(max_length=16, unique=True, default=new_pseudonym, editable=False)
     body_mass_kg = models.FloatField(
-        "body mass (kg)",
+        _("body mass (kg)"),
         null=True,
         blank=True,
         validators=[MinValueValidator(10), MaxValueValidator(300)],
-        help_text="Needed when sensors send raw signals: A2 is power per kilogram.",
+        help_text=_("Needed when sensors send raw signals: A2 is power per kilogram."),
     )
-    paretic_side = models.CharField(max_length=8, choices=SIDES, blank=True)
-    language = models.CharField(max_length=8, choices=LANGUAGES, default="en")
+    paretic_side = models.CharField(_("paretic side"), max_length=8, choices=SIDES, blank=True)
+    language = models.CharField(_("language"), max_length=8, choices=LANGUAGES, default="en")
     screen_side = models.CharField(
-        "thermometer", max_length=8, choices=ScreenSide.choices, default=ScreenSide.RIGHT
+        _("thermometer"), max_length=8, choices=ScreenSide.choices, default=ScreenSide.RIGHT
+    )
+    screen_text = models.CharField(
+        _("size of words"), max_length=8, choices=ScreenText.choices, default=ScreenText.NORMAL
     )
     screen_still = models.BooleanField(
-        "calm page", default=False, help_text="No confetti, and nothing moves but the level."
+        _("calm page"), default=False, help_text=_("No confetti, and nothing moves but the level.")
     )
     screen_sounds = models.BooleanField(
-        "sounds",
+        _("sounds"),
         default=False,
-        help_text="A soft tone a step, the higher the better; a second one for points. "
-        "The patient can mute it on the page.",
+        help_text=_(
+            "A soft tone a step, the higher the better; a second one for points. "
+            "The patient can mute it on the page."
+        ),
     )
     boards = models.CharField(
-        "leaderboards",
+        _("leaderboards"),
         max_length=8,
         choices=Boards.choices,
         default=Boards.OWN,
-        help_text="What the patient has agreed to. Taken back, it takes effect at once.",
+        help_text=_("What the patient has agreed to. Taken back, it takes effect at once."),
     )
     alias = models.CharField(
-        "animal name", max_length=32, unique=True, null=True, blank=True, editable=False
+        _("animal name"), max_length=32, unique=True, null=True, blank=True, editable=False
     )
     blinded = models.BooleanField(
-        "in a blinded study",
+        _("in a blinded study"),
         default=False,
-        help_text="No leaderboards and no scores: the patient sees none and stands on none.",
+        help_text=_("No leaderboards and no scores: the patient sees none and stands on none."),
     )
-    simulated = models.BooleanField(default=False, editable=False)
+    simulated = models.BooleanField(_("simulated"), default=False, editable=False)
     original_id = models.BigIntegerField(
-        null=True, editable=False, help_text="The participant of the original GARRY's database."
+        null=True, editable=False, help_text=_("The participant of the original GARRY's database.")
     )
-    created_at = models.DateTimeField(auto_now_add=True)
+    created_at = models.DateTimeField(_("created at"), auto_now_add=True)
+    ended_at = models.DateTimeField(_("program ended"), null=True, editable=False)
+    ended_because = models.CharField(
+        _("why it ended"), max_length=8, choices=Ending.choices, blank=True, editable=False
+    )
+    erased_at = models.DateTimeField(_("erased"), null=True, editable=False)
+    erased_because = models.CharField(
+        _("why it was erased"), max_length=9, choices=Erasing.choices, blank=True, editable=False
+    )
 
     class Meta(ClinicRow.Meta):
+        verbose_name = _("patient")
+        verbose_name_plural = _("patients")
         ordering: ClassVar = ["nickname", "code"]
         constraints: ClassVar = [
             models.UniqueConstraint(fields=["clinic", "code"], name="patient_code_once_per_clinic"),
@@ -216,6 +312,23 @@ class Patient(ClinicRow):
             if kwargs.get("update_fields") is not None:
                 kwargs["update_fields"] = {*kwargs["update_fields"], "alias"}
         super().save(*args, **kwargs)
+
+    def clean(self) -> None:
+        """Refuse boards with others before the patient agreed to them, and to bring anyone back."""
+        if self.erased_at is not None:
+            raise ValidationError(_("This person is erased. Take a new patient in."))
+        if self.boards == Boards.OWN or self.simulated:
+            return
+        agreed = self.pk and self.consents.filter(purpose="boards", withdrawn_at=None).exists()
+        if not agreed:
+            raise ValidationError(
+                {
+                    "boards": _(
+                        "Boards with others need the patient's consent to boards. Note it on the "
+                        "patient's consent page first."
+                    )
+                }
+            )
 
     def draw_alias(self) -> None:
         """Give the patient another animal name, one that nobody on this server has."""

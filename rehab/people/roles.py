@@ -5,15 +5,16 @@ from __future__ import annotations
 from enum import Flag, auto
 
 from django.db.models import TextChoices
+from django.utils.translation import gettext_lazy as _
 
 
 class Role(TextChoices):
     """What a person is to GARRY. A device is no person: see `stations.models.Device`."""
 
-    HOST = "host", "Host"
-    LEAD = "lead", "Clinic lead"
-    PT = "pt", "Physical therapist"
-    RESEARCHER = "researcher", "Researcher"
+    HOST = "host", _("Host")
+    LEAD = "lead", _("Clinic lead")
+    PT = "pt", _("Physical therapist")
+    RESEARCHER = "researcher", _("Researcher")
 
 
 class Right(Flag):
@@ -38,9 +39,15 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Authenticator": {},
     "RecoveryCode": {},
     "Patient": {Role.LEAD: Right.EDIT, Role.PT: Right.EDIT},
+    "Consent": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
+    "ConsentText": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
+    "AuditEntry": {Role.LEAD: Right.VIEW},
+    "HistoryEntry": dict.fromkeys(Role, Right.VIEW),
     "Station": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
-    "Device": {Role.LEAD: Right.EDIT, Role.PT: Right.VIEW},
+    "Device": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
     "Pairing": {},
+    "LeaveTries": {},
+    "Visit": {Role.LEAD: Right.ALL, Role.PT: Right.ALL},
     "Measure": {
         Role.HOST: Right.EDIT,
         Role.LEAD: Right.EDIT,
@@ -59,6 +66,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
         Role.PT: Right.ALL,
         Role.RESEARCHER: Right.VIEW,
     },
+    "Preset": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "Gesture": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "GestureStep": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "FeedbackType": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
@@ -71,6 +79,11 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Step": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "SessionEvent": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "SessionMetric": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
+    "SessionCorrection": {
+        Role.LEAD: Right.VIEW | Right.ADD,
+        Role.PT: Right.VIEW | Right.ADD,
+        Role.RESEARCHER: Right.VIEW,
+    },
     "Leaderboard": {
         Role.HOST: Right.ALL,
         Role.LEAD: Right.ALL,

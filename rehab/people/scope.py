@@ -35,8 +35,8 @@ class Scope:
 
     ``clinic`` is the lookup that leads to the clinic; ``station`` the one to the station, for
     models that a device may see; ``shared`` says that rows without a clinic belong to all;
-    ``host`` narrows what a host sees (None: nothing); ``own`` narrows what a role sees of its
-    own clinic.
+    ``host`` narrows what a host sees (None: nothing); ``narrow`` what a role sees of its own
+    clinic.
     """
 
     clinic: str
@@ -48,6 +48,10 @@ class Scope:
         """Give the rows that a member of this clinic may see."""
         mine = Q(**{self.clinic: clinic_id})
         return mine | Q(**{f"{self.clinic}__isnull": True}) if self.shared else mine
+
+    def narrow(self, role: Role) -> Q:
+        """Give what else must hold for a member with this role. Usually nothing."""
+        return Q()
 
 
 def visible(model: type[models.Model], actor: Any) -> Q | None:
@@ -72,7 +76,9 @@ def _visible_to_user(scope: Scope, user: User, noun: str) -> Q | None:
         return None
     if user.role == Role.HOST:
         return scope.host
-    return scope.of_clinic(user.clinic_id) if user.clinic_id else None
+    if not user.clinic_id:
+        return None
+    return scope.of_clinic(user.clinic_id) & scope.narrow(Role(user.role))
 
 
 def _visible_to_device(scope: Scope, device: Any) -> Q | None:
@@ -84,6 +90,8 @@ def _visible_to_device(scope: Scope, device: Any) -> Q | None:
 class ScopedManager(models.Manager[M]):
     """Gives rows only once it is told for whose eyes: `Patient.objects.visible_to(user)`."""
 
+    rows: type[QuerySet[Any]] = QuerySet
+
     def get_queryset(self) -> NoReturn:
         """Refuse: a query must say who will see its rows."""
         name = self.model.__name__
@@ -94,7 +102,7 @@ class ScopedManager(models.Manager[M]):
 
     def visible_to(self, actor: Any) -> QuerySet[M]:
         """Give the rows that this actor may see."""
-        rows: QuerySet[M] = QuerySet(self.model, using=self._db)
+        rows: QuerySet[M] = self.rows(self.model, using=self._db)
         condition = visible(self.model, actor)
         return rows.none() if condition is None else rows.filter(condition)
 

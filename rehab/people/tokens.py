@@ -10,6 +10,7 @@ from typing import Any, ClassVar, TypeVar
 from django.core.exceptions import ValidationError
 from django.db import models
 from django.utils import timezone
+from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role, may_lend
@@ -29,9 +30,9 @@ class TokenRow(ClinicRow):
     """A row that is known by its token, until that is renewed or revoked."""
 
     token_hash = models.CharField(max_length=64, unique=True, editable=False)
-    created_at = models.DateTimeField(auto_now_add=True)
-    last_seen_at = models.DateTimeField(null=True, blank=True, editable=False)
-    revoked_at = models.DateTimeField(null=True, blank=True, editable=False)
+    created_at = models.DateTimeField(_("created at"), auto_now_add=True)
+    last_seen_at = models.DateTimeField(_("last seen at"), null=True, blank=True, editable=False)
+    revoked_at = models.DateTimeField(_("revoked at"), null=True, blank=True, editable=False)
 
     class Meta(ClinicRow.Meta):
         abstract = True
@@ -57,7 +58,7 @@ T = TypeVar("T", bound=TokenRow)
 def find_holder(model: type[T], token: str) -> T | None:
     """Give the row that this token belongs to; None for an unknown or revoked one."""
     held = model.everywhere.filter(token_hash=hash_token(token), revoked_at__isnull=True)
-    holder: T | None = held.first()
+    holder: T | None = held.select_related("clinic").first()  # whose language its pages have
     if holder is not None:
         now = timezone.now()
         if holder.last_seen_at is None or now - holder.last_seen_at > SEEN_EVERY:
@@ -70,24 +71,30 @@ class ApiToken(TokenRow):
 
     scope = Scope(clinic="clinic")
 
-    clinic = models.ForeignKey(Clinic, on_delete=models.CASCADE, related_name="api_tokens")
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.CASCADE, related_name="api_tokens", verbose_name=_("clinic")
+    )
     user = models.ForeignKey(
         User,
         on_delete=models.CASCADE,
         related_name="api_tokens",
-        verbose_name="account",
-        help_text="What the program does is noted as done by this account.",
+        verbose_name=_("account"),
+        help_text=_("What the program does is noted as done by this account."),
     )
-    name = models.CharField(max_length=64, help_text="What the token is for.")
+    name = models.CharField(_("name"), max_length=64, help_text=_("What the token is for."))
     role = models.CharField(
+        _("role"),
         max_length=16,
         choices=[choice for choice in Role.choices if choice[0] != Role.HOST],
-        help_text="The account's own role, or one that sees less: a researcher's token never "
-        "reads a nickname or code.",
+        help_text=_(
+            "The account's own role, or one that sees less: a researcher's token never "
+            "reads a nickname or code."
+        ),
     )
 
     class Meta(TokenRow.Meta):
-        verbose_name = "API token"
+        verbose_name = _("API token")
+        verbose_name_plural = _("API tokens")
         ordering: ClassVar = ["name"]
 
     def __str__(self) -> str:
@@ -98,7 +105,10 @@ class ApiToken(TokenRow):
         user: Any = getattr(self, "user", None)
         if user is not None and not may_lend(user.role, self.role):
             raise ValidationError(
-                {"role": f"{user} is {user.get_role_display()}: choose that role, or one below."}
+                {
+                    "role": _("%(user)s is %(role)s: choose that role, or one below.")
+                    % {"user": user, "role": user.get_role_display()}
+                }
             )
 
 
@@ -115,5 +125,5 @@ def find_caller(token: str) -> User | None:
     is_alive = user.is_active and user.clinic_id == holder.clinic_id
     if not is_alive or not may_lend(user.role, holder.role):
         return None
-    user.role = holder.role
+    user.role, user.program = holder.role, holder.name
     return user

@@ -2,19 +2,23 @@
 
 from django.urls import path
 
-from rehab.people.views import account, home, second_factor, sign_in
+from rehab.people.views import account, consent, home, language, second_factor, sign_in
 
 urlpatterns = [
     path("", home.home, name="home"),
     path("healthz", home.healthz, name="healthz"),
+    path("js/<str:language>/catalog.js", language.show_catalog, name="catalog"),
     path("sign-in/", sign_in.sign_in, name="sign-in"),
     path("sign-in/code/", sign_in.prove, name="second-factor"),
     path("sign-out/", sign_in.sign_out, name="sign-out"),
     path("account/", account.show_account, name="account"),
+    path("account/language/", language.choose_language, name="own-language"),
     path("account/password/", account.change_password, name="own-password"),
     path("account/second-factor/", second_factor.choose, name="set-up-second-factor"),
     path("account/second-factor/app/", second_factor.add_app, name="add-app"),
     path("account/second-factor/passkey/", second_factor.add_passkey, name="add-passkey"),
     path("account/second-factor/remove/", second_factor.remove, name="remove-authenticator"),
+    path("patients/<int:patient_id>/consent/", consent.show_consent, name="consent"),
+    path("consent/words/", consent.write_words, name="consent-text"),
     path("account/recovery-codes/", second_factor.renew_codes, name="recovery-codes"),
 ]

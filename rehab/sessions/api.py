@@ -63,14 +63,14 @@ def find_session(user: User, session_id: int) -> TrainingSession:
 
 
 @router.get("/protocols", response=answers(Page[Choice]))
-@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
+@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
 def list_protocols(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
     """List the protocols that a session may follow."""
     return cut(Protocol.objects.visible_to(caller(request)).order_by("pk"), wanted)
 
 
 @router.get("/stations", response=answers(Page[Choice]))
-@for_roles(Role.LEAD, Role.PT)
+@for_roles(Role.LEAD, Role.PT, patients=False)
 def list_stations(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
     """List the stations where a session may be."""
     return cut(Station.objects.visible_to(caller(request)).order_by("pk"), wanted)

@@ -29,6 +29,12 @@ def list_gestures(by: User) -> list[tuple[str, Any]]:
     ]
 
 
+def name_gestures(by: User) -> set[str]:
+    """Give every choice that can be made, without its words."""
+    composed = Gesture.objects.visible_to(by).values_list("name", flat=True)
+    return {USUAL, NOTHING, *GESTURES, *ORIGINALS, *composed}
+
+
 def to_cue(above: str, below: str, valence: str, patient: Patient) -> Cue:
     """Give the cue for two choices, by what is usual in the patient's clinic."""
     usual = valences_of(patient.clinic_id)[valence].cue

@@ -1,10 +1,14 @@
-"""Rows that every database begins with: the measure A2 and the protocols that all may use."""
+"""Rows that every database begins with: the measure A2 and the protocols that all may use.
+
+They are stored in English, and each page says them in its language.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 from django.db import transaction
+from django.utils.translation import gettext_noop
 
 from rehab.training.measures import A2
 from rehab.training.phases import Phase, make_phase
@@ -18,31 +22,40 @@ def _catch(strides: int = 12) -> Phase:
 # then ever longer blocks shown at 85 % with catch blocks between them, ten minutes of washout.
 LAB_PROTOCOL: tuple[Phase, ...] = (
     make_phase("baseline", strides=54),
-    make_phase("training", "Training 100 %", seconds=57),
+    make_phase("training", gettext_noop("Training 100 %"), seconds=57),
     *(
         phase
         for seconds in (57, 117, 117, 179, 239, 179)
-        for phase in (_catch(), make_phase("training", "Training 85 %", gain=0.85, seconds=seconds))
+        for phase in (
+            _catch(),
+            make_phase("training", gettext_noop("Training 85 %"), gain=0.85, seconds=seconds),
+        )
     ),
     make_phase("washout", seconds=605),
 )
 
 PROTOCOLS: dict[str, tuple[str, tuple[Phase, ...]]] = {
-    "Training only": (
-        "Feedback from the first step until the therapist ends the session. Needs a goal value.",
+    gettext_noop("Training only"): (
+        gettext_noop(
+            "Feedback from the first step until the therapist ends the session. Needs a goal value."
+        ),
         (make_phase("training"),),
     ),
-    "Baseline, training, washout": (
-        "A minute without feedback sets the goal; ten minutes of training; two minutes without.",
+    gettext_noop("Baseline, training, washout"): (
+        gettext_noop(
+            "A minute without feedback sets the goal; ten minutes of training; two minutes without."
+        ),
         (
             make_phase("baseline", strides=54),
             make_phase("training", seconds=600),
             make_phase("washout", seconds=120),
         ),
     ),
-    "Thirty minutes with catch blocks": (
-        "A laboratory protocol: the display shows 85 % of the real push, so that the goal asks for "
-        "118 % of the baseline; short blocks without feedback in between; a long washout.",
+    gettext_noop("Thirty minutes with catch blocks"): (
+        gettext_noop(
+            "A laboratory protocol: the display shows 85 % of the real push, so that the goal asks "
+            "for 118 % of the baseline; short blocks without feedback in between; a long washout."
+        ),
         LAB_PROTOCOL,
     ),
 }

@@ -10,13 +10,19 @@ from typing import Any, ClassVar
 from django import forms
 from django.conf import settings
 from django.core.exceptions import ValidationError
+from django.db import transaction
 from django.db.models import QuerySet
+from django.utils import timezone
+from django.utils.text import capfirst
+from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
-from rehab.people.models import SIDES, Patient, User
+from rehab.people.consent import Purpose, give, join_boards
+from rehab.people.models import SIDES, Boards, Patient, User
 from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
 from rehab.sessions.models import Protocol, SessionEvent, TrainingSession
 from rehab.sessions.services import create_session
+from rehab.sessions.words import LEVELS, RECORDING, say_source
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
 from rehab.sources.synthetic import PROFILES
@@ -50,14 +56,36 @@ class PatientForm(forms.ModelForm):
         self._by = by
         self.fields["paretic_side"].required = True
         self.fields["nickname"].widget.attrs["autofocus"] = True
+        if self.instance.pk is None:
+            self.fields["agrees"] = forms.MultipleChoiceField(
+                label=_("What the patient agrees to"),
+                choices=Purpose.choices,
+                required=False,
+                widget=forms.CheckboxSelectMultiple,
+                help_text=_(
+                    "Read the clinic's words to the patient first. It can change any time."
+                ),
+            )
 
     def clean_code(self) -> str:
         """Refuse a code that is taken, and say by whom."""
         code: str = self.cleaned_data["code"]
         others = Patient.objects.visible_to(self._by).filter(code=code).exclude(pk=self.instance.pk)
         if (other := others.first()) is not None:
-            raise ValidationError(f"Code {code} already exists: it is {other.nickname}'s.")
+            said = _("Code %(code)s already exists: it is %(nickname)s's.")
+            raise ValidationError(said % {"code": code, "nickname": other.nickname})
         return code
+
+    def save(self, commit: bool = True) -> Patient:
+        """Store the patient, and what a new one agrees to."""
+        with transaction.atomic():
+            patient: Patient = super().save(commit)
+            for purpose in map(Purpose, self.cleaned_data.get("agrees", [])):
+                if purpose is Purpose.BOARDS:
+                    join_boards(patient, Boards.CLINIC, self._by, timezone.now())
+                else:
+                    give(patient, purpose, self._by, timezone.now())
+        return patient
 
 
 class ScreenForm(forms.ModelForm):
@@ -65,8 +93,8 @@ class ScreenForm(forms.ModelForm):
 
     class Meta:
         model = Patient
-        fields: ClassVar = ["screen_side", "screen_still", "screen_sounds"]
-        widgets: ClassVar = {"screen_side": forms.RadioSelect}
+        fields: ClassVar = ["screen_side", "screen_text", "screen_still", "screen_sounds"]
+        widgets: ClassVar = {"screen_side": forms.RadioSelect, "screen_text": forms.RadioSelect}
 
 
 def list_recordings() -> list[Path]:
@@ -76,10 +104,10 @@ def list_recordings() -> list[Path]:
 
 
 def list_sources() -> list[tuple[str, str]]:
-    """Give what steps can come from, with its words."""
+    """Give what steps can come from, with the words that a session keeps (`words.say_source`)."""
     simulated = [(f"synthetic {name}", f"Simulated patient, {name}") for name in PROFILES]
     recordings = [
-        (f"recording {file.name}", f"Recording {file.name}") for file in list_recordings()
+        (f"recording {file.name}", f"{RECORDING}{file.name}") for file in list_recordings()
     ]
     return [(LIVE, "Live sensor"), *simulated, *recordings]
 
@@ -95,8 +123,8 @@ class NumberField(forms.FloatField):
 class SessionForm(forms.Form):
     """Everything a session of one patient needs. Nothing has to be typed."""
 
-    valence = forms.ChoiceField(choices=[(v.slug, v.label) for v in VALENCES.values()])
-    goal_by = forms.ChoiceField(choices=[("value", A2.unit), ("percent", "% of baseline")])
+    valence = forms.ChoiceField(choices=[(v.slug, _(v.label)) for v in VALENCES.values()])
+    goal_by = forms.ChoiceField(choices=[("value", A2.unit), ("percent", _("% of baseline"))])
     goal_value = NumberField(min_value=0.05, max_value=A2.goal_max, required=False)
     goal_percent = NumberField(min_value=50, max_value=200, required=False)
     wanted_hits = forms.IntegerField(min_value=1, max_value=100, required=False)
@@ -110,7 +138,8 @@ class SessionForm(forms.Form):
     source = forms.ChoiceField(widget=forms.RadioSelect)
     trained_side = forms.ChoiceField(choices=SIDES, widget=forms.RadioSelect)
     robot = forms.ChoiceField(
-        choices=[(level, level.capitalize()) for level in ROBOT_LEVELS], widget=forms.RadioSelect
+        choices=[(level, capfirst(LEVELS[level])) for level in ROBOT_LEVELS],
+        widget=forms.RadioSelect,
     )
     robot_above = forms.ChoiceField()
     robot_below = forms.ChoiceField()
@@ -121,7 +150,7 @@ class SessionForm(forms.Form):
         fields: dict[str, Any] = self.fields
         fields["protocol"].queryset = Protocol.objects.visible_to(by)
         fields["station"].queryset = Station.objects.visible_to(by)
-        fields["source"].choices = list_sources()
+        fields["source"].choices = [(name, say_source(words)) for name, words in list_sources()]
         fields["robot_above"].choices = fields["robot_below"].choices = list_gestures(by)
 
     def clean_station(self) -> Station:
@@ -132,22 +161,28 @@ class SessionForm(forms.Form):
         )
         if (session := busy.select_related("patient").first()) is not None:
             raise ValidationError(
-                f"{station} still has an open session of {session.patient}. End it first, or "
-                "choose another station."
+                _(
+                    "%(station)s still has an open session of %(patient)s. End it first, or choose "
+                    "another station."
+                ),
+                params={"station": station, "patient": session.patient},
             )
         return station
 
     def clean_source(self) -> str:
         """Refuse a recording that cannot be played, in its reader's own words."""
         source: str = self.cleaned_data["source"]
-        kind, _, name = source.partition(" ")
+        kind, _between, name = source.partition(" ")
         if kind == "recording":
             file = settings.DATA_DIR / "recordings" / name
             if holds_signals(file):
                 if self.patient.body_mass_kg is None:
                     raise ValidationError(
-                        f"{name} holds raw signals, and A2 is power per kilogram: give "
-                        f"{self.patient.nickname}'s body mass first."
+                        _(
+                            "%(file)s holds raw signals, and A2 is power per kilogram: give "
+                            "%(patient)s's body mass first."
+                        ),
+                        params={"file": name, "patient": self.patient.nickname},
                     )
                 return source
             try:
@@ -161,7 +196,7 @@ class SessionForm(forms.Form):
         data = self.cleaned_data
         by_value = data["goal_by"] == "value"
         hits, minutes = data["wanted_hits"], data["minutes"]
-        kind, _, name = data["source"].partition(" ")
+        kind, _between, name = data["source"].partition(" ")
         return create_session(
             self.patient,
             valence=data["valence"],
@@ -252,7 +287,7 @@ def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
             "protocol": protocol,
             "station": _free(stations),
             "source": (source := "synthetic good" if patient.simulated else LIVE),
-            "source_words": words[source],
+            "source_words": say_source(words[source]),
             "trained_side": patient.paretic_side or Side.LEFT.value,
             "robot": "normal",
             "robot_above": USUAL,
@@ -274,7 +309,7 @@ def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
         "protocol": last.protocol,
         "station": last.station or _free(stations),
         "source": source,
-        "source_words": words[source],
+        "source_words": say_source(words[source]),
         "trained_side": last.trained_side,
         "robot": name_robot_level(_last_intensity(last, by)),
         "robot_above": above,

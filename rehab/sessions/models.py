@@ -10,8 +10,10 @@ from django.db import models
 from django.db.models import F, Q
 from django.dispatch import Signal
 from django.utils import timezone
-from django.utils.translation import gettext as _
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
 
+from rehab.people.consent import PatientScope
 from rehab.people.models import SIDES, Clinic, Patient, User
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
 from rehab.stations.models import Station
@@ -22,6 +24,19 @@ from rehab.training.phases import PHASE_KINDS, Phase
 from rehab.training.plans import SessionPlan
 from rehab.training.valences import VALENCES
 
+STATES = {
+    State.READY: _("Ready"),
+    State.RUNNING: _("Running"),
+    State.PAUSED: _("Paused"),
+    State.FINISHED: _("Finished"),
+    State.ABORTED: _("Aborted"),
+}
+
+
+def say_shared(row: Measure | Protocol) -> str:
+    """Give the name of a row; one that all clinics share is said in the page's language."""
+    return row.name if row.clinic_id else gettext(row.name)
+
 
 class Measure(ClinicRow):
     """A quantity of a stride that can be trained. Without a clinic it is shared by all."""
@@ -29,18 +44,25 @@ class Measure(ClinicRow):
     scope = Scope(clinic="clinic", shared=True, host=Q(clinic__isnull=True))
 
     clinic = models.ForeignKey(
-        Clinic, on_delete=models.CASCADE, related_name="measures", null=True, blank=True
+        Clinic,
+        on_delete=models.CASCADE,
+        related_name="measures",
+        null=True,
+        blank=True,
+        verbose_name=_("clinic"),
     )
-    slug = models.SlugField(max_length=32)
-    name = models.CharField(max_length=64)
-    unit = models.CharField(max_length=16)
-    higher_is_better = models.BooleanField(default=True)
-    value_min = models.FloatField(help_text="Smallest value that can be real.")
-    value_max = models.FloatField(help_text="Largest value that can be real.")
-    goal_min = models.FloatField(help_text="A goal lies above this.")
-    goal_max = models.FloatField(help_text="A goal lies at or below this.")
+    slug = models.SlugField(_("slug"), max_length=32)
+    name = models.CharField(_("name"), max_length=64)
+    unit = models.CharField(_("unit"), max_length=16)
+    higher_is_better = models.BooleanField(_("higher is better"), default=True)
+    value_min = models.FloatField(_("value min"), help_text=_("Smallest value that can be real."))
+    value_max = models.FloatField(_("value max"), help_text=_("Largest value that can be real."))
+    goal_min = models.FloatField(_("goal min"), help_text=_("A goal lies above this."))
+    goal_max = models.FloatField(_("goal max"), help_text=_("A goal lies at or below this."))
 
     class Meta(ClinicRow.Meta):
+        verbose_name = _("measure")
+        verbose_name_plural = _("measures")
         ordering: ClassVar = ["name"]
         constraints: ClassVar = [
             models.UniqueConstraint(fields=["clinic", "slug"], name="measure_slug_once_per_clinic"),
@@ -52,13 +74,14 @@ class Measure(ClinicRow):
                 & Q(goal_min__gte=0)
                 & Q(goal_min__lt=F("goal_max")),
                 name="measure_bounds_in_order",
-                violation_error_message="Each smallest value must lie below the largest; "
-                "goals lie above 0.",
+                violation_error_message=_(
+                    "Each smallest value must lie below the largest; goals lie above 0."
+                ),
             ),
         ]
 
     def __str__(self) -> str:
-        return f"{self.name} [{self.unit}]"
+        return f"{say_shared(self)} [{self.unit}]"
 
     def to_rule(self) -> rules.Measure:
         """Give the measure as the rules know it."""
@@ -80,12 +103,19 @@ class Protocol(ClinicRow):
     scope = Scope(clinic="clinic", shared=True, host=Q(clinic__isnull=True))
 
     clinic = models.ForeignKey(
-        Clinic, on_delete=models.CASCADE, related_name="protocols", null=True, blank=True
+        Clinic,
+        on_delete=models.CASCADE,
+        related_name="protocols",
+        null=True,
+        blank=True,
+        verbose_name=_("clinic"),
     )
-    name = models.CharField(max_length=64)
-    description = models.TextField(blank=True)
+    name = models.CharField(_("name"), max_length=64)
+    description = models.TextField(_("description"), blank=True)
 
     class Meta(ClinicRow.Meta):
+        verbose_name = _("protocol")
+        verbose_name_plural = _("protocols")
         ordering: ClassVar = ["name"]
         constraints: ClassVar = [
             models.UniqueConstraint(
@@ -97,11 +127,12 @@ class Protocol(ClinicRow):
         ]
 
     def __str__(self) -> str:
-        return self.name
+        return say_shared(self)
 
     def to_rules(self) -> tuple[Phase, ...]:
         """Give the phases as the rules know them."""
-        return tuple(phase.to_rule() for phase in self.phases.order_by("position"))
+        phases = sorted(self.phases.all(), key=lambda phase: phase.position)  # also if prefetched
+        return tuple(phase.to_rule() for phase in phases)
 
 
 class ProtocolPhase(ScopedModel):
@@ -109,20 +140,34 @@ class ProtocolPhase(ScopedModel):
 
     scope = Scope(clinic="protocol__clinic", shared=True, host=Q(protocol__clinic__isnull=True))
 
-    protocol = models.ForeignKey(Protocol, on_delete=models.CASCADE, related_name="phases")
-    position = models.PositiveSmallIntegerField()
+    protocol = models.ForeignKey(
+        Protocol, on_delete=models.CASCADE, related_name="phases", verbose_name=_("protocol")
+    )
+    position = models.PositiveSmallIntegerField(_("position"))
     kind = models.CharField(
-        max_length=16, choices=[(kind.slug, kind.label) for kind in PHASE_KINDS.values()]
+        _("kind"),
+        max_length=16,
+        choices=[(kind.slug, _(kind.label)) for kind in PHASE_KINDS.values()],
     )
-    name = models.CharField(max_length=64)
-    feedback = models.BooleanField(help_text="Whether the patient gets feedback in this phase.")
+    name = models.CharField(_("name"), max_length=64)
+    feedback = models.BooleanField(
+        _("feedback"), help_text=_("Whether the patient gets feedback in this phase.")
+    )
     gain = models.FloatField(
-        default=1.0, help_text="What is shown is this share of the measured value (0.5 to 1.5)."
+        _("gain"),
+        default=1.0,
+        help_text=_("What is shown is this share of the measured value (0.5 to 1.5)."),
     )
-    strides = models.PositiveIntegerField(null=True, blank=True, help_text="Ends after so many.")
-    seconds = models.FloatField(null=True, blank=True, help_text="Ends after so many seconds.")
+    strides = models.PositiveIntegerField(
+        _("strides"), null=True, blank=True, help_text=_("Ends after so many.")
+    )
+    seconds = models.FloatField(
+        _("seconds"), null=True, blank=True, help_text=_("Ends after so many seconds.")
+    )
 
     class Meta(ScopedModel.Meta):
+        verbose_name = _("protocol phase")
+        verbose_name_plural = _("protocol phases")
         ordering: ClassVar = ["protocol", "position"]
         constraints: ClassVar = [
             models.UniqueConstraint(
@@ -131,7 +176,7 @@ class ProtocolPhase(ScopedModel):
         ]
 
     def __str__(self) -> str:
-        return self.name
+        return gettext(self.name)
 
     def to_rule(self) -> Phase:
         """Give the phase as the rules know it. Raises InvalidSetting for what they refuse."""
@@ -158,60 +203,90 @@ class TrainingSession(ClinicRow):
     ``plan`` is what every step is scored with; the columns beside it are there to be found by.
     ``state``, ``goal``, ``started_at``, ``ended_at``, ``changed_to`` and ``active_s`` follow from
     the log and are written together with its changes (``active_s`` of a running session is that of
-    its last one). ``valence`` is the feedback type it began with.
+    its last one). ``valence`` is the feedback type it began with. Only a correction alters ``patient`` and ``left_out`` (``corrections.py``).
     """
 
-    scope = Scope(clinic="clinic", station="station")
+    scope = PatientScope(clinic="clinic", station="station")
 
-    clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="sessions")
-    patient = models.ForeignKey(Patient, on_delete=models.PROTECT, related_name="sessions")
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.PROTECT, related_name="sessions", verbose_name=_("clinic")
+    )
+    patient = models.ForeignKey(
+        Patient, on_delete=models.PROTECT, related_name="sessions", verbose_name=_("patient")
+    )
     station = models.ForeignKey(
-        Station, on_delete=models.SET_NULL, related_name="sessions", null=True, blank=True
+        Station,
+        on_delete=models.SET_NULL,
+        related_name="sessions",
+        null=True,
+        blank=True,
+        verbose_name=_("station"),
     )
     protocol = models.ForeignKey(
-        Protocol, on_delete=models.SET_NULL, related_name="sessions", null=True, blank=True
+        Protocol,
+        on_delete=models.SET_NULL,
+        related_name="sessions",
+        null=True,
+        blank=True,
+        verbose_name=_("protocol"),
     )
-    measure = models.ForeignKey(Measure, on_delete=models.PROTECT, related_name="sessions")
+    measure = models.ForeignKey(
+        Measure, on_delete=models.PROTECT, related_name="sessions", verbose_name=_("measure")
+    )
     created_by = models.ForeignKey(
-        User, on_delete=models.SET_NULL, related_name="+", null=True, blank=True
+        User,
+        on_delete=models.SET_NULL,
+        related_name="+",
+        null=True,
+        blank=True,
+        verbose_name=_("created by"),
     )
-    created_at = models.DateTimeField(default=timezone.now, db_index=True)
+    created_at = models.DateTimeField(_("created at"), default=timezone.now, db_index=True)
     valence = models.CharField(
-        "feedback type",
+        _("feedback type"),
         max_length=16,
-        choices=[(valence.slug, valence.label) for valence in VALENCES.values()],
+        choices=[(valence.slug, _(valence.label)) for valence in VALENCES.values()],
         db_index=True,
     )
     # Follows from the log, as the columns below `state` do.
     changed_to = models.CharField(
-        max_length=64, blank=True, editable=False, help_text="Types after the first, in order."
+        max_length=64, blank=True, editable=False, help_text=_("Types after the first, in order.")
     )
-    trained_side = models.CharField(max_length=8, choices=SIDES)
-    source = models.CharField(max_length=200, blank=True, help_text="Where its steps come from.")
-    simulated = models.BooleanField(default=False)
+    trained_side = models.CharField(_("trained side"), max_length=8, choices=SIDES)
+    source = models.CharField(
+        _("source"), max_length=200, blank=True, help_text=_("Where its steps come from.")
+    )
+    simulated = models.BooleanField(_("simulated"), default=False)
     runs = models.JSONField(
-        default=list, editable=False, help_text="Arguments of the source that the server runs."
+        default=list, editable=False, help_text=_("Arguments of the source that the server runs.")
     )
-    plan = models.JSONField()
+    plan = models.JSONField(_("plan"))
 
     state = models.CharField(
+        _("state"),
         max_length=16,
-        choices=[(state.value, state.value.capitalize()) for state in State],
+        choices=[(state.value, words) for state, words in STATES.items()],
         default=State.READY.value,
     )
-    goal = models.FloatField(null=True, blank=True, help_text="Goal in force (the measure's unit).")
-    started_at = models.DateTimeField(null=True, blank=True)
-    ended_at = models.DateTimeField(null=True, blank=True)
-    active_s = models.FloatField("walked (s)", default=0.0, help_text="Time without pauses.")
+    goal = models.FloatField(
+        _("goal"), null=True, blank=True, help_text=_("Goal in force (the measure's unit).")
+    )
+    started_at = models.DateTimeField(_("started at"), null=True, blank=True)
+    ended_at = models.DateTimeField(_("ended at"), null=True, blank=True)
+    active_s = models.FloatField(_("walked (s)"), default=0.0, help_text=_("Time without pauses."))
+    left_out = models.BooleanField(
+        default=False, editable=False, help_text=_("Corrected: in no figure, board or trend.")
+    )
     # Its row in the original GARRY's database, where it was imported from there: without steps.
-    original_id = models.BigIntegerField("imported session", null=True, editable=False)
+    original_id = models.BigIntegerField(_("imported session"), null=True, editable=False)
     original = models.JSONField(null=True, editable=False)
     # Which process writes the log: each taking over raises the epoch and shuts out the one before.
     epoch = models.PositiveIntegerField(default=0, editable=False)
     owner = models.CharField(max_length=200, blank=True, editable=False)
 
     class Meta(ClinicRow.Meta):
-        verbose_name = "session"
+        verbose_name = _("session")
+        verbose_name_plural = _("sessions")
         ordering: ClassVar = ["-created_at", "-pk"]
         indexes: ClassVar = [
             models.Index(fields=["clinic", "-created_at"], name="session_by_clinic_and_date"),
@@ -224,7 +299,7 @@ class TrainingSession(ClinicRow):
         ]
 
     def __str__(self) -> str:
-        return f"Session {self.pk}"
+        return gettext("Session %(number)s") % {"number": self.pk}
 
     def to_plan(self) -> SessionPlan:
         """Give the plan as the rules know it."""
@@ -238,10 +313,10 @@ class TrainingSession(ClinicRow):
     @property
     def types_words(self) -> str:
         """Its feedback type, and those it was changed to, in words."""
-        names = [_(VALENCES[slug].label) for slug in (self.valence, *self.later_types)]
+        names = [gettext(VALENCES[slug].label) for slug in (self.valence, *self.later_types)]
         if len(names) == 1:
             return names[0]
-        return _("%(first)s, changed to %(others)s") % {
+        return gettext("%(first)s, changed to %(others)s") % {
             "first": names[0],
             "others": ", ".join(names[1:]),
         }
@@ -250,34 +325,42 @@ class TrainingSession(ClinicRow):
 class Step(ScopedModel):
     """A scored stride. Rows are only ever added."""
 
-    scope = Scope(clinic="session__clinic", station="session__station")
+    scope = PatientScope(
+        clinic="session__clinic", station="session__station", patient="session__patient"
+    )
 
-    session = models.ForeignKey(TrainingSession, on_delete=models.PROTECT, related_name="steps")
-    number = models.PositiveIntegerField()
-    time_s = models.FloatField(help_text="The source's clock.")
-    received_at = models.DateTimeField(help_text="The server's clock.")
-    side = models.CharField(max_length=8, choices=SIDES)
-    value = models.FloatField(null=True)
-    gain = models.FloatField()
-    shown = models.FloatField(null=True)
-    goal = models.FloatField(null=True)
-    performance = models.FloatField(null=True)
-    hit = models.BooleanField(null=True)
-    points = models.SmallIntegerField(null=True)
-    valid = models.BooleanField()
-    reasons = models.JSONField(default=list)
-    phase = models.PositiveSmallIntegerField(help_text="Index into the plan's phases.")
-    rules_version = models.PositiveSmallIntegerField()
-    extra = models.JSONField(default=dict)
+    session = models.ForeignKey(
+        TrainingSession, on_delete=models.PROTECT, related_name="steps", verbose_name=_("session")
+    )
+    number = models.PositiveIntegerField(_("number"))
+    time_s = models.FloatField(_("time (s)"), help_text=_("The source's clock."))
+    received_at = models.DateTimeField(_("received at"), help_text=_("The server's clock."))
+    side = models.CharField(_("side"), max_length=8, choices=SIDES)
+    value = models.FloatField(_("value"), null=True)
+    gain = models.FloatField(_("gain"))
+    shown = models.FloatField(_("shown"), null=True)
+    goal = models.FloatField(_("goal"), null=True)
+    performance = models.FloatField(_("performance"), null=True)
+    hit = models.BooleanField(_("hit"), null=True)
+    points = models.SmallIntegerField(_("points"), null=True)
+    valid = models.BooleanField(_("valid"))
+    reasons = models.JSONField(_("reasons"), default=list)
+    phase = models.PositiveSmallIntegerField(
+        _("phase"), help_text=_("Index into the plan's phases.")
+    )
+    rules_version = models.PositiveSmallIntegerField(_("rules version"))
+    extra = models.JSONField(_("extra"), default=dict)
 
     class Meta(ScopedModel.Meta):
+        verbose_name = _("step")
+        verbose_name_plural = _("steps")
         ordering: ClassVar = ["session", "number"]
         constraints: ClassVar = [
             models.UniqueConstraint(fields=["session", "number"], name="step_number_once")
         ]
 
     def __str__(self) -> str:
-        return f"Step {self.number}"
+        return gettext("Step %(number)d") % {"number": self.number}
 
 
 class RobotEntry(StrEnum):
@@ -302,11 +385,34 @@ class Remark(StrEnum):
     BORG = "borg"  # felt exertion, Borg CR10: 0 to 10 in ``value``
 
 
-EVENT_KINDS = [
-    (kind.value, kind.value.replace("_", " "))
-    for kinds in (ChangeKind, RobotEntry, Remark)
-    for kind in kinds
-]
+EVENTS = {
+    ChangeKind.START: _("start"),
+    ChangeKind.PAUSE: _("pause"),
+    ChangeKind.RESUME: _("resume"),
+    ChangeKind.FINISH: _("finish"),
+    ChangeKind.ABORT: _("abort"),
+    ChangeKind.GOAL: _("goal"),
+    ChangeKind.GAIN: _("gain"),
+    ChangeKind.PHASE: _("phase"),
+    ChangeKind.ACTIVATION_THRESHOLD: _("activation threshold"),
+    ChangeKind.ROBOT_INTENSITY: _("robot intensity"),
+    ChangeKind.VALENCE: _("feedback type"),
+    ChangeKind.WORDS: _("words"),
+    ChangeKind.WORDS_SHOWN: _("words shown"),
+    ChangeKind.CHART_STYLE: _("chart style"),
+    RobotEntry.STOP: _("robot stop"),
+    RobotEntry.ARM: _("robot arm"),
+    RobotEntry.DECISION: _("robot decision"),
+    RobotEntry.GESTURE: _("robot gesture"),
+    Remark.REST: _("rest"),
+    Remark.PAIN: _("pain"),
+    Remark.DIZZINESS: _("dizziness"),
+    Remark.NEAR_FALL: _("near fall"),
+    Remark.FALL: _("fall"),
+    Remark.HANDRAIL: _("handrail"),
+    Remark.VERBAL_CUE: _("verbal cue"),
+    Remark.BORG: _("borg"),
+}
 
 
 class SessionEvent(ScopedModel):
@@ -317,18 +423,30 @@ class SessionEvent(ScopedModel):
     ``value`` (and ``old``) what a change was to that is no number: a name, or words and their type.
     """
 
-    scope = Scope(clinic="session__clinic", station="session__station")
+    scope = PatientScope(
+        clinic="session__clinic", station="session__station", patient="session__patient"
+    )
 
-    session = models.ForeignKey(TrainingSession, on_delete=models.PROTECT, related_name="events")
-    after_number = models.PositiveIntegerField(help_text="The last step before it; 0 for none.")
-    kind = models.CharField(max_length=32, choices=EVENT_KINDS)
-    old = models.FloatField(null=True)
-    value = models.FloatField(null=True)
-    by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
-    at = models.DateTimeField()
-    data = models.JSONField(default=dict)
+    session = models.ForeignKey(
+        TrainingSession, on_delete=models.PROTECT, related_name="events", verbose_name=_("session")
+    )
+    after_number = models.PositiveIntegerField(
+        _("after number"), help_text=_("The last step before it; 0 for none.")
+    )
+    kind = models.CharField(
+        _("kind"), max_length=32, choices=[(kind.value, words) for kind, words in EVENTS.items()]
+    )
+    old = models.FloatField(_("old"), null=True)
+    value = models.FloatField(_("value"), null=True)
+    by = models.ForeignKey(
+        User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("by")
+    )
+    at = models.DateTimeField(_("at"))
+    data = models.JSONField(_("data"), default=dict)
 
     class Meta(ScopedModel.Meta):
+        verbose_name = _("session event")
+        verbose_name_plural = _("session events")
         ordering: ClassVar = ["session", "pk"]
 
     def __str__(self) -> str:
@@ -342,15 +460,23 @@ figures_stored = Signal()
 class SessionMetric(ScopedModel):
     """A figure of an ended session: what boards and reports rank and compare."""
 
-    scope = Scope(clinic="session__clinic", station="session__station")
-
-    session = models.ForeignKey(TrainingSession, on_delete=models.CASCADE, related_name="metrics")
-    slug = models.CharField(
-        max_length=32, choices=[(metric.slug, metric.label) for metric in METRICS.values()]
+    scope = PatientScope(
+        clinic="session__clinic", station="session__station", patient="session__patient"
     )
-    value = models.FloatField()
+
+    session = models.ForeignKey(
+        TrainingSession, on_delete=models.CASCADE, related_name="metrics", verbose_name=_("session")
+    )
+    slug = models.CharField(
+        _("slug"),
+        max_length=32,
+        choices=[(metric.slug, _(metric.label)) for metric in METRICS.values()],
+    )
+    value = models.FloatField(_("value"))
 
     class Meta(ScopedModel.Meta):
+        verbose_name = _("session metric")
+        verbose_name_plural = _("session metrics")
         ordering: ClassVar = ["session", "slug"]
         constraints: ClassVar = [
             models.UniqueConstraint(fields=["session", "slug"], name="session_metric_once")

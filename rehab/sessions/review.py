@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from django.utils.translation import gettext
+from django.utils.translation import gettext, ngettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
@@ -15,7 +15,7 @@ from rehab.sessions.facts import MARKED_CHANGES
 from rehab.sessions.live.actor import read_log
 from rehab.sessions.models import Remark, RobotEntry, SessionEvent, Step, TrainingSession
 from rehab.sessions.trend import figures_of
-from rehab.sessions.words import say_duration, say_number, say_quantity, say_rate
+from rehab.sessions.words import LEVELS, say_duration, say_number, say_quantity, say_rate
 from rehab.training.changes import ChangeKind, PauseReason
 from rehab.training.figures import describe_session
 from rehab.training.fold import SessionFold
@@ -105,11 +105,12 @@ def say_event(event: SessionEvent, plan: SessionPlan) -> str:
         case ChangeKind.ACTIVATION_THRESHOLD:
             return f"{name} {say_rate(event.old)} → {say_rate(event.value)}"
         case ChangeKind.ROBOT_INTENSITY:
-            return f"{name} {name_robot_level(event.old)} → {name_robot_level(event.value)}"
+            levels = [LEVELS[name_robot_level(each)] for each in (event.old, event.value)]
+            return f"{name} {levels[0]} → {levels[1]}"
         case Remark.BORG:
             return f"{name} {say_number(event.value, 0)}"
         case ChangeKind.PHASE:
-            return f"{name}: {plan.phases[int(event.value or 0)].name}"
+            return f"{name}: {gettext(plan.phases[int(event.value or 0)].name)}"
         case ChangeKind.VALENCE:
             return f"{name}: {_name_type(event.data.get('value'))}"
         case ChangeKind.WORDS:
@@ -134,28 +135,39 @@ def sum_up(plan: SessionPlan, review: Review) -> list[dict[str, str]]:
     lost = figures["missing"] + figures["invalid"]
     entries = [
         (
-            "Hit rate",
+            gettext("Hit rate"),
             say_rate(figures["hit_rate"]),
-            f"wanted {say_rate(target.hit_rate)}" if target.hit_rate else "",
+            gettext("wanted %(rate)s") % {"rate": say_rate(target.hit_rate)}
+            if target.hit_rate
+            else "",
         ),
         (
-            "Score",
+            gettext("Score"),
             say_number(figures["score"], 0),
             gettext("points")
             if plan.valence.has_points or figures["score"] is not None
             else gettext("this type has no points"),
         ),
         (
-            "Goal",
+            gettext("Goal"),
             say_number(figures["goal"]),
-            plan.measure.unit + (f", changed {changes} ×" if changes else ""),
+            plan.measure.unit
+            + (gettext(", changed %(count)s ×") % {"count": changes} if changes else ""),
         ),
         (
-            "Walked",
+            gettext("Walked"),
             say_duration(figures["active_s"]),
-            f"planned {say_duration(target.duration_s)}" if target.duration_s else "",
+            gettext("planned %(time)s") % {"time": say_duration(target.duration_s)}
+            if target.duration_s
+            else "",
         ),
-        ("Strides", say_number(figures["strides"], 0), f"{lost} do not count" if lost else ""),
+        (
+            gettext("Strides"),
+            say_number(figures["strides"], 0),
+            ngettext("%(count)s does not count", "%(count)s do not count", lost) % {"count": lost}
+            if lost
+            else "",
+        ),
     ]
     return [{"label": label, "value": value, "beside": beside} for label, value, beside in entries]
 
@@ -191,7 +203,7 @@ def draw(
         "strides": columns,
         "phases": [
             {
-                "name": phase.name + changed,
+                "name": gettext(phase.name) + changed,
                 "feedback": phase.feedback,
                 "from": run[0],
                 "to": run[-1],

@@ -49,6 +49,7 @@ class SessionOut(Schema):
     station: str | None = Field(None, alias="station.name")
     source: str
     simulated: bool
+    left_out: bool = Field(description="Corrected: in no figure, board or trend.")
     imported: bool = Field(description="From the original GARRY, without steps.")
     created_at: datetime
     started_at: datetime | None

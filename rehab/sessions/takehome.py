@@ -7,6 +7,7 @@ from datetime import datetime
 from typing import Any
 
 from django.db.models import Count, F, Max, Q, QuerySet, Sum
+from django.utils.translation import gettext as _
 
 from rehab.people.models import User
 from rehab.sessions.models import SessionMetric, Step, TrainingSession
@@ -30,7 +31,8 @@ def sum_up_for_home(
     user: User, sessions: QuerySet[TrainingSession], now: datetime
 ) -> dict[str, Any]:
     """Give the words and figures of somebody's finished sessions; ``now`` is the clinic's clock."""
-    walked = sessions.filter(metrics__slug="hit_rate").order_by("created_at", "pk").distinct()
+    counted = sessions.filter(metrics__slug="hit_rate", left_out=False)
+    walked = counted.order_by("created_at", "pk").distinct()
     last = walked.last()
     alike = walked.filter(measure=last.measure) if last else walked
     first = alike.first()
@@ -71,7 +73,7 @@ def _draw(points: list[Point], now: datetime) -> list[Bar]:
     longest = max(means, default=0.0)
     if len(means) < 2 or longest <= 0 or points[0].session == points[-1].session:
         return []
-    labels = ("First session", "Last session")
+    labels = (_("First session"), _("Last session"))
     return [
         Bar(
             f"{label}, {say_day(_begun(point, now).date(), now.date())}",
@@ -96,10 +98,17 @@ def _develop(points: list[Point]) -> str:
         return ""
     measure = points[-1].session.measure
     change = after.mean / before.mean - 1
-    name = "Your push-off" if measure.slug == A2.slug else f"Your {measure.name}"
-    figures = f"from {say_number(before.mean)} to {say_number(after.mean)} {measure.unit}"
+    is_push = measure.slug == A2.slug
+    name = _("Your push-off") if is_push else _("Your %(measure)s") % {"measure": measure.name}
+    said = {
+        "what": name,
+        "before": say_number(before.mean),
+        "after": say_number(after.mean),
+        "unit": measure.unit,
+        "change": say_rate(abs(change)),
+    }
     if abs(change) < SAME:
-        return f"{name} stayed the same: {say_number(after.mean)} {measure.unit}."
+        return _("%(what)s stayed the same: %(after)s %(unit)s.") % said
     if change > 0:
-        return f"{name} grew {figures}: {say_rate(change)} more."
-    return f"{name} went {figures}: {say_rate(-change)} less."
+        return _("%(what)s grew from %(before)s to %(after)s %(unit)s: %(change)s more.") % said
+    return _("%(what)s went from %(before)s to %(after)s %(unit)s: %(change)s less.") % said

@@ -79,7 +79,8 @@ def with_figures(user: Any, sessions: QuerySet[TrainingSession]) -> QuerySet[Tra
 
 def read_trend(user: User, sessions: QuerySet[TrainingSession]) -> list[Point]:
     """Give the newest of these sessions that have a hit rate, oldest first."""
-    ended = sessions.filter(metrics__slug="hit_rate").select_related("measure")
+    counted = sessions.filter(metrics__slug="hit_rate", left_out=False)
+    ended = counted.select_related("measure")
     newest = list(ended.order_by("-created_at", "-pk")[:SESSIONS])[::-1]
     figures, values = figures_of(user, newest), _values_by_phase(user, newest)
     points: list[Point] = []

@@ -1,12 +1,15 @@
-"""How pages write figures and dates: the same everywhere, readable aloud."""
+"""How pages write figures, dates and sources: the same everywhere, in the page's language."""
 
 from __future__ import annotations
 
 from datetime import date, datetime
+from typing import Any
 from zoneinfo import ZoneInfo
 
 from django.utils.dateformat import format as format_date
-from django.utils.translation import gettext
+from django.utils.formats import number_format
+from django.utils.translation import gettext, gettext_noop
+from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
 
@@ -23,7 +26,8 @@ def say_number(value: float | None, places: int = 2) -> str:
     """Write a number with a true minus sign."""
     if value is None:
         return NOTHING
-    return f"{round(value, places) + 0.0:,.{places}f}".replace("-", "−")
+    written = number_format(round(value, places) + 0.0, places, force_grouping=True)
+    return written.replace("-", "−")
 
 
 def say_quantity(value: float | None, unit: str) -> str:
@@ -40,7 +44,27 @@ def say_day(day: date, today: date) -> str:
     """Write a day as it is spoken of today."""
     if day == today:
         return gettext("today")
-    return format_date(day, "M j" if day.year == today.year else "M j, Y")
+    return format_date(day, gettext("M j") if day.year == today.year else gettext("M j, Y"))
+
+
+# How lively a robot is (`training.plans.ROBOT_LEVELS`).
+LEVELS: dict[str, Any] = {"normal": _("normal"), "gentle": _("gentle"), "off": _("off"), "": ""}
+# What `list_sources` gives and a session keeps, in English.
+SOURCES = (
+    gettext_noop("Live sensor"),
+    gettext_noop("Simulated patient, good"),
+    gettext_noop("Simulated patient, poor"),
+    gettext_noop("Simulated patient, fatiguing"),
+    gettext_noop("Simulated patient, dropout"),
+)
+RECORDING = "Recording "
+
+
+def say_source(source: str) -> str:
+    """Say where steps come from."""
+    if source.startswith(RECORDING):
+        return gettext("Recording %(name)s") % {"name": source.removeprefix(RECORDING)}
+    return gettext(source) if source else ""
 
 
 def at_clinic(moment: datetime, clinic: Clinic) -> datetime:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from django.db import models
+from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
@@ -17,9 +18,12 @@ class Station(ClinicRow):
     scope = Scope(clinic="clinic", station="pk")
 
     clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="stations")
-    name = models.CharField(max_length=64)
+    name = models.CharField(_("name"), max_length=64)
+    pin_hash = models.CharField(max_length=128, blank=True, editable=False)
 
     class Meta(ClinicRow.Meta):
+        verbose_name = _("station")
+        verbose_name_plural = _("stations")
         ordering: ClassVar = ["name"]
         constraints: ClassVar = [
             models.UniqueConstraint(fields=["clinic", "name"], name="station_name_once_per_clinic")
@@ -35,22 +39,24 @@ class Device(TokenRow):
     class Kind(models.TextChoices):
         """What a device does."""
 
-        SOURCE = "source", "Source of steps"
-        TABLET = "tablet", "Tablet"
-        ROBOT = "robot", "Robot"
+        SOURCE = "source", _("Source of steps")
+        TABLET = "tablet", _("Tablet")
+        ROBOT = "robot", _("Robot")
 
     actor_kind = "device"
     scope = Scope(clinic="clinic")
 
     clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="devices")
     station = models.ForeignKey(Station, on_delete=models.CASCADE, related_name="devices")
-    kind = models.CharField(max_length=16, choices=Kind.choices)
-    name = models.CharField(max_length=64)
+    kind = models.CharField(_("kind"), max_length=16, choices=Kind.choices)
+    name = models.CharField(_("name"), max_length=64)
     builtin = models.BooleanField(
-        default=False, editable=False, help_text="The server runs it itself."
+        default=False, editable=False, help_text=_("The server runs it itself.")
     )
 
     class Meta(TokenRow.Meta):
+        verbose_name = _("device")
+        verbose_name_plural = _("devices")
         ordering: ClassVar = ["station", "kind", "name"]
 
     def __str__(self) -> str:
@@ -72,6 +78,25 @@ class Pairing(ScopedModel):
 
     def __str__(self) -> str:
         return "Pairing"
+
+
+class LeaveTries(ScopedModel):
+    """Wrong PINs of one screen at one station, and until when it has to wait (see ``pins``)."""
+
+    scope = Scope(clinic="station__clinic")
+
+    station = models.ForeignKey(Station, on_delete=models.CASCADE, related_name="+")
+    who = models.CharField(max_length=64)
+    wrong = models.PositiveIntegerField(default=0)
+    open_at = models.DateTimeField()
+
+    class Meta(ScopedModel.Meta):
+        constraints: ClassVar = [
+            models.UniqueConstraint(fields=["station", "who"], name="leave_tries_once_a_screen")
+        ]
+
+    def __str__(self) -> str:
+        return "Tries"
 
 
 def find_device(token: str) -> Device | None:

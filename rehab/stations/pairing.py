@@ -6,6 +6,7 @@ import secrets
 from datetime import datetime, timedelta
 
 from django.core.cache import cache
+from django.utils.translation import gettext as _
 
 from rehab.people.models import UNAMBIGUOUS
 from rehab.people.tokens import hash_token
@@ -28,7 +29,7 @@ def begin(now: datetime) -> tuple[Pairing, str]:
     """
     Pairing.everywhere.filter(expires_at__lte=now).delete()
     if Pairing.everywhere.count() >= MOST_OPEN:
-        raise PairingRefused("Too many tablets are being paired. Try again in five minutes.")
+        raise PairingRefused(_("Too many tablets are being paired. Try again in five minutes."))
     secret = secrets.token_urlsafe(32)
     code = "".join(secrets.choice(UNAMBIGUOUS) for _ in range(CODE_LENGTH))
     pairing = Pairing(code=code, secret_hash=hash_token(secret), expires_at=now + LIFETIME)
@@ -50,26 +51,26 @@ def approve(code: str, station: Station, by: int, now: datetime) -> Device:
     tries = f"pairing-tries-{by}"
     cache.add(tries, 0, LIFETIME.total_seconds())
     if cache.incr(tries) > TRIES:
-        raise PairingRefused("Too many wrong codes. Wait five minutes.")
+        raise PairingRefused(_("Too many wrong codes. Wait five minutes."))
     wanted = Pairing.everywhere.filter(
         code=code.strip().upper(), device__isnull=True, expires_at__gt=now
     )
     if not wanted.exists():
         raise PairingRefused(
-            "No tablet shows this code now. Codes last five minutes; look at the tablet again."
+            _("No tablet shows this code now. Codes last five minutes; look at the tablet again.")
         )
     count = Device.everywhere.filter(station=station, kind=Device.Kind.TABLET).count()
     device = Device(
         clinic_id=station.clinic_id,
         station=station,
         kind=Device.Kind.TABLET,
-        name=f"Tablet {count + 1}",
+        name=_("Tablet %(number)s") % {"number": count + 1},
     )
     device.new_token()  # nobody knows it: the tablet gets its own when it comes back
     device.save()
     if not wanted.update(device=device):  # somebody else was quicker
         device.delete()
-        raise PairingRefused("This tablet has just been paired.")
+        raise PairingRefused(_("This tablet has just been paired."))
     cache.delete(tries)
     return device
 

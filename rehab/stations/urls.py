@@ -6,4 +6,5 @@ from rehab.stations import views
 
 urlpatterns = [
     path("tablets/pair/", views.pair, name="pair"),
+    path("tablets/leave/", views.leave, name="leave"),
 ]

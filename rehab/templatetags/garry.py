@@ -4,6 +4,9 @@ from django import template
 from django.templatetags.static import static
 from django.utils.html import format_html
 from django.utils.safestring import SafeString
+from django.utils.translation import gettext as _
+
+from rehab.sessions.words import say_duration, say_source
 
 register = template.Library()
 
@@ -16,3 +19,13 @@ def icon(name: str) -> SafeString:
         static("img/icons.svg"),
         name,
     )
+
+
+@register.filter
+def leg(side: str) -> str:
+    """Name the leg of a side; "" for none."""
+    return {"left": _("left leg"), "right": _("right leg")}.get(side, "")
+
+
+register.filter("duration", say_duration)
+register.filter("source", say_source)

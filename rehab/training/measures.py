@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rehab.training.marking import gettext_noop
+
 GAIN_MIN = 0.5
 GAIN_MAX = 1.5
 # Beyond any unit of gait; sums over a session stay far from where floats overflow.
@@ -52,7 +54,7 @@ class Measure:
 # (HEBB_03, force-plate faults), so 20 W/kg is a bound that only a wrong unit passes.
 A2 = Measure(
     slug="a2",
-    name="ankle push-off power A2",
+    name=gettext_noop("ankle push-off power A2"),
     unit="W/kg",
     value_min=0.0,
     value_max=20.0,

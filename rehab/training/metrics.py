@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from rehab.training.fold import SessionFold
+from rehab.training.marking import gettext_noop
 
 # Below this share of the baseline a gain is within a walker's own noise (CV 6.5-12 %, gait.md 1.4,
 # standard error of a 50-stride mean 1-2 %), and a share of it would mean nothing.
@@ -100,22 +101,29 @@ def _target_met(fold: SessionFold) -> float | None:
 METRICS: dict[str, Metric] = {
     metric.slug: metric
     for metric in (
-        Metric("score", "Score", "points", _score),
-        Metric("hit_rate", "Hit rate", "", _hit_rate),
-        Metric("mean_performance", "Mean performance", "", _mean_performance),
-        Metric("best_streak", "Best streak", "steps", _best_streak),
-        Metric("points_per_100_steps", "Points per 100 steps", "points", _points_per_100_steps),
+        Metric("score", gettext_noop("Score"), "points", _score),
+        Metric("hit_rate", gettext_noop("Hit rate"), "", _hit_rate),
+        Metric("mean_performance", gettext_noop("Mean performance"), "", _mean_performance),
+        Metric("best_streak", gettext_noop("Best streak"), "steps", _best_streak),
+        Metric(
+            "points_per_100_steps",
+            gettext_noop("Points per 100 steps"),
+            "points",
+            _points_per_100_steps,
+        ),
         Metric(
             "improvement_over_baseline",
-            "Improvement over baseline",
+            gettext_noop("Improvement over baseline"),
             "%",
             _improvement_over_baseline,
         ),
-        Metric("retention_in_washout", "Retention in washout", "%", _retention_in_washout),
-        Metric("steps", "Steps", "steps", _steps),
-        Metric("active_minutes", "Active minutes", "min", _active_minutes),
-        Metric("attended", "Sessions attended", "sessions", _attended),
-        Metric("target_met", "Target met", "days", _target_met),
+        Metric(
+            "retention_in_washout", gettext_noop("Retention in washout"), "%", _retention_in_washout
+        ),
+        Metric("steps", gettext_noop("Steps"), "steps", _steps),
+        Metric("active_minutes", gettext_noop("Active minutes"), "min", _active_minutes),
+        Metric("attended", gettext_noop("Sessions attended"), "sessions", _attended),
+        Metric("target_met", gettext_noop("Target met"), "days", _target_met),
     )
 }
 

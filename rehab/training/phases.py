@@ -27,12 +27,19 @@ class PhaseKind:
 PHASE_KINDS: dict[str, PhaseKind] = {
     kind.slug: kind
     for kind in (
-        PhaseKind("baseline", "Baseline", False, gettext_noop("Just walk as you usually do.")),
-        PhaseKind("familiarization", "Familiarization", True),
-        PhaseKind("training", "Training", True),
-        PhaseKind("catch", "Catch", False, gettext_noop("Just walk as you usually do.")),
-        PhaseKind("washout", "Washout", False),
-        PhaseKind("retention", "Retention", False),
+        PhaseKind(
+            "baseline",
+            gettext_noop("Baseline"),
+            False,
+            gettext_noop("Just walk as you usually do."),
+        ),
+        PhaseKind("familiarization", gettext_noop("Familiarization"), True),
+        PhaseKind("training", gettext_noop("Training"), True),
+        PhaseKind(
+            "catch", gettext_noop("Catch"), False, gettext_noop("Just walk as you usually do.")
+        ),
+        PhaseKind("washout", gettext_noop("Washout"), False),
+        PhaseKind("retention", gettext_noop("Retention"), False),
     )
 }
 

@@ -9,6 +9,8 @@
 // onLink(state, why): "open", "lost" (it will come back by itself) or "closed" (it will not; why
 //   says so in words).
 
+import { _ } from "garry/language";
+
 const SILENCE_MS = 12_000; // the server says something every 5 s
 const DOUBT_MS = 6_000; // after which an old socket is not trusted when the tablet wakes up
 const CONFIRM_MS = 50;
@@ -119,9 +121,9 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
     socket = null;
     confirming = null;
     clearInterval(watch);
-    for (const id of [...waiting.keys()]) answer(id, new Error("The connection was lost. Try again."));
+    for (const id of [...waiting.keys()]) answer(id, new Error(_("The connection was lost. Try again.")));
     if (FINAL.has(code)) {
-      link("closed", why ?? "The connection has ended.");
+      link("closed", why ?? _("The connection has ended."));
       return;
     }
     link("lost", why);
@@ -168,10 +170,10 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
       const id = `c${++mark}`;
       const request = { ...message, id };
       if (!send(request)) {
-        reject(new Error("There is no connection. Try again in a moment."));
+        reject(new Error(_("There is no connection. Try again in a moment.")));
         return;
       }
-      const late = () => answer(id, new Error("No answer. Try again."));
+      const late = () => answer(id, new Error(_("No answer. Try again.")));
       waiting.set(id, { resolve, reject, timer: setTimeout(late, ANSWER_MS) });
     });
   }

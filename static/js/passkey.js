@@ -1,6 +1,8 @@
 // A form that the browser's passkeys fill in: [data-passkey] has what the server asks, data-how says
 // whether one is made ("create") or used ("get").
 
+import { _ } from "garry/language";
+
 const READ = {
   create: (asked) => PublicKeyCredential.parseCreationOptionsFromJSON(asked),
   get: (asked) => PublicKeyCredential.parseRequestOptionsFromJSON(asked),
@@ -11,7 +13,7 @@ for (const form of document.querySelectorAll("[data-passkey]")) {
   const able = window.PublicKeyCredential?.parseCreationOptionsFromJSON;
   if (!able) {
     form.querySelector("button").disabled = true;
-    say.textContent = "This browser knows no passkeys. Take a newer one, or an authenticator app.";
+    say.textContent = _("This browser knows no passkeys. Take a newer one, or an authenticator app.");
     continue;
   }
   form.addEventListener("submit", async (event) => {
@@ -25,8 +27,8 @@ for (const form of document.querySelectorAll("[data-passkey]")) {
     } catch (problem) {
       say.textContent =
         problem.name === "InvalidStateError"
-          ? "This device already has a passkey for your account."
-          : "No passkey was given. Try again.";
+          ? _("This device already has a passkey for your account.")
+          : _("No passkey was given. Try again.");
     }
   });
 }

@@ -4,6 +4,8 @@ import { fillScreen, keepAwake } from "garry/walk/awake";
 import { createCelebration } from "garry/celebration";
 import { createControls } from "garry/walk/controls";
 import { createFeedback } from "garry/walk/feedback";
+import { createFitting } from "garry/walk/fitting";
+import { guardLeaving } from "garry/walk/leaving";
 import { connect } from "garry/live";
 import { createScene } from "garry/scene";
 import { apply, begin, look } from "garry/walk/model";
@@ -20,6 +22,7 @@ const scene = createScene(body.querySelector(".scene"));
 const { celebrate, clear } = createCelebration(body.querySelector(".confetti"));
 const sound = mirrored ? () => {} : createSounds(body.querySelector(".sound"));
 const drawFeedback = createFeedback(body);
+const fitCalm = createFitting(body);
 const page = { link: "", asking: false, still: false };
 let session, why, waiting, breaking, drawing, leaving;
 let confetti = "none";
@@ -49,7 +52,7 @@ const live = connect(body.dataset.socket, {
     else note();
   },
 });
-const showRobot = createControls(body, live, (asking) => {
+const { showRobot, keepFocus } = createControls(body, live, (asking) => {
   page.asking = asking;
   redraw();
 });
@@ -74,10 +77,13 @@ function draw() {
   const now = look(session, page);
   const theme = now === "feedback" ? session.phase.theme : "calm";
   if (body.dataset.theme !== theme) body.dataset.theme = theme;
-  if (body.dataset.look !== now) body.dataset.look = now;
+  const changed = body.dataset.look !== now;
+  if (changed) body.dataset.look = now;
   if (now !== "paused" && now !== "ask") page.asking = false;
   drawFeedback(now, session, why);
   if (session) showRobot(session);
+  if (changed) keepFocus();
+  if (now !== "feedback") fitCalm();
   if (now === "feedback") {
     const { last, steps } = session;
     scene.show({ performance: last?.kind === "missing" ? null : last?.performance, hit: last?.hit ?? false, strides: steps });
@@ -89,5 +95,8 @@ function draw() {
 }
 
 redraw();
-if (!mirrored) keepAwake();
+if (!mirrored) {
+  keepAwake();
+  guardLeaving(body.querySelector("dialog.leave"));
+}
 if (body.classList.contains("alone")) fillScreen();

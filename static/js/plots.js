@@ -1,6 +1,7 @@
 // Drawings of strides against the goal for the PT: a strip, the last twenty, the share of hits.
 // Shape repeats the meaning of color: hits are solid, misses hollow, missing ones hatched.
 
+import { number } from "garry/language";
 import { badge, isRemark, say } from "garry/marks";
 
 const LOW = 0.5, HIGH = 1.5;
@@ -18,7 +19,7 @@ export function drawStrip(svg, strides, marks, phases) {
   const dx = (width - 60) / Math.max(shown.length - 1, 60);
   const x = (index) => 46 + index * dx;
   let drawing = `<rect class="above" x="40" y="${y(HIGH)}" width="${width - 40}" height="${y(1) - y(HIGH)}"/>`;
-  for (const share of [0.5, 1, 1.5]) drawing += `<text x="0" y="${y(share) + 5}">${share * 100} %</text>`;
+  for (const share of [0.5, 1, 1.5]) drawing += `<text x="0" y="${y(share) + 5}">${number(share * 100)} %</text>`;
   drawing += `<path class="goal" d="M40 ${y(1)}H${width}"/>`;
   shown.forEach(({ performance, hit, valid }, index) => {
     const newest = index === shown.length - 1;
@@ -47,7 +48,7 @@ export function drawStrip(svg, strides, marks, phases) {
       if (value === null) continue;
       const cloth = Math.min(Math.max(at, free), width - 56);
       free = cloth + 57;
-      drawing += `<path class="flag" d="M${at} 4V${height - 8}"/><path class="cloth" d="M${cloth} 2h54v20h-54z"/><text class="on-cloth" x="${cloth + 27}" y="17">${value.toFixed(2)}</text>`;
+      drawing += `<path class="flag" d="M${at} 4V${height - 8}"/><path class="cloth" d="M${cloth} 2h54v20h-54z"/><text class="on-cloth" x="${cloth + 27}" y="17">${number(value, 2)}</text>`;
       continue;
     }
     if (!isRemark(mark)) {
@@ -82,7 +83,7 @@ export function drawTwenty(svg, strides) {
     const size = Math.min(Math.max(4, Math.abs(performance - 1) * scale), middle - 22);
     if (hit) drawing += `<rect class="hit" x="${left}" y="${middle - size}" width="${wide}" height="${size}" rx="4"/>`;
     else drawing += `<rect class="miss" x="${left + 1.5}" y="${middle}" width="${wide - 3}" height="${Math.min(size, height - middle - 4)}" rx="4"/>`;
-    if (index === strides.length - 1) drawing += `<text class="newest" x="${left + wide}" y="${hit ? middle - size - 8 : Math.min(middle + size + 17, height - 4)}">${Math.round(100 * performance)}</text>`;
+    if (index === strides.length - 1) drawing += `<text class="newest" x="${left + wide}" y="${hit ? middle - size - 8 : Math.min(middle + size + 17, height - 4)}">${number(100 * performance)}</text>`;
   });
   svg.innerHTML = drawing + `<path class="goal" d="M0 ${middle}H${width}"/>`;
 }
@@ -91,5 +92,5 @@ export function drawRing(svg, rate, wanted) {
   const around = 2 * Math.PI * 62;
   const arc = rate === null || rate === undefined ? "" : `<circle class="arc" cx="80" cy="80" r="62" stroke-dasharray="${around * rate} ${around}" transform="rotate(-90 80 80)"/>`;
   const tick = wanted ? `<g transform="rotate(${wanted * 360} 80 80)"><path class="tick-edge" d="M80 4v28"/><path class="tick" d="M80 2v32"/></g>` : "";
-  svg.innerHTML = `<circle class="track" cx="80" cy="80" r="62"/>${arc}${tick}<text class="rate" x="80" y="80" dy=".36em">${arc ? `${Math.round(100 * rate)} %` : "–"}</text>`;
+  svg.innerHTML = `<circle class="track" cx="80" cy="80" r="62"/>${arc}${tick}<text class="rate" x="80" y="80" dy=".36em">${arc ? `${number(100 * rate)} %` : "–"}</text>`;
 }

@@ -1,6 +1,8 @@
 // A tablet that waits shows the clinic's boards, each for a while, as they are at that moment: who no
 // longer agrees is gone with the next look.
 
+import { guardLeaving } from "garry/walk/leaving";
+
 const EVERY_MS = 5_000;
 const place = document.querySelector("[data-boards]");
 const calm = document.querySelector(".waits");
@@ -21,3 +23,4 @@ async function look() {
 }
 
 if (place) look();
+guardLeaving(document.querySelector("dialog.leave"));

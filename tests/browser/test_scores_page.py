@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Page, expect
 from tests.browsers import SIZES, can_be_read
 from tests.servers import ROOT, Server, clean_environment
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 
 SEED = """
 from django.utils import timezone

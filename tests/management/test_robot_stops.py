@@ -7,7 +7,10 @@ import pytest
 from tests.robot_room import robot_room
 from tests.robot_stops import LINK_S, STOPS, kill_server
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pty, no such signals")
+pytestmark = [
+    pytest.mark.realtime,
+    pytest.mark.skipif(sys.platform == "win32", reason="no pty, no such signals"),
+]
 
 ROUNDS = 2
 

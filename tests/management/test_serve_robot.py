@@ -18,6 +18,8 @@ from websockets.asyncio.client import connect
 
 from tests.servers import ROOT, clean_environment, serve
 
+pytestmark = pytest.mark.realtime
+
 PREPARE = """
 import django; django.setup()
 from rehab.people.first_start import first_clinic, first_password, prepare_database

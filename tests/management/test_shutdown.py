@@ -11,9 +11,12 @@ import sys
 import time
 from typing import Any
 
+import pytest
 from websockets.asyncio.client import connect
 
 from tests.servers import ROOT, clean_environment, serve
+
+pytestmark = pytest.mark.realtime
 
 
 def python(server, *arguments: str) -> str:

@@ -30,7 +30,8 @@ class FakeKobuki:
     """Runs on a thread until closed. ``orders`` has (monotonic time, speed, radius).
 
     What it feels (``bumper`` to ``battery``) goes into its frames as it is; ``is_mute`` keeps it
-    from saying anything, ``is_flooded`` from reading, ``is_held`` its wheels from rolling.
+    from saying anything, ``is_flooded`` from reading, ``is_held`` its wheels from rolling. Where it
+    really is from where it began: ``x_m``, ``y_m`` and ``heading_rad``.
     """
 
     def __init__(self, over="pty", version=(1, 2, 0)):
@@ -43,6 +44,7 @@ class FakeKobuki:
         self._asked = 0
         self._left = self._right = 65000.0  # ticks; they wrap soon
         self._angle_deg, self._rate_deg_s = 179.0, 0.0
+        self.x_m = self.y_m = self.heading_rad = 0.0
         self._speed, self._radius = 0, 0
         self._booted_s = time.monotonic() - 60.0
         self._ends, self._buffer = threading.Event(), b""
@@ -188,6 +190,10 @@ class FakeKobuki:
             v = w * radius
         self._left += (v - w * 0.115) * elapsed_s / TICK_M
         self._right += (v + w * 0.115) * elapsed_s / TICK_M
+        along_rad = self.heading_rad + w * elapsed_s / 2
+        self.x_m += v * elapsed_s * math.cos(along_rad)
+        self.y_m += v * elapsed_s * math.sin(along_rad)
+        self.heading_rad += w * elapsed_s
         self._rate_deg_s = math.degrees(w)
         self._angle_deg += self._rate_deg_s * elapsed_s
 

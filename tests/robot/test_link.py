@@ -20,6 +20,8 @@ from robot.link import (
     Timing,
 )
 
+pytestmark = pytest.mark.realtime
+
 QUICK = Timing(retry_first_s=0.01, retry_longest_s=0.05, close_within_s=0.1)
 HELLO = {"type": "hello", "version": 1}
 

@@ -14,7 +14,10 @@ import pytest
 from robot.port import PortOwner
 from tests.robot.fake_kobuki import FORWARD_200, STOP_FRAME, FakeKobuki
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pty")
+pytestmark = [
+    pytest.mark.realtime,
+    pytest.mark.skipif(sys.platform == "win32", reason="no pty"),
+]
 ROOT = Path(__file__).parents[2]
 
 

@@ -27,7 +27,7 @@ from tests.robot.fake_ros import (
 from tests.robot.real_ros import RosMaster, why_missing
 from tests.wire import Wire
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow]
+pytestmark = [pytest.mark.ros, pytest.mark.realtime]
 
 PLAIN = PROFILES["plain"]
 BUMPER = Topic("/bumper", "std_msgs/Bool")

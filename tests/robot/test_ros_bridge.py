@@ -33,6 +33,8 @@ from tests.robot.fake_ros import (
 )
 from tests.wire import Wire
 
+pytestmark = pytest.mark.realtime
+
 PLAIN = PROFILES["plain"]
 ROOT = Path(__file__).parents[2]
 

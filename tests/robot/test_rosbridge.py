@@ -23,6 +23,8 @@ from tests.robot.fake_ros import FakeBase, FakeRosbridge
 from tests.robot.test_performer import CUE, WELCOME
 from tests.robot.test_ros_frames import ANYTHING
 
+pytestmark = pytest.mark.realtime
+
 CMD, ODOM = PROFILES["plain"].order, PROFILES["plain"].odometry
 BUMPER = Topic("/bumper", "std_msgs/Bool")
 CLOSED = Topics(CMD, ODOM, {"bump": BUMPER})

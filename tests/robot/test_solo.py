@@ -17,6 +17,8 @@ from robot.gestures import GESTURES, ORIGINALS, TETHER_M
 from robot.solo import play
 from tests.robot.fake_kobuki import FakeKobuki
 
+pytestmark = pytest.mark.realtime
+
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="no pty")
 ROOT = Path(__file__).parents[2]
 

@@ -35,6 +35,8 @@ from robot.bases.twin.faults import LIMITS, BadFault, Faults
 from robot.bases.twin.firmware import FIRMWARE, Firmware
 from robot.bases.twin.process import Twin
 
+pytestmark = pytest.mark.realtime
+
 HAS_PHYSICS = importlib.util.find_spec("pybullet") is not None
 needs_physics = pytest.mark.skipif(not HAS_PHYSICS, reason="pybullet is not installed")
 needs_pty = pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals here")

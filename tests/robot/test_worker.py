@@ -14,6 +14,8 @@ from robot.motion import STILL
 from robot.worker import Worker
 from tests.robot.fake_garry import TOKEN, FakeGarry, serve_garry
 
+pytestmark = pytest.mark.realtime
+
 FAST = Timing(retry_first_s=0.02, retry_longest_s=0.1)
 
 

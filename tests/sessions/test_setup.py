@@ -274,11 +274,12 @@ def test_a_patients_details_can_be_mended_but_not_into_somebody_elses(pt, patien
 def test_a_patients_screen_is_kept(pt, patient):
     url = f"/patients/{patient.pk}/screen/"
     assert "Rosa’s screen" in pt.get(url).content.decode()
-    answer = pt.post(url, {"screen_side": "left", "screen_still": "on"})
+    answer = pt.post(url, {"screen_side": "left", "screen_text": "large", "screen_still": "on"})
     assert answer.url == f"/patients/{patient.pk}/"
     patient.refresh_from_db()
     kept = (patient.screen_side, patient.screen_still, patient.screen_sounds)
     assert kept == ("left", True, False)
+    assert patient.screen_text == "large"
     assert "Select a valid choice" in pt.post(url, {"screen_side": "up"}).content.decode()
 
 

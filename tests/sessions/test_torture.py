@@ -9,7 +9,7 @@ import pytest
 from tests.torture import Torture
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_three_kills_lose_nothing(tmp_path, capsys):
     seed = int(os.environ.get("GARRY_TEST_SEED", time.time_ns() % 1_000_000))
     with capsys.disabled():

@@ -11,6 +11,9 @@ from django.core.management import BaseCommand, CommandError
 from django.utils import timezone
 
 from rehab.exports.backup import write_backup
+from rehab.people import audit
+from rehab.people.audit import Act
+from rehab.people.models import Clinic
 
 PASSPHRASE = "GARRY_BACKUP_PASSPHRASE"  # noqa: S105 (the variable's name)
 SHORTEST = 16
@@ -52,6 +55,8 @@ class Command(BaseCommand):
             ) from problem
         finally:
             new.unlink(missing_ok=True)
+        for clinic in Clinic.everywhere.all():
+            audit.note(Act.BACKUP, None, clinic=clinic.pk, about="manage.py backup")
         size_mb = file.stat().st_size / 1e6
         self.stdout.write(
             f"{file}: {size_mb:.1f} MB, {counts['rehab.patient']} patients, "

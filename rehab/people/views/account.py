@@ -6,6 +6,7 @@ from django.contrib import messages
 from django.contrib.auth import update_session_auth_hash
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
+from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
 from django.views.decorators.debug import sensitive_post_parameters
 from django.views.decorators.http import require_http_methods, require_safe
@@ -13,10 +14,11 @@ from django.views.decorators.http import require_http_methods, require_safe
 from rehab.people import factors, passkeys
 from rehab.people.access import for_roles, person
 from rehab.people.forms import NewPasswordForm
+from rehab.people.models import LANGUAGES
 from rehab.people.roles import Role
 
 
-@for_roles(*Role)
+@for_roles(*Role, patients=False)
 @never_cache
 @require_safe
 def show_account(request: HttpRequest) -> HttpResponse:
@@ -24,6 +26,7 @@ def show_account(request: HttpRequest) -> HttpResponse:
     user = person(request)
     context = {
         "owner": user,
+        "languages": LANGUAGES,
         "authenticators": factors.authenticators_of(user),
         "is_required": factors.is_required(user),
         "codes_left": factors.recovery_codes_left(user),
@@ -32,7 +35,7 @@ def show_account(request: HttpRequest) -> HttpResponse:
     return render(request, "people/account.html", context)
 
 
-@for_roles(*Role)
+@for_roles(*Role, patients=False)
 @never_cache
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
@@ -43,6 +46,6 @@ def change_password(request: HttpRequest) -> HttpResponse:
     if form.is_valid():
         form.save()
         update_session_auth_hash(request, user)
-        messages.success(request, "Your password is changed.")
+        messages.success(request, _("Your password is changed."))
         return redirect("account")
     return render(request, "people/new_password.html", {"form": form})

@@ -9,6 +9,7 @@ from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
 from django.urls import reverse
 from django.utils import timezone
+from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
 from django.views.decorators.debug import sensitive_post_parameters
 from django.views.decorators.http import require_http_methods, require_safe
@@ -30,7 +31,7 @@ def owner(request: HttpRequest) -> User:
     return user
 
 
-@for_roles(*Role, setting_up=True)
+@for_roles(*Role, setting_up=True, patients=False)
 @never_cache
 @require_safe
 def choose(request: HttpRequest) -> HttpResponse:
@@ -44,7 +45,7 @@ def choose(request: HttpRequest) -> HttpResponse:
     return render(request, "people/set_up.html", context)
 
 
-@for_roles(*Role, setting_up=True)
+@for_roles(*Role, setting_up=True, patients=False)
 @never_cache
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
@@ -65,7 +66,7 @@ def add_app(request: HttpRequest) -> HttpResponse:
     return render(request, "people/add_app.html", context)
 
 
-@for_roles(*Role, setting_up=True)
+@for_roles(*Role, setting_up=True, patients=False)
 @never_cache
 @require_http_methods(["GET", "HEAD", "POST"])
 def add_passkey(request: HttpRequest) -> HttpResponse:
@@ -75,13 +76,13 @@ def add_passkey(request: HttpRequest) -> HttpResponse:
         raise Http404
     problem = ""
     if request.method == "POST":
-        name = request.POST.get("name", "").strip()[:64] or "Passkey"
+        name = request.POST.get("name", "").strip()[:64] or _("Passkey")
         try:
             return _added(
                 request, user, passkeys.keep(request, user, name, request.POST["passkey"])
             )
         except (KeyError, passkeys.NotProven):
-            problem = "This passkey was not accepted. Try again."
+            problem = _("This passkey was not accepted. Try again.")
     context = {"problem": problem, "passkey": passkeys.ask_to_make(request, user)}
     return render(request, "people/add_passkey.html", context)
 
@@ -94,12 +95,12 @@ def _added(request: HttpRequest, user: User, new: list[str]) -> HttpResponse:
     else:
         then = entry.finish(request, user, proven=True)
     if not new:
-        messages.success(request, "Added.")
+        messages.success(request, _("Added."))
         return redirect(then)
     return _show(request, new, then)
 
 
-@for_roles(*Role)
+@for_roles(*Role, patients=False)
 @never_cache
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
@@ -113,9 +114,9 @@ def renew_codes(request: HttpRequest) -> HttpResponse:
         return _show(request, factors.renew_recovery_codes(user), reverse("account"))
     context = {
         "form": form,
-        "title": "New recovery codes",
-        "words": "They replace the old ones, which then open nothing.",
-        "act": "Make new codes",
+        "title": _("New recovery codes"),
+        "words": _("They replace the old ones, which then open nothing."),
+        "act": _("Make new codes"),
     }
     return render(request, "people/ask_password.html", context)
 
@@ -124,7 +125,7 @@ def _show(request: HttpRequest, new: list[str], then: str) -> HttpResponse:
     return render(request, "people/recovery_codes.html", {"codes": new, "then": then})
 
 
-@for_roles(*Role)
+@for_roles(*Role, patients=False)
 @never_cache
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
@@ -138,14 +139,16 @@ def remove(request: HttpRequest) -> HttpResponse:
     form = OwnPasswordForm(request, user, request.POST if request.method == "POST" else None)
     if form.is_valid():
         if factors.remove(user, own.pk):
-            messages.success(request, f"{own} is removed.")
+            messages.success(request, _("%(name)s is removed.") % {"name": own})
         else:
-            messages.error(request, "Your clinic asks for a second factor. Add another one first.")
+            messages.error(
+                request, _("Your clinic asks for a second factor. Add another one first.")
+            )
         return redirect("account")
     context = {
         "form": form,
-        "title": f"Remove {own}",
-        "words": "It then no longer signs you in.",
-        "act": "Remove",
+        "title": _("Remove %(name)s") % {"name": own},
+        "words": _("It then no longer signs you in."),
+        "act": _("Remove"),
     }
     return render(request, "people/ask_password.html", context)

@@ -11,6 +11,7 @@ from django.http import HttpRequest, HttpResponse, HttpResponseRedirect
 from django.shortcuts import redirect, render
 from django.urls import reverse
 from django.utils import timezone
+from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
 from django.views.decorators.debug import sensitive_post_parameters
 from django.views.decorators.http import require_http_methods, require_POST
@@ -62,7 +63,7 @@ def prove(request: HttpRequest) -> HttpResponse:
         try:
             passkeys.take(request, user, answer, timezone.now())
         except passkeys.NotProven:
-            problem = "This passkey was not accepted. Try again, or type a code."
+            problem = _("This passkey was not accepted. Try again, or type a code.")
         else:
             return HttpResponseRedirect(entry.finish(request, user, proven=True))
     elif form.is_valid():
@@ -82,5 +83,5 @@ def prove(request: HttpRequest) -> HttpResponse:
 def sign_out(request: HttpRequest) -> HttpResponse:
     """End the sign-in of this browser."""
     logout(request)
-    messages.success(request, "You are signed out.")
+    messages.success(request, _("You are signed out."))
     return redirect("sign-in")

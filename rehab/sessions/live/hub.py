@@ -14,6 +14,7 @@ from rehab.sessions.events import Audience, LiveEvent
 
 RING = 512  # events a session; at two steps a second four minutes
 MAX_UNSEEN = 32  # frames that may be on their way to a page
+MAX_UNSEEN_PAST = 4  # of these, frames of past steps: whoever reads faster is fed faster
 UNSEEN_S = 15.0  # how long a page may take to confirm one
 ABSENT_S = 5.0  # after so long nobody can be said to look at it
 
@@ -95,6 +96,15 @@ class Viewer:
             self._waiting_s = asyncio.get_running_loop().time()
         self.frame += 1
         await self._send(f'{{"type":"{kind}","frame":{self.frame},"{kind}":[{",".join(texts)}]}}')
+
+    async def send_past(self, texts: list[str]) -> None:
+        """Send past steps as a frame, once the page has dealt with most of those before.
+
+        Raises Unseen where it confirms nothing.
+        """
+        while self.frame - self._seen >= MAX_UNSEEN_PAST:
+            await self._wait_until_seen()
+        await self.send_frame("steps", texts)
 
     async def pump(self) -> None:
         """Send until cancelled. Raises Lagged or Unseen where the viewer must begin anew."""

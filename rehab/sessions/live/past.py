@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from channels.db import database_sync_to_async
 
-from rehab.sessions.models import Step
+from rehab.sessions.models import SessionEvent, Step
+from rehab.training.changes import ChangeKind
+from rehab.training.measures import Measure
+from rehab.training.steps import Measurement, Reason, add_reason, find_reasons
 
 PAGE = 256  # past steps at a time
+MOVES = (ChangeKind.START, ChangeKind.PAUSE, ChangeKind.RESUME)
 
 
 @database_sync_to_async
@@ -17,6 +21,29 @@ def read_steps(session_id: int, after: int, until: int) -> list[Step]:
 
 
 @database_sync_to_async
-def read_step(session_id: int, number: int) -> Step:
-    """Give a stored step."""
-    return Step.everywhere.get(session_id=session_id, number=number)
+def is_stored(session_id: int, measurement: Measurement, measure: Measure) -> bool:
+    """Say whether the step of this number is stored as it was measured, doubts included."""
+    stored = Step.everywhere.get(session_id=session_id, number=measurement.number)
+    same = (
+        stored.time_s == measurement.time_s
+        and stored.side == measurement.side
+        and stored.value == measurement.value
+        and stored.extra == measurement.extra
+    )
+    if not same or not stored.reasons:
+        return same and not measurement.reasons
+    return tuple(stored.reasons) == _find_reasons(session_id, measurement, measure)
+
+
+def _find_reasons(session_id: int, measurement: Measurement, measure: Measure) -> tuple[str, ...]:
+    """Give the reasons that a measurement was stored with: the source's, then the fold's."""
+    reasons, number = find_reasons(measurement, measure), measurement.number
+    before = Step.everywhere.filter(session_id=session_id, number=number - 1).first()
+    if before is not None and measurement.time_s < before.time_s:
+        reasons = add_reason(reasons, Reason.TIME_BACKWARDS)
+    moves = SessionEvent.everywhere.filter(
+        session_id=session_id, after_number__lt=number, kind__in=MOVES
+    )
+    if moves.order_by("-pk").values_list("kind", flat=True).first() == ChangeKind.PAUSE:
+        reasons = add_reason(reasons, Reason.PAUSED)
+    return reasons

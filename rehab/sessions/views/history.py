@@ -6,17 +6,20 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
+from django.contrib import messages
 from django.core.paginator import Paginator
 from django.db.models import Count, Sum
 from django.http import HttpRequest, HttpResponse
-from django.shortcuts import get_object_or_404, render
+from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.utils.translation import gettext
-from django.views.decorators.http import require_safe
+from django.utils.translation import gettext_lazy as _
+from django.views.decorators.http import require_http_methods, require_safe
 
 from rehab.people.access import for_roles, person
 from rehab.people.models import Patient
 from rehab.people.roles import Role
+from rehab.sessions.corrections import CorrectionForm, Part, may_correct, tell_corrections
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.review import review_session, sum_up
 from rehab.sessions.trend import draw_trend, figures_of, read_trend, sum_up_all
@@ -26,11 +29,11 @@ from rehab.training.valences import VALENCES
 
 A_PAGE = 20
 STATES = {
-    State.READY: "not started",
-    State.RUNNING: "running",
-    State.PAUSED: "paused",
+    State.READY: _("not started"),
+    State.RUNNING: _("running"),
+    State.PAUSED: _("paused"),
     State.FINISHED: "",
-    State.ABORTED: "ended early",
+    State.ABORTED: _("ended early"),
 }
 
 
@@ -69,13 +72,13 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
     groups: list[dict[str, Any]] = [
         dict(group)
         for group in mine.order_by()
-        .values("valence", "simulated")
+        .values("valence", "simulated", "left_out")
         .annotate(Count("pk"), walked=Sum("active_s"))
     ]
     chosen = request.GET.get("type", "")
     chips = [
         Chip(slug, label, sum(g["pk__count"] for g in groups if slug in ("", g["valence"])))
-        for slug, label in (("", "All"), *((v.slug, v.label) for v in VALENCES.values()))
+        for slug, label in (("", gettext("All")), *((v.slug, v.label) for v in VALENCES.values()))
     ]
     if chosen in VALENCES:
         mine = mine.filter(valence=chosen)
@@ -84,6 +87,7 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
         chosen = ""
     # What a person walked and what a simulated patient walked share no figure.
     simulated = bool(groups) and all(group["simulated"] for group in groups)
+    counted = [group for group in groups if not group["left_out"]]
     page = Paginator(mine.select_related("measure").defer("plan"), A_PAGE).get_page(
         request.GET.get("page")
     )
@@ -99,7 +103,8 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
         "page": page,
         "lines": [write_line(row, figures.get(row.pk, {}), patient, today) for row in rows],
         "simulated": simulated,
-        "totals": sum_up_all(groups, trend, simulated=simulated),
+        "totals": sum_up_all(counted, trend, simulated=simulated),
+        "corrected": sum(group["pk__count"] for group in groups if group["left_out"]),
         "trend": list(zip(chart["hits"]["days"], trend, strict=True)),
         "chart": chart,
     }
@@ -119,7 +124,9 @@ def write_line(
         goal=say_number(session.goal),
         score=say_number(figures.get("score"), 0),
         hit_rate=say_rate(figures.get("hit_rate")),
-        state="imported" if session.original_id is not None else STATES[State(session.state)],
+        state=gettext("imported")
+        if session.original_id is not None
+        else str(STATES[State(session.state)]),
     )
 
 
@@ -133,6 +140,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         pk=session_id,
     )
     review = review_session(user, session)
+    corrections = tell_corrections(session, user)
     by_name = user.role != Role.RESEARCHER
     start = at_clinic(session.started_at or session.created_at, session.clinic)
     now = at_clinic(timezone.now(), session.clinic)
@@ -144,6 +152,11 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         "time": f"{start:%H:%M}",
         "state": STATES[State(session.state)],
         "open": State(session.state) in OPEN,
+        "may_correct": by_name and may_correct(session),
+        "corrections": [
+            told | {"at": at_clinic(told["row"].at, session.clinic)} for told in corrections
+        ],
+        "note": next((told["new"] for told in corrections if told["row"].part == Part.NOTE), ""),
         "review": review,
         "totals": sum_up(session.to_plan(), review),
         "phases": [
@@ -162,3 +175,22 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         ],
     }
     return render(request, "sessions/session.html", context)
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_http_methods(["GET", "HEAD", "POST"])
+def correct(request: HttpRequest, session_id: int) -> HttpResponse:
+    """Correct an ended session: who walked, whether it counts, a note. The log stays as it is."""
+    user = person(request)
+    session = get_object_or_404(
+        TrainingSession.objects.visible_to(user).select_related("patient", "clinic"), pk=session_id
+    )
+    if not may_correct(session):
+        messages.error(request, gettext("This session still runs. End it before you correct it."))
+        return redirect("session", session_id=session.pk)
+    form = CorrectionForm(request.POST or None, session=session, by=user)
+    if request.method == "POST" and form.is_valid():
+        form.save(timezone.now())
+        messages.success(request, gettext("Corrected. Figures, boards and trends follow it."))
+        return redirect("session", session_id=session.pk)
+    return render(request, "sessions/correct.html", {"session": session, "form": form})

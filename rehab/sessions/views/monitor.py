@@ -4,30 +4,27 @@ from __future__ import annotations
 
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
-from django.utils.translation import gettext_lazy as _
+from django.utils.text import capfirst
 from django.views.decorators.http import require_safe
 
 from rehab.people.access import for_roles, person
 from rehab.people.roles import Role
 from rehab.sessions.live.messages import BORG_MAX
-from rehab.sessions.models import Remark, TrainingSession
+from rehab.sessions.models import EVENTS, Remark, TrainingSession
+from rehab.sessions.words import LEVELS
 from rehab.training.plans import ROBOT_LEVELS
 
 # What is noted with one tap, with its icon.
 ICONS = {
-    Remark.REST: (_("Rest"), "rest"),
-    Remark.PAIN: (_("Pain"), "pain"),
-    Remark.DIZZINESS: (_("Dizziness"), "dizzy"),
-    Remark.NEAR_FALL: (_("Near fall"), "nearfall"),
-    Remark.FALL: (_("Fall"), "fall"),
-    Remark.HANDRAIL: (_("Handrail"), "rail"),
-    Remark.VERBAL_CUE: (_("Verbal cue"), "voice"),
-    Remark.BORG: (_("Borg"), "borg"),
+    Remark.REST: "rest",
+    Remark.PAIN: "pain",
+    Remark.DIZZINESS: "dizzy",
+    Remark.NEAR_FALL: "nearfall",
+    Remark.FALL: "fall",
+    Remark.HANDRAIL: "rail",
+    Remark.VERBAL_CUE: "voice",
+    Remark.BORG: "borg",
 }
-REMARKS = [
-    {"slug": what.value, "label": label, "icon": icon} for what, (label, icon) in ICONS.items()
-]
-LEVELS = {"normal": _("Normal"), "gentle": _("Gentle"), "off": _("Off")}
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -40,8 +37,11 @@ def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
     )
     context = {
         "session": session,
-        "remarks": REMARKS,
+        "remarks": [
+            {"slug": what.value, "label": capfirst(EVENTS[what]), "icon": icon}
+            for what, icon in ICONS.items()
+        ],
         "borg": range(BORG_MAX + 1),
-        "levels": [(LEVELS[name], share) for name, share in ROBOT_LEVELS.items()],
+        "levels": [(capfirst(LEVELS[name]), share) for name, share in ROBOT_LEVELS.items()],
     }
     return render(request, "sessions/monitor.html", context)

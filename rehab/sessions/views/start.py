@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from django.db.models import Count, Max, QuerySet
+from datetime import timedelta
+from typing import Any
+
+from django.db.models import Count, Max, Q, QuerySet
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.utils import timezone
+from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from rehab.people.access import clinic_of, for_roles, person
@@ -12,6 +17,8 @@ from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.forms import PatientForm, ScreenForm, SessionForm, like_last_time
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.visits import SOON_DAYS, Visit, read_today, usual_time
+from rehab.sessions.words import at_clinic
 from rehab.stations.builtin import first_station
 from rehab.training.changes import OPEN
 
@@ -38,36 +45,58 @@ def open_sessions(user: User) -> QuerySet[TrainingSession]:
     )
 
 
-@for_roles(Role.LEAD, Role.PT)
-@require_safe
-def choose_patient(request: HttpRequest) -> HttpResponse:
-    """List the patients."""
-    user = person(request)
-    words = request.GET.get("q", "").strip()
+def list_everybody(user: User, words: str = "") -> dict[str, Any]:
+    """Give both lists of the start page: who is expected today, and all patients."""
+    now = at_clinic(timezone.now(), clinic_of(user))
     patients = patients_of(user)
     if words:
-        patients = patients.filter(nickname__icontains=words) | patients.filter(
-            code__icontains=words
-        )
-    context = {"patients": patients[:SHOWN], "open": open_sessions(user), "q": words}
+        patients = patients.filter(Q(nickname__icontains=words) | Q(code__icontains=words))
+    else:  # whose program has ended is found by name or code
+        patients = patients.filter(ended_at=None)
+    shown = list(patients[: SHOWN + 1])
+    return {
+        "now": now,
+        "today": read_today(user, now),
+        "patients": shown[:SHOWN],
+        "more": len(shown) > SHOWN,
+        "open": open_sessions(user),
+    }
+
+
+@for_roles(Role.LEAD, Role.PT)
+@never_cache  # going back shows what is true now
+@require_safe
+def choose_patient(request: HttpRequest) -> HttpResponse:
+    """List who is expected today, then all patients."""
+    words = request.GET.get("q", "").strip()
+    context = list_everybody(person(request), words) | {"q": words}
     return render(request, "sessions/start.html", context)
 
 
 @for_roles(Role.LEAD, Role.PT)
+@never_cache
 @require_safe
 def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Offer a patient the session like last time, another one, or the past ones."""
+    """Offer a patient the session like last time, another one, the past ones, the next visit."""
     user = person(request)
     patient = get_object_or_404(patients_of(user), pk=patient_id)
     first_station(patient.clinic)
     initial = like_last_time(patient, user)
-    context = {
-        "patients": patients_of(user)[:SHOWN],
+    lists = list_everybody(user)
+    today = lists["now"].date()
+    visits = Visit.objects.visible_to(user).filter(patient=patient, day__gte=today)
+    context = lists | {
         "patient": patient,
-        "open": open_sessions(user),
         "open_here": open_sessions(user).filter(patient=patient),
         "form": SessionForm(initial=initial, patient=patient, by=user),
         "last": initial,
+        "visits": visits,
+        "soon": [
+            (days, today + timedelta(days=days))
+            for days in SOON_DAYS
+            if days or all(row.patient != patient for row in lists["today"])
+        ],
+        "at": usual_time(user, patient, lists["now"]),
     }
     return render(request, "sessions/start.html", context)
 

@@ -8,6 +8,7 @@ from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from rehab.people.access import for_roles, person
+from rehab.people.language import speak_to
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
@@ -23,6 +24,7 @@ def show_take_home(request: HttpRequest, patient_id: int) -> HttpResponse:
     patient = get_object_or_404(
         Patient.objects.visible_to(user).select_related("clinic"), pk=patient_id
     )
+    speak_to(patient)
     sessions = TrainingSession.objects.visible_to(user).filter(
         patient=patient, simulated=patient.simulated
     )

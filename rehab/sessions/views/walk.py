@@ -6,9 +6,11 @@ from csp.constants import SELF
 from csp.decorators import csp_replace
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
 from django.views.decorators.clickjacking import xframe_options_sameorigin
 
 from rehab.people.access import actor_of, for_roles
+from rehab.people.language import speak_to
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ENDED, State
@@ -19,11 +21,19 @@ from rehab.training.changes import ENDED, State
 @csp_replace({"frame-ancestors": [SELF]})  # type: ignore[arg-type]  # knows no views with arguments
 def show_walk(request: HttpRequest, session_id: int) -> HttpResponse:
     """Show a session as the patient sees it; one that has ended shows its scores."""
-    sessions = TrainingSession.objects.visible_to(actor_of(request)).select_related("patient")
+    sessions = TrainingSession.objects.visible_to(actor_of(request)).select_related(
+        "patient", "station"
+    )
     session = get_object_or_404(sessions, pk=session_id)
     mirror = "mirror" in request.GET
+    speak_to(session.patient)
     if State(session.state) in ENDED and not mirror:
         return redirect("scores", session_id=session.pk)
     alone = not request.user.is_authenticated
-    context = {"session": session, "mirror": mirror, "tablet": alone}
+    context = {
+        "session": session,
+        "mirror": mirror,
+        "tablet": alone,
+        "leave_to": reverse("start") if alone else reverse("patient", args=[session.patient_id]),
+    }
     return render(request, "sessions/walk.html", context)

@@ -1,4 +1,5 @@
-// The page's buttons: start, pause, go on, end (asked twice) and the robot's stop.
+// The page's buttons: start, pause, go on, end (asked twice) and the robot's stop; and where the
+// keyboard's focus goes when a button leaves.
 
 const GUARD_MS = 700; // a question that just appeared takes no answer: a second tap is no yes
 const NOTE_MS = 6_000;
@@ -7,7 +8,7 @@ export function createControls(body, live, ask) {
   const note = body.querySelector(".note");
   const robot = body.querySelector(".robot");
   const label = robot.textContent;
-  let hiding, resetting;
+  let hiding, resetting, held;
   let [said, stopped] = ["", false];
 
   function tell(message) {
@@ -25,6 +26,7 @@ export function createControls(body, live, ask) {
       tell(problem.message);
     }
     button.disabled = false;
+    keepFocus();
   }
 
   function question(asked) {
@@ -54,6 +56,15 @@ export function createControls(body, live, ask) {
     robot.toggleAttribute("data-said", words !== label);
   }
 
+  const usable = (element) => element.isConnected && !element.disabled && element.checkVisibility({ visibilityProperty: true });
+
+  // Who steers by keys goes on from the button that takes the place of the one that has gone.
+  function keepFocus() {
+    if (!held || (document.activeElement !== body && usable(document.activeElement))) return;
+    [held, ...body.querySelectorAll(".actions .main, header .pause")].find(usable)?.focus();
+  }
+
+  body.addEventListener("focusin", ({ target }) => (held = target));
   body.addEventListener("click", ({ target }) => {
     const button = target.closest("button");
     if (!button) return;
@@ -64,9 +75,11 @@ export function createControls(body, live, ask) {
   });
   body.addEventListener("contextmenu", (event) => event.preventDefault()); // of a long press
 
-  return function showRobot({ presence, robot_stopped }) {
+  function showRobot({ presence, robot_stopped }) {
     stopped = robot_stopped;
     robot.hidden = !presence.robot;
     drawRobot();
-  };
+  }
+
+  return { showRobot, keepFocus };
 }

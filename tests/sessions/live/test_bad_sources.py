@@ -182,6 +182,48 @@ async def test_the_same_number_with_other_content(place, begun, bystander):
     assert (await Step.everywhere.aget(session=session)).value == 4.0
 
 
+# What was sent, by what becomes of it besides: the server adds doubts of its own.
+DOUBTED: dict[str, Message] = {
+    "two": {"value": 4.0, "reasons": ["slip", "cross_step"]},
+    "out_of_bounds": {"value": 99.0, "reasons": ["slip"]},
+    "missing": {"value": None, "reasons": ["slip"]},
+    "own_doubt": {"value": 4.0, "reasons": ["paused"]},
+    "own_clock": {"value": 4.0, "reasons": ["time_backwards"]},
+    "backwards": {"value": 4.0, "time_s": -5.0, "reasons": ["slip"]},
+    "backwards_alone": {"value": 4.0, "time_s": -5.0, "reasons": []},
+}
+
+
+@pytest.mark.parametrize("paused", [False, True], ids=["running", "paused"])
+@pytest.mark.parametrize("sent", DOUBTED.values(), ids=list(DOUBTED))
+async def test_the_same_number_with_fewer_or_other_reasons(place, begun, sent, paused):
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    await source.walk(4.0)
+    if paused:
+        await change(session, "pause")
+    step = a_step(2) | sent
+    source.number = 2
+    await source.say(step)
+    await source.acked(2)
+    reasons = step["reasons"]
+    others = [reasons[:-1], reasons[1:], [*reasons, "other"], reasons[::-1]]
+    # Of a step that came while the session was paused, "paused" says nothing that is not known.
+    same = [reasons, []] if paused and reasons == ["paused"] else [reasons]
+    for other in [other for other in others if other not in same]:
+        await source.say(step | {"reasons": other})
+        code, error = await source.sent_away()
+        assert (code, error["code"]) == (4400, "conflict"), other
+        source = await place.source().dial()
+        await source.hello()
+        before = len(source.heard)
+        await source.say(step)  # as it was: acknowledged again
+        while source.heard[before:].count({"type": "ack", "number": 2}) < 1:
+            await source.hear("ack")
+    assert await numbers(session) == [1, 2]
+
+
 async def test_other_content_while_the_first_is_on_its_way_to_the_disk(place, begun, stall):
     session = await begun(place)
     source = await place.source().dial()

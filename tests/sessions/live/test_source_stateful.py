@@ -6,12 +6,13 @@ import asyncio
 import os
 import socket
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 from asgiref.sync import sync_to_async
 from django.db import connections
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
     RuleBasedStateMachine,
@@ -23,13 +24,17 @@ from hypothesis.stateful import (
 )
 
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live import writer as writers
 from rehab.sessions.live.actor import SessionActor, read_log
+from rehab.sessions.live.consumers import source as source_consumers
+from rehab.sessions.live.session import LiveSession
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.models import Step, TrainingSession
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.fold import SessionFold
 from rehab.training.phases import make_phase
 from rehab.training.steps import Measurement, Side
+from tests.sessions.live import callers
 from tests.sessions.live.callers import (
     PATIENCE_S,
     Caller,
@@ -48,12 +53,22 @@ SIDES = st.sampled_from(["left", "left", "right"])
 
 
 class PowerSwitch:
-    """Takes the power from a runtime's writer: what is queued is neither written nor reported."""
+    """Takes the power from a runtime's writer: what is queued is neither written nor reported.
+
+    One that is frozen writes it later, as a process that was suspended.
+    """
 
     def __init__(self) -> None:
         self.dead: set[Writer] = set()  # the objects: numbers are used again
+        self.frozen: dict[Writer, threading.Event] = {}
         self.open = threading.Event()
         self.open.set()
+
+    def wait(self, writer: Writer) -> None:
+        """Wait until a writer may write (in its thread)."""
+        self.open.wait(PATIENCE_S)
+        if writer in self.frozen:
+            self.frozen[writer].wait(PATIENCE_S)
 
 
 class Sources(RuleBasedStateMachine):
@@ -241,6 +256,26 @@ class Sources(RuleBasedStateMachine):
         """The power goes: no drain, no farewell; what was not committed is gone."""
         self.go(self._crash())
 
+    @precondition(lambda self: self.source and not self.stalled)
+    @rule(steps=st.lists(st.tuples(VALUES, SIDES), min_size=1, max_size=3))
+    def freeze(self, steps: list[tuple[float | None, str]]) -> None:
+        """The process freezes with steps on their way, another takes the session over, and then
+        the first one goes on: what it had queued may not come into the log any more.
+        """
+        self.go(self._freeze(steps))
+
+    async def _freeze(self, steps: list[tuple[float | None, str]]) -> None:
+        await self._catch_up()
+        frozen, kept = runtimes.current(), self.sent
+        thaw = self.switch.frozen.setdefault(frozen.writer, threading.Event())
+        await self._send(*[self._make(*step) for step in steps])
+        await self.source.overhear()
+        self._note_acks()
+        runtimes._current = None
+        await self._lose_all_but(kept)
+        thaw.set()
+        await self._end(frozen)
+
     async def _catch_up(self) -> None:
         """Let the server finish, so that what a crash takes along is no matter of timing."""
         live = runtimes.current().sessions.get(self.session.pk)
@@ -261,8 +296,10 @@ class Sources(RuleBasedStateMachine):
         self.switch.open.set()
         self.stalled = False
         await self._end(runtime)
-        self.source = None
-        kept = await Step.everywhere.filter(session=self.session).acount()
+        await self._lose_all_but(await Step.everywhere.filter(session=self.session).acount())
+
+    async def _lose_all_but(self, kept: int) -> None:
+        """Have a new process take over what the one before has stored."""
         assert self.acked <= kept <= self.sent  # nothing acknowledged is lost
         while self.sent > kept:
             assert isinstance(self.log.pop(), Measurement)
@@ -278,7 +315,9 @@ class Sources(RuleBasedStateMachine):
         runtime._ticker.cancel()
         for caller in list(Caller.open_ones):
             await caller.hang_up()
-        runtimes._current = None
+        self.source = None
+        if runtimes._current is runtime:
+            runtimes._current = None
 
     async def _sent_away(self) -> tuple[int, dict[str, Any]]:
         source, self.source = self.source, None
@@ -364,14 +403,14 @@ def figures(fold: SessionFold) -> tuple[Any, ...]:
     )
 
 
-def test_the_log_is_what_a_plain_list_says(
-    transactional_db: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def walk(transactional_db: None, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Give what runs the machine, in a place of its own."""
     switch = PowerSwitch()
     write = Writer._write
 
     def write_while_there_is_power(self: Writer, jobs: Any) -> None:
-        switch.open.wait(PATIENCE_S)
+        switch.wait(self)
         if self not in switch.dead:
             write(self, jobs)
 
@@ -380,13 +419,84 @@ def test_the_log_is_what_a_plain_list_says(
     monkeypatch.setattr(Sources, "place", build_place("elm"), raising=False)
     runtimes._current = None
     Caller.open_ones.clear()
-    run_state_machine_as_test(
-        Sources,
-        settings=settings(
-            max_examples=25,
-            stateful_step_count=30,
-            deadline=None,
-            derandomize=True,  # the same walks each time; --hypothesis-seed tries others
-            suppress_health_check=list(HealthCheck),
-        ),
-    )
+
+    def walk(**more: Any) -> None:
+        run_state_machine_as_test(
+            Sources,
+            settings=settings(
+                max_examples=25,
+                stateful_step_count=30,
+                deadline=None,
+                derandomize=True,  # the same walks each time; --hypothesis-seed tries others
+                suppress_health_check=list(HealthCheck),
+                **more,
+            ),
+        )
+
+    return walk
+
+
+def test_the_log_is_what_a_plain_list_says(walk: Callable[..., None]) -> None:
+    walk()
+
+
+# --- the machine can fail: seeded faults ----------------------------------------------------------
+
+
+def acknowledge_before_the_commit(monkeypatch: pytest.MonkeyPatch) -> None:
+    take = LiveSession.take
+
+    def take_and_acknowledge(self: LiveSession, measurement: Measurement, *args: Any, **more: Any):
+        take(self, measurement, *args, **more)
+        if self.source is not None:
+            self.source.acknowledge(measurement.number)
+
+    monkeypatch.setattr(LiveSession, "take", take_and_acknowledge)
+
+
+def check_no_epoch(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(writers, "_check_epochs", lambda expected: None)
+
+
+def take_other_content_for_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def is_stored(*_: Any) -> bool:
+        return True
+
+    monkeypatch.setattr(source_consumers, "is_stored", is_stored)
+
+
+def forget_where_a_change_stood(monkeypatch: pytest.MonkeyPatch) -> None:
+    change = SessionActor.change
+
+    def change_from_the_start(self: SessionActor, *args: Any) -> list[Any]:
+        rows: list[Any] = change(self, *args)
+        rows[0].after_number = 0
+        return rows
+
+    monkeypatch.setattr(SessionActor, "change", change_from_the_start)
+
+
+# Each with the rule or check of the machine that must trip over it.
+FAULTS = {
+    acknowledge_before_the_commit: "_connect",
+    check_no_epoch: "_look_at_the_log",
+    take_other_content_for_the_same: "contradict",
+    forget_where_a_change_stood: "_look_at_the_log",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "place"), FAULTS.items(), ids=lambda one: getattr(one, "__name__", "")
+)
+def test_a_seeded_fault_is_found(
+    fault: Callable[[pytest.MonkeyPatch], None],
+    place: str,
+    walk: Callable[..., None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fault(monkeypatch)
+    monkeypatch.setattr(callers, "PATIENCE_S", 1.0)  # it will wait for an answer in vain
+    with pytest.raises((AssertionError, TimeoutError)) as found:  # HungUp is an assertion, too
+        walk(phases=[Phase.generate], report_multiple_bugs=False)
+    assert place in [entry.name for entry in found.traceback]

@@ -16,12 +16,14 @@ from rehab.people.roles import Role
 from rehab.sessions.live import hub
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.actor import SessionActor
+from rehab.sessions.live.past import PAGE
 from rehab.sessions.models import Remark, SessionEvent
 from rehab.sessions.services import change_session, create_session
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
 from tests.sessions.live.callers import (
+    Caller,
     Message,
     MonitorPage,
     Page,
@@ -136,6 +138,55 @@ async def test_after_gives_exactly_the_missing_steps_once(place, begun):
     await source.walk(4.0)
     await up_to_date.until_step(count + 1)
     assert not [m for m in up_to_date.heard if m["type"] == "steps"]
+
+
+async def test_a_long_past_is_fed_as_fast_as_it_is_read(place, begun):
+    """A page asks for 5,000 steps and reads slowly; a page beside it notices nothing."""
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    count = 5_000
+    for first in range(1, count, 200):
+        await source.say({"type": "steps", "steps": [a_step(first + i) for i in range(200)]})
+        await source.acked(first + 199)
+    source.number = count
+    beside = place.monitor(session)
+    await beside.watch()
+    slow = place.tablet(session, "?after=0")
+    await slow.watch()
+    while len(frames_of_past(slow)) < hub.MAX_UNSEEN_PAST:
+        await slow.hear("steps")
+    await source.walk(*[4.0] * 20)
+    await beside.until_step(count + 20)
+    await Caller.overhear(slow)
+    past = frames_of_past(slow)
+    assert len(past) == hub.MAX_UNSEEN_PAST  # not one more before it has read one
+    assert max(len(frame["steps"]) for frame in past) <= PAGE
+    while len(numbers_of(slow)) < count:
+        await slow.say({"type": "seen", "frame": frames_of_past(slow)[-1]["frame"]})
+        await slow.hear("steps")
+    await slow.until_step(count + 20)
+    assert numbers_of(slow) == list(range(1, count + 21))
+
+
+async def test_a_page_that_reads_none_of_its_past_is_let_go(place, begun, monkeypatch):
+    monkeypatch.setattr(hub, "UNSEEN_S", 0.05)
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    for first in range(1, 2000, 200):
+        await source.say({"type": "steps", "steps": [a_step(first + i) for i in range(200)]})
+        await source.acked(first + 199)
+    page = place.tablet(session, "?after=0")
+    await page.watch()
+    code, error = await page.sent_away()
+    assert (code, error["code"]) == (4008, "unseen")
+    live = await runtimes.current().session(session.pk)
+    assert not live.channel.viewers
+
+
+def frames_of_past(page: Page) -> list[Message]:
+    return [message for message in page.heard if message["type"] == "steps"]
 
 
 def numbers_of(page: Page) -> list[int]:

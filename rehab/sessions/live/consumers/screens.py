@@ -9,11 +9,12 @@ from urllib.parse import parse_qs
 
 from django.utils import timezone
 
+from rehab.people.audit import Act
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.events import Audience, history_entry, to_text
 from rehab.sessions.facts import Message
-from rehab.sessions.live.admission import Actor, find_actor, may_open
+from rehab.sessions.live.admission import Actor, find_actor, may_open, note
 from rehab.sessions.live.consumers.base import Closing, Socket
 from rehab.sessions.live.hub import Lagged, Unseen, Viewer
 from rehab.sessions.live.messages import (
@@ -62,6 +63,7 @@ class ScreenConsumer(Socket):
             live.tablets += 1
             live.tablet_heard_at = timezone.now()
         self.start(self._pump(live, _after(self.scope["query_string"])))
+        self.runtime.do_beside(note(Act.VIEW, self.actor, session_id, self.scope))
 
     @classmethod
     def is_welcome(cls, actor: Actor) -> bool:
@@ -77,11 +79,11 @@ class ScreenConsumer(Socket):
             self.viewer = viewer
             if isinstance(self.actor, Device) or self.audience is Audience.MONITOR:
                 live.announce_presence(timezone.now())
-            await self.say(shown)
-            if after is not None:
-                await self._send_missed(live, viewer, after, shown["number"])
-            viewer.wake()
             try:
+                await self.say(shown)
+                if after is not None:
+                    await self._send_missed(live, viewer, after, shown["number"])
+                viewer.wake()
                 await viewer.pump()
             except Unseen:
                 raise Closing(
@@ -102,7 +104,7 @@ class ScreenConsumer(Socket):
             entries = (history_entry(self.audience, plan, step) for step in steps)
             texts = [to_text(entry) for entry in entries if entry is not None]
             if texts:
-                await viewer.send_frame("steps", texts)
+                await viewer.send_past(texts)
             after = steps[-1].number
 
     async def heard(self, text: str | None) -> None:
@@ -177,6 +179,9 @@ class ScreenConsumer(Socket):
                 session.stop_robot(by, timezone.now(), device)
         elif by is not None:
             self.start(_until_stored([s.arm_robot(by, timezone.now()) for s in sessions]))
+        if by is not None or order == "stop":  # beside the socket: no robot waits for the log
+            act = Act(f"robot_{order}")
+            self.runtime.do_beside(note(act, self.actor, live.id, self.scope))
 
     async def _refuse(self, mark: str, code: str, message: str) -> None:
         await self.say({"type": "error", "code": code, "id": mark, "message": message})

@@ -18,7 +18,7 @@ from rehab.sessions.live.messages import (
     read_plain,
     read_steps,
 )
-from rehab.sessions.live.past import read_step
+from rehab.sessions.live.past import is_stored
 from rehab.sessions.live.session import LiveSession, source_phase
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED, State
@@ -115,15 +115,7 @@ class SourceConsumer(DeviceSocket):
         """Acknowledge a step that is there already; refuse another one under its number."""
         if measurement.number > live.committed:
             await live.settled()
-        stored = await read_step(live.id, measurement.number)
-        same = (
-            stored.time_s == measurement.time_s
-            and stored.side == measurement.side
-            and stored.value == measurement.value
-            and tuple(stored.reasons[: len(measurement.reasons)]) == measurement.reasons
-            and stored.extra == measurement.extra
-        )
-        if not same:
+        if not await is_stored(live.id, measurement, live.actor.fold.plan.measure):
             raise BadFrame(
                 f"Step {measurement.number} is stored with other content. A source that begins "
                 f"anew takes a new run and counts from {live.next_number}.",

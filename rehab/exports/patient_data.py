@@ -1,0 +1,114 @@
+"""What is given out: all that is kept of one patient, or all sessions that somebody may see."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime
+from typing import Any
+
+from django.utils.translation import gettext as _
+from django.utils.translation import gettext_lazy as _lazy
+
+from rehab.exports.archive import write_csv, write_json
+from rehab.exports.tables import TABLES, Selection, codebook
+from rehab.people.consent import Consent
+from rehab.people.models import Patient, User
+from rehab.sessions.models import TrainingSession
+from rehab.training.scoring import RULES_VERSION
+
+FILES = {
+    "README.txt": _lazy("this page"),
+    "patient.json": _lazy("who it is, and how the pages are set"),
+    "consent.json": _lazy("what was agreed to, to which words, and when"),
+    "sessions.csv": _lazy("a row for each session"),
+    "steps.csv": _lazy("a row for each step"),
+    "events.csv": _lazy("a row for each thing done or noted during a session"),
+    "codebook.csv": _lazy("what every column means, with its unit"),
+}
+ABOUT = _lazy("""\
+The tables open in any spreadsheet, R or Python: text in UTF-8, commas between cells, the names of
+the columns in the first line, an empty cell where there is nothing. Times are in UTC. Numbers have
+a decimal point and all their digits: read back, they are what GARRY computes with.
+
+A text that a spreadsheet could take for a formula has a ' before it; so has one that begins with '.
+Take one ' off to get what was written.
+
+A step's verdict follows from rules that have versions; the newest here is %(version)d. The column
+rules_version of steps.csv says which one judged each step.
+
+This is health data. Keep it where only those who need it can open it, and delete it when nobody
+does.
+""")
+
+
+def patient_files(user: User, patient: Patient, now: datetime) -> Iterator[tuple[str, Any]]:
+    """Give all that is kept of one patient, with the name: for the patient and the therapists."""
+    sessions = TrainingSession.objects.visible_to(user).filter(patient=patient)
+    title = _("Everything that GARRY keeps of %(patient)s") % {"patient": patient}
+    yield "README.txt", [write_readme(title, list(FILES), now)]
+    yield "patient.json", write_json(describe(patient))
+    yield "consent.json", write_json(list_consents(user, patient))
+    yield from _tables(Selection(user, sessions, named=True))
+
+
+def session_files(user: User, now: datetime) -> Iterator[tuple[str, Any]]:
+    """Give all sessions that somebody may see, by pseudonyms, trial by trial."""
+    sessions = TrainingSession.objects.visible_to(user)
+    names = [name for name in FILES if not name.endswith(".json")]
+    title = _("All sessions of %(clinic)s, by pseudonyms") % {"clinic": user.clinic}
+    yield "README.txt", [write_readme(title, names, now)]
+    yield from _tables(Selection(user, sessions, named=False))
+
+
+def _tables(selection: Selection) -> Iterator[tuple[str, Any]]:
+    for table in TABLES:
+        header = [column.name for column in table.columns]
+        yield table.file, write_csv(header, selection.read(table))
+    yield "codebook.csv", write_csv(("file", "column", "unit", "meaning"), codebook())
+
+
+def describe(patient: Patient) -> dict[str, Any]:
+    """Give what is kept of the person."""
+    return {
+        "nickname": patient.nickname,
+        "code": patient.code,
+        "pseudonym": patient.pseudonym,
+        "clinic": patient.clinic.name,
+        "paretic_side": patient.paretic_side or None,
+        "body_mass_kg": patient.body_mass_kg,
+        "language": patient.language,
+        "screen_side": patient.screen_side,
+        "screen_still": patient.screen_still,
+        "screen_sounds": patient.screen_sounds,
+        "leaderboards": patient.boards,
+        "animal_name": patient.alias,
+        "in_a_blinded_study": patient.blinded,
+        "simulated": patient.simulated,
+        "participant_of_the_original": patient.original_id,
+        "created_at": patient.created_at,
+        "program_ended_at": patient.ended_at,
+        "program_ended_because": patient.ended_because or None,
+        "erased_at": patient.erased_at,
+    }
+
+
+def list_consents(user: User, patient: Patient) -> list[dict[str, Any]]:
+    """Give what was agreed to, with the words."""
+    rows = Consent.objects.visible_to(user).filter(patient=patient).select_related("text")
+    return [
+        {
+            "purpose": row.purpose,
+            "given_at": row.given_at,
+            "withdrawn_at": row.withdrawn_at,
+            "version": row.text and row.text.version,
+            "words": row.text and row.text.text,
+        }
+        for row in rows.order_by("pk")
+    ]
+
+
+def write_readme(title: str, names: list[str], now: datetime) -> str:
+    """Say in plain words what is in the archive."""
+    listed = "\n".join(f"  {name:14} {FILES[name]}" for name in names)
+    made = _("Made on %(moment)s UTC.") % {"moment": f"{now:%Y-%m-%d %H:%M}"}
+    return f"{title}\n{made}\n\n{listed}\n\n{ABOUT % {'version': RULES_VERSION}}"

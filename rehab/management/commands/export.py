@@ -1,0 +1,62 @@
+"""`manage.py export`: the files that the pages give out, for scripts and very large ones."""
+
+from __future__ import annotations
+
+import os
+from argparse import ArgumentParser
+from pathlib import Path
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError
+from django.utils import timezone
+
+from rehab.exports.archive import write_zip
+from rehab.exports.patient_data import patient_files, session_files
+from rehab.people import audit
+from rehab.people.audit import Act
+from rehab.people.models import Patient, User
+
+
+class Command(BaseCommand):
+    """Writes all sessions that an account may see, or all that is kept of one patient."""
+
+    help = "Write FILE (a ZIP): all sessions that an account may see, or one patient's data."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Ask where to, and for whose eyes."""
+        parser.add_argument("file", type=Path, metavar="FILE")
+        parser.add_argument("--as", dest="username", required=True, metavar="ACCOUNT")
+        parser.add_argument("--patient", metavar="CODE", help="all of this patient, with the name")
+
+    def handle(
+        self, *args: Any, file: Path, username: str, patient: str | None, **options: Any
+    ) -> None:
+        """Write it, for the account's owner only to read on this machine."""
+        user = User.everywhere.select_related("clinic").filter(username=username).first()
+        if user is None or user.clinic is None:
+            raise CommandError(f"No clinic's account is called {username!r}. Look in the admin.")
+        now, key = timezone.now(), None
+        files = session_files(user, now)
+        if patient is not None:
+            whose = Patient.objects.visible_to(user).filter(code=patient).first()
+            if whose is None:
+                raise CommandError(f"{username} sees no patient with the code {patient!r}.")
+            files, key = patient_files(user, whose, now), whose.pk
+        audit.note(
+            Act.EXPORT,
+            None,
+            clinic=user.clinic_id,
+            patient=key,
+            about=f"manage.py export --as {username}",
+            now=now,
+        )
+        try:
+            descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+            with os.fdopen(descriptor, "wb") as out:
+                for part in write_zip(files, now):
+                    out.write(part)
+        except OSError as problem:
+            raise CommandError(
+                f"{file} cannot be written ({problem.strerror}). Choose another place."
+            ) from problem
+        self.stdout.write(f"{file}: {file.stat().st_size / 1e6:.1f} MB.")

@@ -1,0 +1,24 @@
+"""Django's `makemessages`, which also knows the words of our scripts (static/js/language.js)."""
+
+from pathlib import Path
+
+from django.core.management.commands import makemessages
+
+OPTIONS = makemessages.Command
+DATED = '"POT-Creation-Date:'  # differs each time, and says nothing
+
+
+class Command(makemessages.Command):
+    """Collects what is to be translated into locale/. Guesses no translation."""
+
+    xgettext_options = [*OPTIONS.xgettext_options, "--keyword=n_:1,2"]
+    msgmerge_options = [*OPTIONS.msgmerge_options, "--no-fuzzy-matching"]
+
+    def write_po_file(self, potfile: str, locale: str) -> None:
+        """Bring a language up to date."""
+        super().write_po_file(potfile, locale)
+        for folder in self.locale_paths:
+            file = Path(folder, locale, "LC_MESSAGES", f"{self.domain}.po")
+            lines = file.read_text(encoding="utf-8").splitlines(keepends=True)
+            kept = (line for line in lines if not line.startswith(DATED))
+            file.write_text("".join(kept), encoding="utf-8")

@@ -1,0 +1,45 @@
+"""`manage.py retention`: erase whom clinics have kept long enough. Meant to run every night."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from typing import Any
+
+from django.core.management.base import BaseCommand
+from django.db import transaction
+from django.utils import timezone
+
+from rehab.people.models import Clinic, Erasing
+from rehab.sessions.endings import StillOpen, erase, let_logs_go, overdue
+
+
+class Command(BaseCommand):
+    """Erases patients and old log entries, clinic by clinic, as their leads have set it."""
+
+    help = "Erase whom clinics have kept long enough (Clinic: keep patients, keep the logs)."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Offer to look first."""
+        parser.add_argument("--dry-run", action="store_true", help="say whom, and change nothing")
+
+    def handle(self, *args: Any, dry_run: bool, **options: Any) -> None:
+        """Erase, and say how many. Who still has an open session is named and left."""
+        now = timezone.now()
+        for clinic in Clinic.everywhere.order_by("pk"):
+            erased = 0
+            for patient in overdue(clinic, now):
+                if dry_run:
+                    self.stdout.write(f"{clinic}: would erase {patient.code}")
+                    continue
+                try:
+                    erase(patient, Erasing.RETENTION, None, now)
+                    erased += 1
+                except StillOpen as problem:
+                    self.stderr.write(f"{clinic}, {patient.code}: {problem}")
+            with transaction.atomic():
+                gone = let_logs_go(clinic, now)
+                transaction.set_rollback(dry_run)
+            would = "would let go" if dry_run else "let go"
+            self.stdout.write(f"{clinic}: {erased} patient(s) erased, {would} {gone} log entries.")
+        if dry_run:
+            self.stdout.write("Nothing was changed (--dry-run).")

@@ -1,0 +1,67 @@
+"""What a host sees first in the admin: clinics, accounts and the server itself. No patient."""
+
+from __future__ import annotations
+
+import shutil
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import django
+from django.conf import settings
+from django.db import connection
+from django.db.migrations.executor import MigrationExecutor
+from django.db.models import Count, Q
+from django.utils.translation import gettext
+
+from rehab.people.models import Clinic, User
+from rehab.people.roles import Role
+
+LOW_DISK = 2 * 2**30  # bytes; a year of a clinic's sessions takes about one GB
+
+
+def look_at_server(user: User) -> dict[str, Any]:
+    """Give the clinics with their accounts, and how the server is."""
+    clinics = Clinic.objects.visible_to(user).annotate(
+        accounts=Count("users", filter=Q(users__is_active=True)),
+        leads=Count("users", filter=Q(users__is_active=True, users__role=Role.LEAD)),
+    )
+    accounts = User.objects.visible_to(user)
+    free = shutil.disk_usage(settings.DATA_DIR).free if settings.DATA_DIR.exists() else None
+    executor = MigrationExecutor(connection)
+    due = len(executor.migration_plan(executor.loader.graph.leaf_nodes()))
+    matters = [
+        gettext("%(clinic)s has no lead. Give one of its accounts that role.") % {"clinic": clinic}
+        for clinic in clinics
+        if not clinic.leads
+    ]
+    if due:
+        matters.append(
+            gettext("%(count)s migrations are due. Run manage.py migrate.") % {"count": due}
+        )
+    if free is not None and free < LOW_DISK:
+        matters.append(gettext("The disk is nearly full. Make room before sessions run."))
+    return {
+        "clinics": clinics,
+        "accounts": accounts.filter(is_active=True).count(),
+        "switched_off": accounts.filter(is_active=False).count(),
+        "server_matters": matters,
+        "server": {
+            gettext("GARRY"): _version(),
+            gettext("Django"): django.get_version(),
+            gettext("Database"): connection.display_name,
+            gettext("Migrations"): gettext("up to date")
+            if not due
+            else gettext("%(count)s due") % {"count": due},
+            gettext("Free on the disk"): "–" if free is None else f"{free / 2**30:.1f} GB",
+            gettext("Many clinics behind TLS"): gettext("yes")
+            if settings.HOSTED
+            else gettext("no"),
+        },
+    }
+
+
+def _version() -> str:
+    try:
+        return version("garry")
+    except PackageNotFoundError:
+        return gettext("not installed as a package")

@@ -1,0 +1,232 @@
+"""What is mended of a session that has ended: who walked it, whether it counts, a note.
+
+The log stays as it was. Each correction is a row of its own that says who, when, why, and what
+stood there before; what follows from it (figures, boards, trends) follows in the same transaction.
+"""
+
+from __future__ import annotations
+
+import re
+from datetime import datetime
+from typing import Any, ClassVar
+
+from django import forms
+from django.core.exceptions import ValidationError
+from django.db import models, transaction
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.consent import PatientScope
+from rehab.people.models import Patient, User
+from rehab.people.scope import ScopedModel
+from rehab.sessions.models import TrainingSession
+from rehab.training.changes import OPEN, State
+
+
+class Part(models.TextChoices):
+    """What may be corrected."""
+
+    PATIENT = "patient", _("Who walked")
+    COUNTS = "counts", _("Counts")
+    NOTE = "note", _("Note")
+
+
+class SessionCorrection(ScopedModel):
+    """One correction of a session. Rows are only ever added.
+
+    ``old`` and ``new``: a patient's pseudonym, `yes` or `no`, or the words of the note.
+    """
+
+    scope = PatientScope(clinic="session__clinic", patient="session__patient")
+
+    session = models.ForeignKey(
+        TrainingSession, on_delete=models.PROTECT, related_name="corrections"
+    )
+    part = models.CharField(_("what"), max_length=16, choices=Part.choices)
+    old = models.TextField(_("before"), blank=True)
+    new = models.TextField(_("after"), blank=True)
+    reason = models.TextField(_("reason"))
+    by = models.ForeignKey(
+        User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("by")
+    )
+    at = models.DateTimeField(_("at"))
+
+    class Meta(ScopedModel.Meta):
+        verbose_name = _("correction")
+        verbose_name_plural = _("corrections")
+        ordering: ClassVar = ["session", "pk"]
+
+    def __str__(self) -> str:
+        return self.get_part_display()
+
+    def save(self, *args: Any, **kwargs: Any) -> None:
+        """Add the row. Refuses to alter one that is there."""
+        if self.pk and not kwargs.get("force_insert"):
+            raise TypeError("A correction is never altered. Make another one.")
+        super().save(*args, **kwargs)
+
+    def delete(self, *args: Any, **kwargs: Any) -> Any:
+        """Refuse: what was corrected stays known."""
+        raise TypeError("A correction is never deleted. Make another one.")
+
+
+class CorrectionForm(forms.Form):
+    """The form of a correction: what is to hold from now on, and why."""
+
+    patient: forms.ModelChoiceField[Patient] = forms.ModelChoiceField(
+        queryset=None, empty_label=None, label=_("Who walked")
+    )
+    counts = forms.TypedChoiceField(
+        label=_("This session"),
+        choices=[
+            ("yes", _("Counts in figures, boards and trends")),
+            ("no", _("Is left out of figures, boards and trends")),
+        ],
+        widget=forms.RadioSelect,
+    )
+    note = forms.CharField(
+        label=_("Note"),
+        required=False,
+        max_length=500,
+        widget=forms.Textarea(attrs={"rows": 3}),
+        help_text=_("What whoever reads this session should know."),
+    )
+    reason = forms.CharField(
+        label=_("Reason for the correction"),
+        max_length=500,
+        widget=forms.Textarea(attrs={"rows": 2}),
+        help_text=_("Stays with the session. Name nobody: researchers read it too."),
+    )
+
+    def __init__(self, *args: Any, session: TrainingSession, by: User, **options: Any) -> None:
+        self.session, self.by = session, by
+        self.before = {
+            Part.PATIENT: session.patient.pseudonym,
+            Part.COUNTS: "no" if session.left_out else "yes",
+            Part.NOTE: find_note(session, by),
+        }
+        options.setdefault(
+            "initial",
+            {
+                "patient": session.patient_id,
+                "counts": self.before[Part.COUNTS],
+                "note": self.before[Part.NOTE],
+            },
+        )
+        super().__init__(*args, **options)
+        fields: dict[str, Any] = self.fields
+        fields["patient"].queryset = Patient.objects.visible_to(by).filter(clinic=session.clinic_id)
+
+    def clean_note(self) -> str:
+        """Refuse the patient's name in the note."""
+        return self._nameless(self.cleaned_data["note"])
+
+    def clean_reason(self) -> str:
+        """Refuse a patient's name in the reason."""
+        return self._nameless(self.cleaned_data["reason"])
+
+    def _nameless(self, words: str) -> str:
+        for patient in (self.session.patient, self.cleaned_data.get("patient")):
+            for name in (patient.nickname, patient.code) if patient else ():
+                if re.search(rf"(?<!\w){re.escape(name)}(?!\w)", words, re.IGNORECASE):
+                    raise ValidationError(
+                        gettext("Leave out “%(name)s”: researchers read this too."),
+                        params={"name": name},
+                    )
+        return words
+
+    def clean(self) -> dict[str, Any]:
+        """Refuse a form in which nothing is altered."""
+        data: dict[str, Any] = super().clean() or {}
+        if not self.errors and not self.changes():
+            raise ValidationError(
+                gettext("Nothing is altered. Change who walked, what counts or the note.")
+            )
+        return data
+
+    def changes(self) -> dict[Part, str]:
+        """Give what is altered, as corrections write it."""
+        wanted = {
+            Part.PATIENT: self.cleaned_data["patient"].pseudonym,
+            Part.COUNTS: self.cleaned_data["counts"],
+            Part.NOTE: self.cleaned_data["note"],
+        }
+        return {part: new for part, new in wanted.items() if new != self.before[part]}
+
+    def save(self, now: datetime) -> list[SessionCorrection]:
+        """Correct the session."""
+        return correct_session(
+            self.session, self.changes(), self.cleaned_data["reason"], self.by, now
+        )
+
+
+def find_note(session: TrainingSession, reader: Any) -> str:
+    """Give the note that holds now; empty for none."""
+    notes = SessionCorrection.objects.visible_to(reader).filter(session=session, part=Part.NOTE)
+    return notes.order_by("-pk").values_list("new", flat=True).first() or ""
+
+
+def may_correct(session: TrainingSession) -> bool:
+    """Whether a session can be corrected: what still runs is ended first."""
+    return State(session.state) not in OPEN
+
+
+@transaction.atomic
+def correct_session(
+    session: TrainingSession, changes: dict[Part, str], reason: str, by: User, now: datetime
+) -> list[SessionCorrection]:
+    """Put down corrections and let them take effect, both or neither.
+
+    Raises ValidationError for a session that still runs, and for a patient whom ``by`` cannot see.
+    """
+    rows = TrainingSession.objects.visible_to(by).select_for_update(of=("self",))
+    stored = rows.select_related("patient").get(pk=session.pk)
+    if not may_correct(stored):
+        raise ValidationError(gettext("This session still runs. End it first."))
+    before = {
+        Part.PATIENT: stored.patient.pseudonym,
+        Part.COUNTS: "no" if stored.left_out else "yes",
+        Part.NOTE: find_note(stored, by),
+    }
+    if Part.PATIENT in changes:
+        walker = Patient.objects.visible_to(by).filter(pseudonym=changes[Part.PATIENT]).first()
+        if walker is None:
+            raise ValidationError(gettext("There is no such patient. Choose one of your clinic."))
+        stored.patient = walker
+    if Part.COUNTS in changes:
+        stored.left_out = changes[Part.COUNTS] == "no"
+    stored.save(update_fields=["patient", "left_out"])
+    made = [
+        SessionCorrection(
+            session=stored, part=part, old=before[part], new=new, reason=reason, by=by, at=now
+        )
+        for part, new in changes.items()
+        if new != before[part]
+    ]
+    for correction in made:
+        correction.save()
+    return made
+
+
+def tell_corrections(session: TrainingSession, reader: User) -> list[dict[str, Any]]:
+    """Give a session's corrections in words, newest first; patients by name for who may see it."""
+    rows = list(
+        SessionCorrection.objects.visible_to(reader)
+        .filter(session=session)
+        .select_related("by")
+        .order_by("-pk")
+    )
+    walkers = {name for row in rows if row.part == Part.PATIENT for name in (row.old, row.new)}
+    words: dict[str, str] = {}
+    if walkers:
+        seen = Patient.objects.visible_to(reader).filter(pseudonym__in=walkers)
+        words |= {patient.pseudonym: patient.nickname for patient in seen}
+    words |= {"yes": gettext("counts"), "no": gettext("left out")}
+    return [
+        {
+            "row": row,
+            "old": row.old if row.part == Part.NOTE else words.get(row.old, row.old),
+            "new": row.new if row.part == Part.NOTE else words.get(row.new, row.new),
+        }
+        for row in rows
+    ]

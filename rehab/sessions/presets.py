@@ -1,0 +1,186 @@
+"""Presets: what a PT often sets up, kept under a name and put into the set-up with one tap."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from django.core.exceptions import ValidationError
+from django.core.validators import MaxValueValidator, MinValueValidator
+from django.db import models
+from django.utils.text import capfirst
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.access import clinic_of
+from rehab.people.models import Clinic, Patient, User
+from rehab.people.scope import ClinicRow, Scope
+from rehab.sessions.cues import USUAL, name_gestures
+from rehab.sessions.forms import LIVE, SessionForm
+from rehab.sessions.models import Protocol
+from rehab.sessions.words import LEVELS, say_quantity, say_rate
+from rehab.sources.synthetic import PROFILES
+from rehab.training.goals import GoalRule, Target
+from rehab.training.measures import A2, InvalidSetting
+from rehab.training.plans import ROBOT_LEVELS, SessionPlan
+from rehab.training.steps import Side
+from rehab.training.valences import VALENCES, find_valence
+
+# Not of a preset: they belong to the person and the place.
+PERSONAL = ("station", "trained_side")
+
+
+class Preset(ClinicRow):
+    """A set-up without its patient, leg and station."""
+
+    scope = Scope(clinic="clinic")
+
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.CASCADE, related_name="presets", verbose_name=_("clinic")
+    )
+    name = models.CharField(_("name"), max_length=64)
+    valence = models.CharField(
+        _("feedback type"), max_length=16, choices=[(v.slug, _(v.label)) for v in VALENCES.values()]
+    )
+    goal_by = models.CharField(
+        _("goal is given as"),
+        max_length=8,
+        choices=[("value", A2.unit), ("percent", _("% of baseline"))],
+        default="value",
+    )
+    goal_value = models.FloatField(_("goal, W/kg"), null=True, blank=True)
+    goal_percent = models.FloatField(_("goal, % of baseline"), null=True, blank=True)
+    wanted_hits = models.PositiveSmallIntegerField(
+        _("wanted hits, % of the steps"),
+        null=True,
+        blank=True,
+        validators=[MinValueValidator(1), MaxValueValidator(100)],
+    )
+    minutes = models.PositiveSmallIntegerField(
+        _("planned minutes"),
+        null=True,
+        blank=True,
+        validators=[MinValueValidator(1), MaxValueValidator(240)],
+    )
+    protocol = models.ForeignKey(
+        Protocol, on_delete=models.CASCADE, related_name="presets", verbose_name=_("protocol")
+    )
+    robot = models.CharField(
+        _("robot"),
+        max_length=16,
+        choices=[(level, capfirst(LEVELS[level])) for level in ROBOT_LEVELS],
+        default="normal",
+    )
+    robot_above = models.CharField(_("after five strong seconds"), max_length=64, default=USUAL)
+    robot_below = models.CharField(_("after five weak seconds"), max_length=64, default=USUAL)
+    source = models.CharField(
+        _("steps come from"),
+        max_length=64,
+        blank=True,
+        choices=[
+            ("", _("As last time")),
+            (LIVE, _("Live sensor")),
+            *((f"synthetic {name}", _(f"Simulated patient, {name}")) for name in PROFILES),
+        ],
+    )
+
+    class Meta(ClinicRow.Meta):
+        verbose_name = _("preset")
+        verbose_name_plural = _("presets")
+        ordering: ClassVar = ["name"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(
+                fields=["clinic", "name"],
+                name="preset_name_once_per_clinic",
+                violation_error_message=_("A preset of this name exists. Choose another name."),
+            )
+        ]
+
+    def __str__(self) -> str:
+        return self.name
+
+    def clean(self) -> None:
+        """Refuse what could not be walked, in the rules' own words."""
+        protocol = getattr(self, "protocol", None)
+        if protocol is None or self.valence not in VALENCES or self.robot not in ROBOT_LEVELS:
+            return  # said at the field itself
+        by_value = self.goal_by == "value"
+        try:
+            SessionPlan(
+                measure=A2,
+                valence=find_valence(self.valence),
+                phases=protocol.to_rules(),
+                trained_side=Side.LEFT,
+                goal=GoalRule(
+                    self.goal_value if by_value else None, None if by_value else self.goal_percent
+                ),
+                target=Target(self.wanted_hits / 100 if self.wanted_hits else None),
+                robot_intensity=ROBOT_LEVELS[self.robot],
+            )
+        except InvalidSetting as problem:
+            raise ValidationError(str(problem)) from problem
+
+    @property
+    def about(self) -> str:
+        """Say in a few words what it sets."""
+        return " · ".join(filter(None, (self.get_valence_display(), self.goal_words, self.length)))
+
+    @property
+    def goal_words(self) -> str:
+        """Say the goal."""
+        if self.goal_by == "value":
+            return say_quantity(self.goal_value, A2.unit)
+        share = say_rate(self.goal_percent / 100 if self.goal_percent else None)
+        return gettext("%(share)s of baseline") % {"share": share}
+
+    @property
+    def length(self) -> str:
+        """Say how long is planned."""
+        return gettext("%(count)s min") % {"count": self.minutes} if self.minutes else ""
+
+    def to_choices(self, by: User) -> dict[str, Any]:
+        """Give what it sets of the set-up; a gesture that is gone becomes the usual one."""
+        known = name_gestures(by)
+        chosen: dict[str, Any] = {
+            "valence": self.valence,
+            "goal_by": self.goal_by,
+            "wanted_hits": self.wanted_hits,
+            "minutes": self.minutes,
+            "protocol": self.protocol,
+            "robot": self.robot,
+            "robot_above": self.robot_above if self.robot_above in known else USUAL,
+            "robot_below": self.robot_below if self.robot_below in known else USUAL,
+        }
+        goal = {"goal_value": self.goal_value, "goal_percent": self.goal_percent}
+        chosen |= {name: value for name, value in goal.items() if value is not None}
+        return chosen | ({"source": self.source} if self.source else {})
+
+
+def keep_preset(data: Any, patient: Patient, by: User, name: str) -> Preset:
+    """Keep what stands in a set-up under a name; without one, under words that say what it is.
+
+    Raises ValidationError for what could not be walked, and for a name that is taken.
+    """
+    form = SessionForm(data, patient=patient, by=by)
+    for field in PERSONAL:
+        del form.fields[field]
+    if not form.is_valid():
+        raise ValidationError([words for errors in form.errors.values() for words in errors])
+    chosen = form.cleaned_data
+    kinds = {slug for slug, _words in Preset._meta.get_field("source").flatchoices}
+    preset = Preset(
+        clinic=clinic_of(by),
+        name=name,
+        **chosen | {"source": chosen["source"] if chosen["source"] in kinds else ""},
+    )
+    if not name:
+        preset.name = _find_name(preset.about, by)
+    preset.full_clean()
+    preset.save()
+    return preset
+
+
+def _find_name(words: str, by: User) -> str:
+    """Give a name that no preset has: the words, or the words with a number."""
+    taken = set(Preset.objects.visible_to(by).values_list("name", flat=True))
+    names = (words, *(f"{words} ({number})" for number in range(2, len(taken) + 3)))
+    return next(name for name in names if name not in taken)

@@ -1,0 +1,85 @@
+"""What a robot tells of itself: reports to the server, lights and sounds to people."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+
+from robot.bases import BaseState, MobileBase, Mood
+from robot.gestures import Gesture
+from robot.reports import Report, gesture_report, status_report
+from robot.safety import BATTERY_WARN_V, battery_share
+
+STATUS_MOVING_S = 0.25
+STATUS_IDLE_S = 1.0
+REPORTS_KEPT = 64  # while nobody fetches them the oldest are dropped: what is past is past
+
+State = tuple[str, str]  # the robot's state, and why it would not perform now
+
+
+class Voice:
+    """Keeps reports until somebody sends them, and says everything once.
+
+    Parameters
+    ----------
+    base
+        Whose lights and sounds show what the robot is about.
+
+    Attributes
+    ----------
+    reports
+        What is to be sent, oldest first; whoever sends takes them from the left.
+    """
+
+    def __init__(self, base: MobileBase) -> None:
+        self.reports: deque[Report] = deque(maxlen=REPORTS_KEPT)
+        self._base = base
+        self._told_s: float | None = None  # the last status
+        self._told: State | None = None
+        self._mood: Mood | None = None
+
+    def fall_silent(self) -> None:
+        """Take it that nobody has heard anything: the next status is due at once."""
+        self._told_s = None
+
+    def tell_gesture(self, gesture: Gesture, phase: str, outcome: str) -> None:
+        """Report that a gesture has started or ended."""
+        is_open = not self._base.abilities.closed_loop
+        self.reports.append(gesture_report(gesture.name, phase, outcome, open_loop=is_open))
+
+    def tell_status(
+        self,
+        now_s: float,
+        state: State,
+        there: BaseState,
+        gesture: Gesture | None,
+        bad_messages: int,
+        counters: Mapping[str, int],
+    ) -> None:
+        """Report the status where it has changed, and every so often."""
+        every_s = STATUS_IDLE_S if gesture is None else STATUS_MOVING_S
+        due = self._told_s is None or not 0 <= now_s - self._told_s < every_s
+        if not due and state == self._told:
+            return
+        self._told_s, self._told = now_s, state
+        name = None if gesture is None else gesture.name
+        volts = there.senses.battery_v
+        battery = (None, False) if volts is None else (battery_share(volts), volts < BATTERY_WARN_V)
+        self.reports.append(
+            status_report(self._base, *state, name, there, battery, bad_messages, counters)
+        )
+
+    def show(self, state: State, *, is_quiet: bool) -> None:
+        """Tell by the base's lights what it is about; sounds only where they are wanted."""
+        match state:
+            case "stopped", _:
+                mood = Mood.STOPPED
+            case "performing", _:
+                mood = Mood.MOVING
+            case "idle", "":
+                mood = Mood.READY
+            case _:
+                mood = Mood.WAITING
+        if mood is not self._mood:
+            self._mood = mood
+            self._base.show(mood, aloud=not is_quiet and mood in (Mood.MOVING, Mood.STOPPED))

@@ -1,0 +1,144 @@
+"""A session on paper: the figures of its log, and all that was noted, however much that is."""
+
+from __future__ import annotations
+
+import html
+import re
+
+import pytest
+from django.test import Client
+
+from rehab.people.models import Patient
+from rehab.people.roles import Role
+from rehab.sessions.models import SessionEvent, TrainingSession
+from rehab.sessions.report import draw_chart, write_report
+from rehab.training.changes import Change, ChangeKind
+from rehab.training.phases import make_phase
+from tests.walks import HIT, MISS, RIGHT, Walked, walk
+from tests.world import NOW, World, build_world
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+@pytest.fixture
+def patient(world: World) -> Patient:
+    return Patient.everywhere.create(
+        clinic=world.clinic, code="B-1", nickname="Rosa", paretic_side="left"
+    )
+
+
+def read(world: World, session: TrainingSession, role: Role = Role.PT) -> str:
+    """Give the page's words."""
+    client = Client()
+    client.force_login(world.people[role])
+    page = client.get(f"/sessions/{session.pk}/report/").content.decode()
+    paper = page.split("<article")[1].split("</article>")[0]
+    text = html.unescape(re.sub(r"<[^>]+>", " ", paper)).replace("\N{NO-BREAK SPACE}", " ")
+    return " ".join(text.split())
+
+
+def note(session: TrainingSession, kind: str, value: float | None = None, **data) -> None:
+    SessionEvent.everywhere.create(
+        session=session, kind=kind, value=value, after_number=3, at=NOW, data=data
+    )
+
+
+def test_it_says_who_walked_what_and_how_well(world, patient):
+    phases = (make_phase("baseline", strides=4), make_phase("training"))
+    walked: list[Walked] = [1.0, 3.0, 2.0, 2.0, HIT, MISS, HIT, Change(ChangeKind.GOAL, 2.4), HIT]
+    session = walk(patient, "positive", [*walked, None, (RIGHT, HIT)], phases=phases, wanted=0.6)
+    words = read(world, session)
+    assert "Rosa code B-1" in words
+    assert "Saturday 21 November 2026, 10:00" in words
+    assert "Positive · left leg" in words
+    assert "Hit rate 75 % wanted 60 %" in words
+    assert "Mean with feedback 2.25 W/kg baseline 2.00 W/kg, +12 %" in words
+    assert "Strides, trained leg 9 1 does not count" in words
+    assert "Goal 2.00 W/kg → 2.40 W/kg (10:00)" in words
+    assert re.search(r"Training yes 1\.00 5 4 3 75 % 2\.25", words)
+    assert "Nothing was noted. Robot No robot." in words
+
+
+def test_what_was_noted_stands_with_its_times_adverse_first(world, patient):
+    session = walk(patient, "binary", [HIT, MISS])
+    for kind, value in [("rest", None), ("borg", 4), ("fall", None), ("borg", 7), ("fall", None)]:
+        note(session, kind, value)
+    for above in (True, True, False):
+        note(session, "robot_decision", above=above)
+    note(session, "robot_gesture", phase="started")
+    note(session, "robot_gesture", phase="ended")
+    note(session, "robot_stop")
+    words = read(world, session)
+    assert "! Fall 2 ×: 10:00, 10:00 Rest 1 ×: 10:00 Exertion (Borg): 4 (10:00), 7 (10:00)" in words
+    assert (
+        "1 gesture, 2 of 3 windows of five seconds at or above its threshold, stopped once."
+        in words
+    )
+
+
+def test_of_many_events_the_count_is_right_and_the_list_short(world, patient):
+    changes = [Change(ChangeKind.GOAL, 2 + n / 100) for n in range(1, 31)]
+    session = walk(patient, "positive", [HIT, *changes, HIT])
+    for _ in range(400):
+        note(session, "pain")
+    words = read(world, session)
+    assert "! Pain 400 ×: 10:00, 10:00, 10:00, 10:00, 10:00, … 394 more …, 10:00" in words
+    assert "… 24 changes more … → 2.30 W/kg" in words
+    assert len(words) < 2_500
+
+
+def test_a_researcher_reads_a_pseudonym(world, patient):
+    words = read(world, walk(patient, "explicit", [HIT]), Role.RESEARCHER)
+    assert patient.pseudonym in words
+    assert "Rosa" not in words
+    assert "B-1" not in words
+
+
+@pytest.mark.parametrize("walked", [[], [None, None]])
+def test_a_session_without_a_stride_has_a_page(world, patient, walked):
+    session = walk(patient, "explicit", walked, end=ChangeKind.ABORT)
+    words = read(world, session)
+    assert ("No strides recorded." in words) == (not walked)
+    assert "Aborted" in words
+
+
+def test_the_chart_shows_every_stride_once(world, patient):
+    phases = (make_phase("baseline", strides=2), make_phase("training"))
+    strides: list[Walked] = [
+        1.0,
+        1.5,
+        HIT,
+        MISS,
+        None,
+        HIT,
+        Change(ChangeKind.GOAL, 3.0),
+        HIT,
+        MISS,
+        0.0,
+    ]
+    session = walk(patient, "positive", strides, phases=phases)
+    chart = write_report(world.people[Role.PT], session)["chart"]
+    assert chart["hit"].count("M") == 2
+    assert chart["miss"].count("M") == 6
+    assert chart["lost"].count("M") == 1
+    assert [phase["quiet"] for phase in chart["phases"]] == [True, False]
+    heights = re.findall(r"[MV](?:[\d.]+ )?([\d.]+)", chart["goal"])
+    assert len(set(heights)) == 2  # both goals, the higher one above
+    assert float(heights[0]) > float(heights[-1])
+
+
+def test_a_chart_of_the_smallest_and_largest_values():
+    for values in ([0.0], [1e-6, 2e-6], [15.0] * 3, [None]):
+        count = len(values)
+        columns = {"number": list(range(1, count + 1)), "shown": values, "goal": [None] * count}
+        chart = {"strides": columns | {"hit": [None] * count}, "phases": []}
+        drawn = draw_chart(chart)
+        assert drawn["strides"] == count
+        assert len(drawn["levels"]) <= 8
+        for number in re.findall(r"-?[\d.]+", drawn.get("free", "")):
+            assert -10 < float(number) < 1010

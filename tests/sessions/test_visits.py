@@ -1,0 +1,132 @@
+"""Who is expected when: planned in one tap, listed with how far today has come."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, time, timedelta
+
+import pytest
+from django.test import Client
+from django.utils import timezone
+
+from rehab.people.models import Patient
+from rehab.people.roles import Role
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.visits import Progress, Visit, plan_visit, read_today, usual_time
+from tests.walks import HIT, walk
+from tests.world import NOW, World, build_world
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def world() -> World:
+    made = build_world("amber")
+    Visit.everywhere.all().delete()
+    TrainingSession.everywhere.filter(pk=made.session.pk).update(created_at=NOW - timedelta(9))
+    return made
+
+
+def patient(world: World, name: str) -> Patient:
+    return Patient.everywhere.create(
+        clinic=world.clinic, code=name, nickname=name, paretic_side="left"
+    )
+
+
+def pt_of(world: World) -> Client:
+    client = Client()
+    client.force_login(world.people[Role.PT])
+    return client
+
+
+def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):
+    names = ("Ana", "Bo", "Cleo", "Dora", "Emil", "Fay")
+    ana, bo, cleo, dora, emil, fay = (patient(world, name) for name in names)
+    plan_visit(ana, NOW.date(), time(11, 0))
+    plan_visit(bo, NOW.date(), None)
+    plan_visit(cleo, NOW.date(), time(9, 0))
+    plan_visit(fay, NOW.date() + timedelta(1), time(8, 0))
+    walk(cleo, "positive", [HIT] * 130)
+    walk(dora, "positive", [HIT] * 3, end=None)  # came without a plan, and walks
+    walk(emil, "positive", [HIT], days_ago=1)
+    listed = read_today(world.people[Role.PT], NOW + timedelta(hours=1))
+    assert [(row.patient.nickname, row.at, row.progress) for row in listed] == [
+        ("Dora", time(10, 0), Progress.WALKING),
+        ("Ana", time(11, 0), Progress.EXPECTED),
+        ("Bo", None, Progress.EXPECTED),
+        ("Cleo", time(9, 0), Progress.DONE),
+    ]
+    assert listed[-1].walked_s == pytest.approx(130, abs=3)
+
+
+def test_a_day_is_the_clinics_own(world):
+    rosa = patient(world, "Rosa")
+    plan_visit(rosa, NOW.date(), None)
+    late = datetime(2026, 11, 21, 23, 30, tzinfo=UTC)
+    assert read_today(world.people[Role.PT], late)
+    world.clinic.time_zone = "Asia/Tokyo"
+    world.clinic.save()
+    Visit.everywhere.all().delete()
+    pt_of(world).post(f"/patients/{rosa.pk}/visits/", {"in": "0"})
+    (visit,) = Visit.everywhere.all()
+    assert visit.day == (timezone.now() + timedelta(hours=9)).date()
+
+
+def test_the_next_visit_is_one_tap_at_the_usual_time(world):
+    rosa = patient(world, "Rosa")
+    session = walk(rosa, "positive", [HIT])
+    began = datetime(2026, 11, 20, 10, 8, tzinfo=UTC)
+    TrainingSession.everywhere.filter(pk=session.pk).update(created_at=began)
+    assert usual_time(world.people[Role.PT], rosa, NOW) == time(10, 15)
+    client, today = pt_of(world), timezone.now().date()
+    page = client.get(f"/patients/{rosa.pk}/").content.decode()
+    assert "In a week" in page
+    assert "10:15" in page
+    for days in ("1", "2", "7", "7"):  # tapped twice it is planned once
+        answer = client.post(f"/patients/{rosa.pk}/visits/", {"in": days}, follow=True)
+    assert "is expected on" in answer.content.decode()
+    planned = list(Visit.everywhere.values_list("day", "at"))
+    assert planned == [(today + timedelta(days), time(10, 15)) for days in (1, 2, 7)]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"day": "", "at": ""}, "Choose the day"),
+        ({"day": "2026-02-31"}, "Choose the day"),
+        ({"day": "soon"}, "Choose the day"),
+        ({"day": "2020-01-01"}, "between today and a year"),
+        ({"day": "2199-01-01"}, "between today and a year"),
+        ({"in": "9999999999"}, "Choose the day"),
+        ({"day": f"{timezone.now().date():%Y-%m-%d}", "at": "25:99"}, "a time such as 10:30"),
+    ],
+)
+def test_a_day_that_cannot_be_says_what_to_do(world, given, said):
+    url = f"/patients/{world.patient.pk}/visits/"
+    answer = pt_of(world).post(url, given, follow=True)
+    assert said in answer.content.decode()
+    assert not Visit.everywhere.exists()
+
+
+def test_a_visit_is_removed_from_its_own_patient_alone(world):
+    rosa, joon = patient(world, "Rosa"), patient(world, "Joon")
+    mine = plan_visit(rosa, timezone.now().date() + timedelta(1), time(9, 30))
+    other = plan_visit(joon, timezone.now().date() + timedelta(1), None)
+    client = pt_of(world)
+    client.post(f"/patients/{rosa.pk}/visits/", {"remove": other.pk})
+    assert Visit.everywhere.filter(pk=other.pk).exists()
+    client.post(f"/patients/{rosa.pk}/visits/", {"remove": mine.pk})
+    assert not Visit.everywhere.filter(pk=mine.pk).exists()
+
+
+def test_nobody_plans_for_another_clinic(world):
+    birch = build_world("birch")
+    before = Visit.everywhere.count()
+    answer = pt_of(world).post(f"/patients/{birch.patient.pk}/visits/", {"in": "1"})
+    assert answer.status_code == 404
+    assert Visit.everywhere.count() == before
+
+
+def test_going_back_asks_the_server_anew(world):
+    """An old list would offer a start that has happened."""
+    for page in ("/start/", f"/patients/{world.patient.pk}/"):
+        assert "no-store" in pt_of(world).get(page).headers["Cache-Control"]

@@ -1,0 +1,194 @@
+"""What is to be translated is marked, collected, translated and compiled."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import polib
+import pytest
+from django.conf import settings
+from django.utils.translation import override
+
+from rehab.people.aliases import ANIMALS, MANNERS, say_alias, words
+
+ROOT = Path(__file__).resolve().parent.parent
+CATALOGS = sorted((ROOT / "locale").rglob("*.po"))
+PLACE = re.compile(r"%\(\w+\)[sdi]|%%|</?\w+>|https?://\S+")
+# The same in English and in another language.
+ALIKE = {"Borg", "Error", "GARRY", "Total", "Robot", "Sensor", "Normal", "token", "No", "Control"}
+
+
+def entries() -> Iterator[polib.POEntry]:
+    for file in CATALOGS:
+        yield from polib.pofile(str(file))
+
+
+def forms(entry: polib.POEntry) -> list[str]:
+    """Give a translation; of a count, one for each number."""
+    if not entry.msgid_plural:
+        return [entry.msgstr]
+    return [entry.msgstr_plural.get(index, "") for index in range(2)]
+
+
+def test_each_language_but_english_has_both_catalogs():
+    wanted = {
+        f"{code}/LC_MESSAGES/{domain}.po"
+        for code, _ in settings.LANGUAGES
+        for domain in ("django", "djangojs")
+        if code != settings.LANGUAGE_CODE
+    }
+    assert {str(file.relative_to(ROOT / "locale")) for file in CATALOGS} == wanted
+
+
+def test_everything_is_translated():
+    for entry in entries():
+        assert not entry.fuzzy, entry
+        assert not entry.obsolete, entry
+        assert all(forms(entry)), f"no translation of {entry.msgid!r}"
+
+
+def test_hardly_anything_is_the_same_in_both_languages():
+    same = {entry.msgid for entry in entries() if entry.msgid in forms(entry)}
+    said = {text for text in same if re.search(r"[^\W\d_]{3}", PLACE.sub("", text))}
+    assert {text for text in said if text.strip(" .") not in ALIKE} == set()
+
+
+def test_translations_have_the_same_places_for_values():
+    for entry in entries():
+        for index, form in enumerate(forms(entry)):
+            source = entry.msgid_plural if entry.msgid_plural and index else entry.msgid
+            wanted, found = sorted(PLACE.findall(source)), sorted(PLACE.findall(form))
+            if entry.msgid_plural and not index:  # "a step" may well say "1 step"
+                assert set(found) <= set(PLACE.findall(entry.msgid_plural)), entry
+            else:
+                assert found == wanted, entry
+
+
+def test_translations_end_and_are_written_as_their_sources():
+    for entry in entries():
+        sources = [entry.msgid, entry.msgid_plural or entry.msgid]
+        for source, form in zip(sources, forms(entry) * 2, strict=False):
+            assert form == form.strip() or source != source.strip(), entry
+            for sign in (".", "?", "!", ":", "…"):
+                assert form.endswith(sign) == source.endswith(sign), entry
+            assert '"' not in form or '"' in source, entry  # it may stand in an attribute
+
+
+def test_compiled_catalogs_are_those_that_can_be_read():
+    for file in CATALOGS:
+        compiled = polib.mofile(str(file.with_suffix(".mo")))
+
+        def read(catalog: Iterable[Any]) -> dict[tuple[str | None, str], list[str]]:
+            return {(entry.msgctxt, entry.msgid): forms(entry) for entry in catalog}
+
+        assert read(compiled) == read(polib.pofile(str(file))), f"make messages ({file.name})"
+
+
+def test_plurals_have_two_forms_with_a_known_rule():
+    for file in CATALOGS:
+        rule = polib.pofile(str(file)).metadata["Plural-Forms"]
+        assert rule == "nplurals=2; plural=(n != 1);"
+
+
+@pytest.mark.skipif(not shutil.which("xgettext"), reason="no gettext: apt-get install gettext")
+def test_the_catalogs_have_every_marked_word(tmp_path):
+    for name in ("rehab", "robot", "garry_site", "templates", "static", "locale", "manage.py"):
+        if (ROOT / name).is_dir():
+            ignore = shutil.ignore_patterns("__pycache__")
+            shutil.copytree(ROOT / name, tmp_path / name, ignore=ignore)
+        else:
+            shutil.copy(ROOT / name, tmp_path / name)
+    for domain in ("django", "djangojs"):
+        collect = "makemessages --all --no-obsolete --add-location file --verbosity 0 --domain"
+        done = subprocess.run(
+            [sys.executable, "manage.py", *collect.split(), domain],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+    for file in CATALOGS:
+        fresh = polib.pofile(str(tmp_path / file.relative_to(ROOT)))
+        marked = {(entry.msgctxt, entry.msgid, entry.msgid_plural) for entry in fresh}
+        known = {(e.msgctxt, e.msgid, e.msgid_plural) for e in polib.pofile(str(file))}
+        assert marked == known, "make messages"
+
+
+# --- templates ----------------------------------------------------------------------------------
+
+UNMARKED = {"GARRY", "W/kg", "W", "kg", "min", "s"}
+SAID = {"aria-label", "title", "placeholder", "alt", "label"}
+BLOCK = re.compile(
+    r"{% (blocktranslate|comment)\b.*?{% end\1 %}|{#.*?#}|{% block page_class %}.*?{% endblock %}",
+    re.DOTALL,
+)
+TAG = re.compile(r"{%.*?%}|{{.*?}}", re.DOTALL)
+# Filters whose words or formats are English whatever the page's language. What a machine reads, in
+# an attribute, stands in single quotes: yesno:'true,false'.
+SPEAKS = re.compile(
+    r"""\|(?:default|default_if_none|add):["'][^"']*[A-Za-z]{2}"""
+    r"""|\|pluralize|\|yesno(?!:'|:_)|\|(?:date|time):["'](?![A-Z_]+_FORMAT|[cHi:]+["']|Y-m-d["'])"""
+    r"""|{% now ["'](?![A-Z_]+_FORMAT)"""
+)
+
+
+class Words(HTMLParser):
+    """Collects what a page says beside its marked words."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.said: list[str] = []
+        self.silent = 0
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.said += [value or "" for name, value in attrs if name in SAID]
+        self.silent += tag in {"script", "style", "code", "pre"}
+
+    def handle_endtag(self, tag: str) -> None:
+        self.silent -= tag in {"script", "style", "code", "pre"}
+
+    def handle_data(self, data: str) -> None:
+        if not self.silent:
+            self.said.append(data)
+
+    @property
+    def words(self) -> set[str]:
+        """The words that are no marks or units."""
+        found = {word for text in self.said for word in re.findall(r"[^\W\d_][\w/’']*", text)}
+        return found - UNMARKED
+
+
+@pytest.mark.parametrize(
+    "template",
+    sorted((ROOT / "templates").rglob("*.html")),
+    ids=lambda file: str(file.relative_to(ROOT / "templates")),
+)
+def test_templates_say_nothing_that_is_not_marked(template):
+    source = template.read_text()
+    assert not (found := SPEAKS.search(source)), f"say it in the page's language: {found[0]}"
+    page = Words()
+    page.feed(TAG.sub("", BLOCK.sub("", source)))
+    assert page.words == set()
+
+
+# --- animal names -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("language", [code for code, _ in settings.LANGUAGES])
+def test_animal_names_are_said_in_each_language(language):
+    with override(language):
+        names = {say_alias(f"{a} {b}") for a in words(MANNERS) for b in words(ANIMALS)}
+    assert len(names) == len(words(MANNERS)) * len(words(ANIMALS))
+
+
+def test_an_animal_name_keeps_its_number_and_an_unknown_one_stays():
+    with override("es"):
+        assert say_alias("Brave Otter 7") == "Nutria valiente 7"
+        assert say_alias("Odd Fellow") == "Odd Fellow"
