@@ -9,6 +9,7 @@ from django.core.exceptions import ValidationError
 from django.core.validators import MaxValueValidator
 from django.db import models
 from django.dispatch import Signal
+from django.utils.text import format_lazy
 from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.wording import FALLBACK, words_in
@@ -45,13 +46,13 @@ class FeedbackType(ClinicRow):
         _("points at the goal"),
         null=True,
         blank=True,
-        help_text=_("For a step at or above the goal, 1 to %(most)s.") % {"most": POINTS_MAX},
+        help_text=format_lazy(_("For a step at or above the goal, 1 to {most}."), most=POINTS_MAX),
     )
     miss_points = models.SmallIntegerField(
         _("points below the goal"),
         null=True,
         blank=True,
-        help_text=_("For a step below the goal, −1 to −%(most)s.") % {"most": POINTS_MAX},
+        help_text=format_lazy(_("For a step below the goal, −1 to −{most}."), most=POINTS_MAX),
     )
     cue_above = models.CharField(_("after five strong seconds"), max_length=32, blank=True)
     cue_below = models.CharField(_("after five weak seconds"), max_length=32, blank=True)

@@ -4,12 +4,13 @@ import { legend } from "garry/marks";
 import { quality } from "garry/presence";
 import { drawStrip, drawTwenty, drawRing } from "garry/plots";
 import { RobotPanel } from "garry/robot";
+import { drawControls, drawTypes } from "garry/controls";
 
 const root = document.getElementById("monitor");
 const slots = new Map([...document.querySelectorAll("[data-show]")].map((slot) => [slot.dataset.show, slot]));
 const KEPT = 400; // strides on the strip
 const TYPES = ["began", "changed_to", "valence", "next_valence", "types"];
-const GAINS = [0.85, 0.9, 0.95, 1];
+const ENDED = new Set(["finished", "aborted"]);
 
 let session = null; // the last snapshot, brought up to date by events
 let strides = [];
@@ -41,7 +42,7 @@ const live = connect(root.dataset.socket, {
     const note = document.querySelector(".notice.link");
     note.hidden = state === "open";
     note.textContent = state === "lost" ? "No connection to the server. What the patient walks is stored; this page comes back by itself." : why;
-    if (state === "closed" && session && ["finished", "aborted"].includes(session.state)) location.assign(root.dataset.details);
+    if (state === "closed" && session && ENDED.has(session.state)) location.assign(root.dataset.details);
   },
 });
 let drawing = 0;
@@ -132,7 +133,8 @@ function draw() {
   drawPhases();
   drawLast();
   drawPresence();
-  drawControls();
+  drawControls(session, show);
+  if (ENDED.has(session.state)) location.assign(root.dataset.details);
   const judged = strides.filter(({ performance }) => performance !== null).slice(-20);
   show("of-twenty", judged.length ? `${judged.filter(({ hit }) => hit).length} of ${judged.length} hit` : "");
   drawStrip(document.getElementById("strip"), strides, marks, session.phases);
@@ -203,77 +205,6 @@ function drawPresence() {
 }
 setInterval(drawPresence, 1_000); // what is silent says nothing by itself
 
-const PAUSED = {
-  restart: "The server was restarted; nothing was lost. Go on when ready.",
-  patient: "Paused on the patient’s page. Go on when ready.",
-  therapist: "Paused by the therapist.",
-};
-
-function drawPause() {
-  const note = document.querySelector(".notice.why");
-  note.hidden = session.state !== "paused";
-  note.textContent = PAUSED[session.pause_reason] ?? "Paused.";
-}
-
-const label = (slug) => session.types.find((type) => type.slug === slug)?.label ?? slug;
-
-function press(group, value) {
-  for (const button of document.querySelectorAll(`[data-${group}] button`)) {
-    const on = button.value === String(value);
-    button.classList.toggle("on", on);
-    button.setAttribute("aria-pressed", on);
-  }
-}
-
-function drawTypes() {
-  const later = session.changed_to.map(label).join(", ");
-  show("types", label(session.began) + (later ? `, changed to ${later}` : ""));
-  const choice = document.querySelector("[data-type]"), wanted = session.next_valence || session.valence;
-  if (choice.options.length !== session.types.length) choice.replaceChildren(...session.types.map(({ slug, label: name }) => new Option(name, slug)));
-  if (choice.dataset.of !== wanted) choice.value = choice.dataset.of = wanted; // not while somebody chooses
-  choice.disabled = session.types.length < 2 || !session.phases.slice(session.phase.index + 1).some(({ feedback }) => feedback);
-  const next = session.phases.slice(session.phase.index + 1).find(({ feedback }) => feedback);
-  show("type-when", choice.disabled ? "no further feedback phase" : session.next_valence ? `from ${next?.name ?? "the next phase"} on; now ${label(session.valence)}` : "of the next phase: as now");
-}
-
-const MAIN = {
-  ready: ["start", "Start", "play"],
-  running: ["pause", "Pause", "pause"],
-  paused: ["resume", "Go on", "play"],
-};
-
-function drawControls() {
-  drawPause();
-  drawTypes();
-  press("words", session.words_shown ? 1 : 0);
-  press("chart", session.chart);
-  show("goal", session.goal === null ? "–" : session.goal.toFixed(2));
-  show("threshold", percent(session.activation_threshold));
-  for (const level of document.querySelectorAll("[data-levels] button")) {
-    const on = Number(level.value) === session.robot_intensity;
-    level.classList.toggle("on", on);
-    level.setAttribute("aria-pressed", on);
-  }
-  const gains = document.querySelector("[data-gains]");
-  const wanted = [...new Set([...GAINS, session.gain])].sort((a, b) => a - b);
-  if (gains.dataset.of !== wanted.join()) {
-    gains.dataset.of = wanted.join();
-    gains.replaceChildren(...wanted.map((gain) => Object.assign(document.createElement("button"), { textContent: gain.toFixed(2), value: gain })));
-  }
-  for (const button of gains.children) button.classList.toggle("on", Number(button.value) === session.gain);
-  const next = session.phases[session.phase.index + 1];
-  show("next-phase", next ? `Go to ${next.name}` : "No further phase");
-  document.querySelector("[data-next-phase]").disabled = !next;
-  const main = document.querySelector("[data-main]"), [kind, words, icon] = MAIN[session.state] ?? [];
-  main.disabled = !kind;
-  if (main.value !== (kind ?? "")) {
-    main.value = kind ?? "";
-    main.innerHTML = kind ? `<svg class="ic" aria-hidden="true"><use href="${document.body.dataset.icons}#${icon}"></use></svg><span>${words}</span>` : "Ended";
-  }
-  document.querySelector("[data-end]").disabled = !kind;
-  if (!kind) location.assign(root.dataset.details);
-}
-
 function tell(words) {
   const note = document.querySelector(".said");
   note.textContent = words;
@@ -325,7 +256,7 @@ document.addEventListener("click", (event) => {
 
 document.querySelector("[data-type]").addEventListener("change", ({ target }) => {
   target.dataset.of = ""; // what was refused goes back to what holds
-  if (session) change("valence", target.value).finally(drawTypes);
+  if (session) change("valence", target.value).finally(() => drawTypes(session, show));
 });
 
 document.getElementById("exertion").addEventListener("close", ({ target }) => {

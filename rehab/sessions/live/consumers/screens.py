@@ -12,7 +12,8 @@ from django.utils import timezone
 from rehab.people.audit import Act
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.sessions.events import Audience, Message, history_entry, to_text
+from rehab.sessions.events import Audience, history_entry, to_text
+from rehab.sessions.facts import Message
 from rehab.sessions.live.admission import Actor, find_actor, may_open, note
 from rehab.sessions.live.consumers.base import Closing, Socket
 from rehab.sessions.live.hub import Lagged, Unseen, Viewer
