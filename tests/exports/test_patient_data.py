@@ -8,6 +8,7 @@ import json
 import secrets
 import tracemalloc
 from datetime import UTC, datetime
+from typing import Any
 
 import pytest
 from asgiref.sync import sync_to_async
@@ -232,7 +233,7 @@ async def test_by_asgi_a_patients_file_is_as_whole_as_any(transactional_db):
     client = AsyncClient()
     await client.aforce_login(world.people[Role.LEAD])
     url = reverse("patient-data", kwargs={"patient_id": world.patient.pk})
-    response = await client.get(url)
+    response: Any = await client.get(url)
     files = open_archive(b"".join([part async for part in response]))
     assert len(rows_of(files["steps.csv"])) == 10
     assert world.patient.nickname in files["patient.json"]
