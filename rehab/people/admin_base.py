@@ -96,6 +96,10 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
     form = ClinicForm
     list_per_page = 50
 
+    def get_object(self, request: HttpRequest, object_id: str, from_field: Any = None) -> Any:
+        """Find a row; where a form names no field to find it by (Django fails), by its key."""
+        return super().get_object(request, object_id, from_field or None)
+
     def has_module_permission(self, request: HttpRequest) -> bool:
         """Whether the model is on the front page."""
         return bool(rights(request, self.model))
