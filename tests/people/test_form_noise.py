@@ -7,6 +7,7 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.people.roles import Role
+from rehab.sessions.models import Protocol
 from tests.form_noise import run_noise
 from tests.world import build_world
 
@@ -26,5 +27,6 @@ def test_a_form_that_names_no_field_to_find_its_row_by(page):
     world = build_world("amber")
     browser = Client()
     browser.force_login(world.people[Role.LEAD])
-    address = reverse(f"admin:rehab_patient_{page}", kwargs={"object_id": world.patient.pk})
+    row = world.rows[Protocol]
+    address = reverse(f"admin:rehab_protocol_{page}", kwargs={"object_id": row.pk})
     assert browser.get(address, {"_to_field": ""}).status_code == 200
