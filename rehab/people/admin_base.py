@@ -115,6 +115,10 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
     row_actions: tuple[str, ...] = ()  # actions that a row's own page offers as well
     for_viewers: tuple[str, ...] = ()  # those of them that alter nothing of the row
 
+    def get_object(self, request: HttpRequest, object_id: str, from_field: Any = None) -> Any:
+        """Find a row; where a form names no field to find it by (Django fails), by its key."""
+        return super().get_object(request, object_id, from_field or None)
+
     def has_module_permission(self, request: HttpRequest) -> bool:
         """Whether the model is on the front page."""
         return bool(rights(request, self.model))
