@@ -11,6 +11,8 @@ from django import forms
 from django.conf import settings
 from django.core.exceptions import ValidationError
 from django.db.models import QuerySet
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
 from rehab.people.models import SIDES, Patient, User
@@ -96,7 +98,7 @@ class SessionForm(forms.Form):
     """Everything a session of one patient needs. Nothing has to be typed."""
 
     valence = forms.ChoiceField(choices=[(v.slug, v.label) for v in VALENCES.values()])
-    goal_by = forms.ChoiceField(choices=[("value", A2.unit), ("percent", "% of baseline")])
+    goal_by = forms.ChoiceField(choices=[("value", A2.unit), ("percent", _("% of baseline"))])
     goal_value = NumberField(min_value=0.05, max_value=A2.goal_max, required=False)
     goal_percent = NumberField(min_value=50, max_value=200, required=False)
     wanted_hits = forms.IntegerField(min_value=1, max_value=100, required=False)
@@ -110,7 +112,7 @@ class SessionForm(forms.Form):
     source = forms.ChoiceField(widget=forms.RadioSelect)
     trained_side = forms.ChoiceField(choices=SIDES, widget=forms.RadioSelect)
     robot = forms.ChoiceField(
-        choices=[(level, level.capitalize()) for level in ROBOT_LEVELS], widget=forms.RadioSelect
+        choices=[(level, _(level.capitalize())) for level in ROBOT_LEVELS], widget=forms.RadioSelect
     )
     robot_above = forms.ChoiceField()
     robot_below = forms.ChoiceField()
@@ -132,8 +134,11 @@ class SessionForm(forms.Form):
         )
         if (session := busy.select_related("patient").first()) is not None:
             raise ValidationError(
-                f"{station} still has an open session of {session.patient}. End it first, or "
-                "choose another station."
+                gettext(
+                    "%(station)s still has an open session of %(patient)s. End it first, or "
+                    "choose another station."
+                ),
+                params={"station": station, "patient": session.patient},
             )
         return station
 
@@ -146,8 +151,11 @@ class SessionForm(forms.Form):
             if holds_signals(file):
                 if self.patient.body_mass_kg is None:
                     raise ValidationError(
-                        f"{name} holds raw signals, and A2 is power per kilogram: give "
-                        f"{self.patient.nickname}'s body mass first."
+                        gettext(
+                            "%(file)s holds raw signals, and A2 is power per kilogram: give "
+                            "%(name)s's body mass first."
+                        ),
+                        params={"file": name, "name": self.patient.nickname},
                     )
                 return source
             try:
