@@ -155,7 +155,9 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
                 actions = {name: actions[name] for name in actions if name in self.for_viewers}
             context["row_links"] = self.get_row_links(request, row)
             context["row_actions"] = [
-                (name, found[2]) for name in self.row_actions if (found := actions.get(name))
+                (name, found[2], name not in self.for_viewers)
+                for name in self.row_actions
+                if (found := actions.get(name))
             ]
         return super().render_change_form(request, context, *args, **kwargs)
 
