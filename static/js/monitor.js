@@ -1,6 +1,8 @@
 // The PT's page: shows what the server says, and asks it for changes. It computes no score.
+import { _, fill, number } from "garry/language";
 import { connect } from "garry/live";
-import { legend } from "garry/marks";
+import { legend, say } from "garry/marks";
+import { phaseName, reasonName, typeName } from "garry/names";
 import { quality } from "garry/presence";
 import { drawStrip, drawTwenty, drawRing } from "garry/plots";
 import { RobotPanel } from "garry/robot";
@@ -40,7 +42,7 @@ const live = connect(root.dataset.socket, {
   onLink(state, why) {
     const note = document.querySelector(".notice.link");
     note.hidden = state === "open";
-    note.textContent = state === "lost" ? "No connection to the server. What the patient walks is stored; this page comes back by itself." : why;
+    note.textContent = state === "lost" ? _("No connection to the server. What the patient walks is stored; this page comes back by itself.") : why;
     if (state === "closed" && session && ["finished", "aborted"].includes(session.state)) location.assign(root.dataset.details);
   },
 });
@@ -76,7 +78,7 @@ function take(event) {
       session.chart = event.value;
       break;
     case "words":
-      tell("The clinic’s words were edited; the patient reads them from the next step.");
+      tell(_("The clinic’s words were edited; the patient reads them from the next step."));
       break;
     case "goal":
       session.goal = event.goal;
@@ -97,10 +99,10 @@ function take(event) {
       break;
     case "remark":
       marks.push({ after: event.number, kind: event.what, value: event.value });
-      tell(`Noted: ${event.what.replace("_", " ")}${event.value === null ? "" : ` ${event.value}`}`);
+      tell(fill(_("Noted: %(what)s"), { what: say({ kind: event.what, value: event.value }) }));
       break;
     case "source_goal":
-      tell(`The sensor’s own goal is ${event.goal}; yours counts.`);
+      tell(fill(_("The sensor’s own goal is %(goal)s; yours counts."), { goal: number(event.goal, 2) }));
       break;
     default:
       robot.take(event);
@@ -118,7 +120,7 @@ function show(name, text) {
   if (slot && slot.textContent !== text) slot.textContent = text;
 }
 
-const percent = (share) => `${Math.round(100 * share)} %`;
+const percent = (share) => `${number(100 * share)} %`;
 const minutes = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 
 function draw() {
@@ -127,27 +129,27 @@ function draw() {
   const planned = session.target.duration_s;
   show("clock", minutes(session.active_s));
   const over = session.completed || (planned && session.active_s >= planned);
-  show("planned", over ? "planned time reached" : planned ? `of ${minutes(planned)}` : "walked");
+  show("planned", over ? _("planned time reached") : planned ? fill(_("of %(time)s"), { time: minutes(planned) }) : _("walked"));
   document.querySelector(".end").classList.toggle("over", Boolean(over));
   drawPhases();
   drawLast();
   drawPresence();
   drawControls();
   const judged = strides.filter(({ performance }) => performance !== null).slice(-20);
-  show("of-twenty", judged.length ? `${judged.filter(({ hit }) => hit).length} of ${judged.length} hit` : "");
+  show("of-twenty", judged.length ? fill(_("%(hits)s of %(count)s hit"), { hits: judged.filter(({ hit }) => hit).length, count: judged.length }) : "");
   drawStrip(document.getElementById("strip"), strides, marks, session.phases);
   drawLegend();
   drawTwenty(document.getElementById("twenty"), strides.slice(-20));
   drawRing(document.getElementById("ring"), session.hit_rate, session.target.hit_rate);
-  show("wanted", session.target.hit_rate ? `Wanted ${percent(session.target.hit_rate)}` : "No rate set");
-  show("judged", session.judged === undefined ? "" : `${session.hits} of ${session.judged} strides`);
+  show("wanted", session.target.hit_rate ? fill(_("Wanted %(rate)s"), { rate: percent(session.target.hit_rate) }) : _("No rate set"));
+  show("judged", session.judged === undefined ? "" : fill(_("%(hits)s of %(count)s strides"), { hits: session.hits, count: session.judged }));
   robot.draw();
 }
 
 function drawPhases() {
   const list = document.querySelector(".phases"), now = session.phase.index;
   if (list.children.length !== session.phases.length) {
-    list.replaceChildren(...session.phases.map(({ name }) => Object.assign(document.createElement("li"), { textContent: name })));
+    list.replaceChildren(...session.phases.map(({ name }) => Object.assign(document.createElement("li"), { textContent: phaseName(name) })));
   }
   [...list.children].forEach((item, index) => {
     item.className = index < now ? "was" : index === now ? "is" : "";
@@ -157,20 +159,20 @@ function drawPhases() {
 }
 
 function drawLast() {
-  const goal = session.goal === null ? null : session.goal.toFixed(2);
-  show("goal-line", goal ? `goal ${goal} ${session.unit}` : (session.obstacle ?? "The goal follows from the baseline."));
+  const goal = session.goal === null ? null : number(session.goal, 2);
+  show("goal-line", goal ? fill(_("goal %(goal)s"), { goal: `${goal} ${session.unit}` }) : session.obstacle || _("The goal follows from the baseline."));
   if (!last) return;
   const valid = last.performance !== null && last.performance !== undefined;
   const { value, gain } = last;
-  show("number", `no. ${last.number}`);
+  show("number", fill(_("no. %(number)s"), { number: last.number }));
   show("performance", valid ? percent(last.performance) : "—");
   // What the patient sees is gain × value, and the goal is compared with that.
-  const scaled = gain && gain !== 1 ? ` × ${gain.toFixed(2)} = ${(gain * value).toFixed(2)}` : "";
-  show("value", value === null || value === undefined ? "" : `${value.toFixed(2)}${scaled} ${session.unit}`);
-  show("extras", Object.entries(last.extra ?? {}).map(([name, number]) => `${name} ${+number.toPrecision(3)}`).join("\n"));
+  const scaled = gain && gain !== 1 ? ` × ${number(gain, 2)} = ${number(gain * value, 2)}` : "";
+  show("value", value === null || value === undefined ? "" : `${number(value, 2)}${scaled} ${session.unit}`);
+  show("extras", Object.entries(last.extra ?? {}).map(([name, value]) => `${name} ${number(+value.toPrecision(3), null)}`).join("\n"));
   const points = last.points ? `, ${last.points > 0 ? "+" : "−"}${Math.abs(last.points)}` : "";
-  const why = last.valid ? `${session.phase.name}: no goal yet` : `does not count: ${(last.reasons ?? []).join(", ") || "no value"}`;
-  show("verdict", valid ? (last.hit ? "hit" : "below") + points : why);
+  const why = last.valid ? fill(_("%(phase)s: no goal yet"), { phase: phaseName(session.phase.name) }) : fill(_("does not count: %(why)s"), { why: (last.reasons ?? []).map(reasonName).join(", ") || _("no value") });
+  show("verdict", valid ? (last.hit ? _("hit") : _("below")) + points : why);
   const dot = document.querySelector(".verdict .dot");
   dot.hidden = !valid;
   dot.classList.toggle("miss", !last.hit);
@@ -204,18 +206,18 @@ function drawPresence() {
 setInterval(drawPresence, 1_000); // what is silent says nothing by itself
 
 const PAUSED = {
-  restart: "The server was restarted; nothing was lost. Go on when ready.",
-  patient: "Paused on the patient’s page. Go on when ready.",
-  therapist: "Paused by the therapist.",
+  restart: _("The server was restarted; nothing was lost. Go on when ready."),
+  patient: _("Paused on the patient’s page. Go on when ready."),
+  therapist: _("Paused by the therapist."),
 };
 
 function drawPause() {
   const note = document.querySelector(".notice.why");
   note.hidden = session.state !== "paused";
-  note.textContent = PAUSED[session.pause_reason] ?? "Paused.";
+  note.textContent = PAUSED[session.pause_reason] ?? _("Paused.");
 }
 
-const label = (slug) => session.types.find((type) => type.slug === slug)?.label ?? slug;
+const label = (slug) => typeName(slug, session.types.find((type) => type.slug === slug)?.label);
 
 function press(group, value) {
   for (const button of document.querySelectorAll(`[data-${group}] button`)) {
@@ -227,19 +229,19 @@ function press(group, value) {
 
 function drawTypes() {
   const later = session.changed_to.map(label).join(", ");
-  show("types", label(session.began) + (later ? `, changed to ${later}` : ""));
+  show("types", later ? fill(_("%(first)s, changed to %(others)s"), { first: label(session.began), others: later }) : label(session.began));
   const choice = document.querySelector("[data-type]"), wanted = session.next_valence || session.valence;
-  if (choice.options.length !== session.types.length) choice.replaceChildren(...session.types.map(({ slug, label: name }) => new Option(name, slug)));
+  if (choice.options.length !== session.types.length) choice.replaceChildren(...session.types.map(({ slug }) => new Option(label(slug), slug)));
   if (choice.dataset.of !== wanted) choice.value = choice.dataset.of = wanted; // not while somebody chooses
   choice.disabled = session.types.length < 2 || !session.phases.slice(session.phase.index + 1).some(({ feedback }) => feedback);
   const next = session.phases.slice(session.phase.index + 1).find(({ feedback }) => feedback);
-  show("type-when", choice.disabled ? "no further phase with feedback" : session.next_valence ? `from ${next?.name ?? "the next phase"} on; now ${label(session.valence)}` : "of the next phase: as now");
+  show("type-when", choice.disabled ? _("no further phase with feedback") : session.next_valence ? fill(_("from %(phase)s on; now %(type)s"), { phase: next ? phaseName(next.name) : _("the next phase"), type: label(session.valence) }) : _("of the next phase: as now"));
 }
 
 const MAIN = {
-  ready: ["start", "Start", "play"],
-  running: ["pause", "Pause", "pause"],
-  paused: ["resume", "Go on", "play"],
+  ready: ["start", _("Start"), "play"],
+  running: ["pause", _("Pause"), "pause"],
+  paused: ["resume", _("Go on"), "play"],
 };
 
 function drawControls() {
@@ -247,7 +249,7 @@ function drawControls() {
   drawTypes();
   press("words", session.words_shown ? 1 : 0);
   press("chart", session.chart);
-  show("goal", session.goal === null ? "–" : session.goal.toFixed(2));
+  show("goal", session.goal === null ? "–" : number(session.goal, 2));
   show("threshold", percent(session.activation_threshold));
   for (const level of document.querySelectorAll("[data-levels] button")) {
     const on = Number(level.value) === session.robot_intensity;
@@ -258,17 +260,17 @@ function drawControls() {
   const wanted = [...new Set([...GAINS, session.gain])].sort((a, b) => a - b);
   if (gains.dataset.of !== wanted.join()) {
     gains.dataset.of = wanted.join();
-    gains.replaceChildren(...wanted.map((gain) => Object.assign(document.createElement("button"), { textContent: gain.toFixed(2), value: gain })));
+    gains.replaceChildren(...wanted.map((gain) => Object.assign(document.createElement("button"), { textContent: number(gain, 2), value: gain })));
   }
   for (const button of gains.children) button.classList.toggle("on", Number(button.value) === session.gain);
   const next = session.phases[session.phase.index + 1];
-  show("next-phase", next ? `Go to ${next.name}` : "No further phase");
+  show("next-phase", next ? fill(_("Go to %(phase)s"), { phase: phaseName(next.name) }) : _("No further phase"));
   document.querySelector("[data-next-phase]").disabled = !next;
   const main = document.querySelector("[data-main]"), [kind, words, icon] = MAIN[session.state] ?? [];
   main.disabled = !kind;
   if (main.value !== (kind ?? "")) {
     main.value = kind ?? "";
-    main.innerHTML = kind ? `<svg class="ic" aria-hidden="true"><use href="${document.body.dataset.icons}#${icon}"></use></svg><span>${words}</span>` : "Ended";
+    main.innerHTML = kind ? `<svg class="ic" aria-hidden="true"><use href="${document.body.dataset.icons}#${icon}"></use></svg><span>${words}</span>` : _("Ended");
   }
   document.querySelector("[data-end]").disabled = !kind;
   if (!kind) location.assign(root.dataset.details);
@@ -292,7 +294,7 @@ function note(what, value) {
 // Before the baseline is complete a goal can be set from what has been walked so far.
 function setFirstGoal() {
   const values = strides.filter(({ valid, value }) => valid && value > 0).map(({ value }) => value);
-  if (values.length < 5) tell("The goal follows from the baseline. Walk five steps to set one from them.");
+  if (values.length < 5) tell(_("The goal follows from the baseline. Walk five steps to set one from them."));
   else change("goal", Number((values.reduce((sum, value) => sum + value, 0) / values.length).toFixed(2)));
 }
 
