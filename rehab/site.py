@@ -7,8 +7,9 @@ from typing import Any
 
 from django.contrib.admin import AdminSite
 from django.contrib.admin.apps import AdminConfig
-from django.http import HttpRequest, HttpResponse
+from django.http import HttpRequest, HttpResponseRedirect
 from django.shortcuts import redirect
+from django.template.response import TemplateResponse
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
@@ -62,7 +63,7 @@ class GarrySite(AdminSite):
             if heading in found
         ]
 
-    def index(self, request: HttpRequest, extra_context: Any = None) -> HttpResponse:
+    def index(self, request: HttpRequest, extra_context: Any = None) -> TemplateResponse:
         """Show the dashboard: a clinic's for its people, the server's for a host."""
         from rehab.people.access import person
         from rehab.people.roles import Role
@@ -74,9 +75,9 @@ class GarrySite(AdminSite):
         told = look_at_server(user) if user.role == Role.HOST else look(user, now)
         return super().index(request, {**told, **(extra_context or {})})
 
-    def app_index(
+    def app_index(  # type: ignore[override]
         self, request: HttpRequest, app_label: str, extra_context: Any = None
-    ) -> HttpResponse:
+    ) -> HttpResponseRedirect:
         """Lead to the dashboard, which lists all there is."""
         return redirect("admin:index")
 

@@ -16,9 +16,12 @@ from django.shortcuts import render
 from django.urls import URLPattern, path
 from django.utils import timezone
 from django.utils.decorators import method_decorator
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
 from django.views.decorators.clickjacking import xframe_options_sameorigin
 from django.views.decorators.http import require_safe
 
+from rehab.boards import entries
 from rehab.boards.forms import LeaderboardForm
 from rehab.boards.models import Leaderboard
 from rehab.boards.showing import Viewer
@@ -39,14 +42,15 @@ class LeaderboardAdmin(ScopedAdmin):
     form = LeaderboardForm
     change_form_template = "boards/admin_form.html"
     list_display = ("name", "among", "types", "metric", "period", "moment", "active")
-    list_filter = ("active", "moment")
+    list_filter = ("active", "moment", "among", "metric")
+    search_fields = ("name",)
     radio_fields = dict.fromkeys(
         ("among", "types", "entry", "period", "moment", "display", "names", "ties"),
         admin.HORIZONTAL,
     )
     fieldsets = (
         (
-            "Who and what",
+            _("Who and what"),
             {
                 "fields": (
                     "name",
@@ -61,7 +65,7 @@ class LeaderboardAdmin(ScopedAdmin):
             },
         ),
         (
-            "Which sessions",
+            _("Which sessions"),
             {
                 "fields": (
                     "period",
@@ -72,7 +76,7 @@ class LeaderboardAdmin(ScopedAdmin):
             },
         ),
         (
-            "How it is shown",
+            _("How it is shown"),
             {
                 "fields": (
                     "moment",
@@ -87,7 +91,7 @@ class LeaderboardAdmin(ScopedAdmin):
             },
         ),
         (
-            "Finer points",
+            _("Finer points"),
             {
                 "classes": ("collapse",),
                 "fields": ("ties", "tie_breaker", "higher_is_better", "frozen_on"),
@@ -126,6 +130,8 @@ class LeaderboardAdmin(ScopedAdmin):
     ) -> HttpResponse:
         """Show the form; patients to see the preview as stand beside it."""
         context["seen_as"] = self._walkers(request)[:SEEN_AS]
+        board: Leaderboard | None = kwargs.get("obj")
+        context["built"] = None if board is None else entries.measure_progress(board)
         return super().render_change_form(request, context, *args, **kwargs)
 
     @method_decorator(require_safe)
@@ -141,7 +147,7 @@ class LeaderboardAdmin(ScopedAdmin):
         if not may(request, *([row] if row else [])):
             raise PermissionDenied
         given = request.GET.copy()
-        given["name"] = given.get("name", "").strip() or "Leaderboard"
+        given["name"] = given.get("name", "").strip() or gettext("Leaderboard")
         form = self.get_form(request, row, change=row is not None)(given, instance=row)
         if not form.is_valid():
             faults = [
@@ -150,7 +156,9 @@ class LeaderboardAdmin(ScopedAdmin):
             ]
             return render(request, "boards/preview_faults.html", {"faults": faults})
         if form.instance.clinic_id is None:
-            fault = "It is made of patients, whom a host does not see. Clinics see it on tablets."
+            fault = gettext(
+                "It is made of patients, whom a host does not see. Clinics see it on tablets."
+            )
             return render(request, "boards/preview_faults.html", {"faults": [("", fault)]})
         board = self._viewer(request, form.instance).show()
         return render(request, "boards/scores.html", {"boards": [board], "ranked": True})

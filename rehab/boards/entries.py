@@ -3,25 +3,27 @@
 Rows are written here only, each together with the count of its figure. What alters them: a session
 that ends or is taken away, a patient who agrees or no longer does, a board that is built, and the
 calendar. The same rows come out whether they were kept up or are made anew; a test compares.
+
+A board of many is built by `building.py`, some patients at a time; what happens to a patient
+meanwhile is kept up as ever.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable
 from datetime import datetime
-from itertools import islice
 
 from django.db import connection, transaction
-from django.db.models import F, Q, QuerySet
+from django.db.models import Q, QuerySet
 from django.utils import timezone
 
-from rehab.boards.figures import Figure, read_figures
+from rehab.boards.figures import Figure, read_figures, standing_on
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.boards.periods import period_of
 from rehab.people.models import Patient
 
-AT_ONCE = 2_000  # rows a statement, and patients a look
+AT_ONCE = 2_000  # patients a transaction, where nobody waits beside it
 
 
 def boards_of(clinic_id: int | None) -> QuerySet[Leaderboard]:
@@ -46,13 +48,82 @@ def refresh(
     One at a time for each board, so that no two writers count the same row.
     """
     now = now or timezone.now()
+    if patients is None:
+        begin(board)
+        while advance(board.pk, AT_ONCE, now):
+            pass
+        board.built_to = None
+        return
     with transaction.atomic():
-        if not Leaderboard.everywhere.select_for_update().filter(pk=board.pk).exists():
+        locked = _lock(board.pk)
+        if locked is None:
             return
-        if patients is None:
-            _rebuild(board, now)
-        else:
-            _replace(board, patients, now)
+        before, after = _replace(board, patients, now)
+        if locked.built_to is not None:  # those beyond are counted when building comes there
+            before = [row for row in before if row.patient_id <= locked.built_to]
+            after = [row for row in after if row.patient_id <= locked.built_to]
+        changed = _tally(after)
+        changed.subtract(_tally(before))
+        _count(board, changed)
+
+
+def begin(board: Leaderboard) -> None:
+    """Forget the counts; rows stay until building comes to their patients."""
+    with transaction.atomic():
+        if _lock(board.pk) is not None:
+            board.built_to = 0
+            Leaderboard.everywhere.filter(pk=board.pk).update(built_to=0)
+            BoardCount.everywhere.filter(board=board).delete()
+
+
+def advance(board_id: int, most: int, now: datetime) -> bool:
+    """Build the rows of the next patients, so many at most; give whether there are more.
+
+    How far it has come is stored with them, so that anyone can go on after a crash.
+    """
+    with transaction.atomic():
+        board = _lock(board_id)
+        if board is None or board.built_to is None:
+            return False
+        patients = next_patients(board, board.built_to, most)
+        _, after = _replace(board, patients, now)
+        _count(board, _tally(after))
+        built_to = patients[-1] if len(patients) == most else None
+        Leaderboard.everywhere.filter(pk=board_id).update(built_to=built_to)
+    return built_to is not None
+
+
+def find_unbuilt() -> int | None:
+    """Give a board that is to be built."""
+    unbuilt = Leaderboard.everywhere.filter(built_to__isnull=False).order_by("pk")
+    return unbuilt.values_list("pk", flat=True).first()
+
+
+def measure_progress(board: Leaderboard) -> int | None:
+    """Give how much of a board is built, in percent; None where all is."""
+    if board.built_to is None:
+        return None
+    standing = standing_on(board)
+    return 100 * standing.filter(pk__lte=board.built_to).count() // max(1, standing.count())
+
+
+def _lock(board_id: int) -> Leaderboard | None:
+    """Give a board, if it is still there, and let nobody else write its rows until the commit."""
+    return Leaderboard.everywhere.select_for_update().filter(pk=board_id).first()
+
+
+def next_patients(board: Leaderboard, after: int, most: int) -> list[int]:
+    """Give the next patients who have a row or may have one, so many at most."""
+    rows = BoardEntry.everywhere.filter(board=board, patient__gt=after).order_by("patient_id")
+    found = set(rows.values_list("patient_id", flat=True).distinct()[:most])
+    if _has_rows(board):
+        standing = standing_on(board).filter(pk__gt=after).order_by("pk")
+        found.update(standing.values_list("pk", flat=True)[:most])
+    return sorted(found)[:most]
+
+
+def _has_rows(board: Leaderboard) -> bool:
+    return board.active and not board.is_own
 
 
 def refresh_stale(board: Leaderboard, now: datetime) -> None:
@@ -63,72 +134,65 @@ def refresh_stale(board: Leaderboard, now: datetime) -> None:
         refresh(board, patients, now)
 
 
-def _replace(board: Leaderboard, patients: Collection[int], now: datetime) -> None:
+def _replace(
+    board: Leaderboard, patients: Collection[int], now: datetime
+) -> tuple[list[BoardEntry], list[BoardEntry]]:
+    """Make the rows of some patients anew; give those that were there and those that are."""
     rows = BoardEntry.everywhere.filter(board=board, patient__in=patients)
     before = {(row.patient_id, row.valence): row for row in rows}
-    after = {(row.patient_id, row.valence): row for row in read_figures(board, now, patients)}
-    gone = [row for key, row in before.items() if _alters(row, after.get(key))]
-    new = [row for key, row in after.items() if key not in before or before[key] in gone]
+    figures = read_figures(board, now, patients) if _has_rows(board) else ()
+    after = {(row.patient_id, row.valence): make_entry(board, row) for row in figures}
+    gone = [row.pk for key, row in before.items() if _alters(row, after.get(key))]
+    new = [row for key, row in after.items() if _alters(row, before.get(key))]
     if gone:
-        BoardEntry.everywhere.filter(pk__in=[row.pk for row in gone]).delete()
-    BoardEntry.everywhere.bulk_create(make_entry(board, row) for row in new)
-    changed = Counter((row.valence, row.value) for row in new)
-    changed.subtract((row.valence, row.figure) for row in gone)
-    for (valence, figure), count in sorted(changed.items()):
-        _count(board, valence, figure, count)
+        BoardEntry.everywhere.filter(pk__in=gone).delete()
+    BoardEntry.everywhere.bulk_create(new)
+    return list(before.values()), list(after.values())
 
 
-def _alters(row: BoardEntry, figure: Figure | None) -> bool:
-    """Whether a stored row is no longer what it should be."""
-    return figure is None or (row.figure, row.stake, row.key, row.stale_on) != (
-        figure.value,
-        figure.stake,
-        figure.key,
-        figure.stale_on,
+def _alters(row: BoardEntry, other: BoardEntry | None) -> bool:
+    """Whether two rows of a patient differ in anything that is told or ordered by."""
+    return other is None or (row.figure, row.stake, row.key, row.stale_on) != (
+        other.figure,
+        other.stake,
+        other.key,
+        other.stale_on,
     )
 
 
-def _count(board: Leaderboard, valence: str, figure: int, count: int) -> None:
-    """Add to the count of a figure; one that nobody has any more goes."""
-    if not count:
-        return
-    counts = BoardCount.everywhere.filter(board=board, valence=valence, figure=figure)
-    if not counts.update(rows=F("rows") + count):
-        BoardCount.everywhere.create(board=board, valence=valence, figure=figure, rows=count)
-    elif count < 0:
-        counts.filter(rows=0).delete()
+def _tally(rows: Iterable[BoardEntry]) -> Counter[tuple[str, int]]:
+    return Counter((row.valence, row.figure) for row in rows)
 
 
-def _rebuild(board: Leaderboard, now: datetime) -> None:
-    BoardEntry.everywhere.filter(board=board).delete()
-    BoardCount.everywhere.filter(board=board).delete()
-    if board.is_own or not board.active:
+def _count(board: Leaderboard, changed: Counter[tuple[str, int]]) -> None:
+    """Add to the counts of some figures; one that nobody has any more goes."""
+    altered = {key: number for key, number in changed.items() if number}
+    if not altered:
         return
-    counted: Counter[tuple[str, int]] = Counter()
-    for rows in _batches(read_figures(board, now)):
-        counted.update((row.valence, row.value) for row in rows)
-        BoardEntry.everywhere.bulk_create(make_entry(board, row) for row in rows)
+    counts = BoardCount.everywhere.filter(board=board, figure__in={key[1] for key in altered})
+    there = {(one.valence, one.figure): one for one in counts}
+    known = [there[key].pk for key in altered if key in there]
+    if known:
+        BoardCount.everywhere.filter(pk__in=known).delete()
+    for key, one in there.items():
+        if key in altered:
+            altered[key] += one.rows
     BoardCount.everywhere.bulk_create(
-        (
-            BoardCount(board=board, valence=valence, figure=figure, rows=count)
-            for (valence, figure), count in counted.items()
-        ),
-        AT_ONCE,
+        BoardCount(board=board, valence=valence, figure=figure, rows=rows)
+        for (valence, figure), rows in sorted(altered.items())
+        if rows
     )
-    if counted.total() > AT_ONCE:
-        _analyze()
 
 
-def _analyze() -> None:
-    """Tell the database how much there is now; PostgreSQL would go on sorting whole boards."""
-    with connection.cursor() as cursor:
-        for model in (BoardEntry, BoardCount):
-            cursor.execute(f"ANALYZE {model._meta.db_table}")
+def tidy() -> None:
+    """Tell the database what there is now, once a board of many has been built.
 
-
-def _batches(figures: Iterator[Figure]) -> Iterator[list[Figure]]:
-    while batch := list(islice(figures, AT_ONCE)):
-        yield batch
+    Without it PostgreSQL sorts whole boards, and looks every row of an index up in the table.
+    """
+    tables = ", ".join(model._meta.db_table for model in (BoardEntry, BoardCount))
+    if connection.vendor == "postgresql":
+        with connection.cursor() as cursor:
+            cursor.execute(f"VACUUM (ANALYZE) {tables}")
 
 
 def make_entry(board: Leaderboard, row: Figure) -> BoardEntry:

@@ -205,6 +205,12 @@ class Leaderboard(ClinicRow):
         _("shown"), max_length=16, choices=Moment.choices, default=Moment.AFTER_SESSION
     )
 
+    built_to = models.BigIntegerField(
+        null=True,
+        editable=False,
+        help_text="The patient whom building its rows has come to; nothing once they are built.",
+    )
+
     class Meta(ClinicRow.Meta):
         verbose_name = _("leaderboard")
         verbose_name_plural = _("leaderboards")
@@ -238,6 +244,11 @@ class Leaderboard(ClinicRow):
         faults = dict(find_faults(self))
         if faults:
             raise ValidationError(faults)
+
+    @property
+    def is_being_built(self) -> bool:
+        """Whether its rows are not yet what they should be: it is not shown then."""
+        return self.built_to is not None
 
     @property
     def is_own(self) -> bool:

@@ -11,6 +11,7 @@ from django.utils.translation import gettext as _
 from django.utils.translation import gettext_noop, ngettext
 
 from rehab.boards import entries
+from rehab.boards.building import builder
 from rehab.boards.choosing import choose
 from rehab.boards.figures import keeps, read_figures, read_own, standing_on
 from rehab.boards.models import Leaderboard
@@ -20,6 +21,7 @@ from rehab.people.models import Clinic, Patient
 from rehab.sessions.models import TrainingSession
 
 OWN = gettext_noop("These are your own sessions.")
+BUILT = gettext_noop("This board is being built.")
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,9 @@ class Viewer:
         board, patient = self.board, self.patient
         if board.is_own:
             return self._show_own("")
+        if self.stored and board.is_being_built:
+            builder.wake()  # whoever was at it may have been stopped
+            return self._show_own(f"{_(BUILT)} {_(OWN)}" if patient else _(BUILT))
         standings = self._standings()
         people = ngettext(
             "%(count)d patient on it now.", "%(count)d patients on it now.", standings.count

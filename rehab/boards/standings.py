@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-from django.db.models import Count, F, QuerySet, Sum
+from django.db.models import Count, F, Max, Min, QuerySet, Sum
 
 from rehab.boards.figures import Figure
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
@@ -110,7 +110,7 @@ class Stored:
     def find(self, patient_id: int) -> Placed | None:
         """Give a patient's row. Its place: all whose figures are better, and one."""
         for row in self.find_rows().filter(patient=patient_id).values_list(*COLUMNS):
-            figure, key = row[1], row[3]
+            figure = row[1]
             better = "figure__gt" if self._board.higher_is_better else "figure__lt"
             sums = self._counts.filter(**{better: figure}).aggregate(
                 rows=Sum("rows", default=0), figures=Count("pk")
@@ -120,7 +120,7 @@ class Stored:
                 case Ties.DENSE:
                     return make_placed(row, shared, 1 + sums["figures"])
                 case Ties.EARLIER:
-                    return make_placed(row, shared, shared + self._count_equals_before(key))
+                    return make_placed(row, shared, shared + self._count_equals_before(row))
             return make_placed(row, shared, shared)
         return None
 
@@ -159,10 +159,20 @@ class Stored:
                 return make_placed(row, shared, beside.rank + step)
         return make_placed(row, shared, shared)
 
-    def _count_equals_before(self, key: str) -> int:
-        """Count the rows of the same figure that stand before one."""
+    def _count_equals_before(self, row: Columns) -> int:
+        """Count the rows of the same figure that stand before one, from the nearer end.
+
+        A figure may have some ten thousand rows; which end is nearer is guessed from the keys.
+        """
+        _, figure, _, key = row
         merit = key[:10]
-        return self.find_rows().filter(key__gt=key, key__lt=f"{int(merit) + 1:010d}").count()
+        equals = self.find_rows().filter(key__gt=merit, key__lt=f"{int(merit) + 1:010d}")
+        ends = equals.aggregate(last=Min("key"), first=Max("key"))
+        last, mine, first = (int(one[10:]) for one in (ends["last"], key, ends["first"]))
+        if 2 * mine >= first + last:
+            return equals.filter(key__gt=key).count()
+        size = self._counts.filter(figure=figure).values_list("rows", flat=True)[0]
+        return size - 1 - equals.filter(key__lt=key).count()
 
 
 def make_placed(row: Columns, shared: int, rank: int) -> Placed:

@@ -8,9 +8,8 @@ from typing import Any
 
 from django.db.models import Model
 from django.db.models.signals import m2m_changed, post_delete, post_save
-from django.utils import timezone
 
-from rehab.boards import entries
+from rehab.boards import building, entries
 from rehab.boards.models import Leaderboard
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.corrections import Part, SessionCorrection
@@ -79,21 +78,19 @@ def on_figure(instance: SessionMetric, **_signal: Any) -> None:
 
 @unless_restored
 def on_board(instance: Leaderboard, **_signal: Any) -> None:
-    """A board was built or changed."""
-    entries.refresh(instance)
+    """A board was made or changed."""
+    building.rebuild(instance)
 
 
 def on_group(instance: Leaderboard, action: str, **_signal: Any) -> None:
     """A board's group was chosen."""
     if action.startswith("post_"):
-        entries.refresh(instance)
+        building.rebuild(instance)
 
 
 @unless_restored
 def on_clinic(instance: Clinic, created: bool, **_signal: Any) -> None:
     """A clinic takes part in boards across clinics, or no longer."""
-    if created:
-        return
-    patients = Patient.everywhere.filter(clinic=instance).values_list("pk", flat=True)
-    for board in entries.boards_of(None):
-        entries.refresh(board, set(patients), timezone.now())
+    if not created:
+        for board in entries.boards_of(None):
+            building.rebuild(board)

@@ -12,7 +12,7 @@ from rehab.people.models import Ending, Erasing, Patient
 
 
 class EndingForm(forms.Form):
-    """Why the programme ends."""
+    """Why the program ends."""
 
     because = forms.ChoiceField(
         label=_("Why?"), choices=Ending.choices, initial=Ending.DONE, widget=forms.RadioSelect
@@ -35,6 +35,7 @@ class ErasingForm(forms.Form):
 
     def __init__(self, *args: Any, patient: Patient, **options: Any) -> None:
         super().__init__(*args, **options)
+        self.label_suffix = ""
         self.patient = patient
 
     def clean_code(self) -> str:

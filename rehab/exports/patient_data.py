@@ -7,6 +7,7 @@ from datetime import datetime
 from typing import Any
 
 from django.utils.translation import gettext as _
+from django.utils.translation import gettext_lazy as _lazy
 
 from rehab.exports.archive import write_csv, write_json
 from rehab.exports.tables import TABLES, Selection, codebook
@@ -16,14 +17,28 @@ from rehab.sessions.models import TrainingSession
 from rehab.training.scoring import RULES_VERSION
 
 FILES = {
-    "README.txt": "this page",
-    "patient.json": "who it is, and how the pages are set",
-    "consent.json": "what was agreed to, to which words, and when",
-    "sessions.csv": "a row for each session",
-    "steps.csv": "a row for each step",
-    "events.csv": "a row for each thing done or noted during a session",
-    "codebook.csv": "what every column means, with its unit",
+    "README.txt": _lazy("this page"),
+    "patient.json": _lazy("who it is, and how the pages are set"),
+    "consent.json": _lazy("what was agreed to, to which words, and when"),
+    "sessions.csv": _lazy("a row for each session"),
+    "steps.csv": _lazy("a row for each step"),
+    "events.csv": _lazy("a row for each thing done or noted during a session"),
+    "codebook.csv": _lazy("what every column means, with its unit"),
 }
+ABOUT = _lazy("""\
+The tables open in any spreadsheet, R or Python: text in UTF-8, commas between cells, the names of
+the columns in the first line, an empty cell where there is nothing. Times are in UTC. Numbers have
+a decimal point and all their digits: read back, they are what GARRY computes with.
+
+A text that a spreadsheet could take for a formula has a ' before it; so has one that begins with '.
+Take one ' off to get what was written.
+
+A step's verdict follows from rules that have versions; the newest here is %(version)d. The column
+rules_version of steps.csv says which one judged each step.
+
+This is health data. Keep it where only those who need it can open it, and delete it when nobody
+does.
+""")
 
 
 def patient_files(user: User, patient: Patient, now: datetime) -> Iterator[tuple[str, Any]]:
@@ -71,8 +86,8 @@ def describe(patient: Patient) -> dict[str, Any]:
         "simulated": patient.simulated,
         "participant_of_the_original": patient.original_id,
         "created_at": patient.created_at,
-        "programme_ended_at": patient.ended_at,
-        "programme_ended_because": patient.ended_because or None,
+        "program_ended_at": patient.ended_at,
+        "program_ended_because": patient.ended_because or None,
         "erased_at": patient.erased_at,
     }
 
@@ -95,21 +110,5 @@ def list_consents(user: User, patient: Patient) -> list[dict[str, Any]]:
 def write_readme(title: str, names: list[str], now: datetime) -> str:
     """Say in plain words what is in the archive."""
     listed = "\n".join(f"  {name:14} {FILES[name]}" for name in names)
-    return f"""{title}
-Made on {now:%Y-%m-%d %H:%M} UTC.
-
-{listed}
-
-The tables open in any spreadsheet, R or Python: text in UTF-8, commas between cells, the names of
-the columns in the first line, an empty cell where there is nothing. Times are in UTC. Numbers have
-a decimal point and all their digits: read back, they are what GARRY computes with.
-
-A text that a spreadsheet could take for a formula has a ' before it; so has one that begins with '.
-Take one ' off to get what was written.
-
-A step's verdict follows from rules that have versions; the newest here is {RULES_VERSION}. The
-column rules_version of steps.csv says which one judged each step.
-
-This is health data. Keep it where only those who need it can open it, and delete it when nobody
-does.
-"""
+    made = _("Made on %(moment)s UTC.") % {"moment": f"{now:%Y-%m-%d %H:%M}"}
+    return f"{title}\n{made}\n\n{listed}\n\n{ABOUT % {'version': RULES_VERSION}}"

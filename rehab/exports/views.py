@@ -21,7 +21,7 @@ from rehab.people.consent import holding
 from rehab.people.lockout import client_address
 from rehab.people.models import Ending, Erasing, Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.endings import StillOpen, end_programme, erase, reopen_programme
+from rehab.sessions.endings import StillOpen, end_program, erase, reopen_program
 from rehab.sessions.models import TrainingSession
 
 
@@ -94,7 +94,7 @@ def note_export(request: HttpRequest, patient: Patient | None = None) -> None:
     audit.note(
         Act.EXPORT,
         person(request),
-        patient=patient and patient.pk,
+        patient=None if patient is None else patient.pk,
         about=request.path,
         address=client_address(request),
     )
@@ -107,17 +107,17 @@ def _send(files: Any, name: str, now: Any) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_POST
 def end(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """End a patient's programme: off the lists, with the summary to take home."""
+    """End a patient's program: off the lists, with the summary to take home."""
     patient = find_patient(person(request), patient_id)
     form = EndingForm(request.POST)
     if not form.is_valid():
         return render_records(request, patient, ending=form)
     try:
-        end_programme(patient, Ending(form.cleaned_data["because"]), timezone.now())
+        end_program(patient, Ending(form.cleaned_data["because"]), timezone.now())
     except StillOpen as problem:
         form.add_error(None, str(problem))
         return render_records(request, patient, ending=form)
-    said = _("%(patient)s's programme has ended. Give the summary along.")
+    said = _("%(patient)s's program has ended. Give the summary along.")
     messages.success(request, said % {"patient": patient.nickname})
     return redirect("patient", patient_id=patient.pk)
 
@@ -127,11 +127,11 @@ def end(request: HttpRequest, patient_id: int) -> HttpResponse:
 def reopen(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Take a patient back in."""
     patient = find_patient(person(request), patient_id)
-    reopen_programme(patient)
+    reopen_program(patient)
     return redirect("patient", patient_id=patient.pk)
 
 
-@for_roles(Role.LEAD)
+@for_roles(Role.LEAD, patients=False)  # what is noted must not name whom it erases
 @require_POST
 def erase_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Erase all that leads to a person, once the code has been typed."""

@@ -9,10 +9,12 @@ from django.contrib import admin
 from django.core.exceptions import ValidationError
 from django.http import HttpRequest
 from django.utils.html import format_html
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
 
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.gestures.picture import draw
-from rehab.people.admin_base import ScopedAdmin, ScopedOptions
+from rehab.people.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
 from robot.composed import MOVES_MAX, to_data
 from robot.gestures import TETHER_M, BadGesture
 from robot.trial import Trial, admit_gesture, try_gesture
@@ -20,7 +22,7 @@ from robot.trial import Trial, admit_gesture, try_gesture
 WINDOW_S = 5.0  # what takes longer is still running when the next decision comes
 
 
-class StepFormSet(forms.BaseInlineFormSet):
+class StepFormSet(RowFormSet):
     """The steps of one gesture, which must be one together."""
 
     def clean(self) -> None:
@@ -69,11 +71,13 @@ class StepRows(ScopedOptions, admin.TabularInline):
 
 def tell(trial: Trial) -> str:
     """Say how long a gesture takes and how far it goes."""
-    late = " Longer than a window: it may miss the next." if trial.took_s > WINDOW_S else ""
-    return (
-        f"Takes {trial.took_s:.1f} s, goes up to {trial.farthest_m:.2f} m from home "
-        f"(tether {TETHER_M:.2f} m), ends at home.{late}"
-    )
+    words = gettext(
+        "Takes %(took).1f s, goes up to %(far).2f m from home (tether %(tether).2f m), "
+        "ends at home."
+    ) % {"took": trial.took_s, "far": trial.farthest_m, "tether": TETHER_M}
+    if trial.took_s > WINDOW_S:
+        words += " " + gettext("Longer than a window: it may miss the next.")
+    return words
 
 
 @admin.register(Gesture)
@@ -86,7 +90,7 @@ class GestureAdmin(ScopedAdmin):
     readonly_fields = ("picture",)
     inlines = (StepRows,)
 
-    @admin.display(description="simulated")
+    @admin.display(description=_("simulated"))
     def simulated(self, gesture: Gesture) -> str:
         """Say how long it takes and how far it goes, or what is wrong with it."""
         try:
@@ -94,11 +98,11 @@ class GestureAdmin(ScopedAdmin):
         except BadGesture as problem:
             return str(problem)
 
-    @admin.display(description="where it goes")
+    @admin.display(description=_("where it goes"))
     def picture(self, gesture: Gesture) -> str:
         """Draw the way of what is stored."""
         if not gesture.pk:
-            return "Save it to see where it goes. Its last step has to end at home."
+            return gettext("Save it to see where it goes. Its last step has to end at home.")
         try:
             trial = try_gesture(admit_gesture(gesture.to_data()))
         except BadGesture as problem:

@@ -88,6 +88,7 @@ class AccountAdmin(ScopedOptions, UserAdmin):
         "is_active",
     )
     list_filter = ("role", "is_active", "last_login", ("clinic", admin.RelatedOnlyFieldListFilter))
+    list_select_related = ("clinic",)
     show_facets = admin.ShowFacets.NEVER
     add_form = NewAccountForm
     filter_horizontal = ()
@@ -196,7 +197,7 @@ class PatientAdmin(ScopedAdmin):
     readonly_fields = ("alias", "pseudonym", "created_at", "ended_at", "erased_at")
     actions = row_actions = ("draw_aliases",)
 
-    def get_queryset(self, request: HttpRequest) -> QuerySet[Patient]:
+    def get_queryset(self, request: HttpRequest) -> QuerySet[Any]:
         """Give the visible patients with how often and when they were here last."""
         rows = super().get_queryset(request)
         return rows.annotate(walks=Count("sessions"), last_visit=Max("sessions__created_at"))

@@ -8,10 +8,11 @@ from django import forms
 from django.contrib import admin, messages
 from django.db import models
 from django.db.models import QuerySet
-from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
+from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import redirect
 from django.template.response import TemplateResponse
 from django.utils import timezone
+from django.utils.text import capfirst
 from django.utils.translation import gettext, ngettext
 from django.utils.translation import gettext_lazy as _
 
@@ -80,6 +81,16 @@ class ScopedOptions(admin.options.BaseModelAdmin):
         return not isinstance(obj, ScopedModel) or owns(request.user, obj)
 
 
+class RowFormSet(forms.BaseInlineFormSet):
+    """Rows of a table inside a page: each field is named by its column, for who cannot see it."""
+
+    def add_fields(self, form: Any, index: int | None) -> None:
+        """Name the fields."""
+        super().add_fields(form, index)
+        for field in form.fields.values():
+            field.widget.attrs["aria-label"] = field.label
+
+
 class ClinicForm(forms.ModelForm):
     """A form whose row belongs to a clinic that nobody chooses."""
 
@@ -120,6 +131,11 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
         form: Any = super().get_form(request, obj, change=change, **kwargs)
         return type(form)(form.__name__, (form,), {"new_clinic_id": person(request).clinic_id})
 
+    def changelist_view(self, request: HttpRequest, extra_context: Any = None) -> HttpResponse:
+        """Show the list under what it is a list of."""
+        title = capfirst(self.opts.verbose_name_plural)
+        return super().changelist_view(request, {"title": title} | (extra_context or {}))
+
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Give addresses and words of where one may want to go from a row's page."""
         return []
@@ -135,15 +151,15 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
                 actions = {name: actions[name] for name in actions if name in self.for_viewers}
             context["row_links"] = self.get_row_links(request, row)
             context["row_actions"] = [
-                (name, actions[name][2]) for name in self.row_actions if name in actions
+                (name, found[2]) for name in self.row_actions if (found := actions.get(name))
             ]
         return super().render_change_form(request, context, *args, **kwargs)
 
     def response_action(
-        self, request: HttpRequest, queryset: QuerySet[Any]
-    ) -> HttpResponseBase | None:
+        self, request: HttpRequest, queryset: QuerySet[Any], *args: Any
+    ) -> HttpResponse | None:
         """Do it; what was asked for on a row's own page leads back there."""
-        response = super().response_action(request, queryset)
+        response = super().response_action(request, queryset, *args)
         key = request.POST.get("stay", "")
         if key.isdecimal() and getattr(response, "url", "") == request.get_full_path():
             meta = self.opts
@@ -182,6 +198,7 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
             "title": gettext("Changes: %(row)s") % {"row": row},
             "object": row,
             "opts": self.opts,
+            "module_name": capfirst(self.opts.verbose_name_plural),
             "changes": changes_of(request.user, row, parts),
         }
         return TemplateResponse(request, "people/changes.html", context)
@@ -190,7 +207,7 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
 class TokenAdmin(ScopedAdmin):
     """Pages of rows that are known by a token. It is shown once, when it is made."""
 
-    readonly_fields = ("created_at", "last_seen_at", "revoked_at")
+    readonly_fields: ClassVar[tuple[str, ...]] = ("created_at", "last_seen_at", "revoked_at")
     actions = row_actions = ("renew_tokens", "revoke_tokens")
 
     def save_model(self, request: HttpRequest, obj: Any, form: Any, change: bool) -> None:

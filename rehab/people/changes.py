@@ -69,7 +69,8 @@ def _tell(user: Any, model: type[Model], entry: HistoryEntry) -> Iterator[Line]:
             yield Line(str(label), _("erased"), "")
         elif entry.kind != HistoryEntry.Kind.DELETED:
             old, new = (_say(user, field, value) for value in pair)
-            yield Line(str(label), old, new)
+            added = entry.kind == HistoryEntry.Kind.ADDED
+            yield Line(str(label), new, "") if added else Line(str(label), old, new)
 
 
 def _say(user: Any, field: Field[Any, Any] | None, value: Any) -> str:

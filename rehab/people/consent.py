@@ -10,25 +10,34 @@ from django.db import models, transaction
 from django.db.models import Exists, OuterRef, Q
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
+from django.utils.translation import override
 
 from rehab.people.models import Boards, Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.scope import Scope, ScopedModel
 
-FIRST_TEXT = """\
-GARRY measures your steps while you walk on the treadmill: how strongly you push off, when, and how
-your therapist set the goal. The clinic keeps this under a nickname and a number, never your full
-name.
-
-Care: your therapists use your sessions to plan your training.
-Research: researchers of this clinic see your sessions under a made-up name. They never see your
-nickname or number.
-Boards: your results stand beside those of others, under the name of an animal. You can leave at any
-time, also by yourself on the tablet.
-Remote view: your therapist may watch a session from another place.
-
-You may say no to any of these, and change your mind at any time. Your care does not depend on
-research, boards or remote view."""
+# What a clinic begins with, in its language. It is its own to change.
+FIRST_WORDS = (
+    _(
+        "GARRY measures your steps while you walk on the treadmill: how strongly you push off, "
+        "when, and how your therapist set the goal. The clinic keeps this under a nickname and a "
+        "number, never your full name."
+    ),
+    _("Care: your therapists use your sessions to plan your training."),
+    _(
+        "Research: researchers of this clinic see your sessions under a made-up name. They never "
+        "see your nickname or number."
+    ),
+    _(
+        "Boards: your results stand beside those of others, under the name of an animal. You can "
+        "leave at any time, also by yourself on the tablet."
+    ),
+    _("Remote view: your therapist may watch a session from another place."),
+    _(
+        "You may say no to any of these, and change your mind at any time. Your care does not "
+        "depend on research, boards or remote view."
+    ),
+)
 
 
 class Purpose(models.TextChoices):
@@ -129,13 +138,14 @@ class PatientScope(Scope):
 
 def current_text(clinic: Clinic) -> ConsentText:
     """Give the words in force; a clinic's first ones are made on first use."""
-    texts = ConsentText.everywhere.filter(clinic=clinic)
-    return (
-        texts.first()
-        or ConsentText.everywhere.get_or_create(
-            clinic=clinic, version=1, defaults={"text": FIRST_TEXT}
-        )[0]
-    )
+    text = ConsentText.everywhere.filter(clinic=clinic).first()
+    if text is None:
+        with override(clinic.language):
+            words = "\n\n".join(map(str, FIRST_WORDS))
+        text, _made = ConsentText.everywhere.get_or_create(
+            clinic=clinic, version=1, defaults={"text": words}
+        )
+    return text
 
 
 def write_text(clinic: Clinic, text: str, by: User | None, now: datetime) -> ConsentText:

@@ -200,9 +200,9 @@ class Boards(models.TextChoices):
 
 
 class Ending(models.TextChoices):
-    """Why a patient's programme has ended."""
+    """Why a patient's program has ended."""
 
-    DONE = "done", _("The programme is complete")
+    DONE = "done", _("The program is complete")
     WISH = "wish", _("The patient wishes to stop")
     HEALTH = "health", _("Health")
     MOVED = "moved", _("Goes on elsewhere")
@@ -282,7 +282,7 @@ class Patient(ClinicRow):
         null=True, editable=False, help_text=_("The participant of the original GARRY's database.")
     )
     created_at = models.DateTimeField(_("created at"), auto_now_add=True)
-    ended_at = models.DateTimeField(_("programme ended"), null=True, editable=False)
+    ended_at = models.DateTimeField(_("program ended"), null=True, editable=False)
     ended_because = models.CharField(
         _("why it ended"), max_length=8, choices=Ending.choices, blank=True, editable=False
     )
@@ -314,7 +314,9 @@ class Patient(ClinicRow):
         super().save(*args, **kwargs)
 
     def clean(self) -> None:
-        """Refuse boards with others before the patient has agreed to them."""
+        """Refuse boards with others before the patient agreed to them, and to bring anyone back."""
+        if self.erased_at is not None:
+            raise ValidationError(_("This person is erased. Take a new patient in."))
         if self.boards == Boards.OWN or self.simulated:
             return
         agreed = self.pk and self.consents.filter(purpose="boards", withdrawn_at=None).exists()

@@ -17,6 +17,7 @@ from django.utils import timezone
 
 from rehab.people import audit
 from rehab.people.audit import Act
+from rehab.people.history import HistoryEntry
 from rehab.people.lockout import client_address
 from rehab.people.models import Patient
 
@@ -35,8 +36,8 @@ def note_request(request: HttpRequest, response: HttpResponseBase) -> None:
     if actor is None or match is None or response.status_code >= 400 or not _shows(request, match):
         return
     reads = request.method in ("GET", "HEAD", "OPTIONS")
-    if reads and response.status_code >= 300:
-        return  # sent on: nothing was shown
+    if reads and response.status_code != 200:
+        return  # nothing there, or sent on: nothing was shown
     about = match.route if "code" in match.kwargs else request.path
     who = (type(actor).__name__, actor.pk, getattr(actor, "program", ""))
     now = timezone.now()
@@ -79,7 +80,7 @@ def _model_of(match: ResolverMatch) -> type[Model] | None:
 @cache
 def leads_to_patients(model: type[Model]) -> bool:
     """Whether a model is the patient's, or its rows point to one that is."""
-    if model is Patient:
+    if model in (Patient, HistoryEntry):  # whose values may be a patient's
         return True
     related = {
         field.related_model

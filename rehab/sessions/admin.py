@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from django import forms
@@ -17,7 +18,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import person
-from rehab.people.admin_base import ReadOnlyAdmin, ScopedAdmin, ScopedOptions
+from rehab.people.admin_base import ReadOnlyAdmin, RowFormSet, ScopedAdmin, ScopedOptions
 from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection, may_correct, tell_corrections
 from rehab.sessions.cues import list_gestures
@@ -34,7 +35,7 @@ from rehab.sessions.models import (
 )
 from rehab.sessions.presets import Preset
 from rehab.sessions.trend import with_figures
-from rehab.sessions.words import at_clinic, say_quantity, say_rate
+from rehab.sessions.words import at_clinic
 from rehab.training.changes import OPEN, State
 
 PARKED = 10_000  # where phases wait while they change places; no protocol has as many
@@ -66,7 +67,7 @@ class PhaseForm(forms.ModelForm):
         return super()._get_validation_exclusions() | {"position"}  # type: ignore[misc, no-any-return]
 
 
-class PhaseFormSet(forms.BaseInlineFormSet):
+class PhaseFormSet(RowFormSet):
     """The phases of one protocol, in the order of their numbers."""
 
     def clean(self) -> None:
@@ -137,16 +138,7 @@ class ProtocolAdmin(ScopedAdmin):
         """Show the form; what is drawn of the protocol begins with what is stored."""
         row: Protocol | None = context.get("original")
         context["stride_s"] = STRIDE_S
-        context["phases"] = [
-            {
-                "name": phase.name,
-                "feedback": phase.feedback,
-                "gain": phase.gain,
-                "strides": phase.strides,
-                "seconds": phase.seconds,
-            }
-            for phase in (row.to_rules() if row else ())
-        ]
+        context["phases"] = [asdict(phase) for phase in (row.to_rules() if row else ())]
         return super().render_change_form(request, context, *args, **kwargs)
 
     @transaction.atomic
@@ -189,9 +181,8 @@ class ProtocolAdmin(ScopedAdmin):
             description=protocol.description,
         )
         copy.save()
-        for phase in protocol.phases.order_by("position"):
-            phase.pk, phase.protocol, phase._state.adding = None, copy, True
-            phase.save()
+        for position, phase in enumerate(protocol.to_rules(), 1):
+            ProtocolPhase(protocol=copy, position=position, **asdict(phase)).save()
         return copy
 
 
@@ -287,7 +278,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         """Give a session with its corrections as this person may read them."""
         row = super().get_object(request, *args, **kwargs)
         if row is not None:
-            row.told = tell_corrections(row, person(request))  # type: ignore[attr-defined]
+            row.told = tell_corrections(row, person(request))
         return row
 
     def get_list_display(self, request: HttpRequest) -> Any:
@@ -355,7 +346,7 @@ class TrainingSessionAdmin(ScopedAdmin):
     @admin.display(description=_("goal"), ordering="goal")
     def goal_value(self, session: TrainingSession) -> str | None:
         """Give the goal with its unit."""
-        return None if session.goal is None else say_quantity(session.goal, session.measure.unit)
+        return None if session.goal is None else f"{session.goal:.2f} {session.measure.unit}"
 
     @admin.display(description=_("score"), ordering="metric_score")
     def score(self, session: Any) -> int | None:
@@ -365,7 +356,7 @@ class TrainingSessionAdmin(ScopedAdmin):
     @admin.display(description=_("hit rate"), ordering="metric_hit_rate")
     def hit_rate(self, session: Any) -> str | None:
         """Give the share of hits."""
-        return None if session.metric_hit_rate is None else say_rate(session.metric_hit_rate)
+        return None if session.metric_hit_rate is None else f"{session.metric_hit_rate:.0%}"
 
     @admin.display(description=_("counts"), ordering="left_out", boolean=True)
     def counts(self, session: TrainingSession) -> bool:
@@ -454,6 +445,6 @@ class SessionCorrectionAdmin(ReadOnlyAdmin):
     list_filter = ("part", "at")
     list_select_related = ("session", "by")
 
-    def has_add_permission(self, request: HttpRequest) -> bool:
+    def has_add_permission(self, request: HttpRequest, obj: Any = None) -> bool:
         """Corrections are made in their own form."""
         return False

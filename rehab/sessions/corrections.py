@@ -60,7 +60,7 @@ class SessionCorrection(ScopedModel):
 
     def save(self, *args: Any, **kwargs: Any) -> None:
         """Add the row. Refuses to alter one that is there."""
-        if self.pk is not None and not kwargs.get("force_insert"):
+        if self.pk and not kwargs.get("force_insert"):
             raise TypeError("A correction is never altered. Make another one.")
         super().save(*args, **kwargs)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.valences import valences_of
@@ -67,12 +68,17 @@ def find_composed(patient: Patient, cue: Cue) -> Iterator[dict[str, Any]]:
     for name in sorted(named - GESTURES.keys() - ORIGINALS.keys()):
         row = Gesture.everywhere.filter(clinic=patient.clinic_id, name=name).first()
         if row is None:
-            raise InvalidSetting(f"There is no gesture {name}. Compose it in the admin first.")
+            raise InvalidSetting(
+                gettext("There is no gesture %(name)s. Compose it in the admin, or choose another.")
+                % {"name": name}
+            )
         data = row.to_data()
         try:
             admit_gesture(data)
         except BadGesture as problem:
-            raise InvalidSetting(f"Gesture {name}: {problem}") from problem
+            raise InvalidSetting(
+                gettext("Gesture %(name)s: %(problem)s") % {"name": name, "problem": problem}
+            ) from problem
         yield data
 
 

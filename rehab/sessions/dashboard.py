@@ -1,4 +1,4 @@
-"""What a clinic sees first in the admin: today, this week, its stations, and what wants attention."""
+"""What a clinic sees first in the admin: today, this week, its stations, what wants attention."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a patient's time with GARRY ends: the programme for now, what leads to the person for good.
+"""How a patient's time with GARRY ends: the program for now, what leads to the person for good.
 
 An erased patient stays as figures under a new false name: sessions, steps and what boards never
 show. Nobody can undo it; backups made before still hold the person (docs/privacy.md).
@@ -29,7 +29,7 @@ class StillOpen(ValueError):
     """A patient whose time cannot end while a session is open."""
 
 
-def end_programme(patient: Patient, because: Ending, now: datetime) -> None:
+def end_program(patient: Patient, because: Ending, now: datetime) -> None:
     """Take a patient off the lists; nothing can be started until it is reopened.
 
     Raises StillOpen.
@@ -40,7 +40,7 @@ def end_programme(patient: Patient, because: Ending, now: datetime) -> None:
         patient.save(update_fields=["ended_at", "ended_because"])
 
 
-def reopen_programme(patient: Patient) -> None:
+def reopen_program(patient: Patient) -> None:
     """Put a patient back on the lists. An erased one stays away: nobody is there to come back."""
     if patient.erased_at is None:
         patient.ended_at, patient.ended_because = None, ""

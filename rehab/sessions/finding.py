@@ -44,7 +44,7 @@ class FindForm(forms.Form):
     goal_max = NumberField(required=False, min_value=0, label=_("Goal to"))
 
     def __init__(self, *args: Any, by: User, **options: Any) -> None:
-        super().__init__(*args, auto_id="find_%s", **options)
+        super().__init__(*args, **options | {"auto_id": "find_%s"})
         fields: dict[str, Any] = self.fields
         for name in ("first", "last"):
             fields[name].widget = forms.DateInput(attrs={"type": "date"}, format="%Y-%m-%d")
@@ -78,7 +78,7 @@ class FindForm(forms.Form):
     def narrow(self, sessions: QuerySet[Any], zone: str) -> QuerySet[Any]:
         """Give those of some sessions that fit; days by the clock of a time zone."""
         data = self.cleaned_data
-        begun = sessions.annotate(begun=Coalesce("started_at", "created_at"))
+        begun: QuerySet[Any] = sessions.annotate(begun=Coalesce("started_at", "created_at"))
         if data["first"]:
             begun = begun.filter(begun__gte=_midnight(data["first"], zone))
         if data["last"]:
@@ -103,7 +103,7 @@ def _midnight(day: Any, zone: str) -> datetime:
 class Finder(ListFilter):
     """The form as the admin's filter. What it cannot read it says, and then gives nothing."""
 
-    title = _("what was walked")  # type: ignore[assignment]
+    title = _("what was walked")
     template = "admin/find.html"
 
     def __init__(
@@ -126,7 +126,7 @@ class Finder(ListFilter):
         """Give the form at all times."""
         return True
 
-    def expected_parameters(self) -> list[str]:
+    def expected_parameters(self) -> list[str | None]:
         """Give the names of the form's fields."""
         return list(self.form.fields)
 

@@ -131,7 +131,8 @@ class Protocol(ClinicRow):
 
     def to_rules(self) -> tuple[Phase, ...]:
         """Give the phases as the rules know them."""
-        return tuple(phase.to_rule() for phase in self.phases.order_by("position"))
+        phases = sorted(self.phases.all(), key=lambda phase: phase.position)  # also if prefetched
+        return tuple(phase.to_rule() for phase in phases)
 
 
 class ProtocolPhase(ScopedModel):

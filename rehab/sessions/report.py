@@ -189,7 +189,8 @@ def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
     known = [value for value in (*shown, *goals) if value is not None]
     highest: float = max(known, default=1.0)
     top = 1.08 * highest if highest > 0 else 1.0
-    first, span = numbers[0], max(1, numbers[-1] - numbers[0])
+    first: int = numbers[0]
+    span: int = max(1, numbers[-1] - first)
 
     def x(number: float) -> float:
         return SPACE + (WIDE - 2 * SPACE) * (number - first) / span

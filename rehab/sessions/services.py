@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from asgiref.sync import async_to_sync
-from django.utils.translation import gettext as _
+from django.utils.translation import gettext
 
 from rehab.feedback.valences import valences_of
 from rehab.people.models import Patient, User
@@ -51,19 +51,18 @@ def create_session(
     patient, station and the rest are not of one clinic; nothing is stored then.
     """
     if patient.ended_at is not None:
-        said = _(
-            "%(patient)s's programme has ended. Reopen it on the page “Consent and data” first."
-        )
+        said = gettext("%(patient)s's program has ended. Reopen it on the page “Consent and data” first.")
         raise InvalidSetting(said % {"patient": patient.nickname})
     measure = measure or Measure.everywhere.get(clinic=None, slug=A2.slug)
     if phases is None:
         if protocol is None:
-            raise InvalidSetting("A session needs a protocol, or phases of its own.")
+            raise InvalidSetting(gettext("A session needs a protocol, or phases of its own."))
         phases = protocol.to_rules()
     side = trained_side or (Side(patient.paretic_side) if patient.paretic_side else None)
     if side is None:
         raise InvalidSetting(
-            f"Which leg is trained? Set the paretic side of {patient}, or choose a leg."
+            gettext("Which leg is trained? Set the paretic side of %(patient)s, or choose a leg.")
+            % {"patient": patient}
         )
     find_valence(valence)
     known = valences_of(patient.clinic_id, patient.language)

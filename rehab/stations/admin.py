@@ -150,6 +150,6 @@ class DeviceAdmin(TokenAdmin):
     @admin.display(description=_("state"), ordering="last_seen_at")
     def state(self, device: Device) -> str:
         """Say whether it may dial in, and when it last did."""
-        if device.pk is None:
+        if not device.pk:
             return gettext("Its token is shown once you save it.")
         return say_state(device, timezone.now())

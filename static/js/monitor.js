@@ -235,7 +235,7 @@ function drawTypes() {
   if (choice.dataset.of !== wanted) choice.value = choice.dataset.of = wanted; // not while somebody chooses
   choice.disabled = session.types.length < 2 || !session.phases.slice(session.phase.index + 1).some(({ feedback }) => feedback);
   const next = session.phases.slice(session.phase.index + 1).find(({ feedback }) => feedback);
-  show("type-when", choice.disabled ? _("no further phase with feedback") : session.next_valence ? fill(_("from %(phase)s on; now %(type)s"), { phase: next ? phaseName(next.name) : _("the next phase"), type: label(session.valence) }) : _("of the next phase: as now"));
+  show("type-when", choice.disabled ? _("no further feedback phase") : session.next_valence ? fill(_("from %(phase)s on; now %(type)s"), { phase: next ? phaseName(next.name) : _("the next phase"), type: label(session.valence) }) : _("of the next phase: as now"));
 }
 
 const MAIN = {

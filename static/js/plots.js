@@ -28,11 +28,14 @@ export function drawStrip(svg, strides, marks, phases) {
     else drawing += `<circle class="${hit ? "hit" : "miss"}" cx="${x(index)}" cy="${y(performance)}" r="${newest ? 6 : 3.2}"/>`;
   });
   const parts = []; // names that somebody typed: set as text, never as markup
-  shown.forEach(({ phase }, index) => {
-    if (!index || phase === shown[index - 1].phase || phase === undefined) return;
-    const at = x(index) - dx / 2;
-    drawing += `<path class="bound" d="M${at} 4V${height - 8}"/><text class="part" x="${Math.min(at + 5, width - 80)}" y="40"></text>`;
-    parts.push(phases[phase]?.name ?? "");
+  const bounds = shown.flatMap(({ phase }, index) => (index && phase !== undefined && phase !== shown[index - 1].phase ? [index] : []));
+  bounds.forEach((index, n) => {
+    const at = x(index) - dx / 2, name = phases[shown[index].phase]?.name ?? "";
+    drawing += `<path class="bound" d="M${at} 4V${height - 8}"/>`;
+    const room = (n + 1 < bounds.length ? x(bounds[n + 1]) : width) - at;
+    if (room < 8 * name.length) return;
+    drawing += `<text class="part" x="${at + 5}" y="40"></text>`;
+    parts.push(name);
   });
   let level = 0, before = null; // what was noted at the same stride stands above each other
   let free = 0; // badges and flags stand in a row on top and never cover each other

@@ -241,7 +241,7 @@ def test_every_place_is_one_more_than_the_better_ones(walked):
         Figures(pk, "negative", hits / (hits + misses), -misses, hits if not misses else 0)
         for pk, (hits, misses) in enumerate(walked)
     ]
-    percent = [round(100 * hits / (hits + misses)) for hits, misses in walked]
+    percent = [round(100 * (hits / (hits + misses))) for hits, misses in walked]
     points = [hits for hits, _ in walked]
     for by, given_figures, truth in (
         (By.RATE, figures, percent),

@@ -29,13 +29,18 @@ WALKED = """
 from django.utils import timezone
 from rehab.people.first_start import first_clinic
 from rehab.people.models import Patient
+from rehab.sessions.models import Protocol
+from rehab.stations.models import Station
 from tests.walks import visit
 rosa = Patient.everywhere.create(
     clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"
 )
 for number, valence in enumerate(["positive", "negative", "explicit"], start=1):
     visit(rosa, valence, number, 9 - 3 * number, 360, timezone.now())
-print(rosa.pk, *rosa.sessions.order_by("pk").values_list("pk", flat=True))
+blocks = Protocol.everywhere.create(clinic=first_clinic(), name="Blocks")
+for position, kind in enumerate(["baseline", "training", "washout"], 1):
+    blocks.phases.create(position=position, kind=kind, name=kind, feedback=kind == "training")
+print(Station.everywhere.first().pk, blocks.pk, rosa.pk, *rosa.sessions.order_by("pk").values_list("pk", flat=True))
 """
 PT_PAGES = [
     "/start/",
@@ -46,7 +51,11 @@ PT_PAGES = [
     "/patients/{patient}/screen/",
     "/patients/{patient}/sessions/",
     "/patients/{patient}/home/",
+    "/patients/{patient}/records/",
+    "/patients/{patient}/consent/",
     "/sessions/{session}/details/",
+    "/sessions/{session}/correct/",
+    "/sessions/{session}/report/",
     "/sessions/{walk}/monitor/",
     "/tablets/pair/",
     "/account/",
@@ -54,6 +63,24 @@ PT_PAGES = [
     "/account/second-factor/",
     "/account/second-factor/app/",
     "/nowhere/",
+]
+ADMIN_PAGES = [
+    "/admin/",
+    "/admin/rehab/trainingsession/?hits_min=90&hits_max=10",
+    "/admin/rehab/trainingsession/{session}/change/",
+    "/admin/rehab/step/?session__id__exact={session}",
+    "/admin/rehab/patient/",
+    "/admin/rehab/patient/{patient}/change/",
+    "/admin/rehab/protocol/",
+    "/admin/rehab/protocol/{protocol}/change/",
+    "/admin/rehab/protocol/add/",
+    "/admin/rehab/protocol/{protocol}/delete/",
+    "/admin/rehab/protocol/{protocol}/history/",
+    "/admin/rehab/preset/add/",
+    "/admin/rehab/gesture/add/",
+    "/admin/rehab/station/{station}/change/",
+    "/admin/rehab/leaderboard/",
+    "/admin/rehab/leaderboard/add/",
 ]
 PATIENT_PAGES = ["/sessions/{session}/scores/", "/sessions/{kept}/scores/", "/tablet/"]
 
@@ -76,9 +103,8 @@ def places(server: Server, walks: list[Walk]) -> dict[str, str]:
         capture_output=True,
         text=True,
     ).stdout
-    patient, session, kept, _ = told.split()
-    walk = str(walks[0].session)
-    return {"patient": patient, "session": session, "kept": kept, "walk": walk}
+    names = ("station", "protocol", "patient", "session", "kept")
+    return dict(zip(names, told.split(), strict=False)) | {"walk": str(walks[0].session)}
 
 
 @pytest.fixture
@@ -111,6 +137,20 @@ def test_therapists_pages(context: BrowserContext, places: dict[str, str], path:
     page = open_page(context, path.format(**places), "laptop")
     page.wait_for_load_state("networkidle")
     assert "/sign-in/" not in page.url
+    check(page)
+
+
+@pytest.mark.parametrize("path", ADMIN_PAGES)
+def test_the_admin(context: BrowserContext, places: dict[str, str], path: str) -> None:
+    """Light on a laptop, then dark on a phone: the same page, laid out anew."""
+    page = open_page(context, path.format(**places), "laptop")
+    page.wait_for_load_state("networkidle")
+    assert "/sign-in/" not in page.url
+    check(page)
+    page.evaluate("localStorage.setItem('theme', 'dark')")
+    page.set_viewport_size(dict(zip(("width", "height"), SIZES["phone"], strict=True)))
+    page.reload(wait_until="networkidle")
+    assert page.evaluate("document.documentElement.dataset.pt") == "dark"
     check(page)
 
 

@@ -329,7 +329,13 @@ def test_the_last_one_stays_where_one_is_required(client, pt, app):
 def test_a_lead_asks_for_it_and_helps_whoever_lost_it(client, pt, app):
     lead = User.everywhere.create_user("lead", password=PASSWORD, role=Role.LEAD, clinic=pt.clinic)
     enter(client, "lead")
-    form = {"name": "Elm", "language": "en", "time_zone": "UTC", "second_factor_required": "on"}
+    form = {
+        "name": "Elm",
+        "language": "en",
+        "time_zone": "UTC",
+        "keep_log_months": 36,
+        "second_factor_required": "on",
+    }
     client.post(f"/admin/rehab/clinic/{pt.clinic.pk}/change/", form)
     pt.clinic.refresh_from_db()
     assert pt.clinic.second_factor_required

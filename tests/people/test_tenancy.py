@@ -29,6 +29,7 @@ from rehab.people.roles import Right, Role, rights_of
 from rehab.people.scope import CrossClinic, Scope, ScopedManager, UnscopedQuery
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device, Station
+from tests.archives import words_of
 from tests.world import (
     Actor,
     World,
@@ -289,7 +290,7 @@ def what_leaks(
     actor: Actor, route: Route, response: Any, worlds: tuple[World, ...]
 ) -> Iterator[str]:
     """Give what is wrong with an answer: a foreign mark, an open door, a failure."""
-    body = response.content.decode(errors="replace")
+    body = words_of(response)
     if response.status_code >= 500:
         yield f"{actor.label}: {route.url} fails with {response.status_code}"
     for world in worlds:

@@ -19,31 +19,68 @@ PAGES = {
     "second-factor": "/account/second-factor/app/",
     "admin": "/admin/",
     "patients": "/admin/rehab/patient/",
+    "patient-in-admin": "/admin/rehab/patient/2/change/",
     "sessions": "/admin/rehab/trainingsession/",
-    "session": "/admin/rehab/trainingsession/1/change/",
+    "sessions-found": "/admin/rehab/trainingsession/?hits_min=95&hits_max=90&who=2",
+    "session": "/admin/rehab/trainingsession/12/change/",
+    "protocols": "/admin/rehab/protocol/",
     "protocol": "/admin/rehab/protocol/2/change/",
+    "own-protocol": "/admin/rehab/protocol/4/change/",
+    "delete-protocol": "/admin/rehab/protocol/4/delete/",
+    "presets": "/admin/rehab/preset/",
+    "preset": "/admin/rehab/preset/1/change/",
+    "stations": "/admin/rehab/station/",
+    "station": "/admin/rehab/station/1/change/",
+    "devices": "/admin/rehab/device/",
+    "device": "/admin/rehab/device/1/change/",
+    "accounts": "/admin/rehab/user/",
+    "account-in-admin": "/admin/rehab/user/1/change/",
+    "leaderboards": "/admin/rehab/leaderboard/",
     "leaderboard": "/admin/rehab/leaderboard/add/",
+    "feedback": "/admin/rehab/feedbacktype/add/?slug=binary",
+    "feedback-types": "/admin/rehab/feedbacktype/",
     "gesture": "/admin/rehab/gesture/1/change/",
     "scores-points": "/sessions/12/scores/",
     "scores-kept": "/sessions/11/scores/",
     "past-sessions": "/patients/2/sessions/",
     "session-details": "/sessions/12/details/",
+    "report": "/sessions/12/report/",
+    "take-home": "/patients/2/home/",
     "start": "/start/",
     "patient": "/patients/2/",
     "new-patient": "/patients/new/",
+    "screen": "/patients/2/screen/",
+    "pairing": "/tablet/",
+    "pair": "/tablets/pair/",
+    "station": "/admin/rehab/station/1/change/",
     "set-up": "/patients/2/new/",
+    "set-up-preset": "/patients/2/new/?preset=1",
+    "correct": "/sessions/12/correct/",
+    "corrected": "/sessions/11/details/",
+    "records": "/patients/2/records/",
+    "consent": "/patients/2/consent/",
+    "consent-words": "/consent/words/",
+    "export": "/export/",
+    "audit-log": "/admin/rehab/auditentry/",
+    "changes": "/admin/rehab/patient/2/history/",
     "therapist": "/sessions/13/monitor/",  # last: by then there is something to see
 }
 
-# A gesture, and patient 2 with the sessions 4 to 12, walked over three weeks.
+# A gesture, patient 2 with the sessions 4 to 12, walked over three weeks, and who else is expected.
 VISITS = """
+from datetime import time, timedelta
 from django.utils import timezone
 from rehab.people.first_start import first_clinic
 from rehab.gestures.models import Gesture
-from rehab.people.models import Patient
+from rehab.people.models import Patient, User
+from rehab.sessions.corrections import Part, correct_session
+from rehab.sessions.models import Protocol, SessionEvent, TrainingSession
+from rehab.sessions.presets import Preset
+from rehab.sessions.visits import plan_visit
+from rehab.stations.models import Device, Station
 from tests.walks import visit
 rosa = Patient.everywhere.create(
-    clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"
+    clinic=first_clinic(), code="K7-204", nickname="Rosa", paretic_side="left"
 )
 wave = Gesture.everywhere.create(clinic=first_clinic(), name="slow-wave")
 for position, (turn, way) in enumerate([(40, 0.12), (0, -0.12), (-80, 0.12), (0, -0.12), (40, 0)]):
@@ -51,7 +88,62 @@ for position, (turn, way) in enumerate([(40, 0.12), (0, -0.12), (-80, 0.12), (0,
 types = "explicit positive positive negative binary positive binary negative positive".split()
 for index, valence in enumerate(types):
     days_ago = 3 * (len(types) - 1 - index)
-    visit(rosa, valence, index + 1, days_ago, 360 + 70 * (index % 3), timezone.now())
+    last = visit(rosa, valence, index + 1, days_ago, 360 + 70 * (index % 3), timezone.now())
+lead = User.everywhere.get(username="pt")
+left_out = TrainingSession.everywhere.get(pk=11)
+changes = {Part.COUNTS: "no", Part.NOTE: "Walked with a cane from minute four on."}
+correct_session(left_out, changes, "The sensor slipped.", lead, timezone.now())
+blocks = Protocol.everywhere.create(
+    clinic=first_clinic(), name="Short blocks", description="Four blocks, each a little harder."
+)
+for position, (kind, name, gain, seconds) in enumerate([
+    ("baseline", "Baseline", 1, 60), ("training", "Block 1", 1, 180), ("catch", "Catch", 1, 15),
+    ("training", "Block 2", 0.9, 240), ("washout", "Washout", 1, None),
+], 1):
+    blocks.phases.create(
+        position=position, kind=kind, name=name, gain=gain, seconds=seconds,
+        feedback=kind == "training",
+    )
+for name, valence, percent, minutes in (
+    ("Gentle start", "positive", 95, 10), ("Challenge", "binary", 118, 20),
+):
+    Preset.everywhere.create(
+        clinic=first_clinic(), name=name, valence=valence, goal_by="percent", goal_percent=percent,
+        wanted_hits=60, minutes=minutes, protocol=blocks,
+    )
+for station, kind, name, seen in (
+    ("Treadmill 1", "tablet", "Tablet by the window", True),
+    ("Treadmill 1", "source", "Force plates", True),
+    ("Treadmill 1", "robot", "Kobuki", False),
+    ("Treadmill 2", "tablet", "Old tablet", True),
+):
+    place, _ = Station.everywhere.get_or_create(clinic=first_clinic(), name=station)
+    device = Device(clinic=first_clinic(), station=place, kind=kind, name=name)
+    device.new_token()
+    device.save()
+    if seen:
+        Device.everywhere.filter(pk=device.pk).update(last_seen_at=timezone.now())
+    Device.everywhere.filter(name="Kobuki").update(
+        created_at=timezone.now() - timedelta(days=1)
+    )
+    Device.everywhere.filter(name="Old tablet").update(revoked_at=timezone.now())
+for number, (kind, value) in enumerate([("borg", 3), ("rest", None), ("pain", None), ("borg", 5)]):
+    at = timezone.now() - timedelta(minutes=5 - number)
+    SessionEvent.everywhere.create(
+        session=last, kind=kind, value=value, after_number=90 * number, at=at
+    )
+today = timezone.now().date()
+plan_visit(rosa, today, time(9, 30))
+plan_visit(rosa, today + timedelta(7), time(9, 30))
+for name, code, side, at in (
+    ("Joon", "K7-211", "right", time(10, 15)),
+    ("Amara", "K7-230", "left", time(11, 0)),
+    ("Walter", "K7-118", "right", time(13, 30)),
+):
+    who = Patient.everywhere.create(
+        clinic=first_clinic(), code=code, nickname=name, paretic_side=side
+    )
+    plan_visit(who, today, at)
 """
 
 

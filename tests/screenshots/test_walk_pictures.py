@@ -42,6 +42,11 @@ class Screens:
         """Tap a button on the first screen."""
         next(iter(self.pages.values())).click(button)
 
+    def tap_all(self, button: str) -> None:
+        """Tap a button on every screen."""
+        for page in self.pages.values():
+            page.click(button)
+
     def take(self, name: str, look: str, after_ms: int = CROSSFADE_MS) -> None:
         """Take a picture of each screen, once all look as they should."""
         for page in self.pages.values():
@@ -73,8 +78,14 @@ def test_pictures_of_a_walk(server: Server, stack: ExitStack) -> None:
     sides = [
         {"screen": {"screen_side": side, "screen_sounds": True}} for side in ("left", "center")
     ]
-    wanted: list[dict[str, Any]] = [*({"valence": valence} for valence in valences), *sides, catch]
-    *walks, left, center, calm = make_walks(server, *wanted)
+    largest = {"screen": {"screen_text": "largest"}}
+    wanted: list[dict[str, Any]] = [
+        *({"valence": valence} for valence in valences),
+        *sides,
+        largest,
+        catch,
+    ]
+    *walks, left, center, large, calm = make_walks(server, *wanted)
     browser = stack.enter_context(chromium())
     pages = {}
     for name, (width, height) in SIZES.items():
@@ -87,6 +98,9 @@ def test_pictures_of_a_walk(server: Server, stack: ExitStack) -> None:
         screens.show(walk)
         if valence == "positive":
             screens.take("ready", "ready")
+            screens.tap_all("button.out")
+            screens.take("leave", "ready")
+            screens.tap_all("text=Stay here")
         screens.tap("text=Start")
         if valence == "positive":
             screens.take("waiting", "waiting")
@@ -111,7 +125,7 @@ def test_pictures_of_a_walk(server: Server, stack: ExitStack) -> None:
         for page in pages.values():
             page.click("text=End")
         screens.take("ask", "ask")
-    for side, walk in {"left": left, "center": center}.items():
+    for side, walk in {"left": left, "center": center, "largest": large}.items():
         screens.show(walk)
         screens.tap("text=Start")
         with feet_of(server, walk) as feet:

@@ -14,7 +14,7 @@ from rehab.sessions.models import SessionEvent, TrainingSession
 from rehab.sessions.report import draw_chart, write_report
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
-from tests.walks import HIT, MISS, RIGHT, walk
+from tests.walks import HIT, MISS, RIGHT, Walked, walk
 from tests.world import NOW, World, build_world
 
 pytestmark = pytest.mark.django_db
@@ -50,7 +50,7 @@ def note(session: TrainingSession, kind: str, value: float | None = None, **data
 
 def test_it_says_who_walked_what_and_how_well(world, patient):
     phases = (make_phase("baseline", strides=4), make_phase("training"))
-    walked = [1.0, 3.0, 2.0, 2.0, HIT, MISS, HIT, Change(ChangeKind.GOAL, 2.4), HIT]
+    walked: list[Walked] = [1.0, 3.0, 2.0, 2.0, HIT, MISS, HIT, Change(ChangeKind.GOAL, 2.4), HIT]
     session = walk(patient, "positive", [*walked, None, (RIGHT, HIT)], phases=phases, wanted=0.6)
     words = read(world, session)
     assert "Rosa code B-1" in words
@@ -109,7 +109,18 @@ def test_a_session_without_a_stride_has_a_page(world, patient, walked):
 
 def test_the_chart_shows_every_stride_once(world, patient):
     phases = (make_phase("baseline", strides=2), make_phase("training"))
-    strides = [1.0, 1.5, HIT, MISS, None, HIT, Change(ChangeKind.GOAL, 3.0), HIT, MISS, 0.0]
+    strides: list[Walked] = [
+        1.0,
+        1.5,
+        HIT,
+        MISS,
+        None,
+        HIT,
+        Change(ChangeKind.GOAL, 3.0),
+        HIT,
+        MISS,
+        0.0,
+    ]
     session = walk(patient, "positive", strides, phases=phases)
     chart = write_report(world.people[Role.PT], session)["chart"]
     assert chart["hit"].count("M") == 2

@@ -6,12 +6,12 @@ from typing import Any
 
 from django.core.management.base import BaseCommand
 
-from rehab.boards.entries import refresh
+from rehab.boards.entries import refresh, tidy
 from rehab.boards.models import BoardEntry, Leaderboard
 
 
 class Command(BaseCommand):
-    """Rebuilds boards, one by one; tablets show each as it was until it is done."""
+    """Rebuilds boards, one by one; tablets show each again once it is done."""
 
     help = "Make the rows of every leaderboard anew, from the sessions."
 
@@ -22,3 +22,4 @@ class Command(BaseCommand):
             if options["verbosity"]:
                 rows = BoardEntry.everywhere.filter(board=board).count()
                 self.stdout.write(f"{board}: {rows} rows")
+        tidy()

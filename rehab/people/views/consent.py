@@ -106,7 +106,7 @@ def write_words(request: HttpRequest) -> HttpResponse:
     user = person(request)
     clinic = clinic_of(user)
     text = current_text(clinic)
-    form = ConsentTextForm(request.POST or None, initial={"text": text.text})
+    form = ConsentTextForm(request.POST or None, initial={"text": text.text}, label_suffix="")
     if request.method == "POST" and form.is_valid():
         new = write_text(clinic, form.cleaned_data["text"], user, timezone.now())
         said = _("Version %(version)d is in force. Ask patients again when they come.")

@@ -11,8 +11,10 @@ from rehab.people.access import for_roles, person
 from rehab.people.roles import Role
 from rehab.sessions.live.messages import BORG_MAX
 from rehab.sessions.models import EVENTS, Remark, TrainingSession
+from rehab.sessions.words import LEVELS
 from rehab.training.plans import ROBOT_LEVELS
 
+# What is noted with one tap, with its icon.
 ICONS = {
     Remark.REST: "rest",
     Remark.PAIN: "pain",
@@ -40,6 +42,6 @@ def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
             for what, icon in ICONS.items()
         ],
         "borg": range(BORG_MAX + 1),
-        "levels": ROBOT_LEVELS,
+        "levels": [(capfirst(LEVELS[name]), share) for name, share in ROBOT_LEVELS.items()],
     }
     return render(request, "sessions/monitor.html", context)

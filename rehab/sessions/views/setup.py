@@ -44,7 +44,7 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
                 kept = keep_preset(request.POST, patient, user, name)
             except ValidationError as problem:
                 form.errors.clear()
-                form.add_error(None, problem.messages)  # type: ignore[arg-type]
+                form.add_error(None, problem.messages)
             else:
                 words = gettext("Saved as preset “%(name)s”. It is renamed or deleted in Admin.")
                 messages.success(request, words % {"name": kept.name})
@@ -54,7 +54,8 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
     else:
         initial = like_last_time(patient, user) | (chosen.to_choices(user) if chosen else {})
         form = SessionForm(initial=initial, patient=patient, by=user)
-    lengths = {row.pk: minutes_of(row) for row in Protocol.objects.visible_to(user)}
+    protocols = Protocol.objects.visible_to(user).prefetch_related("phases")
+    lengths = {row.pk: minutes_of(row) for row in protocols}
     context = {
         "patient": patient,
         "form": form,

@@ -51,7 +51,7 @@ def list_everybody(user: User, words: str = "") -> dict[str, Any]:
     patients = patients_of(user)
     if words:
         patients = patients.filter(Q(nickname__icontains=words) | Q(code__icontains=words))
-    else:  # whose programme has ended is found by name or code
+    else:  # whose program has ended is found by name or code
         patients = patients.filter(ended_at=None)
     shown = list(patients[: SHOWN + 1])
     return {

@@ -1,0 +1,119 @@
+"""What the admin's scripts do: phases move and are drawn, the week is drawn, dark and light follow."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.servers import ROOT, Server, clean_environment
+from tests.walk_seed import make_walks
+
+pytestmark = pytest.mark.browser
+
+SEED = """
+from django.utils import timezone
+from rehab.people.first_start import first_clinic
+from rehab.people.models import Patient
+from rehab.sessions.models import Protocol
+from tests.walks import strides, walk
+rosa = Patient.everywhere.create(
+    clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"
+)
+walk(rosa, "positive", strides(60, 60), now=timezone.now(), wanted=0.6)
+blocks = Protocol.everywhere.create(clinic=first_clinic(), name="Blocks")
+blocks.phases.create(position=1, kind="baseline", name="Look", feedback=False, strides=60)
+blocks.phases.create(position=2, kind="training", name="Push", feedback=True, gain=0.85)
+print(blocks.pk)
+"""
+
+
+@pytest.fixture(scope="module")
+def protocol(server: Server) -> str:
+    return subprocess.run(
+        [sys.executable, "manage.py", "shell", "-v0", "-c", SEED],
+        cwd=ROOT,
+        env=clean_environment(server.folder, server.port),
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout.strip()
+
+
+@pytest.fixture
+def page(browser: Browser, server: Server, protocol: str) -> Iterator[Page]:
+    (walk,) = make_walks(server, {})
+    context = browser.new_context(base_url=server.url, color_scheme="light")
+    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
+    made = context.new_page()
+    complaints: list[str] = []
+    made.on("pageerror", lambda error: complaints.append(str(error)))
+    made.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+    yield made
+    context.close()
+    assert complaints == []
+
+
+def names(page: Page) -> list[str]:
+    return page.locator(".protocol-drawing text.name").all_text_contents()
+
+
+def test_phases_move_are_added_and_are_drawn_as_they_will_be_walked(page, protocol):
+    url = f"/admin/rehab/protocol/{protocol}/change/"
+    page.goto(url)
+    drawing = page.locator(".protocol-drawing")
+    expect(drawing.locator("text.length")).to_have_text(["66 s", "until you move on"])
+    expect(drawing.locator("text.gain")).to_have_text("×0.85")
+    page.get_by_role("button", name="Move down").first.click()
+    assert names(page) == ["Push", "Look"]
+    page.locator("#phases-group .add-row a").click()
+    row = page.locator("#phases-group tr.form-row:not(.empty-form)").last
+    row.locator("[name$=-kind]").select_option("washout")
+    row.locator("[name$=-name]").fill("Cool")
+    row.locator("[name$=-seconds]").fill("120")
+    assert names(page) == ["Push", "Look", "Cool"]
+    expect(drawing.locator(".total")).to_have_text("3 min +")
+    page.get_by_role("button", name="Save", exact=True).click()
+    page.goto(url)
+    assert names(page) == ["Push", "Look", "Cool"]
+
+
+def test_a_shared_protocol_is_drawn_for_who_may_not_change_it(page):
+    page.goto("/admin/rehab/protocol/1/change/")
+    assert names(page)
+    assert not page.get_by_role("button", name="Move down").count()
+
+
+def test_the_week_is_drawn_in_light_and_in_dark(page):
+    page.goto("/admin/")
+    expect(page.locator("[data-chart=minutes] rect.bar")).to_have_count(1)
+    expect(page.locator("[data-chart=types] .share")).to_have_text("50 %")
+    expect(page.locator("[data-chart=types] .wanted")).to_have_count(1)
+    bright = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    page.emulate_media(color_scheme="dark")
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") != bright
+    page.locator(".theme-toggle").click()  # the reader's own choice beats the device's
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == bright
+
+
+def test_what_is_used_on_a_tablet_is_large_enough_for_a_finger(page, protocol):
+    page.set_viewport_size({"width": 800, "height": 1280})
+    for path in (
+        "/admin/",
+        "/admin/rehab/trainingsession/",
+        f"/admin/rehab/protocol/{protocol}/change/",
+        "/admin/rehab/preset/add/",
+    ):
+        page.goto(path)
+        small = page.evaluate(
+            """() => [...document.querySelectorAll(
+              "button, input:not([type=hidden], [type=checkbox], [type=radio]), select, "
+              + "header a, .object-tools a, summary, #result_list tbody a, .submit-row a")]
+              .filter((one) => one.checkVisibility({ visibilityProperty: true }))
+              .filter((one) => one.getBoundingClientRect().height < 43.5)
+              .map((one) => one.outerHTML.slice(0, 120))"""
+        )
+        assert small == [], path

@@ -1,0 +1,374 @@
+"""A clinic's day in a real browser: three taps, no way out by accident, keys alone, one page A4."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from rehab.training.valences import VALENCES
+from tests.browsers import SIZES
+from tests.servers import ROOT, Server, clean_environment
+from tests.walk_seed import feet_of, make_walks
+
+pytestmark = pytest.mark.browser
+
+
+def run(server: Server, script: str) -> list[str]:
+    """Run a script beside the server; give the words that it prints."""
+    done = subprocess.run(
+        [sys.executable, "manage.py", "shell", "-v0", "-c", script],
+        cwd=ROOT,
+        env=clean_environment(server.folder, server.port),
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    return done.stdout.split()
+
+
+@contextmanager
+def page_with(
+    browser: Browser, server: Server, size: str = "tablet-portrait", **cookies: str
+) -> Iterator[Page]:
+    """Open a page with these cookies whose complaints fail the test."""
+    width, height = SIZES[size]
+    context = browser.new_context(
+        base_url=server.url, viewport={"width": width, "height": height}, has_touch=True
+    )
+    context.add_cookies(
+        [{"name": name, "value": value, "url": server.url} for name, value in cookies.items()]
+    )
+    context.set_default_timeout(40_000)
+    page = context.new_page()
+    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
+    yield page
+    context.close()
+
+
+# --- today --------------------------------------------------------------------------------------
+
+EXPECTED = """
+from datetime import time
+from django.utils import timezone
+from rehab.people.first_start import first_clinic
+from rehab.people.models import Patient
+from rehab.sessions.visits import plan_visit
+from rehab.stations.models import Station
+amara = Patient.everywhere.create(
+    clinic=first_clinic(), code="A-1", nickname="Amara", paretic_side="left"
+)
+plan_visit(amara, timezone.now().date(), time(9, 30))
+Station.everywhere.create(clinic=first_clinic(), name="Window")
+"""
+SESSIONS = """
+from rehab.sessions.models import TrainingSession
+print(TrainingSession.everywhere.filter(patient__nickname="Amara").count())
+"""
+
+
+def test_from_today_to_walking_in_three_taps(server: Server, browser: Browser) -> None:
+    (walk,) = make_walks(server, {})
+    run(server, EXPECTED)
+    with page_with(browser, server, sessionid=walk.cookie) as page:
+        page.goto("/start/")
+        page.tap(".today >> text=Amara")
+        page.dblclick(".huge")  # a tap that trembles is one tap
+        page.tap("[data-change=start]")
+        page.wait_for_selector("body[data-look=waiting]")  # says so until the sensor is there
+        expect(page.locator(".words")).to_have_text("Waiting for the sensor.")
+        assert run(server, SESSIONS) == ["1"]
+        # Going back asks; whoever walks may rest meanwhile.
+        here = page.url
+        page.go_back()
+        expect(page.locator("dialog.leave")).to_be_visible()
+        assert page.url == here
+        page.tap("button.pause")
+        page.wait_for_selector("body[data-look=paused]")
+        page.tap("text=Stay here")
+        expect(page.locator("dialog.leave")).to_be_hidden()
+        page.go_back()
+        page.tap("dialog >> text='Leave'")
+        # What is true now, and nothing to be posted again.
+        expect(page.locator(".open")).to_contain_text("Open now")
+        expect(page.locator(".huge")).to_have_count(0)
+        page.goto("/start/")
+        expect(page.locator(".today .paused")).to_contain_text("Amara")
+        page.tap("text=Try a demo")
+        page.wait_for_selector(".huge")
+        page.go_back()
+        expect(page.locator("h1").first).to_contain_text("Today")
+
+
+# --- leaving ------------------------------------------------------------------------------------
+
+FORGET = """
+from rehab.stations.models import LeaveTries
+LeaveTries.everywhere.all().delete()
+"""
+PIN = """
+from rehab.sessions.models import TrainingSession
+from rehab.stations.pins import set_pin
+station = TrainingSession.everywhere.get(pk={session}).station
+set_pin(station, "4711")
+station.save()
+"""
+
+
+def test_nobody_leaves_a_tablet_without_the_pin(server: Server, browser: Browser) -> None:
+    (walk,) = make_walks(server, {})
+    run(server, PIN.format(session=walk.session))
+    with page_with(browser, server, garry_tablet=walk.tablet) as page:
+        page.goto("/tablet/")
+        page.wait_for_selector("body.alone[data-look=ready]")
+        dialog, wrong = page.locator("dialog.leave"), page.locator("dialog .wrong")
+        page.go_back()
+        expect(dialog).to_be_visible()
+        for pin, said in (("1234", "not the PIN"), ("0000", "not the PIN"), ("9999", "Wait 30")):
+            page.fill("[name=pin]", pin)
+            page.keyboard.press("Enter")
+            expect(wrong).to_contain_text(said)
+            expect(page.locator("[name=pin]")).to_have_value("")
+        page.tap("text=Stay here")
+        assert page.url.endswith(walk.path)
+        run(
+            server, "from rehab.stations.models import LeaveTries as T; T.everywhere.all().delete()"
+        )
+        page.tap("button.out")
+        page.fill("[name=pin]", "4711")
+        page.tap("dialog >> text='Leave'")
+        page.wait_for_url("**/sign-in/**")
+
+
+# --- words --------------------------------------------------------------------------------------
+
+# At most six words, as long as Spanish makes them.
+LONG = [
+    "¡Impulso extraordinariamente fuerte!",
+    "Entrenamiento interrumpido temporalmente.",
+    "Continúe caminando tranquilamente, por favor.",
+    "Descansaremos inmediatamente.",
+]
+LOOKS = ["ready", "begin", "calm", "waiting", "lost", "still", "paused", "ask", "offline"]
+# Draws every look with every phrase in every size, and tells what runs out or into another.
+FIND_CLASHES = """async ([phrases, long, looks]) => {
+  const { createFeedback } = await import("garry/walk/feedback");
+  const { createFitting } = await import("garry/walk/fitting");
+  const { body } = document;
+  const [draw, fit] = [createFeedback(body), createFitting(body)];
+  const step = { kind: "step", number: 214, hit: true, points: 2, emblem: "gain", shown: 4.38 };
+  const session = {
+    state: "running", presence: { source: true }, has_points: true, unit: "W/kg", score: 1402,
+    number: 214, streak: 12, active_s: 100, target: { duration_s: 600 }, phase_s: 10,
+    phase_strides: 2, phase: { calm_words: long[2], strides: 120 }, last: step,
+  };
+  const seen = (element) => element.checkVisibility({ visibilityProperty: true });
+  const box = (element) => {
+    const range = document.createRange();
+    range.selectNodeContents(element);
+    if (element.matches("button, .wall, .emblem svg")) return element.getBoundingClientRect();
+    const { left, right, width } = range.getBoundingClientRect();
+    const { top, bottom } = (element.closest(".run") ?? element).getBoundingClientRect();
+    return { left, right, width, top, bottom };
+  };
+  const found = [];
+  const look = (name, words) => {
+    const texts = [...document.querySelectorAll(
+      "header b span, header .time, header button, .words span, .sub, .label, .key, .run span, " +
+      ".part p, .actions button, .thermometer .wall, .emblem svg"
+    )].filter((element) => seen(element) && box(element).width);
+    for (const [i, one] of texts.entries()) {
+      const a = box(one);
+      const own = one.textContent || one.className.baseVal;
+      const which = `${body.dataset.text} ${document.dir} ${name} "${words}": ${own}`;
+      const outer = one.matches("header b span") ? { left: 0, right: innerWidth } : a;
+      const sideways = outer.left < -1 || outer.right > innerWidth + 1;
+      if (sideways || a.top < -1 || a.bottom > innerHeight + 1) found.push(`${which} leaves`);
+      for (const other of texts.slice(i + 1)) {
+        if (one.closest("header") && other.closest("header")) continue;
+        const b = box(other);
+        const x = Math.min(a.right, b.right) - Math.max(a.left, b.left);
+        const y = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+        if (x > 2 && y > 4) found.push(`${which} runs into ${other.outerHTML.slice(0, 60)}`);
+      }
+    }
+  };
+  for (const size of ["normal", "large", "largest"]) {
+    for (const dir of ["ltr", "rtl"]) {
+      body.dataset.text = size;
+      document.dir = dir;
+      dispatchEvent(new Event("resize"));
+      for (const words of phrases) {
+        body.dataset.look = "feedback";
+        step.words = words;
+        session.score *= -1;
+        draw("feedback", session);
+        look("feedback", words);
+      }
+      for (const name of looks) {
+        body.dataset.look = name;
+        draw(name, session, "");
+        fit();
+        look(name, "");
+        for (const words of long) {
+          draw(name, session, "");
+          document.querySelector(".words span").textContent = words;
+          document.querySelector(".sub").textContent = long[0];
+          fit();
+          look(name, words);
+        }
+      }
+    }
+  }
+  return found;
+}"""
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_words_of_every_size_stay_in_their_place(
+    server: Server, browser: Browser, size: str
+) -> None:
+    bands = [band.words for valence in VALENCES.values() for band in valence.bands]
+    assert len(bands) > 8
+    assert max(len(words.split()) for words in bands) <= 6
+    screen = {"screen_still": True, "screen_sounds": True}
+    (walk,) = make_walks(server, {"screen": screen, "name": "Bartholomäus"})
+    with page_with(browser, server, size, sessionid=walk.cookie) as page:
+        page.emulate_media(reduced_motion="reduce")
+        page.goto(walk.path)
+        page.wait_for_selector("body[data-look=ready]")
+        clashes = page.evaluate(FIND_CLASHES, [[*bands, *LONG], LONG, LOOKS])
+    assert not clashes, "\n".join(clashes[:40])
+
+
+# --- keys ---------------------------------------------------------------------------------------
+
+# Where the focus is, and what would make it hard to find.
+FOCUS = """() => {
+  const at = document.activeElement;
+  const { outlineStyle, outlineWidth, outlineColor } = getComputedStyle(at);
+  const { top, bottom, left, right } = at.getBoundingClientRect();
+  const dark = outlineColor.match(/\\d+/g).slice(0, 3).every((part) => part < 70);
+  const ringed = outlineStyle !== "none" && parseFloat(outlineWidth) >= 3 && dark;
+  const inside = bottom > 0 && right > 0 && top < innerHeight && left < innerWidth;
+  const name = at.outerHTML.slice(0, 160);
+  return { name, lost: at === document.body, ringed, inside };
+}"""
+
+
+def tab_to(page: Page, selector: str) -> None:
+    """Go on by the Tab key until something is reached; what is on the way is seen as well."""
+    for _ in range(80):
+        page.keyboard.press("Tab")
+        focus = page.evaluate(FOCUS)
+        if focus["lost"]:
+            continue  # the browser's own bar
+        if not focus["name"].startswith("<iframe"):
+            assert focus["ringed"], focus
+            assert focus["inside"], focus
+        if page.evaluate("wanted => document.activeElement.matches(wanted)", selector):
+            return
+    pytest.fail(f"{selector} is not reached on {page.url}")
+
+
+def test_a_session_by_keys_alone(server: Server, browser: Browser) -> None:
+    (walk,) = make_walks(server, {"name": "Keyla"})
+    with (
+        page_with(browser, server, "laptop", sessionid=walk.cookie) as patient,
+        page_with(browser, server, "laptop", sessionid=walk.cookie) as pt,
+        feet_of(server, walk) as feet,
+    ):
+        patient.goto("/start/")
+        open_here = f"a[href='{walk.path}']"
+        tab_to(patient, open_here)
+        patient.keyboard.press("Enter")
+        patient.wait_for_selector("body[data-look=ready]")
+        tab_to(patient, "[data-change=start]")
+        patient.keyboard.press("Enter")
+        patient.wait_for_selector("body[data-look=begin]")
+        expect(patient.locator("button.pause")).to_be_focused()
+        feet.walk(1.1, 0.9)
+        patient.wait_for_selector("body[data-look=feedback]")
+        expect(patient.locator("button.pause")).to_be_focused()
+        patient.keyboard.press("Space")
+        patient.wait_for_selector("body[data-look=paused]")
+        expect(patient.locator("[data-change=resume]")).to_be_focused()
+        patient.keyboard.press("Enter")
+        patient.wait_for_selector("body[data-look=feedback]")
+
+        pt.goto("/start/")
+        tab_to(pt, f"a[href='{walk.path}monitor/']")
+        pt.keyboard.press("Enter")
+        expect(pt.locator("[data-show=goal]")).to_have_text("4.00")
+        tab_to(pt, "[data-goal='1']")
+        pt.keyboard.press("Enter")
+        expect(pt.locator("[data-show=goal]")).to_have_text("4.10")
+        tab_to(pt, "[data-main]")
+        pt.keyboard.press("Space")
+        expect(pt.locator("[data-main]")).to_contain_text("Go on")
+        expect(pt.locator("[data-main]")).to_be_focused()
+        tab_to(pt, "[data-end]")
+        pt.keyboard.press("Enter")
+        tab_to(pt, "dialog [value=end]")
+        pt.keyboard.press("Enter")
+        pt.wait_for_url("**/details/")
+        expect(pt.locator(".figures")).to_contain_text("50")
+        tab_to(pt, ".skip")
+        pt.keyboard.press("Enter")
+        tab_to(pt, f"a[href='{walk.path}report/']")
+        pt.keyboard.press("Enter")
+        pt.wait_for_url("**/report/")
+        patient.wait_for_url("**/scores/")
+
+
+# --- paper --------------------------------------------------------------------------------------
+
+LONG_DAY = """
+from django.utils import timezone
+from rehab.people.first_start import first_clinic
+from rehab.people.models import Patient
+from rehab.sessions.models import EVENT_KINDS, Remark, SessionEvent
+from tests.walks import visit, walk
+long = Patient.everywhere.create(
+    clinic=first_clinic(), code="C" * 32, nickname="Maximiliana-Konstantina-Schmidt.",
+    paretic_side="left",
+)
+session = visit(long, "negative", 1, 0, 1600, timezone.now())
+SessionEvent.everywhere.bulk_create(
+    SessionEvent(
+        session=session, kind=kind, after_number=n, at=timezone.now(),
+        value=n % 11 if kind == Remark.BORG else 4.0, old=3.9,
+        data={"phase": "started", "above": True},
+    )
+    for n in range(40)
+    for kind in [*Remark, "robot_stop", "robot_gesture", "robot_decision"]
+)
+print(session.pk, walk(long, "explicit", []).pk)
+"""
+
+
+def test_a_report_is_one_page_of_paper(server: Server, browser: Browser) -> None:
+    (walk,) = make_walks(server, {})
+    for session, fewest in zip(run(server, LONG_DAY), (1400, 0), strict=True):
+        with page_with(browser, server, "laptop", sessionid=walk.cookie) as page:
+            answer = page.goto(f"/sessions/{session}/report/")
+            assert answer is not None
+            assert answer.ok, page.inner_text("body")
+            paper = page.pdf(prefer_css_page_size=True)
+            assert len(re.findall(rb"/Type\s*/Page\b", paper)) == 1
+            page.emulate_media(media="print")
+            page.set_viewport_size({"width": 703, "height": 1030})  # 186 mm between the margins
+            cut = "sheet => sheet.scrollHeight - sheet.clientHeight"
+            assert page.locator(".sheet").evaluate(cut) <= 0
+            notes = page.locator(".notes-space").bounding_box()
+            assert notes is not None
+            assert notes["height"] > 60
+            marks = page.locator("svg path.hit, svg path.miss").evaluate_all(
+                "paths => paths.map(({ attributes }) => attributes.d.value.split('M').length - 1)"
+            )
+            assert sum(marks) >= fewest

@@ -1,0 +1,258 @@
+"""What is given out holds everything, exactly, harmlessly, and for the right eyes."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import secrets
+import tracemalloc
+from datetime import UTC, datetime
+
+import pytest
+from asgiref.sync import sync_to_async
+from django.core.management import CommandError, call_command
+from django.test import Client
+from django.urls import reverse
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rehab.exports.archive import ZipResponse, write_csv, write_zip
+from rehab.exports.tables import PAGE, STEPS, TABLES, Selection, to_cell
+from rehab.people.audit import Act, AuditEntry
+from rehab.people.consent import Purpose, withdraw
+from rehab.people.models import Patient, User
+from rehab.people.roles import Role
+from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
+from rehab.stations.models import Station
+from tests.archives import body_of, open_archive, rows_of
+from tests.world import World, build_world, mark
+
+NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
+NAMED = {Patient, User, Station}
+
+
+@pytest.fixture
+def world(db) -> World:
+    return build_world("amber")
+
+
+def client_of(world: World, role: Role) -> Client:
+    client = Client()
+    client.force_login(world.people[role])
+    return client
+
+
+def fetch(world: World, role: Role = Role.LEAD) -> dict[str, str]:
+    url = reverse("patient-data", kwargs={"patient_id": world.patient.pk})
+    return open_archive(body_of(client_of(world, role).get(url)))
+
+
+def to_number(text: str) -> float | None:
+    return float(text) if text else None
+
+
+# --- one patient ----------------------------------------------------------------------------------
+
+
+def test_a_patients_file_holds_everything_that_is_kept(world):
+    files = fetch(world, Role.PT)
+    assert set(files) == {
+        *("README.txt", "patient.json", "consent.json", "codebook.csv"),
+        *("sessions.csv", "steps.csv", "events.csv"),
+    }
+    who = json.loads(files["patient.json"])
+    assert (who["nickname"], who["code"]) == (world.patient.nickname, world.patient.code)
+    agreed = json.loads(files["consent.json"])
+    assert {row["purpose"] for row in agreed} == {"boards", "research"}
+    assert agreed[0]["words"] == world.patient.consents.first().text.text
+    assert len(rows_of(files["steps.csv"])) == Step.everywhere.count()
+    assert len(rows_of(files["events.csv"])) == SessionEvent.everywhere.count()
+
+
+def test_read_back_the_numbers_are_the_same_to_the_last_digit(world):
+    Step.everywhere.filter(number=4).update(value=0.1 + 0.2, time_s=1e-17, goal=1 / 3)
+    files = fetch(world)
+    for row, step in zip(
+        rows_of(files["steps.csv"]), Step.everywhere.order_by("number"), strict=True
+    ):
+        for column, field in (
+            *(("time", "time_s"), ("value", "value"), ("shown", "shown"), ("goal", "goal")),
+            *(("performance", "performance"), ("gain", "gain"), ("points", "points")),
+        ):
+            assert to_number(row[column]) == getattr(step, field), column
+        assert (row["hit"], row["valid"]) == (
+            "" if step.hit is None else str(step.hit).lower(),
+            str(step.valid).lower(),
+        )
+        assert datetime.fromisoformat(row["received_at"]) == step.received_at
+        assert row["reasons"].split() == step.reasons
+        assert (row["phase_kind"], row["side"], row["trained"]) == ("training", "left", "true")
+    session = rows_of(files["sessions.csv"])[0]
+    for metric in SessionMetric.everywhere.filter(session=world.session):
+        assert to_number(session[metric.slug]) == metric.value
+
+
+def test_the_codebook_says_what_every_column_means(world):
+    files = fetch(world)
+    told = {(row["file"], row["column"]): row["meaning"] for row in rows_of(files["codebook.csv"])}
+    for table in TABLES:
+        header = next(csv.reader(io.StringIO(files[table.file])))
+        assert header == [column.name for column in table.columns]
+        assert all(told[table.file, name] for name in header)
+    assert len(told) == sum(len(table.columns) for table in TABLES)
+
+
+def test_giving_a_file_is_noted_each_time_with_who_and_whose(world):
+    for _ in range(2):
+        fetch(world, Role.PT)
+    entries = AuditEntry.everywhere.filter(act=Act.EXPORT)
+    assert {(e.by, e.patient) for e in entries} == {(world.people[Role.PT], world.patient)}
+    assert entries.count() == 2
+
+
+def test_an_imported_session_without_steps_or_log_is_in_it(world):
+    TrainingSession.everywhere.filter(pk=world.session.pk).update(
+        original_id=7, protocol=None, trained_side=""
+    )
+    Step.everywhere.all().delete()
+    row = rows_of(fetch(world)["sessions.csv"])[0]
+    assert (row["imported"], row["protocol"], row["trained_side"]) == ("true", "", "")
+
+
+# --- all sessions ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("role", [Role.LEAD, Role.RESEARCHER])
+def test_all_sessions_go_out_by_pseudonyms_alone(role, world):
+    response = client_of(world, role).get(reverse("export-sessions"))
+    files = open_archive(body_of(response))
+    whole = "\n".join(files.values())
+    assert not any(mark("amber", model) in whole for model in NAMED)
+    assert "patient.json" not in files
+    for table in TABLES:
+        assert {row["patient"] for row in rows_of(files[table.file])} == {world.patient.pseudonym}
+    assert rows_of(files["sessions.csv"])[0]["source"] == ""
+    assert {row["by"] for row in rows_of(files["events.csv"])} == {"person"}
+
+
+def test_researchers_get_no_session_of_who_has_not_agreed(world):
+    withdraw(world.patient, Purpose.RESEARCH, None, NOW)
+    response = client_of(world, Role.RESEARCHER).get(reverse("export-sessions"))
+    files = open_archive(body_of(response))
+    assert not any(rows_of(files[table.file]) for table in TABLES)
+
+
+def test_therapists_and_strangers_do_not_take_all_sessions_along(world):
+    assert client_of(world, Role.PT).get(reverse("export-sessions")).status_code == 403
+    assert Client().get(reverse("export-sessions")).status_code == 302
+    url = reverse("patient-data", kwargs={"patient_id": world.patient.pk})
+    assert client_of(world, Role.RESEARCHER).get(url).status_code == 403
+
+
+# --- cells ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r", "\n", "'"])
+def test_no_text_is_a_formula_and_all_can_be_told_back(start):
+    text = f'{start}HYPERLINK("http://example.org")'
+    cell = to_cell(text)
+    assert cell == f"'{text}"
+    assert cell[1:] == text
+
+
+@given(st.one_of(st.floats(allow_nan=False), st.integers(), st.text(), st.booleans(), st.none()))
+def test_any_value_is_read_back_as_it_was(value):
+    text = "".join(write_csv(["value", "end"], [(value, "end")]))
+    (row,) = rows_of(text)
+    cell = row["value"]
+    if isinstance(value, str):
+        assert cell.removeprefix("'") == value if cell.startswith("'") else cell == value
+        assert not cell.startswith(("=", "+", "-", "@", "\t", "\r", "\n"))
+    elif isinstance(value, bool) or value is None:
+        assert cell == {True: "true", False: "false", None: ""}[value]
+    else:
+        assert type(value)(cell) == value
+
+
+def test_a_nickname_that_is_a_formula_stays_text(world):
+    TrainingSession.everywhere.update(source="=1+1")
+    assert rows_of(fetch(world)["sessions.csv"])[0]["source"] == "'=1+1"
+
+
+# --- size -----------------------------------------------------------------------------------------
+
+
+def test_pages_of_steps_join_without_a_gap(world):
+    step = Step.everywhere.get(number=1)
+    columns = {f.attname: getattr(step, f.attname) for f in Step._meta.concrete_fields}
+    numbers = range(11, 2 * PAGE + 1)
+    Step.everywhere.bulk_create(Step(**columns | {"id": None, "number": n}) for n in numbers)
+    user = world.people[Role.LEAD]
+    sessions = TrainingSession.objects.visible_to(user)
+    place = [column.name for column in STEPS.columns].index("number")
+    rows = Selection(user, sessions, named=False).step_rows()
+    assert [row[place] for row in rows] == list(range(1, 2 * PAGE + 1))
+
+
+def test_memory_does_not_grow_with_the_number_of_steps():
+    row = (1, "P-ABCDEFGH", 1, 1.07, NOW, "left", True, 0.1 + 0.2, 1.0, 1 / 3)
+
+    def peak(count: int) -> int:
+        parts = write_zip([("steps.csv", write_csv(["x"] * 10, (row for _ in range(count))))], NOW)
+        tracemalloc.start()
+        for _part in parts:
+            pass
+        _, most = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return most
+
+    peak(100)
+    assert peak(40_000) < peak(4_000) + 200_000
+
+
+async def test_served_by_asgi_it_comes_part_by_part():
+    made = []
+
+    def texts():
+        for number in range(200):
+            made.append(number)
+            yield secrets.token_hex(5_000)
+
+    response = ZipResponse([("steps.csv", texts())], "x.zip", NOW)
+    first = [part async for part in _few(response, 1)]
+    assert first
+    assert len(made) < 200
+    assert response["Content-Disposition"] == 'attachment; filename="x.zip"'
+    await sync_to_async(response.close)()
+
+
+async def _few(response, count):
+    iterator = aiter(response)
+    for _ in range(count):
+        yield await anext(iterator)
+    await iterator.aclose()
+
+
+# --- manage.py export -----------------------------------------------------------------------------
+
+
+def test_the_command_writes_what_the_account_may_see(world, tmp_path):
+    file = tmp_path / "all.zip"
+    researcher = world.people[Role.RESEARCHER]
+    call_command("export", file, "--as", researcher.username, stdout=io.StringIO())
+    files = open_archive(file.read_bytes())
+    assert len(rows_of(files["steps.csv"])) == 10
+    assert file.stat().st_mode & 0o077 == 0
+    entry = AuditEntry.everywhere.filter(act=Act.EXPORT).get()
+    assert (entry.by, entry.through, entry.clinic) == (None, "server console", world.clinic)
+    code = world.patient.code
+    with pytest.raises(CommandError, match="sees no patient"):
+        call_command("export", file, "--as", researcher.username, "--patient", code)
+    lead = world.people[Role.LEAD].username
+    call_command("export", file, "--as", lead, "--patient", code, stdout=io.StringIO())
+    assert code in open_archive(file.read_bytes())["patient.json"]
+    with pytest.raises(CommandError, match="account"):
+        call_command("export", file, "--as", "nobody")
+    with pytest.raises(CommandError, match="cannot be written"):
+        call_command("export", tmp_path / "no" / "x.zip", "--as", lead)

@@ -1,0 +1,247 @@
+"""Whoever looks at patients' data stands in the log, and nobody takes it out again."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from django.contrib import admin
+from django.db import DatabaseError
+from django.test import Client
+from django.urls import get_resolver, reverse
+from django.utils import timezone
+
+from rehab.people import audit, sightings
+from rehab.people.audit import Act, AppendOnly, AuditEntry, Recent, shorten
+from rehab.people.models import Clinic, Patient
+from rehab.people.roles import Role
+from rehab.people.tokens import ApiToken
+from rehab.sessions.models import Measure, Protocol, Step, TrainingSession
+from rehab.stations.models import Device
+from tests.archives import body_of
+from tests.people.test_tenancy import all_routes, walk_patterns
+from tests.world import World, build_world, mark
+
+pytestmark = pytest.mark.django_db
+NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
+
+
+@pytest.fixture(autouse=True)
+def nothing_noted_yet(monkeypatch):
+    monkeypatch.setattr(audit, "recent", Recent())
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+def client_of(world: World, role: Role = Role.LEAD, **options) -> Client:
+    client = Client(**options)
+    client.force_login(world.people[role])
+    return client
+
+
+def entries():
+    return AuditEntry.everywhere.exclude(about=mark("amber", AuditEntry)).order_by("pk")
+
+
+# --- every route ----------------------------------------------------------------------------------
+
+# Pages and calls that show nothing of patients. Whatever is not here must leave an entry.
+SILENT = {
+    *("account", "own-password", "set-up-second-factor", "add-app", "add-passkey"),
+    *("remove-authenticator", "recovery-codes", "pair", "consent-text", "export"),
+    *("home", "healthz", "tablet", "tablet-app", "tablet-state", "sign-in", "second-factor"),
+    *("api:api-root", "api:openapi-json", "api:openapi-view", "api:show_me"),
+    *("api:list_protocols", "api:list_stations", "api:list_boards"),
+    *("admin:login", "admin:logout", "admin:jsi18n"),
+    *("admin:password_change", "admin:password_change_done", "admin:auth_user_password_change"),
+}
+
+
+def is_silent(name: str) -> bool:
+    """Say, independently of the code under test, whether a route shows nothing of patients."""
+    bare = {"clinic", "user", "apitoken", "station", "device", "measure", "protocol", "gesture"}
+    return name in SILENT or any(name.startswith(f"admin:rehab_{noun}_") for noun in bare)
+
+
+def test_every_route_that_shows_patients_leaves_an_entry(world, monkeypatch):
+    """A new page is in this test by itself; one that shows no patients says so and stands above."""
+    shown = set()
+    people = [
+        client_of(world, role, raise_request_exception=False) for role in Role if role != "host"
+    ]
+    for route in all_routes((world,)):
+        for client in people:
+            monkeypatch.setattr(audit, "recent", Recent())
+            before = entries().count()
+            response = client.get(route.url)
+            body_of(response)
+            noted = entries().count() - before
+            if response.status_code == 200 and not is_silent(route.name):
+                shown.add(route.name)
+                assert noted == 1, f"{route.url} leaves {noted} entries"
+                if route.model in (Patient, TrainingSession, Step):
+                    assert entries().last().patient == world.patient, route.url
+            else:
+                assert not noted, f"{route.url} ({response.status_code}) leaves an entry"
+    assert len(shown) > 30
+    assert {"patient", "history", "session", "monitor", "walk"} - shown <= {"walk"}  # it has ended
+
+
+def test_every_silent_route_is_one_that_there_is():
+    assert {name for name, _, _ in walk_patterns(get_resolver())} >= SILENT
+
+
+def test_which_admin_pages_lead_to_patients():
+    for model in admin.site._registry:
+        name = f"admin:rehab_{model._meta.model_name}_changelist"
+        assert sightings.leads_to_patients(model) != is_silent(name), model
+    assert sightings.leads_to_patients(Step)
+    assert not any(map(sightings.leads_to_patients, (Clinic, Measure, Protocol, Device)))
+
+
+# --- who, whose, what -----------------------------------------------------------------------------
+
+
+def test_an_entry_says_who_whose_what_when_and_from_which_network(world):
+    url = reverse("history", kwargs={"patient_id": world.patient.pk})
+    client_of(world, Role.PT, REMOTE_ADDR="192.0.2.77").get(url)
+    entry = entries().get()
+    assert (entry.by, entry.patient, entry.act) == (world.people[Role.PT], world.patient, Act.VIEW)
+    assert (entry.about, entry.address) == (url, "192.0.2.0/24")
+    assert entry.clinic == world.clinic
+
+
+def test_a_program_is_noted_by_its_name_and_no_code_of_a_patient_is_kept(world):
+    row = ApiToken(clinic=world.clinic, user=world.people[Role.LEAD], name="nightly", role=Role.PT)
+    token = row.new_token()
+    row.save()
+    client = Client(headers={"Authorization": f"Bearer {token}"})
+    assert client.get(f"/api/v1/users/{world.patient.code}").status_code == 200
+    entry = entries().get()
+    assert (entry.by, entry.through) == (world.people[Role.LEAD], "nightly")
+    assert entry.patient == world.patient
+    assert world.patient.code not in entry.about
+
+
+def test_a_tablet_is_noted_as_itself(world):
+    device = Device(clinic=world.clinic, station=world.device.station, kind="tablet", name="Door")
+    token = device.new_token()
+    device.save()
+    url = reverse("scores", kwargs={"session_id": world.session.pk})
+    Client(headers={"Authorization": f"Bearer {token}"}).get(url)
+    entry = entries().get()
+    assert (entry.by, entry.through, entry.patient) == (None, "Door (Tablet)", world.patient)
+
+
+def test_a_page_that_asks_again_and_again_is_noted_once_in_five_minutes(world, monkeypatch):
+    client = client_of(world)
+    url = reverse("session", kwargs={"session_id": world.session.pk})
+    for minutes, count in ((0, 1), (1, 1), (4, 1), (5, 2), (9, 2), (10, 3)):
+        monkeypatch.setattr(timezone, "now", lambda m=minutes: NOW + timedelta(minutes=m))
+        client.get(url)
+        assert entries().count() == count, minutes
+
+
+def test_changes_are_noted_each_time_and_refusals_never(world):
+    client = client_of(world, Role.PT)
+    url = reverse("screen", kwargs={"patient_id": world.patient.pk})
+    for _ in range(2):
+        client.post(url, {"screen_side": "left"})
+    assert [entry.act for entry in entries()] == [Act.CHANGE, Act.CHANGE]
+    client_of(world, Role.RESEARCHER).get(url)
+    Client().get(url)
+    client.get(reverse("patient", kwargs={"patient_id": 10**9}))
+    assert entries().count() == 2
+
+
+def test_a_page_costs_at_most_two_statements_more_and_one_that_polls_none(
+    world, django_assert_num_queries, django_assert_max_num_queries
+):
+    client = client_of(world)
+    request = client.get(reverse("monitor", kwargs={"session_id": world.session.pk})).wsgi_request
+    request.resolver_match = get_resolver().resolve(request.path)
+    response = client.get(request.path)
+    with django_assert_num_queries(0):
+        sightings.note_request(request, response)
+    audit.recent = Recent()
+    with django_assert_max_num_queries(4):  # whose session, the entry, and a savepoint around it
+        sightings.note_request(request, response)
+
+
+def test_care_goes_on_when_the_log_cannot_be_written_but_nothing_is_given_out(world, monkeypatch):
+    def fail(*args, **kwargs):
+        raise DatabaseError("the disk is full")
+
+    monkeypatch.setattr(AuditEntry.everywhere, "create", fail)
+    client = client_of(world, raise_request_exception=False)
+    key = {"patient_id": world.patient.pk}
+    assert client.get(reverse("patient", kwargs=key)).status_code == 200
+    assert client.get(reverse("patient-data", kwargs=key)).status_code == 500
+    assert client.get(reverse("export-sessions")).status_code == 500
+
+
+# --- append only ----------------------------------------------------------------------------------
+
+
+def test_entries_cannot_be_changed_or_deleted(world):
+    audit.note(Act.VIEW, world.people[Role.PT], patient=world.patient.pk)
+    entry = entries().get()
+    visible = AuditEntry.objects.visible_to(world.people[Role.LEAD])
+    for attempt in (
+        entry.save,
+        entry.delete,
+        entries().delete,
+        lambda: entries().update(about="x"),
+        lambda: AuditEntry.everywhere.bulk_update([entry], ["about"]),
+        lambda: AuditEntry.everywhere.update_or_create(pk=entry.pk, defaults={"about": "x"}),
+        visible.delete,
+        lambda: visible.update(about="x"),
+    ):
+        with pytest.raises(AppendOnly, match="only added to"):
+            attempt()
+    assert entries().get().about == ""
+
+
+def test_leads_read_it_in_the_admin_and_nobody_writes_there(world):
+    audit.note(Act.EXPORT, world.people[Role.PT], patient=world.patient.pk, about="here")
+    entry = entries().get()
+    lead = client_of(world)
+    changelist = reverse("admin:rehab_auditentry_changelist")
+    assert "here" in lead.get(changelist).content.decode()
+    for key, value in (
+        ("patient__id__exact", world.patient.pk),
+        ("by__id__exact", world.people[Role.PT].pk),
+        ("act__exact", "export"),
+        ("at__year", entry.at.year),
+        ("q", world.patient.nickname),
+    ):
+        assert "here" in lead.get(changelist, {key: value}).content.decode(), key
+    assert lead.post(reverse("admin:rehab_auditentry_change", args=[entry.pk])).status_code == 403
+    assert lead.post(reverse("admin:rehab_auditentry_delete", args=[entry.pk])).status_code == 403
+    assert lead.get(reverse("admin:rehab_auditentry_add")).status_code == 403
+    for role in (Role.PT, Role.RESEARCHER):
+        assert client_of(world, role).get(changelist).status_code == 403
+
+
+@pytest.mark.parametrize(
+    ("address", "kept"),
+    [
+        ("192.0.2.77", "192.0.2.0/24"),
+        ("2001:db8:1:2:3::4", "2001:db8:1::/48"),
+        ("", ""),
+        ("unknown", ""),
+    ],
+)
+def test_of_an_address_the_network_is_kept(address, kept):
+    assert shorten(address) == kept
+
+
+def test_what_was_noted_is_forgotten_in_its_turn(monkeypatch):
+    monkeypatch.setattr(audit, "REMEMBERED", 2)
+    recent = Recent()
+    assert [recent.is_new(key, NOW) for key in "abab"] == [True, True, False, False]
+    assert recent.is_new("c", NOW)
+    assert recent.is_new("a", NOW)

@@ -1,0 +1,217 @@
+"""Consent: to which words, noted with a tap, withdrawn with effect at once."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from importlib import import_module
+
+import pytest
+from django.apps import apps
+from django.core.exceptions import ValidationError
+from django.test import Client
+from django.urls import reverse
+
+from rehab.boards.models import BoardEntry
+from rehab.people.consent import (
+    Consent,
+    ConsentText,
+    FixedText,
+    Purpose,
+    current_text,
+    give,
+    holding,
+    withdraw,
+    write_text,
+)
+from rehab.people.models import Boards, Clinic, Patient
+from rehab.people.roles import Role
+from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
+from tests.world import World, build_world
+
+pytestmark = pytest.mark.django_db
+NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
+LOG = (TrainingSession, Step, SessionEvent, SessionMetric)
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+@pytest.fixture
+def pt(world) -> Client:
+    client = Client()
+    client.force_login(world.people[Role.PT])
+    return client
+
+
+def tap(client: Client, patient: Patient, purpose: str, says: str) -> Patient:
+    url = reverse("consent", kwargs={"patient_id": patient.pk})
+    assert client.post(url, {"purpose": purpose, "says": says}).status_code == 302
+    patient.refresh_from_db()
+    return patient
+
+
+# --- words ----------------------------------------------------------------------------------------
+
+
+def test_words_that_somebody_agreed_to_never_change(world):
+    text = current_text(world.clinic)
+    text.text = "Something else"
+    with pytest.raises(FixedText, match="new version"):
+        text.save()
+
+
+def test_a_clinic_begins_with_words_that_name_every_purpose_but_are_its_own_to_change():
+    clinic = Clinic.everywhere.create(name="New")
+    first = current_text(clinic)
+    assert first.version == 1
+    assert all(f"{purpose.label}:" in first.text for purpose in Purpose)
+    assert current_text(clinic) == first
+    assert ConsentText.everywhere.filter(clinic=clinic).count() == 1
+
+
+def test_new_words_are_a_new_version_and_old_consent_stays_with_the_old_ones(world):
+    old = current_text(world.clinic)
+    assert write_text(world.clinic, old.text, None, NOW) == old  # nothing new in it
+    new = write_text(world.clinic, "New words", world.people[Role.LEAD], NOW)
+    assert (new.version, new.written_by) == (old.version + 1, world.people[Role.LEAD])
+    held = holding(world.patient)["research"]
+    assert held.text == old
+    give(world.patient, Purpose.RESEARCH, world.people[Role.PT], NOW)
+    assert holding(world.patient)["research"].text == new
+    held.refresh_from_db()
+    assert held.withdrawn_at == NOW
+
+
+def test_a_lead_writes_the_words_and_others_do_not(world, pt):
+    url = reverse("consent-text")
+    assert pt.get(url).status_code == 403
+    lead = Client()
+    lead.force_login(world.people[Role.LEAD])
+    assert lead.post(url, {"text": "First line\r\nsecond"}).status_code == 302
+    assert current_text(world.clinic).text == "First line\nsecond"
+    assert lead.post(url, {"text": " "}).status_code == 200  # refused
+    assert ConsentText.everywhere.filter(clinic=world.clinic).count() == 2
+
+
+# --- the page -------------------------------------------------------------------------------------
+
+
+def test_a_tap_notes_consent_and_another_withdraws_it_with_who_and_when(world, pt):
+    tap(pt, world.patient, "care", "yes")
+    row = holding(world.patient)["care"]
+    assert (row.recorded_by, row.text) == (world.people[Role.PT], current_text(world.clinic))
+    tap(pt, world.patient, "care", "yes")  # nothing new
+    assert Consent.everywhere.filter(patient=world.patient, purpose="care").count() == 1
+    tap(pt, world.patient, "care", "no")
+    row.refresh_from_db()
+    assert row.withdrawn_by == world.people[Role.PT]
+    assert row.withdrawn_at >= row.given_at
+    assert "care" not in holding(world.patient)
+
+
+@pytest.mark.parametrize(("purpose", "says"), [("care", "maybe"), ("fame", "yes"), ("boards", "x")])
+def test_what_was_not_offered_is_refused(world, pt, purpose, says):
+    before = list(Consent.everywhere.values_list("pk", "withdrawn_at"))
+    tap(pt, world.patient, purpose, says)
+    assert list(Consent.everywhere.values_list("pk", "withdrawn_at")) == before
+
+
+def test_the_page_says_where_the_words_have_changed_since(world, pt):
+    url = reverse("consent", kwargs={"patient_id": world.patient.pk})
+    assert b"words have changed since" not in pt.get(url).content
+    write_text(world.clinic, "New words", None, NOW)
+    assert b"words have changed since" in pt.get(url).content
+
+
+def test_the_new_patient_form_notes_what_is_agreed_to(world, pt):
+    given = {"nickname": "Rosa", "code": "R1", "paretic_side": "left", "agrees": ["care", "boards"]}
+    assert pt.post(reverse("new-patient"), given).status_code == 302
+    rosa = Patient.everywhere.get(code="R1")
+    assert set(holding(rosa)) == {"care", "boards"}
+    assert rosa.boards == Boards.CLINIC
+    given |= {"code": "R2"}
+    del given["agrees"]
+    pt.post(reverse("new-patient"), given)
+    assert not holding(Patient.everywhere.get(code="R2"))
+
+
+# --- boards ---------------------------------------------------------------------------------------
+
+
+def test_boards_with_others_need_consent(world):
+    patient = Patient.everywhere.create(clinic=world.clinic, code="n", nickname="N")
+    patient.boards = Boards.TOTAL
+    with pytest.raises(ValidationError, match="consent to boards"):
+        patient.full_clean()
+    give(patient, Purpose.BOARDS, None, NOW)
+    patient.full_clean()
+
+
+def test_the_admin_refuses_boards_without_consent(world):
+    withdraw(world.patient, Purpose.BOARDS, None, NOW)
+    lead = Client()
+    lead.force_login(world.people[Role.LEAD])
+    url = reverse("admin:rehab_patient_change", args=[world.patient.pk])
+    given = {"code": "c", "nickname": "n", "language": "en", "boards": "clinic"}
+    page = lead.post(url, given)
+    assert b"consent to boards" in page.content
+    assert Patient.everywhere.get(pk=world.patient.pk).boards == Boards.OWN
+
+
+def test_withdrawing_takes_the_patient_off_all_boards_at_once(world, pt):
+    assert BoardEntry.everywhere.filter(patient=world.patient).exists()
+    patient = tap(pt, world.patient, "boards", "own")
+    assert patient.boards == Boards.OWN
+    assert not BoardEntry.everywhere.filter(patient=patient).exists()
+    assert tap(pt, patient, "boards", "total").boards == Boards.TOTAL
+    assert "boards" in holding(patient)
+
+
+def test_leaving_boards_on_the_tablet_withdraws_the_consent(world, pt):
+    pt.post(reverse("leave-boards", kwargs={"session_id": world.session.pk}))
+    assert "boards" not in holding(world.patient)
+
+
+# --- research -------------------------------------------------------------------------------------
+
+
+def seen(world: World, role: Role = Role.RESEARCHER) -> set[bool]:
+    return {model.objects.visible_to(world.people[role]).exists() for model in LOG}
+
+
+def test_researchers_see_sessions_of_those_only_who_agreed(world, pt):
+    assert seen(world) == {True}
+    tap(pt, world.patient, "research", "no")
+    assert seen(world) == {False}
+    assert seen(world, Role.PT) == {True}
+    client = Client()
+    client.force_login(world.people[Role.RESEARCHER])
+    url = reverse("session", kwargs={"session_id": world.session.pk})
+    assert client.get(url).status_code == 404
+    assert client.get("/api/v1/sessions").json()["total"] == 0
+    tap(pt, world.patient, "research", "yes")
+    assert client.get(url).status_code == 200
+
+
+def test_a_clinic_may_do_without_and_simulated_patients_need_none(world):
+    withdraw(world.patient, Purpose.RESEARCH, None, NOW)
+    world.clinic.research_needs_consent = False
+    world.clinic.save()
+    assert seen(world) == {True}
+    world.clinic.research_needs_consent = True
+    world.clinic.save()
+    Patient.everywhere.filter(pk=world.patient.pk).update(simulated=True)
+    assert seen(world) == {True}
+
+
+def test_what_exists_when_garry_is_updated_goes_on(world):
+    Consent.everywhere.all().delete()
+    quiet = Patient.everywhere.create(clinic=world.clinic, code="q", nickname="Q")
+    import_module("rehab.migrations.0003_carry_over_consent").carry_over(apps, None)
+    world.clinic.refresh_from_db()
+    assert not world.clinic.research_needs_consent
+    assert [(row.patient, row.text) for row in Consent.everywhere.all()] == [(world.patient, None)]
+    world.patient.full_clean()
+    assert not holding(quiet)

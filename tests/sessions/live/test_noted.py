@@ -1,0 +1,94 @@
+"""Who watches a session or orders its robot stands in the audit log; no step waits for that."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from asgiref.sync import sync_to_async
+from django.db import DatabaseError
+
+from rehab.people import audit
+from rehab.people.audit import Act, AuditEntry, Recent
+from tests.sessions.live.callers import turns
+
+pytestmark = pytest.mark.django_db(transaction=True)
+
+STOP = {"type": "robot", "order": "stop"}
+ARM = {"type": "robot", "order": "arm"}
+
+
+@pytest.fixture(autouse=True)
+def nothing_noted_yet(monkeypatch):
+    monkeypatch.setattr(audit, "recent", Recent())
+
+
+async def noted(count: int) -> list[tuple[Any, ...]]:
+    """Give the entries once there are so many."""
+    names = ("act", "by", "through", "patient", "about")
+    for _ in range(500):
+        rows = await sync_to_async(
+            lambda: list(AuditEntry.everywhere.order_by("pk").values_list(*names))
+        )()
+        if len(rows) >= count:
+            return rows
+        await turns()
+    raise AssertionError(f"{len(rows)} entries instead of {count}: {rows}")
+
+
+async def test_a_page_that_watches_is_noted_when_it_connects(place, begun):
+    session = await begun(place)
+    monitor, tablet = place.monitor(session), place.tablet(session)
+    await monitor.watch()
+    await tablet.watch()
+    by_person, by_tablet = sorted(await noted(2), key=lambda row: row[1] is None)
+    about = f"/ws/session/{session.pk}/"
+    assert by_person == (Act.VIEW, place.pt.pk, "", session.patient_id, f"{about}monitor/")
+    assert by_tablet[:2] == (Act.VIEW, None)
+    assert "Tablet" in by_tablet[2]
+    assert by_tablet[3:] == (session.patient_id, f"{about}patient/")
+
+
+async def test_a_page_that_connects_again_is_not_noted_again(place, begun):
+    session = await begun(place)
+    for _ in range(3):
+        monitor = place.monitor(session)
+        await monitor.watch()
+        await monitor.hang_up()
+    await monitor.overhear()
+    assert len(await noted(1)) == 1
+
+
+async def test_who_stops_and_arms_the_robot_is_noted_each_time(place, begun):
+    session = await begun(place)
+    monitor = place.monitor(session)
+    await monitor.watch()
+    for order in (STOP, ARM, STOP):
+        await monitor.say(order)
+    acts = [row[0] for row in (await noted(4))]
+    assert acts == [Act.VIEW, Act.ROBOT_STOP, Act.ROBOT_ARM, Act.ROBOT_STOP]
+
+
+async def test_an_order_is_noted_though_its_page_is_gone_at_once(place, begun):
+    session = await begun(place)
+    tablet = place.tablet(session)
+    await tablet.watch()
+    await tablet.say(STOP)
+    await tablet.hang_up()
+    assert (await noted(2))[-1][0] == Act.ROBOT_STOP
+
+
+async def test_a_log_that_cannot_be_written_stops_no_step_and_no_robot(place, begun, monkeypatch):
+    def fail(*args, **kwargs):
+        raise DatabaseError("the disk is full")
+
+    monkeypatch.setattr(AuditEntry.everywhere, "create", fail)
+    monkeypatch.setattr(audit.log, "exception", lambda *args: None)
+    session = await begun(place)
+    robot, monitor, source = place.robot(), place.monitor(session), place.source()
+    await (await robot.dial()).hello()
+    await monitor.watch()
+    await (await source.dial()).hello()
+    await source.walk(4.0)
+    await monitor.say(STOP)
+    assert await robot.hear("stop") == {"type": "stop"}

@@ -1,0 +1,362 @@
+"""Sessions are found by what one remembers of them; protocols are built row by row."""
+
+from __future__ import annotations
+
+import json
+import re
+from datetime import datetime, timedelta
+from typing import Any
+from zoneinfo import ZoneInfo
+
+import pytest
+from django.db import connection
+from django.test import Client
+from django.test.utils import CaptureQueriesContext
+from django.urls import reverse
+
+from rehab.boards.models import Leaderboard
+from rehab.people.models import Clinic, Patient, User
+from rehab.people.roles import Role
+from rehab.sessions.corrections import SessionCorrection
+from rehab.sessions.models import Protocol, ProtocolPhase, TrainingSession
+from rehab.sessions.presets import Preset
+from rehab.stations.models import Device, Station, find_device
+from tests.walks import strides, walk
+from tests.world import NOW, World, build_world
+
+pytestmark = pytest.mark.django_db
+
+SESSIONS = "/admin/rehab/trainingsession/"
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+def client_of(world: World, role: Role = Role.PT) -> Client:
+    client = Client()
+    client.force_login(world.people[role])
+    return client
+
+
+def patient_of(world: World, name: str) -> Patient:
+    return Patient.everywhere.create(
+        clinic=world.clinic, code=f"K-{name}", nickname=name, paretic_side="left"
+    )
+
+
+# --- finding sessions ---------------------------------------------------------------------------
+
+
+@pytest.fixture
+def walked(world) -> dict[str, TrainingSession]:
+    """Four sessions of two people; the world's own is a fifth."""
+    rosa, omar = patient_of(world, "Rosa"), patient_of(world, "Omar")
+    made = {
+        "weak": walk(rosa, "positive", strides(2, 8), days_ago=9),
+        "strong": walk(rosa, "positive", strides(9, 1), days_ago=5),
+        "lost": walk(omar, "negative", strides(5, 5), days_ago=5),
+        "told": walk(omar, "explicit", strides(5, 5), days_ago=1),
+    }
+    station = Station.everywhere.create(clinic=world.clinic, name="Window")
+    TrainingSession.everywhere.filter(pk=made["lost"].pk).update(station=station)
+    return made
+
+
+def found(client: Client, walked: dict[str, TrainingSession], **asked: Any) -> set[str]:
+    page = client.get(SESSIONS, asked)
+    assert page.status_code == 200, page.headers.get("Location")
+    keys = {int(key) for key in re.findall(rf"{SESSIONS}(\d+)/change/", page.content.decode())}
+    return {name for name, session in walked.items() if session.pk in keys}
+
+
+def test_sessions_are_found_by_day_person_place_type_and_figures(world, walked):
+    client = client_of(world)
+    rosa = walked["weak"].patient_id
+    place = Station.everywhere.get(name="Window").pk
+    day = (NOW - timedelta(days=5)).date().isoformat()
+    assert found(client, walked) == {"weak", "strong", "lost", "told"}
+    assert found(client, walked, first=day, last=day) == {"strong", "lost"}
+    assert found(client, walked, last=day) == {"weak", "strong", "lost"}
+    assert found(client, walked, who=rosa) == {"weak", "strong"}
+    assert found(client, walked, who=rosa, first=day) == {"strong"}
+    assert found(client, walked, place=place) == {"lost"}
+    assert found(client, walked, valence__exact="explicit") == {"told"}
+    assert found(client, walked, hits_min="50", hits_max="89") == {"lost", "told"}
+    assert found(client, walked, hits_min="90") == {"strong"}
+    assert found(client, walked, score_max="0") == {"lost"}
+    assert found(client, walked, score_min="2,5") == {"strong"}
+    assert found(client, walked, goal_min="1.5", goal_max="2") == set(walked)
+    assert found(client, walked, goal_min="2.1") == set()
+    assert found(client, walked, q="Omar", hits_max=50, valence__exact="negative") == {"lost"}
+
+
+def test_days_are_the_clinics_own(world, walked):
+    Clinic.everywhere.filter(pk=world.clinic.pk).update(time_zone="Pacific/Auckland")
+    begun = datetime(2026, 11, 10, 0, 30, tzinfo=ZoneInfo("Pacific/Auckland"))
+    TrainingSession.everywhere.filter(pk=walked["told"].pk).update(started_at=begun)
+    client = client_of(world)
+    assert found(client, walked, first="2026-11-10", last="2026-11-10") == {"told"}
+    assert found(client, walked, first="2026-11-09", last="2026-11-09") == set()
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"hits_min": "many"}, "Enter a number"),
+        ({"hits_min": "nan"}, "Enter a number"),
+        ({"hits_min": "90", "hits_max": "80"}, "It ends before it begins."),
+        ({"first": "2026-13-01"}, "Enter a valid date"),
+        ({"first": "2026-11-02", "last": "2026-11-01"}, "It ends before it begins."),
+        ({"who": "999999"}, "Select a valid choice"),
+        ({"hits_max": "101"}, "less than or equal to 100"),
+    ],
+)
+def test_what_cannot_be_looked_for_is_said_and_finds_nothing(world, walked, asked, words):
+    page = client_of(world).get(SESSIONS, asked)
+    assert words in page.content.decode()
+    assert found(client_of(world), walked, **asked) == set()
+
+
+def test_what_was_looked_for_stays_in_the_form_beside_the_other_filters(world, walked):
+    asked = {"hits_min": "50", "state__exact": "finished"}
+    page = client_of(world).get(SESSIONS, asked).content.decode()
+    assert re.search(r'name="hits_min" value="50"', page)
+    assert '<input type="hidden" name="state__exact" value="finished">' in page
+    assert "hits_min=50" in page  # in the links of the other filters
+
+
+def test_a_researcher_finds_by_pseudonym_alone(world, walked):
+    client = client_of(world, Role.RESEARCHER)
+    rosa = walked["weak"].patient
+    assert found(client, walked, who=rosa.pseudonym) == {"weak", "strong"}
+    page = client.get(SESSIONS).content.decode()
+    assert "Rosa" not in page
+    assert "Window" in page  # the station's name stands beside a session, as in its details
+    assert found(client, walked, who=str(rosa.pk)) == set()
+
+
+def test_another_clinics_patient_is_no_choice(world, walked):
+    birch = build_world("birch")
+    page = client_of(world).get(SESSIONS, {"who": birch.patient.pk}).content.decode()
+    assert "Select a valid choice" in page
+
+
+# --- lists cost the same, however long they are --------------------------------------------------
+
+
+def multiply(world: World) -> None:
+    """Add five more of everything that lists show."""
+    for number in range(5):
+        patient = patient_of(world, f"More {number}")
+        session = walk(patient, "positive", strides(3, 1), days_ago=number)
+        SessionCorrection.everywhere.create(
+            session=session, part="note", reason="why", by=world.people[Role.PT], at=NOW
+        )
+        Leaderboard.everywhere.create(clinic=world.clinic, name=f"More {number}")
+        station = Station.everywhere.create(clinic=world.clinic, name=f"More {number}")
+        for kind in Device.Kind.values:
+            name = f"{kind}-{number}"
+            Device(
+                clinic=world.clinic, station=station, kind=kind, name=name, token_hash=name
+            ).save()
+        TrainingSession.everywhere.filter(patient=patient).update(station=station)
+        User.everywhere.create_user(f"more-{number}", role=Role.PT, clinic=world.clinic)
+        protocol = Protocol.everywhere.create(clinic=world.clinic, name=f"More {number}")
+        protocol.phases.create(position=1, kind="training", name="one", feedback=True)
+        Preset.everywhere.create(
+            clinic=world.clinic,
+            name=f"More {number}",
+            valence="binary",
+            goal_value=2,
+            protocol=protocol,
+        )
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("trainingsession", "step", "sessionevent", "sessionmetric", "sessioncorrection"),
+        *("patient", "user", "station", "device", "protocol", "preset", "leaderboard"),
+    ],
+)
+def test_a_list_costs_the_same_however_long_it_is(world, name):
+    client = client_of(world, Role.LEAD)
+    url = f"/admin/rehab/{name}/"
+    client.get(url)
+
+    def cost() -> tuple[int, int]:
+        with CaptureQueriesContext(connection) as queries:
+            page = client.get(url)
+        assert page.status_code == 200
+        return len(queries), page.content.decode().count("<tr")
+
+    before, rows = cost()
+    multiply(world)
+    after, more = cost()
+    assert more > rows
+    assert after == before
+    assert after <= 16
+
+
+# --- protocols ----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def protocol(world) -> Protocol:
+    made = Protocol.everywhere.create(clinic=world.clinic, name="Blocks")
+    for position, name in enumerate(("Warm up", "Block", "Rest"), 1):
+        made.phases.create(
+            position=position, kind="training", name=name, feedback=True, seconds=60 * position
+        )
+    return made
+
+
+def rows(protocol: Protocol, *phases: dict[str, object]) -> dict[str, object]:
+    """Give the form of a protocol with these phases."""
+    stored = protocol.phases.count() if protocol.pk else 0
+    form: dict[str, object] = {
+        "name": protocol.name,
+        "description": "",
+        "phases-TOTAL_FORMS": len(phases),
+        "phases-INITIAL_FORMS": stored,
+        "phases-MIN_NUM_FORMS": 0,
+        "phases-MAX_NUM_FORMS": 1000,
+    }
+    for index, phase in enumerate(phases):
+        values = {"kind": "training", "feedback": "on", "gain": "1", **phase}
+        form |= {f"phases-{index}-{name}": value for name, value in values.items()}
+        form[f"phases-{index}-protocol"] = protocol.pk or ""
+    return form
+
+
+def told(protocol: Protocol) -> list[tuple[int, str]]:
+    return list(protocol.phases.order_by("position").values_list("position", "name"))
+
+
+def save(world: World, protocol: Protocol, *phases: dict[str, object]):
+    url = reverse("admin:rehab_protocol_change", args=[protocol.pk])
+    return client_of(world).post(url, rows(protocol, *phases))
+
+
+def test_phases_change_places_and_new_ones_come_between(world, protocol):
+    warm, block, rest = protocol.phases.order_by("position")
+    answer = save(
+        world,
+        protocol,
+        {"id": warm.pk, "name": "Warm up", "position": 3, "seconds": 60},
+        {"id": block.pk, "name": "Block", "position": 1, "seconds": 120},
+        {"id": rest.pk, "name": "Rest", "position": 4, "seconds": 180},
+        {"name": "Catch", "position": 2, "strides": 12},
+    )
+    assert answer.status_code == 302, answer.content.decode()
+    assert told(protocol) == [(1, "Block"), (2, "Catch"), (3, "Warm up"), (4, "Rest")]
+    assert {warm.pk, block.pk, rest.pk} < set(protocol.phases.values_list("pk", flat=True))
+
+
+def test_a_row_without_a_number_follows_the_one_above_and_gaps_close(world, protocol):
+    warm, block, rest = protocol.phases.order_by("position")
+    save(
+        world,
+        protocol,
+        {"id": warm.pk, "name": "Warm up", "position": 1, "DELETE": "on"},
+        {"id": block.pk, "name": "Block", "position": 2, "seconds": 120},
+        {"id": rest.pk, "name": "Rest", "position": 7, "seconds": 180},
+        {"name": "Washout", "position": ""},
+    )
+    assert told(protocol) == [(1, "Block"), (2, "Rest"), (3, "Washout")]
+
+
+def test_a_protocol_without_phases_and_a_phase_that_cannot_be_walked_are_refused(world, protocol):
+    phases = list(protocol.phases.order_by("position"))
+    gone = [{"id": p.pk, "name": p.name, "position": p.position, "DELETE": "on"} for p in phases]
+    assert "needs at least one phase" in save(world, protocol, *gone).content.decode()
+    kept = [{"id": p.pk, "name": p.name, "position": p.position, "gain": "3"} for p in phases]
+    assert save(world, protocol, *kept).status_code == 200
+    assert told(protocol) == [(1, "Warm up"), (2, "Block"), (3, "Rest")]
+
+
+def test_what_is_drawn_is_what_is_stored(world, protocol):
+    url = reverse("admin:rehab_protocol_change", args=[protocol.pk])
+    page = client_of(world).get(url).content.decode()
+    phases = json.loads(re.search(r'<script id="phases"[^>]*>(.*?)</script>', page, re.DOTALL)[1])
+    assert [phase["name"] for phase in phases] == ["Warm up", "Block", "Rest"]
+    assert phases[1] | {"kind": "training"} == {
+        "kind": "training",
+        "name": "Block",
+        "feedback": True,
+        "gain": 1.0,
+        "strides": None,
+        "seconds": 120.0,
+    }
+
+
+def act(world: World, model: str, action: str, key: int, role: Role = Role.PT):
+    """Press a button on a row's own page."""
+    data = {"index": 0, "action": action, "_selected_action": key, "stay": key}
+    return client_of(world, role).post(f"/admin/rehab/{model}/", data)
+
+
+def test_a_shared_protocol_is_copied_and_the_copy_is_the_clinics(world):
+    shared = Protocol.everywhere.get(name="Baseline, training, washout", clinic=None)
+    page = client_of(world).get(reverse("admin:rehab_protocol_change", args=[shared.pk]))
+    assert "Copy to my clinic" in page.content.decode()
+    answer = act(world, "protocol", "copy_to_clinic", shared.pk)
+    copy = Protocol.everywhere.get(clinic=world.clinic, name=f"{shared.name} (copy 1)")
+    assert answer.headers["Location"] == reverse("admin:rehab_protocol_change", args=[copy.pk])
+    assert copy.to_rules() == shared.to_rules()
+    act(world, "protocol", "copy_to_clinic", shared.pk)
+    assert Protocol.everywhere.filter(clinic=world.clinic, name__endswith="(copy 2)").exists()
+    assert ProtocolPhase.everywhere.filter(protocol=shared).count() == len(shared.to_rules())
+
+
+def test_nobody_copies_another_clinics_protocol_and_a_researcher_none(world):
+    birch = build_world("birch")
+    before = Protocol.everywhere.count()
+    act(world, "protocol", "copy_to_clinic", birch.rows[Protocol].pk)
+    shared = Protocol.everywhere.filter(clinic=None).first()
+    act(world, "protocol", "copy_to_clinic", shared.pk, Role.RESEARCHER)
+    assert Protocol.everywhere.count() == before
+
+
+# --- what a row's page offers, and what goes with it ---------------------------------------------
+
+
+def test_a_token_is_renewed_and_revoked_from_the_devices_page(world):
+    page = reverse("admin:rehab_device_change", args=[world.device.pk])
+    answer = act(world, "device", "renew_tokens", world.device.pk, Role.LEAD)
+    assert answer.headers["Location"] == page
+    assert find_device(world.token) is None
+    act(world, "device", "revoke_tokens", world.device.pk, Role.LEAD)
+    told = client_of(world, Role.LEAD).get(page).content.decode()
+    assert "revoked" in told
+    seen_by_pt = client_of(world).get(page).content.decode()
+    assert "Revoke tokens" not in seen_by_pt
+
+
+def test_a_stations_page_shows_its_devices_and_their_state(world):
+    Device.everywhere.filter(pk=world.device.pk).update(revoked_at=NOW)
+    station = world.rows[Station]
+    url = f"/admin/rehab/station/{station.pk}/change/"
+    page = client_of(world, Role.LEAD).get(url).content.decode()
+    assert reverse("admin:rehab_device_change", args=[world.device.pk]) in page
+    assert "revoked" in page
+    assert f"?station={station.pk}" in page
+
+
+def test_deleting_says_what_goes_and_what_stays_behind(world):
+    protocol, preset = world.rows[Protocol], world.rows[Preset]
+    page = client_of(world).get(f"/admin/rehab/protocol/{protocol.pk}/delete/").content.decode()
+    assert preset.name in page
+    assert world.rows[ProtocolPhase].name in page
+    assert "Stays, without its protocol: sessions (1)" in page
+    station = world.rows[Station]
+    lead = client_of(world, Role.LEAD)
+    page = lead.get(f"/admin/rehab/station/{station.pk}/delete/").content.decode()
+    assert world.device.name in page
+    assert "Stays, without its station: sessions (1)" in page
+    lead.post(f"/admin/rehab/station/{station.pk}/delete/", {"post": "yes"})
+    world.session.refresh_from_db()
+    assert world.session.station is None
+    assert not Device.everywhere.filter(pk=world.device.pk).exists()

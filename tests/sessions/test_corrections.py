@@ -1,0 +1,271 @@
+"""Corrections: who walked, what counts, a note. Audited, and everything that follows follows."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+
+from rehab.boards import entries
+from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.people.models import Patient
+from rehab.people.roles import Role
+from rehab.sessions import corrections
+from rehab.sessions.corrections import Part, SessionCorrection, correct_session
+from rehab.sessions.dashboard import read_week
+from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
+from rehab.sessions.takehome import sum_up_for_home
+from rehab.sessions.trend import read_trend
+from tests.walks import strides, walk
+from tests.world import NOW, World, build_world
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+def patient_of(world: World, name: str, **fields) -> Patient:
+    return Patient.everywhere.create(
+        clinic=world.clinic, code=f"K-{ord(name[0])}", nickname=name, paretic_side="left", **fields
+    )
+
+
+@pytest.fixture
+def rosa(world: World) -> Patient:
+    return patient_of(world, "Rosa", boards="clinic")
+
+
+@pytest.fixture
+def omar(world: World) -> Patient:
+    return patient_of(world, "Omar", boards="clinic")
+
+
+def client_of(world: World, role: Role = Role.PT) -> Client:
+    client = Client()
+    client.force_login(world.people[role])
+    return client
+
+
+def correct(world: World, session: TrainingSession, role: Role = Role.PT, **changes):
+    """Send the form as the page does: what is not told stays as it is."""
+    session.refresh_from_db()
+    before = {
+        "patient": session.patient_id,
+        "counts": "no" if session.left_out else "yes",
+        "note": "",
+        "reason": "Read off the sheet.",
+    }
+    url = reverse("correct", args=[session.pk])
+    return client_of(world, role).post(url, before | changes)
+
+
+def log_of(session: TrainingSession) -> list[object]:
+    """Give everything that was recorded of a session."""
+    return [
+        list(model.everywhere.filter(session=session).order_by("pk").values())
+        for model in (Step, SessionEvent, SessionMetric)
+    ]
+
+
+def board_of(world: World) -> Leaderboard:
+    board: Leaderboard = world.rows[Leaderboard]
+    Leaderboard.everywhere.filter(pk=board.pk).update(types="all", metric="hit_rate")
+    board.refresh_from_db()
+    entries.refresh(board)
+    return board
+
+
+def rows_of(board: Leaderboard) -> dict[int, int]:
+    found = BoardEntry.everywhere.filter(board=board)
+    return dict(found.values_list("patient_id", "figure"))
+
+
+def agrees_with_a_rebuild(board: Leaderboard) -> None:
+    """Fail where the rows kept up differ from rows made anew."""
+
+    def told() -> list[object]:
+        fields = ("patient_id", "valence", "figure", "stake", "key", "stale_on")
+        kept = BoardEntry.everywhere.filter(board=board).order_by("key").values_list(*fields)
+        counts = BoardCount.everywhere.filter(board=board).order_by("valence", "figure")
+        return [list(kept), list(counts.values_list("valence", "figure", "rows"))]
+
+    kept_up = told()
+    entries.refresh(board)
+    assert kept_up == told()
+
+
+def test_a_session_goes_to_whoever_walked_it(world, rosa, omar):
+    board = board_of(world)
+    session = walk(rosa, "positive", strides(9, 1))
+    walk(rosa, "positive", strides(1, 1), days_ago=1)
+    log = log_of(session)
+    assert rows_of(board)[rosa.pk] == 90
+    assert correct(world, session, patient=omar.pk).status_code == 302
+    session.refresh_from_db()
+    assert session.patient == omar
+    assert {rosa.pk: 50, omar.pk: 90}.items() <= rows_of(board).items()
+    agrees_with_a_rebuild(board)
+    assert log_of(session) == log
+    row = SessionCorrection.everywhere.get(session=session)
+    assert (row.part, row.old, row.new) == (Part.PATIENT, rosa.pseudonym, omar.pseudonym)
+    assert (row.by, row.reason) == (world.people[Role.PT], "Read off the sheet.")
+
+
+def test_who_loses_the_only_session_leaves_the_board(world, rosa, omar):
+    board = board_of(world)
+    session = walk(rosa, "positive", strides(9, 1))
+    correct(world, session, patient=omar.pk)
+    assert rosa.pk not in rows_of(board)
+    agrees_with_a_rebuild(board)
+
+
+def test_what_is_left_out_is_in_no_board_trend_week_or_paper_and_comes_back(world, rosa):
+    board = board_of(world)
+    pt = world.people[Role.PT]
+    now = NOW
+    bad = walk(rosa, "positive", strides(10, 0))
+    good = walk(rosa, "positive", strides(5, 5), days_ago=1)
+    mine = TrainingSession.objects.visible_to(pt).filter(patient=rosa)
+
+    def figures() -> tuple[Any, ...]:
+        return (
+            rows_of(board).get(rosa.pk),
+            [point.session.pk for point in read_trend(pt, mine)],
+            read_week(pt, world.clinic, now).total.sessions,
+            sum_up_for_home(pt, mine, now)["count"],
+        )
+
+    before = figures()
+    assert before[:2] == (100, [good.pk, bad.pk])
+    log = log_of(bad)
+    correct(world, bad, counts="no")
+    assert figures() == (50, [good.pk], before[2] - 1, before[3] - 1)
+    agrees_with_a_rebuild(board)
+    page = client_of(world).get(reverse("history", args=[rosa.pk])).content.decode()
+    assert "1 session left out of these figures by a correction." in page
+    own = client_of(world).get(reverse("scores", args=[good.pk])).content.decode()
+    assert "100\N{NO-BREAK SPACE}%" not in own
+    correct(world, bad, counts="yes")
+    assert figures() == before
+    assert log_of(bad) == log
+    told = SessionCorrection.everywhere.filter(session=bad).values_list("old", "new")
+    assert list(told.order_by("pk")) == [("yes", "no"), ("no", "yes")]
+
+
+def test_the_board_follows_in_the_same_transaction(world, rosa, omar, monkeypatch):
+    board = board_of(world)
+    session = walk(rosa, "positive", strides(9, 1))
+    before = rows_of(board)
+
+    class Broken(RuntimeError):
+        pass
+
+    def fail(self, *args, **kwargs):
+        raise Broken
+
+    monkeypatch.setattr(corrections.SessionCorrection, "save", fail)
+    changes = {Part.PATIENT: omar.pseudonym}
+    with pytest.raises(Broken):
+        correct_session(session, changes, "why", world.people[Role.PT], NOW)
+    session.refresh_from_db()
+    assert session.patient == rosa
+    assert rows_of(board) == before
+
+
+def test_a_note_stands_with_the_session_and_the_last_one_holds(world, rosa):
+    session = walk(rosa, "positive", strides(3, 1))
+    correct(world, session, note="Walked with a cane.")
+    correct(world, session, note="Walked with a cane from minute two.")
+    page = client_of(world).get(reverse("session", args=[session.pk])).content.decode()
+    assert re.search(r"<h2>Note</h2><p>Walked with a cane from minute two.</p>", page)
+    assert "Walked with a cane. → Walked with a cane from minute two." in page
+    assert SessionCorrection.everywhere.filter(session=session).count() == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, "Nothing is altered"),
+        ({"counts": "no", "reason": " "}, "This field is required"),
+        ({"counts": "no", "reason": "It was rosa who slipped."}, "Leave out “Rosa”"),
+        ({"note": "See k-82."}, "Leave out “K-82”"),
+        ({"counts": "maybe"}, "Select a valid choice"),
+        ({"patient": "999999"}, "Select a valid choice"),
+    ],
+)
+def test_a_correction_that_says_too_little_or_too_much_is_refused(world, rosa, changes, words):
+    session = walk(rosa, "positive", strides(3, 1))
+    page = correct(world, session, **changes)
+    assert page.status_code == 200
+    assert words in page.content.decode()
+    assert not SessionCorrection.everywhere.filter(session=session).exists()
+
+
+def test_another_clinics_patient_cannot_have_walked_here(world, rosa):
+    birch = build_world("birch")
+    session = walk(rosa, "positive", strides(3, 1))
+    page = correct(world, session, patient=birch.patient.pk)
+    assert "Select a valid choice" in page.content.decode()
+    url = reverse("correct", args=[birch.session.pk])
+    assert client_of(world).get(url).status_code == 404
+
+
+def test_a_session_that_still_runs_is_ended_first(world, rosa):
+    session = walk(rosa, "positive", strides(3, 1), end=None)
+    answer = correct(world, session, counts="no")
+    assert answer.headers["Location"] == reverse("session", args=[session.pk])
+    session.refresh_from_db()
+    assert not session.left_out
+
+
+def test_a_researcher_reads_corrections_by_pseudonym_and_makes_none(world, rosa, omar):
+    session = walk(rosa, "positive", strides(3, 1))
+    correct(world, session, patient=omar.pk)
+    assert correct(world, session, Role.RESEARCHER, counts="no").status_code == 403
+    for url in (
+        reverse("session", args=[session.pk]),
+        reverse("admin:rehab_trainingsession_change", args=[session.pk]),
+        reverse("admin:rehab_sessioncorrection_changelist"),
+    ):
+        page = client_of(world, Role.RESEARCHER).get(url).content.decode()
+        assert rosa.pseudonym in page
+        assert omar.pseudonym in page
+        assert "Rosa" not in page
+        assert "Omar" not in page
+        assert reverse("correct", args=[session.pk]) not in page
+
+
+def test_a_therapist_finds_them_in_the_admin_and_edits_none(world, rosa, omar):
+    session = walk(rosa, "positive", strides(3, 1))
+    correct(world, session, patient=omar.pk)
+    client = client_of(world)
+    page = client.get(reverse("admin:rehab_trainingsession_change", args=[session.pk]))
+    assert "Rosa → Omar" in page.content.decode()
+    assert reverse("correct", args=[session.pk]) in page.content.decode()
+    row = SessionCorrection.everywhere.get(session=session)
+    for act in ("change", "delete"):
+        url = reverse(f"admin:rehab_sessioncorrection_{act}", args=[row.pk])
+        assert client.post(url, {"post": "yes", "reason": "x"}).status_code == 403
+    assert client.get(reverse("admin:rehab_sessioncorrection_add")).status_code == 403
+
+
+def test_rows_are_only_ever_added(world):
+    row = world.rows[SessionCorrection]
+    row.reason = "another"
+    with pytest.raises(TypeError, match="never altered"):
+        row.save()
+    with pytest.raises(TypeError, match="never deleted"):
+        row.delete()
+
+
+def test_the_api_says_what_is_left_out(world, rosa):
+    session = walk(rosa, "positive", strides(3, 1))
+    correct(world, session, counts="no")
+    told = client_of(world).get(f"/api/v1/sessions/{session.pk}").json()
+    assert told["left_out"] is True

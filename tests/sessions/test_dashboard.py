@@ -1,0 +1,245 @@
+"""The admin's front page: its figures equal what was walked, and each role sees its own part."""
+
+from __future__ import annotations
+
+import json
+import re
+from datetime import datetime, timedelta
+from zoneinfo import ZoneInfo
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+from django.utils import timezone
+
+from rehab.people.models import Clinic, Patient, User
+from rehab.people.roles import Role
+from rehab.sessions.dashboard import find_matters, look, read_today, read_week
+from rehab.sessions.models import TrainingSession
+from rehab.stations.models import Device, Station
+from rehab.stations.presence import say_seen
+from rehab.training.changes import ChangeKind, State
+from tests.walks import RIGHT, strides, walk
+from tests.world import World, build_world, mark
+
+pytestmark = pytest.mark.django_db
+
+# A Wednesday, ten in the morning in Madrid.
+HERE = ZoneInfo("Europe/Madrid")
+NOW = datetime(2026, 9, 16, 10, 0, tzinfo=HERE)
+
+
+@pytest.fixture
+def world() -> World:
+    """A clinic in Madrid whose own session lies long ago."""
+    world = build_world("amber")
+    Clinic.everywhere.filter(pk=world.clinic.pk).update(time_zone="Europe/Madrid")
+    TrainingSession.everywhere.all().update(
+        created_at=NOW - timedelta(days=90), started_at=NOW - timedelta(days=90)
+    )
+    world.clinic.refresh_from_db()
+    for user in world.people.values():
+        user.clinic.refresh_from_db()
+    return world
+
+
+@pytest.fixture
+def rosa(world: World) -> Patient:
+    return Patient.everywhere.create(
+        clinic=world.clinic, code="K-1", nickname="Rosa", paretic_side="left"
+    )
+
+
+def ago(patient: Patient, valence: str, walked, moment: datetime, **how) -> TrainingSession:
+    """Let somebody walk from a moment on."""
+    return walk(patient, valence, walked, now=moment, **how)
+
+
+def client_of(user: User) -> Client:
+    client = Client()
+    client.force_login(user)
+    return client
+
+
+# --- this week ----------------------------------------------------------------------------------
+
+
+def test_the_weeks_figures_are_those_of_what_was_walked(world, rosa):
+    monday = datetime(2026, 9, 14, 8, 0, tzinfo=HERE)
+    # 8 of 10 (wanted 60 %) and a stride of the other leg; 10 of 30 without a wish; 5 of 10 (80 %)
+    ago(rosa, "positive", [*strides(8, 2), (RIGHT, 2.5)], monday, wanted=0.6)
+    ago(rosa, "positive", [*strides(10, 20), None], monday + timedelta(days=1))
+    ago(rosa, "binary", strides(5, 5), NOW - timedelta(hours=1), wanted=0.8)
+    # Not of this week, of a person, or of the figures:
+    ago(rosa, "positive", strides(9, 0), datetime(2026, 9, 13, 23, 59, tzinfo=HERE))
+    ago(rosa, "negative", strides(9, 0), monday, simulated=True)
+    out = ago(rosa, "negative", strides(9, 0), monday)
+    TrainingSession.everywhere.filter(pk=out.pk).update(left_out=True)
+    week = read_week(world.people[Role.PT], world.clinic, NOW)
+    assert (week.total.sessions, week.total.strides, week.left_out) == (3, 50, 2)
+    assert week.total.hit_rate == pytest.approx((8 + 10 + 5) / 50)
+    assert week.total.wanted == pytest.approx((0.6 * 10 + 0.8 * 10) / 20)
+    positive, binary = week.types
+    assert (positive.label, positive.sessions, positive.strides) == ("Positive", 2, 40)
+    assert positive.hit_rate == pytest.approx(18 / 40)
+    assert positive.wanted == pytest.approx(0.6)
+    assert binary.hit_rate == pytest.approx(0.5)
+    assert binary.wanted == pytest.approx(0.8)
+    rows = TrainingSession.everywhere.filter(started_at__gte=monday, left_out=False)
+    walked = sum(row.active_s for row in rows if not row.simulated)
+    assert week.total.minutes == pytest.approx(walked / 60)
+    assert sum(week.minutes) == pytest.approx(walked / 60)
+    assert [minutes > 0 for minutes in week.minutes] == [True, True, True, *[False] * 4]
+    assert not week.simulated
+
+
+def test_the_week_begins_on_monday_by_the_clinics_clock(world, rosa):
+    # Sunday 22:30 in UTC is Monday in Madrid.
+    ago(rosa, "positive", strides(3, 1), datetime(2026, 9, 13, 22, 30, tzinfo=ZoneInfo("UTC")))
+    week = read_week(world.people[Role.PT], world.clinic, NOW)
+    assert week.total.sessions == 1
+    assert week.minutes[0] > 0
+
+
+def test_where_nobody_walked_the_simulated_ones_are_told_as_such(world, rosa):
+    ago(rosa, "positive", strides(3, 1), NOW - timedelta(hours=1), simulated=True)
+    week = read_week(world.people[Role.PT], world.clinic, NOW)
+    assert (week.simulated, week.total.sessions) == (True, 1)
+
+
+def test_a_week_without_a_session_has_no_rate(world):
+    week = read_week(world.people[Role.PT], world.clinic, NOW)
+    assert (week.total.sessions, week.total.hit_rate, week.types) == (0, None, [])
+
+
+# --- today --------------------------------------------------------------------------------------
+
+
+def test_today_lists_open_sessions_first_and_yesterdays_not_at_all(world, rosa):
+    done = ago(rosa, "positive", strides(3, 1), NOW - timedelta(hours=1))
+    runs = ago(rosa, "binary", strides(3, 1), NOW - timedelta(hours=2), end=None)
+    left = ago(rosa, "negative", strides(3, 1), NOW - timedelta(days=2), end=None)
+    TrainingSession.everywhere.filter(pk=left.pk).update(state=State.PAUSED.value)
+    ago(rosa, "explicit", strides(3, 1), NOW - timedelta(days=1))
+    ago(rosa, "positive", strides(1, 1), NOW - timedelta(hours=3), end=ChangeKind.ABORT)
+    lines = read_today(world.people[Role.PT], world.clinic, NOW)
+    told = [(line.session.pk, line.state, line.hit_rate) for line in lines]
+    assert [state for _, state, _ in told] == ["Running", "Paused", "Finished", "Aborted"]
+    assert [key for key, _, _ in told[:3]] == [runs.pk, left.pk, done.pk]
+    assert told[2][2] == "75\N{NO-BREAK SPACE}%"
+    assert [line.time for line in lines][:3] == ["08:00", "Sep 14, 10:00", "09:00"]
+
+
+def test_a_session_left_open_and_devices_shut_out_want_attention(world, rosa):
+    pt = world.people[Role.PT]
+    ago(rosa, "positive", strides(3, 1), NOW - timedelta(hours=4), end=None)
+    station = world.rows[Station]
+    names = {"new": {}, "never": {}, "revoked": {"revoked_at": NOW}, "long revoked": {}}
+    for name, fields in names.items():
+        device = Device(
+            clinic=world.clinic, station=station, kind="robot", name=name, token_hash=name, **fields
+        )
+        device.save()
+        made = NOW if name == "new" else NOW - timedelta(days=1)
+        Device.everywhere.filter(pk=device.pk).update(created_at=made)
+    Device.everywhere.filter(name="long revoked").update(revoked_at=NOW - timedelta(days=30))
+    Device.everywhere.filter(pk=world.device.pk).update(last_seen_at=NOW)
+    told = look(pt, NOW)
+    words = [matter.words for matter in find_matters(pt, told["today"], told["places"], NOW)]
+    assert len(words) == 3
+    assert words[0] == "The session of Rosa is open since 06:00. End it."
+    assert words[1].startswith("never at ")
+    assert "has never dialed in" in words[1]
+    assert "revoked and shut out" in words[2]
+
+
+@pytest.mark.parametrize(
+    ("ago", "words"),
+    [
+        (None, "never seen"),
+        (timedelta(seconds=90), "seen just now"),
+        (timedelta(minutes=12), "seen 12 minutes ago"),
+        (timedelta(hours=5), "seen 5 hours ago"),
+        (timedelta(days=3), "seen on Sep 13, 2026"),
+    ],
+)
+def test_it_is_said_when_a_device_was_there(ago, words):
+    assert say_seen(ago and NOW - ago, NOW) == words
+
+
+# --- the page, for each role --------------------------------------------------------------------
+
+
+def front(user: User) -> str:
+    answer = client_of(user).get("/admin/")
+    assert answer.status_code == 200
+    return answer.content.decode()
+
+
+def test_a_therapist_is_led_to_the_monitor_of_who_walks(world, rosa):
+    session = ago(rosa, "positive", strides(3, 1), timezone.now(), end=None)
+    page = front(world.people[Role.PT])
+    assert "1 person walks now" in page
+    assert f'href="{reverse("monitor", args=[session.pk])}"' in page
+    chart = json.loads(re.search(r'<script id="week"[^>]*>(.*?)</script>', page, re.DOTALL)[1])
+    assert len(chart["days"]) == len(chart["minutes"]) == 7
+
+
+def test_a_researcher_sees_pseudonyms_and_no_station(world, rosa):
+    session = ago(rosa, "positive", strides(3, 1), timezone.now(), end=None)
+    page = front(world.people[Role.RESEARCHER])
+    assert rosa.pseudonym in page
+    assert "Rosa" not in page
+    assert mark("amber", Device) not in page
+    assert reverse("monitor", args=[session.pk]) not in page
+
+
+def test_a_host_sees_clinics_and_the_server_and_no_patient(world, rosa):
+    ago(rosa, "positive", strides(3, 1), timezone.now(), end=None)
+    build_world("birch")
+    host = User.everywhere.create_user("host", role=Role.HOST)
+    Clinic.everywhere.create(name="Without a lead")
+    page = front(host)
+    assert "This server" in page
+    assert mark("amber", Clinic) in page
+    assert mark("birch", Clinic) in page
+    assert "Without a lead has no lead." in page
+    assert "SQLite" in page or "PostgreSQL" in page
+    for word in ("Rosa", rosa.pseudonym, mark("amber", Patient), "walks now"):
+        assert word not in page
+
+
+def test_models_stand_under_headings_with_a_line_each(world):
+    page = front(world.people[Role.LEAD])
+    headings = re.findall(r'<section class="heading[^>]*>\s*<h2>(.*?)</h2>', page)
+    assert headings[:5] == [
+        "Patients &amp; sessions",
+        "Feedback &amp; protocols",
+        "Leaderboards",
+        "Places &amp; devices",
+        "People",
+    ]
+    assert "Who walks: code, nickname, leg" in page
+    assert "More" not in headings, "rehab/site.py says no heading for a model"
+
+
+def test_the_front_page_costs_the_same_however_much_was_walked(
+    world, rosa, django_assert_num_queries, django_assert_max_num_queries
+):
+    pt = client_of(world.people[Role.PT])
+    now = timezone.now()
+    ago(rosa, "positive", strides(2, 1), now)
+    pt.get("/admin/")
+    with django_assert_max_num_queries(15) as first:
+        pt.get("/admin/")
+    for number in range(8):
+        patient = Patient.everywhere.create(
+            clinic=world.clinic, code=f"M-{number}", nickname="M", paretic_side="left"
+        )
+        ago(patient, "positive", strides(2, 1), now, end=None if number % 2 else ChangeKind.FINISH)
+        station = Station.everywhere.create(clinic=world.clinic, name=f"S-{number}")
+        Device(
+            clinic=world.clinic, station=station, kind="tablet", name="t", token_hash=f"{number}"
+        ).save()
+    with django_assert_num_queries(len(first.captured_queries)):
+        pt.get("/admin/")

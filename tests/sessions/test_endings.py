@@ -1,0 +1,319 @@
+"""A program that ends, a person who is erased, and what goes with time by itself."""
+
+from __future__ import annotations
+
+import io
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import pytest
+from django.contrib.admin.models import LogEntry
+from django.core.management import call_command
+from django.core.serializers import serialize
+from django.test import Client
+from django.urls import reverse
+
+from rehab.boards.models import BoardEntry
+from rehab.people import audit
+from rehab.people.audit import Act, AuditEntry
+from rehab.people.history import HistoryEntry
+from rehab.people.models import Ending, Erasing, Patient
+from rehab.people.roles import Role
+from rehab.sessions.endings import (
+    StillOpen,
+    end_program,
+    erase,
+    months_before,
+    overdue,
+    reopen_program,
+)
+from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
+from rehab.sessions.services import create_session
+from rehab.training.goals import GoalRule
+from rehab.training.measures import InvalidSetting
+from tests.world import World, build_world, mark, scoped_models
+
+pytestmark = pytest.mark.django_db
+NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+def client_of(world: World, role: Role = Role.PT) -> Client:
+    client = Client()
+    client.force_login(world.people[role])
+    return client
+
+
+def page_of(world: World, client: Client) -> str:
+    url = reverse("patient", kwargs={"patient_id": world.patient.pk})
+    return client.get(url).content.decode()
+
+
+def start(world: World) -> TrainingSession:
+    return create_session(
+        world.patient,
+        valence="positive",
+        goal=GoalRule(value=1.0),
+        protocol=world.session.protocol,
+        measure=world.session.measure,
+    )
+
+
+# --- the program --------------------------------------------------------------------------------
+
+
+def test_an_ended_program_leaves_the_lists_and_is_found_by_name(world):
+    client = client_of(world)
+    key = {"patient_id": world.patient.pk}
+    client.post(reverse("end-program", kwargs=key), {"because": "moved"})
+    world.patient.refresh_from_db()
+    assert world.patient.ended_at is not None
+    assert world.patient.ended_because == Ending.MOVED
+    address = reverse("patient", kwargs=key)
+    assert address not in client.get(reverse("start")).content.decode()
+    found = client.get(reverse("start"), {"q": world.patient.code}).content.decode()
+    assert address in found
+
+
+def test_an_ended_program_cannot_be_started_until_it_is_reopened(world):
+    client = client_of(world)
+    end_program(world.patient, Ending.DONE, NOW)
+    page = page_of(world, client)
+    setup = reverse("setup", kwargs={"patient_id": world.patient.pk})
+    assert f'action="{setup}"' not in page
+    assert reverse("take-home", kwargs={"patient_id": world.patient.pk}) in page
+    with pytest.raises(InvalidSetting, match="has ended"):
+        start(world)
+    client.post(reverse("reopen", kwargs={"patient_id": world.patient.pk}))
+    world.patient.refresh_from_db()
+    assert (world.patient.ended_at, world.patient.ended_because) == (None, "")
+    assert f'action="{setup}"' in page_of(world, client)
+    start(world)
+
+
+def test_who_has_an_open_session_is_neither_ended_nor_erased(world):
+    start(world)
+    for act in (
+        lambda: end_program(world.patient, Ending.DONE, NOW),
+        lambda: erase(world.patient, Erasing.ASKED, None, NOW),
+    ):
+        with pytest.raises(StillOpen, match="End it first"):
+            act()
+    url = reverse("end-program", kwargs={"patient_id": world.patient.pk})
+    assert b"open session" in client_of(world).post(url, {"because": "done"}).content
+    world.patient.refresh_from_db()
+    assert world.patient.ended_at is None
+    assert world.patient.nickname == mark("amber", Patient)
+
+
+def test_the_page_asks_for_a_reason(world):
+    url = reverse("end-program", kwargs={"patient_id": world.patient.pk})
+    assert client_of(world).post(url, {"because": "bored"}).status_code == 200
+    assert Patient.everywhere.get(pk=world.patient.pk).ended_at is None
+
+
+# --- erasing --------------------------------------------------------------------------------------
+
+
+def everything_stored() -> str:
+    """Give every row of every model, and the admin's own notes, as text."""
+    rows: list[Any] = [*scoped_models(), LogEntry]
+    return "\n".join(serialize("json", model._base_manager.all()) for model in rows)
+
+
+def test_erasing_leaves_nothing_that_leads_to_the_person(world):
+    patient, lead = world.patient, client_of(world, Role.LEAD)
+    secrets = {"nickname": "Rosamunde", "code": "CASE-4711", "body_mass_kg": 87.125}
+    details = reverse("mend-patient", kwargs={"patient_id": patient.pk})
+    lead.post(details, secrets | {"paretic_side": "left"})
+    change = reverse("admin:rehab_patient_change", args=[patient.pk])
+    given = secrets | {"language": "en", "screen_side": "right", "boards": "clinic", "blinded": ""}
+    assert lead.post(change, given).status_code == 302
+    TrainingSession.everywhere.filter(pk=world.session.pk).update(
+        source="Recording rosamunde.csv",
+        runs=["recording", "/data/rosamunde.csv"],
+        original={"name": "Rosamunde"},
+        original_id=990_017,
+    )
+    Patient.everywhere.filter(pk=patient.pk).update(original_id=880_018)
+    SessionEvent.everywhere.create(
+        session=world.session, after_number=1, kind="pain", at=NOW, data={"note": "CASE-4711"}
+    )
+    patient.refresh_from_db()
+    known = [patient.pseudonym, patient.alias, "990017", "880018", "87.125", "osamunde", "CASE-47"]
+    assert all(one in everything_stored() for one in known)
+
+    url = reverse("erase", kwargs={"patient_id": patient.pk})
+    assert lead.post(url, {"because": "asked", "code": "CASE-4711"}).status_code == 302
+    left = everything_stored()
+    assert [one for one in known if one in left] == []
+    patient.refresh_from_db()
+    assert patient.erased_at is not None
+    assert patient.pseudonym == patient.code
+    assert not AuditEntry.everywhere.filter(patient=patient).exists()
+    assert not BoardEntry.everywhere.filter(patient=patient).exists()
+
+
+def test_erasing_keeps_the_figures_and_says_who_did_it(world):
+    before = {model: model.everywhere.count() for model in (Step, SessionMetric, TrainingSession)}
+    values = list(Step.everywhere.values_list("value", "points"))
+    erase(world.patient, Erasing.ASKED, world.people[Role.LEAD], NOW)
+    assert {model: model.everywhere.count() for model in before} == before
+    assert list(Step.everywhere.values_list("value", "points")) == values
+    entry = AuditEntry.everywhere.get(act=Act.ERASE)
+    assert (entry.by, entry.at, entry.patient) == (world.people[Role.LEAD], NOW, None)
+    change = HistoryEntry.everywhere.filter(noun="Patient").first()
+    assert change.values.keys() >= {"nickname", "code"}
+    assert not any(change.values.values())
+
+
+def test_an_imported_session_still_tells_its_score_once_erased(world):
+    TrainingSession.everywhere.filter(pk=world.session.pk).update(original_id=17)
+    erase(world.patient, Erasing.ASKED, None, NOW)
+    world.session.refresh_from_db()
+    assert world.session.original_id == -world.session.pk
+    url = reverse("session", kwargs={"session_id": world.session.pk})
+    assert client_of(world).get(url).status_code == 200
+
+
+def test_an_erased_patient_never_comes_back(world):
+    erase(world.patient, Erasing.ASKED, None, NOW)
+    reopen_program(world.patient)
+    assert world.patient.ended_at == NOW
+    client = client_of(world, Role.LEAD)
+    consent = reverse("consent", kwargs={"patient_id": world.patient.pk})
+    client.post(consent, {"purpose": "boards", "says": "clinic"})
+    assert Patient.everywhere.get(pk=world.patient.pk).boards == "own"
+    assert "Reopen" not in page_of(world, client)
+    details = reverse("mend-patient", kwargs={"patient_id": world.patient.pk})
+    given = {"nickname": "Rosa", "code": "R-1", "paretic_side": "left"}
+    assert b"This person is erased" in client.post(details, given).content
+    assert Patient.everywhere.get(pk=world.patient.pk).nickname == "Erased"
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"because": "asked", "code": "another"},
+        {"because": "asked", "code": ""},
+        {"because": "retention", "code": mark("amber", Patient)},
+        {"code": mark("amber", Patient)},
+    ],
+)
+def test_only_the_patients_own_code_and_a_reason_erase(given, world):
+    url = reverse("erase", kwargs={"patient_id": world.patient.pk})
+    assert client_of(world, Role.LEAD).post(url, given).status_code == 200
+    assert Patient.everywhere.get(pk=world.patient.pk).erased_at is None
+
+
+def test_only_leads_erase_and_only_in_their_clinic(world):
+    url = reverse("erase", kwargs={"patient_id": world.patient.pk})
+    given = {"because": "asked", "code": world.patient.code}
+    assert client_of(world, Role.PT).post(url, given).status_code == 403
+    assert client_of(build_world("birch"), Role.LEAD).post(url, given).status_code == 404
+    assert Patient.everywhere.get(pk=world.patient.pk).erased_at is None
+    records = reverse("records", kwargs={"patient_id": world.patient.pk})
+    assert url not in client_of(world, Role.PT).get(records).content.decode()
+
+
+# --- retention ------------------------------------------------------------------------------------
+
+
+def retain(*options: str) -> str:
+    out = io.StringIO()
+    call_command("retention", *options, stdout=out, stderr=out)
+    return out.getvalue()
+
+
+def last_walked(world: World, days: int) -> None:
+    moment = datetime.now(UTC) - timedelta(days=days)
+    TrainingSession.everywhere.filter(patient=world.patient).update(created_at=moment)
+
+
+@pytest.mark.parametrize(("days", "erased"), [(58, False), (63, True)])
+def test_who_was_kept_long_enough_is_erased(days, erased, world):
+    world.clinic.keep_months = 2
+    world.clinic.save()
+    last_walked(world, days)
+    said = retain()
+    world.patient.refresh_from_db()
+    assert (world.patient.erased_at is not None) == erased
+    assert f"{int(erased)} patient(s) erased" in said
+    if erased:
+        assert world.patient.erased_because == Erasing.RETENTION
+        assert "0 patient(s) erased" in retain()
+
+
+def test_without_a_wish_nobody_goes_and_each_clinic_has_its_own(world):
+    birch = build_world("birch")
+    birch.clinic.keep_months = 1
+    birch.clinic.save()
+    for one in (world, birch):
+        last_walked(one, 5000)
+    retain()
+    assert Patient.everywhere.get(pk=world.patient.pk).erased_at is None
+    assert Patient.everywhere.get(pk=birch.patient.pk).erased_at is not None
+
+
+def test_a_dry_run_says_whom_and_changes_nothing(world):
+    world.clinic.keep_months = 1
+    world.clinic.save()
+    last_walked(world, 400)
+    before = everything_stored()
+    assert f"would erase {world.patient.code}" in retain("--dry-run")
+    assert everything_stored() == before
+
+
+def test_an_open_session_holds_up_one_patient_and_no_other(world):
+    world.clinic.keep_months = 1
+    world.clinic.save()
+    other = Patient.everywhere.create(clinic=world.clinic, code="o", nickname="O")
+    start(world)
+    last_walked(world, 400)
+    Patient.everywhere.filter(pk=other.pk).update(created_at=datetime.now(UTC) - timedelta(400))
+    assert "End it first" in retain()
+    assert Patient.everywhere.get(pk=world.patient.pk).erased_at is None
+    assert Patient.everywhere.get(pk=other.pk).erased_at is not None
+
+
+def test_simulated_patients_stay(world):
+    world.clinic.keep_months = 1
+    Patient.everywhere.filter(pk=world.patient.pk).update(simulated=True)
+    assert not overdue(world.clinic, NOW + timedelta(days=5000)).exists()
+
+
+def test_both_logs_go_when_the_clinic_has_kept_them_long_enough(world):
+    now = datetime.now(UTC)
+    for months, about in ((13, "old"), (11, "new")):
+        at = months_before(now, months)
+        audit.note(Act.VIEW, world.people[Role.PT], about=about, now=at)
+        HistoryEntry.everywhere.create(clinic=world.clinic, noun=about, row=1, kind="added", at=at)
+    world.clinic.keep_log_months = 12
+    world.clinic.save()
+    retain("--dry-run")
+    assert AuditEntry.everywhere.filter(about="old").exists()
+    retain()
+    assert not AuditEntry.everywhere.filter(about="old").exists()
+    assert AuditEntry.everywhere.filter(about="new").exists()
+    assert set(
+        HistoryEntry.everywhere.filter(row=1, noun__in=["old", "new"]).values_list("noun")
+    ) == {("new",)}
+
+
+@pytest.mark.parametrize(
+    ("moment", "months", "before"),
+    [
+        ("2026-03-31", 1, "2026-02-28"),
+        ("2024-03-31", 1, "2024-02-29"),
+        ("2026-01-15", 1, "2025-12-15"),
+        ("2026-12-31", 12, "2025-12-31"),
+        ("2026-11-21", 1200, "1926-11-21"),
+    ],
+)
+def test_months_are_those_of_the_calendar(moment, months, before):
+    there = datetime.fromisoformat(moment).replace(tzinfo=UTC)
+    assert months_before(there, months) == datetime.fromisoformat(before).replace(tzinfo=UTC)

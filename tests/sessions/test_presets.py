@@ -1,0 +1,218 @@
+"""Presets: one tap fills the set-up, and what stands in the set-up can be kept as one."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from django.core.exceptions import ValidationError
+from django.test import Client
+
+from rehab.gestures.models import Gesture
+from rehab.people.models import Patient
+from rehab.people.roles import Role
+from rehab.sessions.models import Protocol, TrainingSession
+from rehab.sessions.presets import Preset
+from rehab.stations.models import Station
+from tests.world import World, build_world, mark
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+@pytest.fixture
+def pt(world: World) -> Client:
+    client = Client()
+    client.force_login(world.people[Role.PT])
+    return client
+
+
+@pytest.fixture
+def patient(world: World) -> Patient:
+    return Patient.everywhere.create(
+        clinic=world.clinic, code="K7-204", nickname="Rosa", paretic_side="right"
+    )
+
+
+def protocol(name: str = "Baseline, training, washout") -> Protocol:
+    return Protocol.everywhere.get(name=name, clinic=None)
+
+
+def preset_of(world: World, **fields: object) -> Preset:
+    preset = Preset(
+        **{
+            "clinic": world.clinic,
+            "name": "Challenge",
+            "valence": "binary",
+            "goal_by": "percent",
+            "goal_percent": 118,
+            "wanted_hits": 70,
+            "minutes": 20,
+            "protocol": protocol(),
+            "robot": "gentle",
+            "robot_above": "nod",
+            "robot_below": "(nothing)",
+        }
+        | fields
+    )
+    preset.full_clean()
+    preset.save()
+    return preset
+
+
+def filled(page: str) -> dict[str, str]:
+    """Give what a set-up would send: checked choices, numbers, selected options."""
+    page = page[page.index('class="set-up"') :]
+    found = dict(re.findall(r'<input class="num" name="(\w+)"[^>]* value="([^"]*)"', page))
+    for tag in re.findall(r"<input [^>]*type=\"radio\"[^>]*>", page):
+        if "checked" in tag:
+            name = re.search(r'name="(\w+)"', tag)[1]
+            found[name] = re.search(r'value="([^"]*)"', tag)[1]
+    for name, options in re.findall(r'<select name="(\w+)"[^>]*>(.*?)</select>', page, re.DOTALL):
+        found[name] = re.search(r'value="([^"]*)" selected', options)[1]
+    return found
+
+
+def test_one_tap_fills_the_set_up_and_leaves_person_and_place(pt, world, patient):
+    station = Station.everywhere.create(clinic=world.clinic, name="Free")
+    preset = preset_of(world)
+    url = f"/patients/{patient.pk}/new/"
+    page = pt.get(url).content.decode()
+    assert f'href="?preset={preset.pk}"' in page
+    chosen = filled(pt.get(f"{url}?preset={preset.pk}").content.decode())
+    assert chosen == {
+        "valence": "binary",
+        "goal_by": "percent",
+        "goal_value": "3.90",
+        "goal_percent": "118",
+        "wanted_hits": "70",
+        "minutes": "20",
+        "protocol": str(preset.protocol_id),
+        "robot": "gentle",
+        "robot_above": "nod",
+        "robot_below": "(nothing)",
+        "source": "live",
+        "trained_side": "right",
+        "station": chosen["station"],
+    }
+    pt.post(url, chosen | {"station": station.pk})
+    session = TrainingSession.everywhere.get(patient=patient)
+    plan = session.to_plan()
+    assert (plan.valence.slug, plan.goal.percent_of_baseline) == ("binary", 118)
+    assert (plan.target.hit_rate, plan.target.duration_s) == (0.7, 1200)
+    assert (plan.robot_intensity, plan.valence.cue.above) == (0.5, "nod")
+    assert plan.valence.cue.below is None
+
+
+def test_a_preset_may_bring_its_source(pt, world, patient):
+    preset = preset_of(world, source="synthetic good")
+    page = pt.get(f"/patients/{patient.pk}/new/?preset={preset.pk}").content.decode()
+    assert filled(page)["source"] == "synthetic good"
+
+
+def test_a_gesture_that_is_gone_becomes_the_usual_one(pt, world, patient):
+    gesture = Gesture.everywhere.create(clinic=world.clinic, name="wave")
+    preset = preset_of(world, robot_above="wave")
+    page = f"/patients/{patient.pk}/new/?preset={preset.pk}"
+    assert filled(pt.get(page).content.decode())["robot_above"] == "wave"
+    gesture.delete()
+    assert filled(pt.get(page).content.decode())["robot_above"] == "(usual)"
+
+
+def test_another_clinics_preset_is_not_offered(pt, patient):
+    birch = build_world("birch")
+    foreign = birch.rows[Preset]
+    page = pt.get(f"/patients/{patient.pk}/new/?preset={foreign.pk}").content.decode()
+    assert mark("birch", Preset) not in page
+    assert 'preset" href="/patients' in page
+    assert filled(page)["valence"] == "positive"  # like last time
+
+
+def choices(**others: object) -> dict[str, object]:
+    return {
+        "valence": "negative",
+        "goal_by": "value",
+        "goal_value": "4,05",
+        "goal_percent": "110",
+        "wanted_hits": "65",
+        "minutes": "12",
+        "protocol": protocol("Training only").pk,
+        "source": "live",
+        "robot": "off",
+        "robot_above": "(usual)",
+        "robot_below": "sway",
+        "then": "preset",
+        **others,
+    }
+
+
+def test_what_stands_in_the_set_up_is_kept_under_a_name(pt, world, patient):
+    url = f"/patients/{patient.pk}/new/"
+    answer = pt.post(url, choices(preset_name="Hard day"))
+    kept = Preset.everywhere.get(clinic=world.clinic, name="Hard day")
+    assert answer.headers["Location"] == f"{url}?preset={kept.pk}"
+    assert (kept.valence, kept.goal_by, kept.goal_value) == ("negative", "value", 4.05)
+    assert (kept.wanted_hits, kept.minutes, kept.robot) == (65, 12, "off")
+    assert (kept.robot_above, kept.robot_below, kept.source) == ("(usual)", "sway", "live")
+    assert not TrainingSession.everywhere.filter(patient=patient).exists()
+    assert "Saved as preset “Hard day”" in pt.get(answer.headers["Location"]).content.decode()
+
+
+def test_without_a_name_it_says_what_it_is_and_never_the_same_twice(pt, world, patient):
+    for _ in range(2):
+        pt.post(f"/patients/{patient.pk}/new/", choices())
+    names = Preset.everywhere.filter(valence="negative").values_list("name", flat=True)
+    words = "Negative · 4.05\N{NO-BREAK SPACE}W/kg · 12 min"
+    assert sorted(names) == [words, f"{words} (2)"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"goal_by": "percent"}, "needs a baseline phase"),
+        ({"goal_value": ""}, "either as a value or as percent"),
+        ({"goal_value": "16"}, "less than or equal to 15"),
+        ({"preset_name": "Challenge"}, "A preset of this name exists"),
+        ({"valence": "kind"}, "Select a valid choice"),
+    ],
+)
+def test_what_could_not_be_walked_is_no_preset(pt, world, patient, wrong, words):
+    preset_of(world)
+    before = Preset.everywhere.count()
+    page = pt.post(f"/patients/{patient.pk}/new/", choices(**wrong))
+    assert page.status_code == 200
+    assert words in page.content.decode()
+    assert Preset.everywhere.count() == before
+
+
+def test_the_admin_refuses_what_could_not_be_walked(pt, world):
+    with pytest.raises(ValidationError, match="needs a baseline phase"):
+        preset_of(world, protocol=protocol("Training only"))
+    form = {
+        "name": "New one",
+        "valence": "positive",
+        "protocol": protocol("Training only").pk,
+        "goal_by": "percent",
+        "goal_percent": "100",
+        "robot": "normal",
+        "robot_above": "(usual)",
+        "robot_below": "(usual)",
+    }
+    page = pt.post("/admin/rehab/preset/add/", form)
+    assert "needs a baseline phase" in page.content.decode()
+    saved = pt.post("/admin/rehab/preset/add/", form | {"protocol": protocol().pk})
+    assert saved.status_code == 302
+    assert Preset.everywhere.get(name="New one").clinic == world.clinic
+
+
+def test_a_researcher_reads_presets_and_changes_none(world):
+    client = Client()
+    client.force_login(world.people[Role.RESEARCHER])
+    key = world.rows[Preset].pk
+    assert client.get("/admin/rehab/preset/").status_code == 200
+    assert client.get("/admin/rehab/preset/add/").status_code == 403
+    assert client.post(f"/admin/rehab/preset/{key}/delete/", {"post": "yes"}).status_code == 403
