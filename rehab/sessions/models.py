@@ -203,7 +203,8 @@ class TrainingSession(ClinicRow):
     ``plan`` is what every step is scored with; the columns beside it are there to be found by.
     ``state``, ``goal``, ``started_at``, ``ended_at``, ``changed_to`` and ``active_s`` follow from
     the log and are written together with its changes (``active_s`` of a running session is that of
-    its last one). ``valence`` is the feedback type it began with. Only a correction alters ``patient`` and ``left_out`` (``corrections.py``).
+    its last one). ``valence`` is the feedback type it began with. Only a correction alters
+    ``patient`` and ``left_out`` (``corrections.py``).
     """
 
     scope = PatientScope(clinic="clinic", station="station")

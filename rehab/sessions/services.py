@@ -51,7 +51,9 @@ def create_session(
     patient, station and the rest are not of one clinic; nothing is stored then.
     """
     if patient.ended_at is not None:
-        said = gettext("%(patient)s's program has ended. Reopen it on the page “Consent and data” first.")
+        said = gettext(
+            "%(patient)s's program has ended. Reopen it on the page “Consent and data” first."
+        )
         raise InvalidSetting(said % {"patient": patient.nickname})
     measure = measure or Measure.everywhere.get(clinic=None, slug=A2.slug)
     if phases is None:
