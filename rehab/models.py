@@ -36,6 +36,9 @@ TRACKED = (
     ProtocolPhase,
     Gesture,
     GestureStep,
+    FeedbackType,
+    FeedbackBand,
+    Preset,
     Leaderboard,
 )
 

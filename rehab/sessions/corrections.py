@@ -16,8 +16,9 @@ from django.db import models, transaction
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.consent import PatientScope
 from rehab.people.models import Patient, User
-from rehab.people.scope import Scope, ScopedModel
+from rehab.people.scope import ScopedModel
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN, State
 
@@ -36,7 +37,7 @@ class SessionCorrection(ScopedModel):
     ``old`` and ``new``: a patient's pseudonym, `yes` or `no`, or the words of the note.
     """
 
-    scope = Scope(clinic="session__clinic")
+    scope = PatientScope(clinic="session__clinic", patient="session__patient")
 
     session = models.ForeignKey(
         TrainingSession, on_delete=models.PROTECT, related_name="corrections"
