@@ -22,7 +22,7 @@ from rehab.people.models import SIDES, Boards, Patient, User
 from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
 from rehab.sessions.models import Protocol, SessionEvent, TrainingSession
 from rehab.sessions.services import create_session
-from rehab.sessions.words import LEVELS, RECORDING, say_source
+from rehab.sessions.words import LEVELS, RECORDING, SIMULATED, say_source
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
 from rehab.sources.synthetic import PROFILES
@@ -105,7 +105,7 @@ def list_recordings() -> list[Path]:
 
 def list_sources() -> list[tuple[str, str]]:
     """Give what steps can come from, with the words that a session keeps (`words.say_source`)."""
-    simulated = [(f"synthetic {name}", f"Simulated patient, {name}") for name in PROFILES]
+    simulated = [(f"synthetic {name}", f"{SIMULATED}{name}") for name in PROFILES]
     recordings = [
         (f"recording {file.name}", f"{RECORDING}{file.name}") for file in list_recordings()
     ]

@@ -17,7 +17,7 @@ from rehab.people.scope import ClinicRow, Scope
 from rehab.sessions.cues import USUAL, name_gestures
 from rehab.sessions.forms import LIVE, SessionForm
 from rehab.sessions.models import Protocol
-from rehab.sessions.words import LEVELS, say_quantity, say_rate
+from rehab.sessions.words import LEVELS, SIMULATED, say_quantity, say_rate
 from rehab.sources.synthetic import PROFILES
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting
@@ -79,7 +79,7 @@ class Preset(ClinicRow):
         choices=[
             ("", _("As last time")),
             (LIVE, _("Live sensor")),
-            *((f"synthetic {name}", _(f"Simulated patient, {name}")) for name in PROFILES),
+            *((f"synthetic {name}", _(SIMULATED + name)) for name in PROFILES),
         ],
     )
 

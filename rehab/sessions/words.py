@@ -57,7 +57,7 @@ SOURCES = (
     gettext_noop("Simulated patient, fatiguing"),
     gettext_noop("Simulated patient, dropout"),
 )
-RECORDING = "Recording "
+SIMULATED, RECORDING = "Simulated patient, ", "Recording "
 
 
 def say_source(source: str) -> str:

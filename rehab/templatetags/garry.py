@@ -6,7 +6,8 @@ from django.utils.html import format_html
 from django.utils.safestring import SafeString
 from django.utils.translation import gettext as _
 
-from rehab.sessions.words import say_duration, say_source
+from rehab.sessions.words import LEVELS, say_duration, say_source
+from rehab.training.valences import VALENCES
 
 register = template.Library()
 
@@ -29,3 +30,15 @@ def leg(side: str) -> str:
 
 register.filter("duration", say_duration)
 register.filter("source", say_source)
+
+
+@register.filter
+def type_name(slug: str) -> str:
+    """Name a feedback type."""
+    return _(VALENCES[slug].label)
+
+
+@register.filter
+def level(name: str) -> str:
+    """Say how lively a robot is."""
+    return str(LEVELS[name])

@@ -1,4 +1,5 @@
 // Trend of a patient's sessions: hits against what was wanted, mean against goal and baseline.
+import { number } from "garry/language";
 import { color, draw } from "garry/chart";
 
 const LABELED = 14; // more points leave no room for figures
@@ -29,7 +30,7 @@ function drawHits(element) {
     data: [hits.days.map((_, index) => index), hits.hit],
     series: [{ stroke: color("c-hit"), width: 3, points: { show: false } }],
     scales: { ...sessions(count), y: { range: () => [0, 100] } },
-    yAxis: { values: (_, ticks) => ticks.map((tick) => `${tick} %`), incrs: [20, 25, 50] },
+    yAxis: { values: (_, ticks) => ticks.map((tick) => `${number(tick)} %`), incrs: [20, 25, 50] },
     paint: (marks) => {
       hits.hit.forEach((hit, index) => {
         const wanted = hits.wanted[index];
@@ -38,7 +39,7 @@ function drawHits(element) {
         if (count > LABELED) return;
         const below = hit > 88 || (wanted && wanted > hit && wanted - hit < 16);
         const y = marks.y(hit) + (below ? 26 : -14) * marks.unit;
-        marks.text(`${Math.round(hit)}`, marks.x(index), y, { size: 17, weight: 800, fill: color("text") });
+        marks.text(number(hit), marks.x(index), y, { size: 17, weight: 800, fill: color("text") });
       });
     },
   });
@@ -61,7 +62,7 @@ function drawValues(element) {
     data: [values.days.map((_, index) => index), values.mean],
     series: [{ paths: () => null, points: { show: false } }],
     scales: { ...sessions(count), y: { range: () => [Math.max(0, low - air), high + air] } },
-    yAxis: { values: (_, ticks) => ticks.map((tick) => tick.toFixed(1)), space: 40 },
+    yAxis: { values: (_, ticks) => ticks.map((tick) => number(tick, 1)), space: 40 },
     paint: (marks) => {
       values.days.forEach((_, index) => {
         if (values.mean[index] !== null) {

@@ -20,10 +20,10 @@ export function fill(text, values) {
 
 const formats = new Map();
 
-// Writes a number with so many decimal places; its minus sign is a true one.
+// Writes a number with so many decimal places (null: those that it has); its minus is a true one.
 export function number(value, places = 0) {
   if (!formats.has(places)) {
-    const digits = { minimumFractionDigits: places, maximumFractionDigits: places };
+    const digits = { minimumFractionDigits: places ?? 0, maximumFractionDigits: places ?? 6 };
     formats.set(places, new Intl.NumberFormat(language, digits));
   }
   return formats.get(places).format(value).replace("-", "−");

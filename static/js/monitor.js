@@ -1,10 +1,12 @@
 // The PT's page: shows what the server says, and asks it for changes. It computes no score.
+import { _, fill, number } from "garry/language";
+import { drawControls, drawTypes } from "garry/controls";
 import { connect } from "garry/live";
-import { legend } from "garry/marks";
+import { legend, say } from "garry/marks";
+import { phaseName, reasonName } from "garry/names";
 import { quality } from "garry/presence";
 import { drawStrip, drawTwenty, drawRing } from "garry/plots";
 import { RobotPanel } from "garry/robot";
-import { drawControls, drawTypes } from "garry/controls";
 
 const root = document.getElementById("monitor");
 const slots = new Map([...document.querySelectorAll("[data-show]")].map((slot) => [slot.dataset.show, slot]));
@@ -41,7 +43,7 @@ const live = connect(root.dataset.socket, {
   onLink(state, why) {
     const note = document.querySelector(".notice.link");
     note.hidden = state === "open";
-    note.textContent = state === "lost" ? "No connection to the server. What the patient walks is stored; this page comes back by itself." : why;
+    note.textContent = state === "lost" ? _("No connection to the server. What the patient walks is stored; this page comes back by itself.") : why;
     if (state === "closed" && session && ENDED.has(session.state)) location.assign(root.dataset.details);
   },
 });
@@ -77,7 +79,7 @@ function take(event) {
       session.chart = event.value;
       break;
     case "words":
-      tell("The clinic’s words were edited; the patient reads them from the next step.");
+      tell(_("The clinic’s words were edited; the patient reads them from the next step."));
       break;
     case "goal":
       session.goal = event.goal;
@@ -98,10 +100,10 @@ function take(event) {
       break;
     case "remark":
       marks.push({ after: event.number, kind: event.what, value: event.value });
-      tell(`Noted: ${event.what.replace("_", " ")}${event.value === null ? "" : ` ${event.value}`}`);
+      tell(fill(_("Noted: %(what)s"), { what: say({ kind: event.what, value: event.value }) }));
       break;
     case "source_goal":
-      tell(`The sensor’s own goal is ${event.goal}; yours counts.`);
+      tell(fill(_("The sensor’s own goal is %(goal)s; yours counts."), { goal: number(event.goal, 2) }));
       break;
     default:
       robot.take(event);
@@ -119,7 +121,7 @@ function show(name, text) {
   if (slot && slot.textContent !== text) slot.textContent = text;
 }
 
-const percent = (share) => `${Math.round(100 * share)} %`;
+const percent = (share) => `${number(100 * share)} %`;
 const minutes = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 
 function draw() {
@@ -128,7 +130,7 @@ function draw() {
   const planned = session.target.duration_s;
   show("clock", minutes(session.active_s));
   const over = session.completed || (planned && session.active_s >= planned);
-  show("planned", over ? "planned time reached" : planned ? `of ${minutes(planned)}` : "walked");
+  show("planned", over ? _("planned time reached") : planned ? fill(_("of %(time)s"), { time: minutes(planned) }) : _("walked"));
   document.querySelector(".end").classList.toggle("over", Boolean(over));
   drawPhases();
   drawLast();
@@ -136,20 +138,20 @@ function draw() {
   drawControls(session, show);
   if (ENDED.has(session.state)) location.assign(root.dataset.details);
   const judged = strides.filter(({ performance }) => performance !== null).slice(-20);
-  show("of-twenty", judged.length ? `${judged.filter(({ hit }) => hit).length} of ${judged.length} hit` : "");
+  show("of-twenty", judged.length ? fill(_("%(hits)s of %(count)s hit"), { hits: judged.filter(({ hit }) => hit).length, count: judged.length }) : "");
   drawStrip(document.getElementById("strip"), strides, marks, session.phases);
   drawLegend();
   drawTwenty(document.getElementById("twenty"), strides.slice(-20));
   drawRing(document.getElementById("ring"), session.hit_rate, session.target.hit_rate);
-  show("wanted", session.target.hit_rate ? `Wanted ${percent(session.target.hit_rate)}` : "No rate set");
-  show("judged", session.judged === undefined ? "" : `${session.hits} of ${session.judged} strides`);
+  show("wanted", session.target.hit_rate ? fill(_("Wanted %(rate)s"), { rate: percent(session.target.hit_rate) }) : _("No rate set"));
+  show("judged", session.judged === undefined ? "" : fill(_("%(hits)s of %(count)s strides"), { hits: session.hits, count: session.judged }));
   robot.draw();
 }
 
 function drawPhases() {
   const list = document.querySelector(".phases"), now = session.phase.index;
   if (list.children.length !== session.phases.length) {
-    list.replaceChildren(...session.phases.map(({ name }) => Object.assign(document.createElement("li"), { textContent: name })));
+    list.replaceChildren(...session.phases.map(({ name }) => Object.assign(document.createElement("li"), { textContent: phaseName(name) })));
   }
   [...list.children].forEach((item, index) => {
     item.className = index < now ? "was" : index === now ? "is" : "";
@@ -159,20 +161,20 @@ function drawPhases() {
 }
 
 function drawLast() {
-  const goal = session.goal === null ? null : session.goal.toFixed(2);
-  show("goal-line", goal ? `goal ${goal} ${session.unit}` : (session.obstacle ?? "The goal follows from the baseline."));
+  const goal = session.goal === null ? null : number(session.goal, 2);
+  show("goal-line", goal ? fill(_("goal %(goal)s"), { goal: `${goal} ${session.unit}` }) : session.obstacle || _("The goal follows from the baseline."));
   if (!last) return;
   const valid = last.performance !== null && last.performance !== undefined;
   const { value, gain } = last;
-  show("number", `no. ${last.number}`);
+  show("number", fill(_("no. %(number)s"), { number: last.number }));
   show("performance", valid ? percent(last.performance) : "—");
   // What the patient sees is gain × value, and the goal is compared with that.
-  const scaled = gain && gain !== 1 ? ` × ${gain.toFixed(2)} = ${(gain * value).toFixed(2)}` : "";
-  show("value", value === null || value === undefined ? "" : `${value.toFixed(2)}${scaled} ${session.unit}`);
-  show("extras", Object.entries(last.extra ?? {}).map(([name, number]) => `${name} ${+number.toPrecision(3)}`).join("\n"));
+  const scaled = gain && gain !== 1 ? ` × ${number(gain, 2)} = ${number(gain * value, 2)}` : "";
+  show("value", value === null || value === undefined ? "" : `${number(value, 2)}${scaled} ${session.unit}`);
+  show("extras", Object.entries(last.extra ?? {}).map(([name, value]) => `${name} ${number(+value.toPrecision(3), null)}`).join("\n"));
   const points = last.points ? `, ${last.points > 0 ? "+" : "−"}${Math.abs(last.points)}` : "";
-  const why = last.valid ? `${session.phase.name}: no goal yet` : `does not count: ${(last.reasons ?? []).join(", ") || "no value"}`;
-  show("verdict", valid ? (last.hit ? "hit" : "below") + points : why);
+  const why = last.valid ? fill(_("%(phase)s: no goal yet"), { phase: phaseName(session.phase.name) }) : fill(_("does not count: %(why)s"), { why: (last.reasons ?? []).map(reasonName).join(", ") || _("no value") });
+  show("verdict", valid ? (last.hit ? _("hit") : _("below")) + points : why);
   const dot = document.querySelector(".verdict .dot");
   dot.hidden = !valid;
   dot.classList.toggle("miss", !last.hit);
@@ -223,7 +225,7 @@ function note(what, value) {
 // Before the baseline is complete a goal can be set from what has been walked so far.
 function setFirstGoal() {
   const values = strides.filter(({ valid, value }) => valid && value > 0).map(({ value }) => value);
-  if (values.length < 5) tell("The goal follows from the baseline. Walk five steps to set one from them.");
+  if (values.length < 5) tell(_("The goal follows from the baseline. Walk five steps to set one from them."));
   else change("goal", Number((values.reduce((sum, value) => sum + value, 0) / values.length).toFixed(2)));
 }
 

@@ -1,4 +1,6 @@
 // One session: every stride against the goal, phases behind it, what was changed above it.
+import { _, fill, number } from "garry/language";
+import { reasonName } from "garry/names";
 import { color, draw, paths } from "garry/chart";
 
 const read = document.getElementById("session");
@@ -10,20 +12,20 @@ function pick(wanted) {
 }
 
 function verdict(index) {
-  if (strides.shown[index] === null) return `does not count (${strides.why[index] || "no value"})`;
-  if (strides.hit[index] === null) return "no goal yet";
-  return strides.hit[index] ? "hit" : "below the goal";
+  if (strides.shown[index] === null) return fill(_("does not count (%(why)s)"), { why: strides.why[index] ? strides.why[index].split(", ").map(reasonName).join(", ") : _("no value") });
+  if (strides.hit[index] === null) return _("no goal yet");
+  return strides.hit[index] ? _("hit") : _("below the goal");
 }
 
 function figure(value) {
-  return value === null ? "–" : `${value.toFixed(2)} ${unit}`;
+  return value === null ? "–" : `${number(value, 2)} ${unit}`;
 }
 
 function readOut(index) {
   if (index === null || index === undefined) return;
-  const goal = strides.goal[index] === null ? "" : `, goal ${figure(strides.goal[index])}`;
+  const goal = strides.goal[index] === null ? "" : fill(_(", goal %(goal)s"), { goal: figure(strides.goal[index]) });
   document.querySelector(".readout").textContent =
-    `Stride ${strides.number[index]}: ${figure(strides.shown[index])}${goal}, ${verdict(index)}`;
+    fill(_("Stride %(number)s: %(value)s, %(verdict)s"), { number: strides.number[index], value: figure(strides.shown[index]) + goal, verdict: verdict(index) });
 }
 
 function points(size, width, stroke, fill) {
@@ -122,7 +124,7 @@ function drawStrides(element) {
       drawChanges(marks);
     },
     onCursor: readOut,
-    yAxis: { values: (_, ticks) => ticks.map((tick) => tick.toFixed(1)), label: unit, labelSize: 22, space: 44 },
+    yAxis: { values: (_, ticks) => ticks.map((tick) => number(tick, 1)), label: unit, labelSize: 22, space: 44 },
     xAxis: { space: 70 },
   });
 }
@@ -137,17 +139,17 @@ function cell(tag, words) {
 function tabulate(place) {
   const table = document.createElement("table");
   const head = table.createTHead().insertRow();
-  for (const name of ["Stride", `Shown, ${unit}`, `Goal, ${unit}`, "Verdict"]) {
+  for (const name of [_("Stride"), fill(_("Shown, %(unit)s"), { unit }), fill(_("Goal, %(unit)s"), { unit }), _("Verdict")]) {
     const title = cell("th", name);
     title.scope = "col";
     head.append(title);
   }
   const body = table.createTBody();
-  strides.number.forEach((number, index) => {
+  strides.number.forEach((stride, index) => {
     const row = body.insertRow();
-    const title = cell("th", number);
+    const title = cell("th", stride);
     title.scope = "row";
-    const value = (column) => strides[column][index]?.toFixed(2) ?? "–";
+    const value = (column) => strides[column][index] === null ? "–" : number(strides[column][index], 2);
     row.append(title, cell("td", value("shown")), cell("td", value("goal")), cell("td", verdict(index)));
   });
   place.append(table);

@@ -1,6 +1,8 @@
 // The page's buttons: start, pause, go on, end (asked twice) and the robot's stop; and where the
 // keyboard's focus goes when a button leaves.
 
+import { _ } from "garry/language";
+
 const GUARD_MS = 700; // a question that just appeared takes no answer: a second tap is no yes
 const NOTE_MS = 6_000;
 
@@ -39,8 +41,8 @@ export function createControls(body, live, ask) {
   // Says at once that the tap was heard; that the robot is stopped is the server's word.
   function stopRobot() {
     const sent = live.say({ type: "robot", order: "stop" });
-    if (!sent) tell("No connection. Use the robot's own button.");
-    answer(sent ? "Stop sent" : "Not sent");
+    if (!sent) tell(_("No connection. Use the robot's own button."));
+    answer(sent ? _("Stop sent") : _("Not sent"));
     clearTimeout(resetting);
     resetting = setTimeout(() => answer(""), NOTE_MS);
   }
@@ -51,7 +53,7 @@ export function createControls(body, live, ask) {
   }
 
   function drawRobot() {
-    const words = stopped ? "Robot stopped" : said || label;
+    const words = stopped ? _("Robot stopped") : said || label;
     if (robot.textContent !== words) robot.textContent = words;
     robot.toggleAttribute("data-said", words !== label);
   }

@@ -1,5 +1,6 @@
 // A step in words, emblem and number, and everything else the page says. Draws only what has changed.
 
+import { _, fill, number as decimal } from "garry/language";
 import { isStill } from "garry/walk/motion";
 import { count, partLeft, signed, spoken, timeLeft, wordsFor } from "garry/walk/words";
 
@@ -24,6 +25,7 @@ export function createFeedback(body) {
   const name = find("header b").textContent.trim();
   const sizes = new Map(); // of phrases that were measured before
   let drawn = -1;
+  let shown = 0; // the score
   find(".gain path").setAttribute("d", `M${rosette}Z`);
   addEventListener("resize", () => sizes.clear());
 
@@ -55,7 +57,7 @@ export function createFeedback(body) {
   function drawStep(session) {
     const step = session.last;
     const missing = step?.kind === "missing";
-    const text = missing ? "Step not measured." : (step?.words ?? "");
+    const text = missing ? _("Step not measured.") : (step?.words ?? "");
     say(text);
     fit(text);
     emblem.dataset.emblem = missing ? "none" : (step?.emblem ?? "");
@@ -68,16 +70,17 @@ export function createFeedback(body) {
   }
 
   function drawTotals({ has_points, unit, score, streak, number, last }) {
-    set(label, has_points ? "Points" : `This step, in ${unit}`);
-    const text = has_points ? count(score) : typeof last?.shown === "number" ? last.shown.toFixed(2) : "—";
-    const before = Number(key.textContent.replace("−", "-"));
+    set(label, has_points ? _("Points") : fill(_("This step, in %(unit)s"), { unit }));
+    const text = has_points ? count(score) : typeof last?.shown === "number" ? decimal(last.shown, 2) : "—";
+    const before = shown;
+    shown = score;
     if (set(key, text) && has_points && !isStill()) {
       key.animate([{ transform: `translateY(${score > before ? 8 : -8}%)` }, { transform: "none" }], ROLL);
     }
     key.dataset.long = Math.min(text.length, 6);
     run.dataset.streak = streak ?? "none";
     beads.forEach((bead, i) => bead.classList.toggle("on", streak > i));
-    set(runWords, streak === null ? `Step ${number}` : `${streak} in a row`);
+    set(runWords, streak === null ? fill(_("Step %(number)s"), { number }) : fill(_("%(streak)s in a row"), { streak }));
   }
 
   function drawPart(session) {

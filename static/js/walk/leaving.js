@@ -1,6 +1,8 @@
 // Nobody leaves a patient's page by accident: going back, leaving the full screen or the way out ask
 // first, for the station's PIN where it has one. The dialog is not modal, so that Pause and End stay.
 
+import { _ } from "garry/language";
+
 const PATIENCE_MS = 30_000; // a question that nobody answers goes away
 
 export function guardLeaving(dialog) {
@@ -47,7 +49,7 @@ export function guardLeaving(dialog) {
       if (response.ok) return leave(unpairs || !go ? said.go : go);
       wrong.textContent = said.message;
     } catch {
-      wrong.textContent = "No connection. Try again.";
+      wrong.textContent = _("No connection. Try again.");
     }
     if (pin) {
       pin.value = "";
