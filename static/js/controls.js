@@ -4,7 +4,7 @@ import { _, fill, number } from "garry/language";
 import { phaseName, typeName } from "garry/names";
 
 const GAINS = [0.85, 0.9, 0.95, 1];
-const percent = (share) => `${Math.round(100 * share)} %`;
+const percent = (share) => `${number(100 * share)} %`;
 
 const PAUSED = {
   restart: _("The server was restarted; nothing was lost. Go on when ready."),
