@@ -7,6 +7,7 @@ from typing import Any
 
 from django import forms
 from django.core.exceptions import ValidationError
+from django.utils.text import format_lazy
 from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.models import FeedbackBand, FeedbackType
@@ -87,7 +88,7 @@ class BandForm(forms.ModelForm):
 
 for _field, _language in word_fields().items():
     BandForm.base_fields[_field] = forms.CharField(
-        label=_("words, %(language)s") % {"language": dict(LANGUAGES)[_language]},
+        label=format_lazy(_("words, {language}"), language=dict(LANGUAGES)[_language]),
         max_length=WORDS_MAX,
         required=False,
     )

@@ -9,6 +9,7 @@ from django.core.exceptions import ValidationError
 from django.core.validators import MaxValueValidator
 from django.db import models
 from django.dispatch import Signal
+from django.utils.text import format_lazy
 from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.wording import FALLBACK, words_in
@@ -35,7 +36,9 @@ class FeedbackType(ClinicRow):
 
     scope = Scope(clinic="clinic")
 
-    clinic = models.ForeignKey(Clinic, on_delete=models.CASCADE, related_name="feedback_types")
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.CASCADE, related_name="feedback_types", verbose_name=_("clinic")
+    )
     slug = models.CharField(
         _("feedback type"),
         max_length=16,
@@ -45,13 +48,13 @@ class FeedbackType(ClinicRow):
         _("points at the goal"),
         null=True,
         blank=True,
-        help_text=_("For a step at or above the goal, 1 to %(most)s.") % {"most": POINTS_MAX},
+        help_text=format_lazy(_("For a step at or above the goal, 1 to {most}."), most=POINTS_MAX),
     )
     miss_points = models.SmallIntegerField(
         _("points below the goal"),
         null=True,
         blank=True,
-        help_text=_("For a step below the goal, −1 to −%(most)s.") % {"most": POINTS_MAX},
+        help_text=format_lazy(_("For a step below the goal, −1 to −{most}."), most=POINTS_MAX),
     )
     cue_above = models.CharField(_("after five strong seconds"), max_length=32, blank=True)
     cue_below = models.CharField(_("after five weak seconds"), max_length=32, blank=True)
@@ -98,12 +101,18 @@ class FeedbackBand(ScopedModel):
 
     scope = Scope(clinic="feedback_type__clinic")
 
-    feedback_type = models.ForeignKey(FeedbackType, on_delete=models.CASCADE, related_name="bands")
+    feedback_type = models.ForeignKey(
+        FeedbackType,
+        on_delete=models.CASCADE,
+        related_name="bands",
+        verbose_name=_("feedback type"),
+    )
     from_percent = models.PositiveSmallIntegerField(
         _("from, % of the goal"), validators=[MaxValueValidator(1000)]
     )
-    words = models.JSONField(default=dict, blank=True)
+    words = models.JSONField(_("words"), default=dict, blank=True)
     confetti = models.CharField(
+        _("confetti"),
         max_length=8,
         choices=[
             (Confetti.NONE.value, _("none")),
