@@ -79,7 +79,7 @@ STEPS = Table(
         Column("trained", "", "true: a step of the trained leg; the others are never scored."),
         Column("value", "the measure's unit", "What was measured."),
         Column("gain", "ratio", "Factor between the value and what the patient saw."),
-        Column("shown", "the measure's unit", "gain × value."),
+        Column("shown", "the measure's unit", "gain × value, where a goal was known."),
         Column("goal", "the measure's unit", "Goal in force at this step."),
         Column("performance", "ratio", "shown / goal."),
         Column("hit", "", "true: performance of 1 or more."),

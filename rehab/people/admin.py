@@ -200,8 +200,12 @@ class PatientAdmin(ScopedAdmin):
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Any]:
         """Give the visible patients with how often and when they were here last."""
-        rows = super().get_queryset(request)
-        return rows.annotate(walks=Count("sessions"), last_visit=Max("sessions__created_at"))
+        rows: QuerySet[Any] = (
+            super()
+            .get_queryset(request)
+            .annotate(walks=Count("sessions"), last_visit=Max("sessions__created_at"))
+        )
+        return rows
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Lead to where the patient walks, and to what was walked."""

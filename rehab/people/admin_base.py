@@ -115,6 +115,10 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
     row_actions: tuple[str, ...] = ()  # actions that a row's own page offers as well
     for_viewers: tuple[str, ...] = ()  # those of them that alter nothing of the row
 
+    def get_object(self, request: HttpRequest, object_id: str, from_field: Any = None) -> Any:
+        """Find a row; where a form names no field to find it by (Django fails), by its key."""
+        return super().get_object(request, object_id, from_field or None)
+
     def has_module_permission(self, request: HttpRequest) -> bool:
         """Whether the model is on the front page."""
         return bool(rights(request, self.model))
@@ -151,7 +155,9 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
                 actions = {name: actions[name] for name in actions if name in self.for_viewers}
             context["row_links"] = self.get_row_links(request, row)
             context["row_actions"] = [
-                (name, found[2]) for name in self.row_actions if (found := actions.get(name))
+                (name, found[2], name not in self.for_viewers)
+                for name in self.row_actions
+                if (found := actions.get(name))
             ]
         return super().render_change_form(request, context, *args, **kwargs)
 

@@ -147,7 +147,7 @@ class Recent:
 recent = Recent()
 
 
-def note(
+def compose(
     act: Act,
     actor: Any,
     *,
@@ -156,19 +156,15 @@ def note(
     address: str = "",
     clinic: int | None = None,
     now: datetime | None = None,
-) -> None:
-    """Add an entry. Raises DatabaseError where it could not be kept: nothing may then be given out.
-
-    ``actor`` is a person or a device, None the server's own console; ``clinic`` its clinic, where
-    the actor has none.
+) -> AuditEntry:
+    """Give an entry. ``actor`` is a person or a device; None the server's own console, whose
+    ``clinic`` has to be told.
     """
-    clinic = getattr(actor, "clinic_id", None) or clinic
-    if clinic is None:
-        return  # a host, who sees no patients
     person = actor if isinstance(actor, User) else None
     through = SERVER if actor is None else person.program if person else str(actor)
-    AuditEntry.everywhere.create(
-        clinic_id=clinic,
+    home: Any = getattr(actor, "clinic_id", None) or clinic
+    return AuditEntry(
+        clinic_id=home,
         at=now or timezone.now(),
         by=person,
         through=through[:64],
@@ -179,13 +175,21 @@ def note(
     )
 
 
-def try_to_note(act: Act, actor: Any, **facts: Any) -> None:
-    """Add an entry to what has happened already. If it cannot be kept, care goes on without it."""
+def note(act: Act, actor: Any, **facts: Any) -> None:
+    """Add an entry. Raises DatabaseError where it cannot be kept: nothing may then be given out."""
+    compose(act, actor, **facts).save()
+
+
+def try_to_keep(entries: list[AuditEntry]) -> None:
+    """Add entries of what has happened already. If they cannot be kept, care goes on without.
+
+    What belongs to no clinic is left out: it is a host's, who sees no patients.
+    """
     try:
         with transaction.atomic():
-            note(act, actor, **facts)
+            AuditEntry.everywhere.bulk_create([one for one in entries if one.clinic_id])
     except DatabaseError:
-        log.exception("The audit log missed: %s of patient %s", act, facts.get("patient"))
+        log.exception("The audit log missed: %s", ", ".join(str(one) for one in entries))
 
 
 def shorten(address: str) -> str:

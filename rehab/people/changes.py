@@ -10,7 +10,7 @@ from django.db.models import Field, ForeignKey, Model, Q
 from django.utils.translation import gettext as _
 
 from rehab.people.history import HistoryEntry
-from rehab.people.scope import ScopedModel, visible
+from rehab.people.scope import ScopedModel
 
 SHOWN = 200  # the newest
 
@@ -82,8 +82,7 @@ def _say(user: Any, field: Field[Any, Any] | None, value: Any) -> str:
     related: Any = getattr(field, "related_model", None)
     keys = value if isinstance(value, list) else [value]
     if related is not None:
-        condition = visible(related, user)
-        seen = {} if condition is None else related.everywhere.filter(condition).in_bulk(keys)
+        seen = related.objects.visible_to(user).in_bulk(keys)
         return ", ".join(str(seen.get(key, f"#{key}")) for key in keys)
     choices = dict(getattr(field, "flatchoices", []))
     return ", ".join(str(choices.get(key, key)) for key in keys)

@@ -43,7 +43,7 @@ def note_request(request: HttpRequest, response: HttpResponseBase) -> None:
     now = timezone.now()
     if reads and not audit.recent.is_new((*who, match.view_name, request.path), now):
         return
-    audit.try_to_note(
+    entry = audit.compose(
         Act.VIEW if reads else Act.CHANGE,
         actor,
         patient=find_patient(match, actor.clinic_id),
@@ -51,6 +51,7 @@ def note_request(request: HttpRequest, response: HttpResponseBase) -> None:
         address=client_address(request),
         now=now,
     )
+    audit.try_to_keep([entry])
 
 
 def _actor_of(request: HttpRequest) -> Any:

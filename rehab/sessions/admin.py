@@ -14,6 +14,7 @@ from django.http import HttpRequest, HttpResponseBase
 from django.shortcuts import redirect
 from django.urls import reverse
 from django.utils.html import format_html, format_html_join
+from django.utils.text import capfirst
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
@@ -233,7 +234,7 @@ class PresetAdmin(ScopedAdmin):
         """Offer the gestures that this clinic has."""
         if db_field.name in {"robot_above", "robot_below"}:
             return forms.ChoiceField(
-                choices=list_gestures(person(request)), label=db_field.verbose_name
+                choices=list_gestures(person(request)), label=capfirst(db_field.verbose_name)
             )
         return super().formfield_for_dbfield(db_field, request, **kwargs)
 

@@ -257,17 +257,17 @@ def read_places(user: User, open_now: list[TrainingSession], now: datetime) -> I
             station,
             [(device, say_state(device, now)) for device in devices[station.pk]],
             session,
-            find_here(session) if session else {},
+            find_here(session, now) if session else {},
         )
 
 
-def find_here(session: TrainingSession) -> dict[str, bool]:
+def find_here(session: TrainingSession, now: datetime) -> dict[str, bool]:
     """Give what is connected to a session of this process; nothing where another one runs it."""
     live = runtime.peek()
     running = live.sessions.get(session.pk) if live else None
     if running is None:
         return {}
-    told = running.presence()
+    told = running.presence(now)
     return {"source": told["source"], "tablet": bool(told["tablets"]), "robot": told["robot"]}
 
 

@@ -3,29 +3,28 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Protocol
 
-from django.utils.translation import gettext, override
-
-from rehab.training.changes import ChangeKind, State, Value
+from rehab.sessions.facts import (
+    Message,
+    change_mark,
+    describe_cue,
+    describe_now,
+    describe_phase,
+    describe_state,
+    describe_types,
+    describe_walked,
+    type_mark,
+)
+from rehab.training.changes import ChangeKind, Value
 from rehab.training.fold import SessionFold
-from rehab.training.phases import Phase, find_phase_kind
+from rehab.training.phases import Phase
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import Reason, ScoredStep
-from rehab.training.valences import VALENCES, Valence
-
-Message = dict[str, Any]
-
-# Changes that a PT's chart points out; a phase it shows by itself.
-MARKED_CHANGES = frozenset(ChangeKind) - {
-    ChangeKind.START,
-    ChangeKind.FINISH,
-    ChangeKind.ABORT,
-    ChangeKind.PHASE,
-}
+from rehab.training.valences import Valence
 
 
 class Audience(StrEnum):
@@ -127,15 +126,6 @@ def step_event(fold: SessionFold, told: Told, step: ScoredStep, *, live: bool) -
     return LiveEvent(step.number, build)
 
 
-def describe_walked(fold: SessionFold) -> Message:
-    """Give how far the session and its phase have come."""
-    return {
-        "active_s": round(fold.active_s, 2),
-        "phase_s": round(fold.phase_s, 2),
-        "phase_strides": fold.phase_strides,
-    }
-
-
 def _patient_step(
     plan: SessionPlan,
     told: Told,
@@ -205,71 +195,6 @@ def _robot_step(phase: Phase, step: ScoredStep, *, live: bool) -> Message | None
     }
 
 
-def describe_phase(plan: SessionPlan, index: int, valence: Valence) -> Message:
-    """Give a phase as pages show it, with the feedback type that is in force there."""
-    phase = plan.phases[index]
-    calm_words = ""
-    if not phase.feedback:
-        with override(plan.language):
-            calm_words = gettext(find_phase_kind(phase.kind).calm_words)
-    return {
-        "index": index,
-        "count": len(plan.phases),
-        "kind": phase.kind,
-        "name": phase.name,
-        "feedback": phase.feedback,
-        "calm_words": calm_words,
-        "theme": valence.slug if phase.feedback else "calm",
-        "strides": phase.strides,
-        "seconds": phase.seconds,
-    }
-
-
-def describe_now(fold: SessionFold) -> Message:
-    """Give the phase that the next step falls in, and how its points stand."""
-    return {
-        "phase": describe_phase(fold.plan, fold.phase_index, fold.valence),
-        "has_points": fold.valence.has_points,
-        "score": fold.score,
-        **describe_walked(fold),
-    }
-
-
-def describe_types(fold: SessionFold) -> Message:
-    """Give which feedback type is in force and which comes next, and which it may be."""
-    return {
-        "began": fold.plan.valence.slug,
-        "changed_to": list(fold.changed_to),
-        "valence": fold.valence.slug,
-        "next_valence": fold.next_valence,
-        "types": [{"slug": one.slug, "label": one.label} for one in fold.valences.values()],
-    }
-
-
-def describe_cue(fold: SessionFold) -> Message:
-    """Give the robot's order for this session, as of now."""
-    cue = fold.valence.cue
-    named = {cue.above, cue.below}
-    return {
-        "above": cue.above,
-        "below": cue.below,
-        "threshold": fold.activation_threshold,
-        "window_s": 5.0,
-        "rest_s": 5.0,
-        "intensity": fold.robot_intensity,
-        "gestures": [one for one in fold.plan.gestures if one.get("name") in named],
-    }
-
-
-def describe_state(fold: SessionFold) -> Message:
-    """Give where the session stands, and who paused it."""
-    paused = fold.state is State.PAUSED and fold.pause_reason is not None
-    return {
-        "state": fold.state.value,
-        "pause_reason": fold.pause_reason.value if paused and fold.pause_reason else "",
-    }
-
-
 def state_event(fold: SessionFold) -> LiveEvent:
     """Give the event that a session started, paused, went on or ended."""
     page = {"kind": "state", **describe_state(fold)}
@@ -317,20 +242,6 @@ def change_event(fold: SessionFold, kind: ChangeKind, value: Value = None) -> Li
     if kind in (ChangeKind.ACTIVATION_THRESHOLD, ChangeKind.ROBOT_INTENSITY):
         return _to_each(fold, monitor=monitor, robot=_cue(fold))
     return _to_each(fold, monitor=monitor)
-
-
-def change_mark(after: int, kind: ChangeKind, value: Value) -> Message:
-    """Give a change as a PT's chart points it out; of edited words only whose they are."""
-    return {
-        "after": after,
-        "kind": kind.value,
-        "value": value.get("valence") if isinstance(value, Mapping) else value,
-    }
-
-
-def type_mark(after: int, slug: str) -> Message:
-    """Give the moment from which another feedback type was in force, for a PT's chart."""
-    return {"after": after, "kind": "type", "value": VALENCES[slug].label}
 
 
 def _cue(fold: SessionFold) -> Message:

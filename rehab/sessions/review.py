@@ -11,7 +11,7 @@ from django.utils.translation import gettext, ngettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
-from rehab.sessions.events import MARKED_CHANGES
+from rehab.sessions.facts import MARKED_CHANGES
 from rehab.sessions.live.actor import read_log
 from rehab.sessions.models import Remark, RobotEntry, SessionEvent, Step, TrainingSession
 from rehab.sessions.trend import figures_of
@@ -41,7 +41,7 @@ NAMES = {
     ChangeKind.PHASE: _("Phase"),
     ChangeKind.ACTIVATION_THRESHOLD: _("Robot threshold"),
     ChangeKind.ROBOT_INTENSITY: _("Robot"),
-    ChangeKind.VALENCE: _("Feedback type of the next phase"),
+    ChangeKind.VALENCE: _("Next feedback type"),
     ChangeKind.WORDS: _("Words edited"),
     ChangeKind.WORDS_SHOWN: _("Words"),
     ChangeKind.CHART_STYLE: _("Chart"),

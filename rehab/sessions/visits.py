@@ -124,12 +124,11 @@ def read_today(user: User, now: datetime) -> list[Today]:
 
 
 def _of_today(sessions: QuerySet[TrainingSession], midnight: datetime) -> Iterable[TrainingSession]:
-    """Give what is open, and what was walked since midnight (and a day, at most)."""
-    open_now = [state.value for state in OPEN]
-    begun = {"created_at__gte": midnight, "created_at__lt": midnight + timedelta(days=1)}
-    return sessions.filter(
-        models.Q(state__in=open_now) | models.Q(**begun, active_s__gt=0)
-    ).order_by("created_at")
+    """Give what is open, and what people have walked since midnight (and a day, at most)."""
+    open_now = models.Q(state__in=[state.value for state in OPEN])
+    begun = models.Q(created_at__gte=midnight, created_at__lt=midnight + timedelta(days=1))
+    walked = begun & models.Q(active_s__gt=0, simulated=False)
+    return sessions.filter(open_now | walked).order_by("created_at")
 
 
 def _tell(

@@ -55,7 +55,7 @@ class StationForm(ClinicForm):
     """A station with its PIN, which is written and never read."""
 
     pin = forms.CharField(
-        label=_("new PIN to leave the patient’s page"),
+        label=_("New PIN to leave the patient’s page"),
         required=False,
         max_length=LONGEST,
         widget=forms.PasswordInput(attrs={"inputmode": "numeric", "autocomplete": "new-password"}),
@@ -63,7 +63,7 @@ class StationForm(ClinicForm):
             "Four to eight digits, asked for at this station’s tablet. Empty: stays as it is."
         ),
     )
-    no_pin = forms.BooleanField(label=_("no PIN: leaving asks a plain question"), required=False)
+    no_pin = forms.BooleanField(label=_("No PIN: leaving asks a plain question"), required=False)
 
     def clean(self) -> dict[str, Any] | None:
         """Take the PIN; only its hash is kept."""

@@ -1,5 +1,6 @@
 // A protocol's phases: rows that move up and down, and the protocol drawn as it will be walked.
 
+const LEAST = 58; // pixels of a phase
 const place = document.querySelector(".protocol-drawing");
 const rows = document.querySelector("#phases-group tbody");
 if (place) follow();
@@ -51,13 +52,24 @@ function follow() {
     return new Option(words).innerHTML;
   }
 
+  // Give everybody a part of the room by weight, and nobody less than is needed to be read.
+  function share(room, weights) {
+    const small = new Set();
+    for (;;) {
+      const left = room - LEAST * small.size;
+      const sum = weights.reduce((all, weight, index) => (small.has(index) ? all : all + weight), 0) || 1;
+      const widths = weights.map((weight, index) => (small.has(index) ? LEAST : (weight / sum) * left));
+      const more = widths.findIndex((width, index) => width < LEAST && !small.has(index));
+      if (more < 0) return widths;
+      small.add(more);
+    }
+  }
+
   // Widths grow with the square root, so that a block of ten minutes leaves room for one of 13 s.
   function draw() {
     const phases = read(), lengths = phases.map(length);
     const room = Math.max(place.clientWidth - 42, 200);
-    const weights = lengths.map((seconds) => Math.sqrt(seconds ?? 300));
-    const sum = weights.reduce((all, weight) => all + weight, 0) || 1;
-    const widths = weights.map((weight) => Math.max(58, (weight / sum) * room));
+    const widths = share(room, lengths.map((seconds) => Math.sqrt(seconds ?? 300)));
     const width = widths.reduce((all, one) => all + one, 0);
     let left = 0, drawn = "";
     phases.forEach((phase, index) => {

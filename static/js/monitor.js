@@ -2,16 +2,17 @@
 import { _, fill, number } from "garry/language";
 import { connect } from "garry/live";
 import { legend, say } from "garry/marks";
-import { phaseName, reasonName, typeName } from "garry/names";
+import { phaseName, reasonName } from "garry/names";
 import { quality } from "garry/presence";
 import { drawStrip, drawTwenty, drawRing } from "garry/plots";
 import { RobotPanel } from "garry/robot";
+import { drawControls, drawTypes } from "garry/controls";
 
 const root = document.getElementById("monitor");
 const slots = new Map([...document.querySelectorAll("[data-show]")].map((slot) => [slot.dataset.show, slot]));
 const KEPT = 400; // strides on the strip
 const TYPES = ["began", "changed_to", "valence", "next_valence", "types"];
-const GAINS = [0.85, 0.9, 0.95, 1];
+const ENDED = new Set(["finished", "aborted"]);
 
 let session = null; // the last snapshot, brought up to date by events
 let strides = [];
@@ -43,7 +44,7 @@ const live = connect(root.dataset.socket, {
     const note = document.querySelector(".notice.link");
     note.hidden = state === "open";
     note.textContent = state === "lost" ? _("No connection to the server. What the patient walks is stored; this page comes back by itself.") : why;
-    if (state === "closed" && session && ["finished", "aborted"].includes(session.state)) location.assign(root.dataset.details);
+    if (state === "closed" && session && ENDED.has(session.state)) location.assign(root.dataset.details);
   },
 });
 let drawing = 0;
@@ -134,7 +135,8 @@ function draw() {
   drawPhases();
   drawLast();
   drawPresence();
-  drawControls();
+  drawControls(session, show);
+  if (ENDED.has(session.state)) location.assign(root.dataset.details);
   const judged = strides.filter(({ performance }) => performance !== null).slice(-20);
   show("of-twenty", judged.length ? fill(_("%(hits)s of %(count)s hit"), { hits: judged.filter(({ hit }) => hit).length, count: judged.length }) : "");
   drawStrip(document.getElementById("strip"), strides, marks, session.phases);
@@ -205,77 +207,6 @@ function drawPresence() {
 }
 setInterval(drawPresence, 1_000); // what is silent says nothing by itself
 
-const PAUSED = {
-  restart: _("The server was restarted; nothing was lost. Go on when ready."),
-  patient: _("Paused on the patient’s page. Go on when ready."),
-  therapist: _("Paused by the therapist."),
-};
-
-function drawPause() {
-  const note = document.querySelector(".notice.why");
-  note.hidden = session.state !== "paused";
-  note.textContent = PAUSED[session.pause_reason] ?? _("Paused.");
-}
-
-const label = (slug) => typeName(slug, session.types.find((type) => type.slug === slug)?.label);
-
-function press(group, value) {
-  for (const button of document.querySelectorAll(`[data-${group}] button`)) {
-    const on = button.value === String(value);
-    button.classList.toggle("on", on);
-    button.setAttribute("aria-pressed", on);
-  }
-}
-
-function drawTypes() {
-  const later = session.changed_to.map(label).join(", ");
-  show("types", later ? fill(_("%(first)s, changed to %(others)s"), { first: label(session.began), others: later }) : label(session.began));
-  const choice = document.querySelector("[data-type]"), wanted = session.next_valence || session.valence;
-  if (choice.options.length !== session.types.length) choice.replaceChildren(...session.types.map(({ slug }) => new Option(label(slug), slug)));
-  if (choice.dataset.of !== wanted) choice.value = choice.dataset.of = wanted; // not while somebody chooses
-  choice.disabled = session.types.length < 2 || !session.phases.slice(session.phase.index + 1).some(({ feedback }) => feedback);
-  const next = session.phases.slice(session.phase.index + 1).find(({ feedback }) => feedback);
-  show("type-when", choice.disabled ? _("no further feedback phase") : session.next_valence ? fill(_("from %(phase)s on; now %(type)s"), { phase: next ? phaseName(next.name) : _("the next phase"), type: label(session.valence) }) : _("of the next phase: as now"));
-}
-
-const MAIN = {
-  ready: ["start", _("Start"), "play"],
-  running: ["pause", _("Pause"), "pause"],
-  paused: ["resume", _("Go on"), "play"],
-};
-
-function drawControls() {
-  drawPause();
-  drawTypes();
-  press("words", session.words_shown ? 1 : 0);
-  press("chart", session.chart);
-  show("goal", session.goal === null ? "–" : number(session.goal, 2));
-  show("threshold", percent(session.activation_threshold));
-  for (const level of document.querySelectorAll("[data-levels] button")) {
-    const on = Number(level.value) === session.robot_intensity;
-    level.classList.toggle("on", on);
-    level.setAttribute("aria-pressed", on);
-  }
-  const gains = document.querySelector("[data-gains]");
-  const wanted = [...new Set([...GAINS, session.gain])].sort((a, b) => a - b);
-  if (gains.dataset.of !== wanted.join()) {
-    gains.dataset.of = wanted.join();
-    gains.replaceChildren(...wanted.map((gain) => Object.assign(document.createElement("button"), { textContent: number(gain, 2), value: gain })));
-  }
-  for (const button of gains.children) button.classList.toggle("on", Number(button.value) === session.gain);
-  const next = session.phases[session.phase.index + 1];
-  show("next-phase", next ? fill(_("Go to %(phase)s"), { phase: phaseName(next.name) }) : _("No further phase"));
-  document.querySelector("[data-next-phase]").disabled = !next;
-  const main = document.querySelector("[data-main]"), [kind, words, icon] = MAIN[session.state] ?? [];
-  main.disabled = !kind;
-  if (main.value !== (kind ?? "")) {
-    main.value = kind ?? "";
-    main.innerHTML = kind ? `<svg class="ic" aria-hidden="true"><use href="${document.body.dataset.icons}#${icon}"></use></svg><span>${words}</span>` : _("Ended");
-  }
-  document.querySelector("[data-end]").disabled = !kind;
-  if (!kind) location.assign(root.dataset.details);
-}
-
 function tell(words) {
   const note = document.querySelector(".said");
   note.textContent = words;
@@ -327,7 +258,7 @@ document.addEventListener("click", (event) => {
 
 document.querySelector("[data-type]").addEventListener("change", ({ target }) => {
   target.dataset.of = ""; // what was refused goes back to what holds
-  if (session) change("valence", target.value).finally(drawTypes);
+  if (session) change("valence", target.value).finally(() => drawTypes(session, show));
 });
 
 document.getElementById("exertion").addEventListener("close", ({ target }) => {

@@ -49,13 +49,25 @@ function drawPhases(marks) {
   }
 }
 
+// What was changed after one stride stands in one label.
+function together() {
+  const groups = new Map();
+  for (const { after, kind, words } of changes) {
+    const group = groups.get(after) ?? { after, isGoal: false, words: [] };
+    group.isGoal ||= kind === "goal";
+    group.words.push(words);
+    groups.set(after, group);
+  }
+  return [...groups.values()].map((group) => ({ ...group, words: group.words.join(" · ") }));
+}
+
 function drawChanges(marks) {
   const { box, unit: pixel } = marks;
   let free = box.left; // labels never run into each other
-  for (const change of changes) {
+  for (const change of together()) {
     const x = marks.x(change.after + 0.5);
     if (x < box.left || x > box.left + box.width) continue;
-    const isGoal = change.kind === "goal";
+    const { isGoal } = change;
     const paint = color(isGoal ? "c-goal" : "c-third");
     marks.line(x, box.top - 8 * pixel, x, box.top + box.height, paint, isGoal ? 2 : 1.5, isGoal ? [] : [5, 4]);
     const wide = marks.widthOf(change.words, 13);

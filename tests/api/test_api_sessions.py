@@ -252,6 +252,14 @@ def test_a_session_is_started_steered_paused_and_finished(world, pt, rosa):
     assert (status, "up to 15" in problem["fields"]["value"]) == (409, True)
     assert pt.post(path, kind="goal")[0] == 409
     assert pt.post(path, kind="dance")[0] == 422
+    assert pt.post(path, kind="chart_style", value="line")[0] == 200
+    assert pt.post(path, kind="words_shown", value=0)[0] == 200
+    status, problem = pt.post(path, kind="valence", value="negative")
+    assert (status, "no phase with feedback follows" in problem["message"]) == (409, True)
+    status, problem = pt.post(path, kind="valence", value=2)
+    assert (status, "can be changed to one of" in problem["fields"]["value"]) == (409, True)
+    status, problem = pt.post(path, kind="words", value="Go!")
+    assert (status, "in the admin" in problem["fields"]["kind"]) == (422, True)
     status, ended = pt.post(path, kind="finish")
     assert (status, ended["state"]) == (200, "finished")
     session = TrainingSession.everywhere.get(pk=told["id"])

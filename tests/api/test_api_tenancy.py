@@ -17,8 +17,10 @@ from django.db.models import Model
 from django.test import Client
 
 from rehab.boards.models import Leaderboard
+from rehab.people import api as people_api
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
+from rehab.sessions import api as sessions_api
 from rehab.sessions.models import TrainingSession
 from tests.programs import ROOT, program_of
 from tests.world import World, build_world, mark, scoped_models
@@ -54,8 +56,8 @@ def calls() -> Iterator[str]:
             yield f"{method.upper()} {path.removeprefix(ROOT)}"
 
 
-def test_no_program_reads_or_changes_anything_of_another_clinic(capsys):
-    worlds = build_world("amber"), build_world("birch")
+def find_leaks(worlds: tuple[World, World]) -> tuple[list[str], Counter[str]]:
+    """Make every call as every program. Give what they should not have got, and counts."""
     before = [snapshot(world) for world in worlds]
     counts: Counter[str] = Counter()
     leaks: list[str] = []
@@ -87,11 +89,54 @@ def test_no_program_reads_or_changes_anything_of_another_clinic(capsys):
                     and not (call in OWN_NAMES and model is Patient)
                 ]
                 Patient.everywhere.filter(clinic=mine.clinic).exclude(pk=mine.patient.pk).delete()
+    for world, then in zip(worlds, before, strict=True):
+        if snapshot(world) != then:
+            leaks.append(f"rows of {world.name} were changed")
+    return leaks, counts
+
+
+def test_no_program_reads_or_changes_anything_of_another_clinic(capsys):
+    worlds = build_world("amber"), build_world("birch")
+    leaks, counts = find_leaks(worlds)
     assert leaks == []
-    assert [snapshot(world) for world in worlds] == before
     assert set(BODIES) <= set(counts)
     with capsys.disabled():
         print(f"\nAPI: {len(counts)} calls × {2 * len(worlds[0].people)} programs")
+
+
+# --- the matrix can fail: seeded leaks ------------------------------------------------------------
+
+
+def test_calls_that_ignore_whose_rows_they_read_and_change_are_caught(monkeypatch):
+    monkeypatch.setattr(people_api, "patients_of", lambda user: Patient.everywhere.order_by("pk"))
+    leaks, _ = find_leaks((build_world("amber"), build_world("birch")))
+    for leak in (
+        "pt of birch: GET /patients 200 shows Patient",
+        "pt of birch: GET /patients/{patient_id} 200 opens",
+        "pt of birch: PATCH /patients/{patient_id} 200 opens",
+        "rows of amber were changed",
+    ):
+        assert leak in leaks
+
+
+def test_sessions_and_boards_of_anybody_are_caught(monkeypatch):
+    def find(user: User, session_id: int) -> TrainingSession:
+        them = TrainingSession.everywhere.get(pk=session_id).clinic
+        return find_session(User.everywhere.get(clinic=them, role=Role.LEAD), session_id)
+
+    find_session = sessions_api.find_session
+    monkeypatch.setattr(sessions_api, "find_session", find)
+    monkeypatch.setattr(
+        Leaderboard.objects, "visible_to", lambda actor: Leaderboard.everywhere.all(), raising=False
+    )
+    leaks, _ = find_leaks((build_world("amber"), build_world("birch")))
+    for leak in (
+        "researcher of birch: GET /sessions/{session_id} 200 opens",
+        "pt of amber: GET /sessions/{session_id}/steps 200 opens",
+        "pt of birch: GET /boards 200 shows Leaderboard",
+        "pt of birch: GET /boards/{board_id}/rows 200 opens",
+    ):
+        assert leak in leaks
 
 
 def snapshot(world: World) -> list[Any]:

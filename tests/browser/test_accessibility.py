@@ -40,7 +40,8 @@ for number, valence in enumerate(["positive", "negative", "explicit"], start=1):
 blocks = Protocol.everywhere.create(clinic=first_clinic(), name="Blocks")
 for position, kind in enumerate(["baseline", "training", "washout"], 1):
     blocks.phases.create(position=position, kind=kind, name=kind, feedback=kind == "training")
-print(Station.everywhere.first().pk, blocks.pk, rosa.pk, *rosa.sessions.order_by("pk").values_list("pk", flat=True))
+sessions = rosa.sessions.order_by("pk").values_list("pk", flat=True)
+print(Station.everywhere.first().pk, blocks.pk, rosa.pk, *sessions)
 """
 PT_PAGES = [
     "/start/",
@@ -148,7 +149,8 @@ def test_the_admin(context: BrowserContext, places: dict[str, str], path: str) -
     assert "/sign-in/" not in page.url
     check(page)
     page.evaluate("localStorage.setItem('theme', 'dark')")
-    page.set_viewport_size(dict(zip(("width", "height"), SIZES["phone"], strict=True)))
+    width, height = SIZES["phone"]
+    page.set_viewport_size({"width": width, "height": height})
     page.reload(wait_until="networkidle")
     assert page.evaluate("document.documentElement.dataset.pt") == "dark"
     check(page)

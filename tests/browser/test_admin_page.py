@@ -1,4 +1,4 @@
-"""What the admin's scripts do: phases move and are drawn, the week is drawn, dark and light follow."""
+"""What the admin's scripts do: phases move and are drawn, so is the week, in light and dark."""
 
 from __future__ import annotations
 

@@ -8,11 +8,12 @@ import json
 import secrets
 import tracemalloc
 from datetime import UTC, datetime
+from typing import Any
 
 import pytest
 from asgiref.sync import sync_to_async
 from django.core.management import CommandError, call_command
-from django.test import Client
+from django.test import AsyncClient, Client
 from django.urls import reverse
 from hypothesis import given
 from hypothesis import strategies as st
@@ -224,7 +225,18 @@ async def test_served_by_asgi_it_comes_part_by_part():
     assert first
     assert len(made) < 200
     assert response["Content-Disposition"] == 'attachment; filename="x.zip"'
-    await sync_to_async(response.close)()
+
+
+@pytest.mark.django_db(transaction=True)
+async def test_by_asgi_a_patients_file_is_as_whole_as_any(transactional_db):
+    world = await sync_to_async(build_world)("birch")
+    client = AsyncClient()
+    await client.aforce_login(world.people[Role.LEAD])
+    url = reverse("patient-data", kwargs={"patient_id": world.patient.pk})
+    response: Any = await client.get(url)
+    files = open_archive(b"".join([part async for part in response]))
+    assert len(rows_of(files["steps.csv"])) == 10
+    assert world.patient.nickname in files["patient.json"]
 
 
 async def _few(response, count):

@@ -175,7 +175,8 @@ def test_care_goes_on_when_the_log_cannot_be_written_but_nothing_is_given_out(wo
     def fail(*args, **kwargs):
         raise DatabaseError("the disk is full")
 
-    monkeypatch.setattr(AuditEntry.everywhere, "create", fail)
+    monkeypatch.setattr(AuditEntry.everywhere, "bulk_create", fail)
+    monkeypatch.setattr(AuditEntry, "save", fail)
     client = client_of(world, raise_request_exception=False)
     key = {"patient_id": world.patient.pk}
     assert client.get(reverse("patient", kwargs=key)).status_code == 200

@@ -47,7 +47,7 @@ def test_a_therapist_reads_date_start_duration_score_type_and_goal(world):
     assert cells["date"] == "Nov. 21, 2026"
     assert cells["start_time"] == "10:00:00"
     assert cells["duration"] == "0:10"
-    assert cells["valence"] == "Positive"
+    assert cells["types"] == "Positive"
     assert cells["goal_value"] == "1.00 m"
     assert cells["score"] == "6"
     assert cells["hit_rate"] == "67%"

@@ -10,14 +10,16 @@ from typing import Any
 
 import pytest
 from django.contrib import admin
+from django.contrib.admin.views.autocomplete import AutocompleteJsonView
 from django.contrib.contenttypes.models import ContentType
-from django.db.models import Model
+from django.db.models import Model, Q
 from django.http import HttpRequest, HttpResponse
 from django.test import Client, RequestFactory
 from django.urls import URLPattern, URLResolver, get_resolver, path, reverse
 
 from garry_site import urls as site_urls
 from rehab.boards import rows, showing
+from rehab.boards.admin import LeaderboardAdmin
 from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.boards.standings import Stored
 from rehab.people import api as people_api
@@ -333,10 +335,13 @@ def test_every_admin_page_is_scoped():
             assert issubclass(inline, ScopedOptions), inline
 
 
-def test_every_form_offers_rows_of_the_own_clinic_only(worlds):
-    """The pickers of every admin form, in pages and inlines, for everyone who may open one."""
-    checked = 0
-    for actor in all_actors(*worlds):
+def find_offers(worlds: tuple[World, ...], actors: list[Actor]) -> tuple[list[str], int]:
+    """Look at the pickers of every admin form, in pages and inlines, for everyone who may open one.
+
+    Give the rows of other clinics that they offer, and how many pickers there are.
+    """
+    leaks, checked = [], 0
+    for actor in actors:
         if actor.role not in Role.values:
             continue
         request = RequestFactory().get("/")
@@ -346,19 +351,98 @@ def test_every_form_offers_rows_of_the_own_clinic_only(worlds):
                 continue
             forms = [options.get_form(request)]
             forms += [i.get_formset(request).form for i in options.get_inline_instances(request)]
-            for form in forms:
-                for field in form.base_fields.values():
-                    rows = getattr(field, "queryset", None)
-                    if rows is None:
-                        continue
-                    checked += 1
-                    for world in worlds:
-                        if world.name != actor.clinic and rows.model.__name__ not in HOST_SEES:
-                            assert not rows.filter(pk=world.rows[rows.model].pk).exists()
+            for name, field in [pair for form in forms for pair in form.base_fields.items()]:
+                rows = getattr(field, "queryset", None)
+                if rows is None:
+                    continue
+                checked += 1
+                kind, of = rows.model, options.model.__name__
+                leaks += [
+                    f"{actor.label}: {of}.{name} offers {kind.__name__} of {world.name}"
+                    for world in worlds
+                    if world.name != actor.clinic
+                    and kind.__name__ not in HOST_SEES
+                    and rows.filter(pk=world.rows[kind].pk).exists()
+                ]
+    return leaks, checked
+
+
+def test_every_form_offers_rows_of_the_own_clinic_only(worlds):
+    leaks, checked = find_offers(worlds, all_actors(*worlds))
+    assert leaks == []
     assert checked
 
 
 # --- the matrix can fail: seeded leaks ------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class NoScope(Scope):
+    """A scope that somebody forgot: rights hold, clinics do not."""
+
+    def of_clinic(self, clinic_id: int) -> Q:
+        return Q()
+
+
+# Models that have pages, and where at least the matrix must find them shown to another clinic.
+SHOWN_UNDER = {
+    "/admin/": {"Patient", "Station", "Device", "Measure", "Protocol", "Gesture", "Leaderboard"}
+    | {"TrainingSession", "ProtocolPhase", "User", "ApiToken"},
+    "/api/v1/": {"Patient", "Station", "Protocol", "Leaderboard"},
+    "/admin/autocomplete/": {"Patient", "User"},
+    "/patients": {"Patient"},
+    "/sessions": {"Patient"},
+}
+
+
+def test_a_forgotten_scope_is_caught_wherever_it_shows(worlds, monkeypatch):
+    """Every model without its scope at once: the matrix says so of admin, API and pages."""
+    for model in scoped_models():
+        old = model.scope
+        monkeypatch.setattr(model, "scope", NoScope(old.clinic, old.station, old.shared, old.host))
+    eyes = [one for one in all_actors(*worlds) if one.label in ("lead of birch", "pt of birch")]
+    leaks, counts = find_leaks(worlds, eyes)
+    for under, models in SHOWN_UNDER.items():
+        found = {
+            leak.partition(" shows ")[2].partition(" ")[0]
+            for leak in leaks
+            if f": {under}" in leak and leak.endswith("of amber")
+        }
+        assert models <= found, (under, sorted(models - found))
+    opened = {leak.split()[3] for leak in leaks if leak.endswith(" opens")}
+    assert len(opened) > 20
+    assert set(counts) == {actor.label for actor in eyes}
+
+
+def test_a_picker_of_every_row_is_caught(worlds, monkeypatch):
+    def offer_all(self: Any, db: Any, db_field: Any, request: HttpRequest) -> Any:
+        return db_field.remote_field.model.everywhere.all()
+
+    monkeypatch.setattr(ScopedOptions, "get_field_queryset", offer_all)
+    actors = all_actors(*worlds)
+    assert (
+        "pt of amber: Leaderboard.group offers Patient of birch" in find_offers(worlds, actors)[0]
+    )
+    leaks, _ = find_leaks(worlds, actors, under="/admin/rehab/leaderboard/add/")
+    assert "pt of amber: /admin/rehab/leaderboard/add/ shows Patient of birch" in leaks
+
+
+def test_a_chooser_of_whose_eyes_a_board_is_seen_with_is_caught(worlds, monkeypatch):
+    everybody = Patient.everywhere.annotate(alone=Q(boards="own")).order_by("pk")
+    monkeypatch.setattr(LeaderboardAdmin, "_walkers", lambda self, request: everybody)
+    leaks, _ = find_leaks(worlds, all_actors(*worlds), under="/admin/rehab/leaderboard/")
+    assert "pt of amber: /admin/rehab/leaderboard/add/ shows Patient of birch" in leaks
+
+
+def test_an_autocomplete_of_every_row_is_caught(worlds, monkeypatch):
+    monkeypatch.setattr(
+        AutocompleteJsonView, "get_queryset", lambda self: Patient.everywhere.order_by("pk")
+    )
+    leaks, _ = find_leaks(worlds, all_actors(*worlds), under="/admin/autocomplete/")
+    assert any(
+        leak.startswith("pt of birch: ") and leak.endswith("shows Patient of amber")
+        for leak in leaks
+    )
 
 
 def test_an_unscoped_admin_queryset_is_caught(worlds, monkeypatch):

@@ -52,7 +52,6 @@ PAGES = {
     "screen": "/patients/2/screen/",
     "pairing": "/tablet/",
     "pair": "/tablets/pair/",
-    "station": "/admin/rehab/station/1/change/",
     "set-up": "/patients/2/new/",
     "set-up-preset": "/patients/2/new/?preset=1",
     "correct": "/sessions/12/correct/",

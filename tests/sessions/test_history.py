@@ -420,7 +420,7 @@ def test_a_change_of_type_and_gain_is_told_wherever_the_session_is(client, patie
     told = words(page)
     for line in (
         "Positive, changed to Negative",
-        "Feedback type of the next phase: Negative after stride 2",
+        "Next feedback type: Negative after stride 2",
         "Words: off after stride 2",
         "Chart: line after stride 2",
         "Paused by a restart of the server after stride 2",

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import socket
+
 import pytest
 from django.test import Client
 from django.urls import reverse
 
 from rehab.feedback.models import FeedbackType
 from rehab.people.roles import Role
+from rehab.sessions.live import owners
 from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.models import SessionEvent
 from rehab.sessions.services import create_session
@@ -113,3 +117,13 @@ def test_another_clinic_keeps_its_words(world, pt):
     theirs = begin(build_world("birch"))
     pt.post(f"{ADD}?slug=positive", form())
     assert words_now(theirs) == "Strong push!"
+
+
+def test_a_session_of_another_process_keeps_its_words_and_the_admin_says_so(world, pt):
+    session = begin(world)
+    other = f"{socket.gethostname()}|{os.getppid()}|{owners._started(os.getppid())}"
+    type(session).everywhere.filter(pk=session.pk).update(owner=other)
+    page = pt.post(f"{ADD}?slug=positive", form(), follow=True).content.decode()
+    assert "keeps its words" in page
+    assert f"run by another process ({os.getppid()})" in page
+    assert FeedbackType.everywhere.filter(slug="positive").exists()

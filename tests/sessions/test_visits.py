@@ -48,6 +48,7 @@ def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):
     walk(cleo, "positive", [HIT] * 130)
     walk(dora, "positive", [HIT] * 3, end=None)  # came without a plan, and walks
     walk(emil, "positive", [HIT], days_ago=1)
+    walk(emil, "positive", [HIT], simulated=True)  # nobody was here
     listed = read_today(world.people[Role.PT], NOW + timedelta(hours=1))
     assert [(row.patient.nickname, row.at, row.progress) for row in listed] == [
         ("Dora", time(10, 0), Progress.WALKING),

@@ -15,7 +15,7 @@ from django.core.management import BaseCommand, CommandError
 
 from rehab.people.first_start import first_clinic, prepare_database
 from rehab.people.models import Clinic, Patient
-from rehab.sessions.events import describe_cue
+from rehab.sessions.facts import describe_cue
 from rehab.sessions.headless import Pace, report, robot_steps, run_session, simulate_strides
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import create_session

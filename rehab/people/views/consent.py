@@ -89,8 +89,8 @@ def list_choices(patient: Patient) -> list[Choice]:
         row = held.get(purpose)
         if purpose == Purpose.BOARDS:
             now = patient.boards if row else Boards.OWN
-            levels = [level for level in Boards if level != Boards.ACROSS or level == now]
-            levels = list(Boards) if patient.clinic.boards_across else levels
+            across = patient.clinic.boards_across or now == Boards.ACROSS
+            levels = [level for level in Boards if across or level != Boards.ACROSS]
             options = [(level.value, str(LEVELS[level]), level == now) for level in levels]
         else:
             options = [("yes", _("Yes"), row is not None), ("no", _("No"), row is None)]

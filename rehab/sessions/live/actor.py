@@ -8,7 +8,7 @@ from datetime import datetime
 from typing import Any, NamedTuple
 
 from rehab.people.models import User
-from rehab.sessions.events import MARKED_CHANGES, change_mark
+from rehab.sessions.facts import MARKED_CHANGES, change_mark
 from rehab.sessions.models import (
     Remark,
     RobotEntry,

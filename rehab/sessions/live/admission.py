@@ -15,10 +15,8 @@ from django.http.request import split_domain_port, validate_host
 from django.utils import timezone
 from django.utils.module_loading import import_string
 
-from rehab.people import audit, browser_sessions
-from rehab.people.audit import Act
+from rehab.people import browser_sessions
 from rehab.people.entry import holds
-from rehab.people.lockout import find_address
 from rehab.people.models import User
 from rehab.sessions.models import TrainingSession
 from rehab.stations import tablets
@@ -126,26 +124,6 @@ def keep_signed_in(scopes: Sequence[Mapping[str, Any]]) -> None:
 def may_open(actor: Actor, session_id: int) -> bool:
     """Say whether the session is one that this actor sees."""
     return TrainingSession.objects.visible_to(actor).filter(pk=session_id).exists()
-
-
-@database_sync_to_async
-def note(act: Act, actor: Actor, session_id: int, scope: Mapping[str, Any]) -> None:
-    """Tell the audit log what was seen or ordered; what is only seen once in some minutes."""
-    now = timezone.now()
-    key = (type(actor).__name__, getattr(actor, "pk", None), scope["path"])
-    if act is Act.VIEW and not audit.recent.is_new(key, now):
-        return
-    session = TrainingSession.everywhere.filter(pk=session_id)
-    audit.try_to_note(
-        act,
-        actor,
-        patient=session.values_list("patient_id", flat=True).first(),
-        about=scope["path"],
-        address=find_address(
-            headers_of(scope).get("x-forwarded-for", ""), (scope.get("client") or [""])[0]
-        ),
-        now=now,
-    )
 
 
 @database_sync_to_async

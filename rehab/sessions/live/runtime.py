@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from typing import Any
 
 from asgiref.sync import sync_to_async
@@ -25,6 +25,7 @@ from rehab.sessions.live import owners, sources
 from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.live.admission import find_unwelcome, keep_signed_in
 from rehab.sessions.live.children import Children
+from rehab.sessions.live.notes import Notes
 from rehab.sessions.live.session import RECENT, LiveSession
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.models import RobotEntry, SessionEvent, Step, TrainingSession
@@ -52,21 +53,15 @@ class Runtime:
         self.writer = Writer(self._call)
         # Told when a session opens at their station.
         self.waiting: dict[int, set[Callable[[int], None]]] = defaultdict(set)
+        self.notes = Notes()
         self.sockets: set[Any] = set()  # whoever must be closed when the server stops
         self.children = Children(settings.DATA_DIR / "children.json")
         self.address = sources.local_address(settings.HOST, settings.PORT)  # where children dial in
         self._opening: dict[int, asyncio.Task[LiveSession]] = {}
-        self._beside: set[asyncio.Task[None]] = set()
         self._ticker = self.loop.create_task(self._tick())
 
     def _call(self, function: Callable[[], None]) -> None:
         self.loop.call_soon_threadsafe(function)
-
-    def do_beside(self, work: Coroutine[Any, Any, None]) -> None:
-        """Do what nobody waits for, and what must not end with the socket that asked for it."""
-        task = self.loop.create_task(work, context=contextvars.Context())
-        self._beside.add(task)
-        task.add_done_callback(self._beside.discard)
 
     async def session(self, session_id: int) -> LiveSession:
         """Give a live session, rebuilt from its log where it is not in memory.
@@ -208,7 +203,7 @@ class Runtime:
         with contextlib.suppress(asyncio.CancelledError):
             await self._ticker
         closing = [socket.shut(4012) for socket in list(self.sockets)]
-        await asyncio.gather(*closing, *self._beside, return_exceptions=True)
+        await asyncio.gather(*closing, self.notes.settled(), return_exceptions=True)
         await self.loop.run_in_executor(None, self.writer.close)
         await asyncio.sleep(0)  # the writer's last reports
         held = [(live.id, live.actor.session.epoch) for live in self.sessions.values()]

@@ -12,7 +12,6 @@ from rehab.people.models import User
 from rehab.sessions.events import (
     Audience,
     LiveEvent,
-    Message,
     Told,
     change_event,
     phase_event,
@@ -22,8 +21,8 @@ from rehab.sessions.events import (
     robot_stopped_event,
     snapshot,
     step_event,
-    type_mark,
 )
+from rehab.sessions.facts import Message, type_mark
 from rehab.sessions.live.actor import Row, SessionActor
 from rehab.sessions.live.hub import Channel, Viewer
 from rehab.sessions.live.lateness import Lateness

@@ -82,7 +82,7 @@ async def test_a_log_that_cannot_be_written_stops_no_step_and_no_robot(place, be
     def fail(*args, **kwargs):
         raise DatabaseError("the disk is full")
 
-    monkeypatch.setattr(AuditEntry.everywhere, "create", fail)
+    monkeypatch.setattr(AuditEntry.everywhere, "bulk_create", fail)
     monkeypatch.setattr(audit.log, "exception", lambda *args: None)
     session = await begun(place)
     robot, monitor, source = place.robot(), place.monitor(session), place.source()

@@ -14,6 +14,7 @@ from django.test import Client
 from rehab import routing
 from rehab.people.models import User
 from rehab.people.roles import Role
+from rehab.sessions.live.consumers import device as devices
 from rehab.sessions.live.consumers import screens
 from rehab.sessions.live.consumers.robot import RobotConsumer
 from rehab.sessions.live.consumers.screens import MonitorConsumer, PatientConsumer
@@ -141,8 +142,10 @@ async def find_leaks(everyone: Everyone) -> tuple[list[str], Counter[str]]:
     return leaks, opened
 
 
-async def test_no_socket_lets_others_in(everyone):
+async def test_no_socket_lets_others_in(everyone, capsys):
     leaks, opened = await find_leaks(everyone)
+    with capsys.disabled():
+        print(f"\nsockets: {len(opened)} × {len(everyone.actors)} actors × 2 clinics")
     assert leaks == []
     # Each clinic's own people and devices came in: the matrix is not empty.
     assert dict(opened) == {
@@ -161,6 +164,29 @@ async def test_a_leak_is_caught(everyone, monkeypatch):
     assert f"pt of amber: {route} of birch, None" in leaks
     assert f"tablet of birch: {route} of amber, None" in leaks
     assert not any("researcher" in leak or "stranger" in leak for leak in leaks)
+
+
+async def test_a_device_at_another_clinics_station_is_caught(everyone, monkeypatch):
+    async def open_session_of(device: Device, session_id: int | None) -> int | None:
+        return session_id or everyone.sessions["amber"].pk
+
+    monkeypatch.setattr(devices, "open_session_of", open_session_of)
+    leaks, _ = await find_leaks(everyone)
+    assert "device of birch: ws/source/ of amber, None" in leaks
+    assert "robot of birch: ws/robot/ of amber, None" in leaks
+    assert not any("researcher" in leak or "pt" in leak.split()[0] for leak in leaks)
+
+
+async def test_words_of_another_clinic_are_caught(everyone, monkeypatch):
+    """Who may come in hears a name of another clinic beside the own session."""
+    told = screens.ScreenConsumer.say
+
+    async def say(self: Any, message: Any) -> None:
+        await told(self, message | {"nickname": everyone.worlds[0].patient.nickname})
+
+    monkeypatch.setattr(screens.ScreenConsumer, "say", say)
+    leaks, _ = await find_leaks(everyone)
+    assert "pt of birch: ws/session/<int:session_id>/monitor/ shows amber" in leaks
 
 
 async def test_a_new_socket_must_be_given_its_place(everyone, monkeypatch):

@@ -11,7 +11,8 @@ from typing import Any
 from channels.exceptions import StopConsumer
 from channels.generic.websocket import AsyncWebsocketConsumer
 
-from rehab.sessions.events import Message, to_text
+from rehab.sessions.events import to_text
+from rehab.sessions.facts import Message
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.admission import Actor
 from rehab.sessions.live.messages import BadFrame, read_object

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from django.utils import timezone
 
-from rehab.sessions.events import Message
+from rehab.sessions.facts import Message
 from rehab.sessions.live.admission import (
     find_actor,
     find_device_by,

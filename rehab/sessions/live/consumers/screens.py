@@ -12,8 +12,9 @@ from django.utils import timezone
 from rehab.people.audit import Act
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.sessions.events import Audience, Message, history_entry, to_text
-from rehab.sessions.live.admission import Actor, find_actor, may_open, note
+from rehab.sessions.events import Audience, history_entry, to_text
+from rehab.sessions.facts import Message
+from rehab.sessions.live.admission import Actor, find_actor, may_open
 from rehab.sessions.live.consumers.base import Closing, Socket
 from rehab.sessions.live.hub import Lagged, Unseen, Viewer
 from rehab.sessions.live.messages import (
@@ -62,7 +63,7 @@ class ScreenConsumer(Socket):
             live.tablets += 1
             live.tablet_heard_at = timezone.now()
         self.start(self._pump(live, _after(self.scope["query_string"])))
-        self.runtime.do_beside(note(Act.VIEW, self.actor, session_id, self.scope))
+        self.runtime.notes.add(Act.VIEW, self.actor, session_id, self.scope)
 
     @classmethod
     def is_welcome(cls, actor: Actor) -> bool:
@@ -180,7 +181,7 @@ class ScreenConsumer(Socket):
             self.start(_until_stored([s.arm_robot(by, timezone.now()) for s in sessions]))
         if by is not None or order == "stop":  # beside the socket: no robot waits for the log
             act = Act(f"robot_{order}")
-            self.runtime.do_beside(note(act, self.actor, live.id, self.scope))
+            self.runtime.notes.add(act, self.actor, live.id, self.scope)
 
     async def _refuse(self, mark: str, code: str, message: str) -> None:
         await self.say({"type": "error", "code": code, "id": mark, "message": message})

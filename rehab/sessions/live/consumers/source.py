@@ -6,7 +6,8 @@ import time
 
 from django.utils import timezone
 
-from rehab.sessions.events import Message, source_goal_event
+from rehab.sessions.events import source_goal_event
+from rehab.sessions.facts import Message
 from rehab.sessions.live.consumers.base import Closing
 from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.lateness import Lateness

@@ -1,0 +1,73 @@
+"""What sockets tell the audit log. Whatever waits is written together: thousands of pages that come
+back after a restart cost the disk a few commits, and no step waits for them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from channels.db import database_sync_to_async
+from django.utils import timezone
+
+from rehab.people import audit
+from rehab.people.audit import Act
+from rehab.people.lockout import find_address
+from rehab.sessions.live.admission import Actor, headers_of
+from rehab.sessions.models import TrainingSession
+
+
+class Note(NamedTuple):
+    """Something to be noted, with all but whose session it is."""
+
+    session_id: int
+    act: Act
+    actor: Actor
+    facts: dict[str, Any]
+
+
+class Notes:
+    """Keeps what is to be noted until it is written, beside everything else."""
+
+    def __init__(self) -> None:
+        self._waiting: list[Note] = []
+        self._writing: asyncio.Task[None] | None = None
+
+    def add(self, act: Act, actor: Actor, session_id: int, scope: Mapping[str, Any]) -> None:
+        """Note what was seen or ordered by a socket; what is only seen once in some minutes."""
+        now, path = timezone.now(), scope["path"]
+        key = (type(actor).__name__, getattr(actor, "pk", None), path)
+        if act is Act.VIEW and not audit.recent.is_new(key, now):
+            return
+        forwarded = headers_of(scope).get("x-forwarded-for", "")
+        address = find_address(forwarded, (scope.get("client") or [""])[0])
+        facts = {"about": path, "address": address, "now": now}
+        self._waiting.append(Note(session_id, act, actor, facts))
+        if self._writing is None:
+            loop = asyncio.get_running_loop()
+            self._writing = loop.create_task(self._write(), context=contextvars.Context())
+
+    async def _write(self) -> None:
+        while self._waiting:
+            notes, self._waiting = self._waiting, []
+            await database_sync_to_async(_store)(notes)
+        self._writing = None
+
+    async def settled(self) -> None:
+        """Wait until all is written."""
+        if self._writing is not None:
+            await self._writing
+
+
+def _store(notes: list[Note]) -> None:
+    sessions = TrainingSession.everywhere.filter(pk__in={note.session_id for note in notes})
+    patients = dict(sessions.values_list("pk", "patient_id"))
+    audit.try_to_keep(
+        [
+            audit.compose(note.act, note.actor, patient=patients[note.session_id], **note.facts)
+            for note in notes
+            if note.session_id in patients
+        ]
+    )

@@ -1,0 +1,32 @@
+"""Whatever is sent to a page: no failure, nobody else's rows, nothing of the inside, and soon."""
+
+from __future__ import annotations
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+
+from rehab.people.roles import Role
+from rehab.sessions.models import Protocol
+from tests.form_noise import run_noise
+from tests.world import build_world
+
+REQUESTS = 230  # tests/bench has 10,000
+
+
+@pytest.mark.django_db
+def test_noise_to_every_form_fails_nowhere_and_leaks_nothing(capsys):
+    told = run_noise(REQUESTS)
+    with capsys.disabled():
+        print(f"\nForm noise: {told}")
+
+
+@pytest.mark.django_db
+@pytest.mark.parametrize("page", ["change", "delete"])
+def test_a_form_that_names_no_field_to_find_its_row_by(page):
+    world = build_world("amber")
+    browser = Client()
+    browser.force_login(world.people[Role.LEAD])
+    row = world.rows[Protocol]
+    address = reverse(f"admin:rehab_protocol_{page}", kwargs={"object_id": row.pk})
+    assert browser.get(address, {"_to_field": ""}).status_code == 200
