@@ -20,7 +20,7 @@ from rehab.people.aliases import ANIMALS, MANNERS, say_alias, words
 
 ROOT = Path(__file__).resolve().parent.parent
 CATALOGS = sorted((ROOT / "locale").rglob("*.po"))
-PLACE = re.compile(r"%\(\w+\)[sdi]|%%|</?\w+>|https?://\S+")
+PLACE = re.compile(r"\{\w+\}|%\(\w+\)[sdi]|%%|</?\w+>|https?://\S+")
 # The same in English and in another language.
 ALIKE = {"Borg", "Error", "GARRY", "Total", "Robot", "Sensor", "Normal", "token", "No", "Control"}
 

@@ -36,7 +36,9 @@ class FeedbackType(ClinicRow):
 
     scope = Scope(clinic="clinic")
 
-    clinic = models.ForeignKey(Clinic, on_delete=models.CASCADE, related_name="feedback_types")
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.CASCADE, related_name="feedback_types", verbose_name=_("clinic")
+    )
     slug = models.CharField(
         _("feedback type"),
         max_length=16,
@@ -99,12 +101,18 @@ class FeedbackBand(ScopedModel):
 
     scope = Scope(clinic="feedback_type__clinic")
 
-    feedback_type = models.ForeignKey(FeedbackType, on_delete=models.CASCADE, related_name="bands")
+    feedback_type = models.ForeignKey(
+        FeedbackType,
+        on_delete=models.CASCADE,
+        related_name="bands",
+        verbose_name=_("feedback type"),
+    )
     from_percent = models.PositiveSmallIntegerField(
         _("from, % of the goal"), validators=[MaxValueValidator(1000)]
     )
-    words = models.JSONField(default=dict, blank=True)
+    words = models.JSONField(_("words"), default=dict, blank=True)
     confetti = models.CharField(
+        _("confetti"),
         max_length=8,
         choices=[
             (Confetti.NONE.value, _("none")),

@@ -21,6 +21,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people import factors, lockout
 from rehab.people.access import person
 from rehab.people.admin_base import ScopedAdmin, ScopedOptions, TokenAdmin, rights
+from rehab.people.aliases import say_alias
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.tokens import ApiToken
@@ -188,14 +189,14 @@ class PatientAdmin(ScopedAdmin):
         "paretic_side",
         "language",
         "boards",
-        "alias",
+        "animal_name",
         "blinded",
         "pseudonym",
         "created_at",
         "ended_at",
         "erased_at",
     )
-    readonly_fields = ("alias", "pseudonym", "created_at", "ended_at", "erased_at")
+    readonly_fields = ("animal_name", "pseudonym", "created_at", "ended_at", "erased_at")
     actions = row_actions = ("draw_aliases",)
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Any]:
@@ -226,11 +227,18 @@ class PatientAdmin(ScopedAdmin):
         zone = ZoneInfo(patient.clinic.time_zone)
         return patient.last_visit and patient.last_visit.astimezone(zone).date()
 
+    @admin.display(description=_("animal name"))
+    def animal_name(self, patient: Patient) -> str:
+        """Say what the patient is called on boards."""
+        return say_alias(patient.alias) if patient.alias else "–"
+
     @admin.action(description=_("Draw new animal names for boards"), permissions=["change"])
     def draw_aliases(self, request: HttpRequest, patients: QuerySet[Patient]) -> None:
         """Give the chosen patients other names on boards."""
         for patient in patients:
             patient.draw_alias()
             patient.save(update_fields=["alias"])
-        names = ", ".join(f"{patient.nickname}: {patient.alias}" for patient in patients)
+        names = ", ".join(
+            f"{patient.nickname}: {self.animal_name(patient)}" for patient in patients
+        )
         messages.success(request, gettext("New names on boards. %(names)s") % {"names": names})

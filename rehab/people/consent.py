@@ -58,11 +58,15 @@ class ConsentText(ScopedModel):
 
     scope = Scope(clinic="clinic")
 
-    clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="consent_texts")
-    version = models.PositiveSmallIntegerField()
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.PROTECT, related_name="consent_texts", verbose_name=_("clinic")
+    )
+    version = models.PositiveSmallIntegerField(_("version"))
     text = models.TextField(_("words"), max_length=10_000)
-    written_by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
-    written_at = models.DateTimeField(default=timezone.now)
+    written_by = models.ForeignKey(
+        User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("written by")
+    )
+    written_at = models.DateTimeField(_("written at"), default=timezone.now)
 
     class Meta(ScopedModel.Meta):
         ordering: ClassVar = ["-version"]
@@ -87,14 +91,22 @@ class Consent(ScopedModel):
 
     scope = Scope(clinic="patient__clinic")
 
-    patient = models.ForeignKey(Patient, on_delete=models.CASCADE, related_name="consents")
+    patient = models.ForeignKey(
+        Patient, on_delete=models.CASCADE, related_name="consents", verbose_name=_("patient")
+    )
     purpose = models.CharField(_("to what"), max_length=8, choices=Purpose.choices)
     # None: agreed before GARRY kept the words.
-    text = models.ForeignKey(ConsentText, on_delete=models.PROTECT, related_name="+", null=True)
-    given_at = models.DateTimeField()
-    recorded_by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
-    withdrawn_at = models.DateTimeField(null=True)
-    withdrawn_by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
+    text = models.ForeignKey(
+        ConsentText, on_delete=models.PROTECT, related_name="+", null=True, verbose_name=_("text")
+    )
+    given_at = models.DateTimeField(_("given at"))
+    recorded_by = models.ForeignKey(
+        User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("recorded by")
+    )
+    withdrawn_at = models.DateTimeField(_("withdrawn at"), null=True)
+    withdrawn_by = models.ForeignKey(
+        User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("withdrawn by")
+    )
 
     class Meta(ScopedModel.Meta):
         ordering: ClassVar = ["-given_at", "-pk"]

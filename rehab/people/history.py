@@ -33,6 +33,7 @@ HIDDEN = "•••"
 BEFORE = "row before the save"
 M2M_ACTIONS = {"post_add": 1, "post_remove": 0, "pre_clear": 0}  # place of the keys: old, new
 
+_tracked: list[type[Any]] = []
 _request: ContextVar[HttpRequest | None] = ContextVar("request", default=None)
 
 
@@ -43,6 +44,11 @@ class HistoryScope(Scope):
     def narrow(self, role: Role) -> Q:
         """Leave out what the role could not read where it stands."""
         return Q(noun__in=[noun for noun in RIGHTS if Right.VIEW in rights_of(role, noun)])
+
+
+def nouns() -> list[tuple[str, Any]]:
+    """Give the models whose history is kept, by name, with the words for one of their rows."""
+    return [(model.__name__, model._meta.verbose_name) for model in _tracked]
 
 
 class HistoryEntry(ScopedModel):
@@ -59,16 +65,23 @@ class HistoryEntry(ScopedModel):
         clinic="clinic", host=Q(clinic__isnull=True) | Q(noun__in=["Clinic", "User"])
     )
 
-    clinic = models.ForeignKey(Clinic, on_delete=models.CASCADE, related_name="+", null=True)
-    noun = models.CharField(max_length=32)
-    row = models.BigIntegerField()
-    kind = models.CharField(max_length=8, choices=Kind.choices)
-    values = models.JSONField(default=dict, encoder=DjangoJSONEncoder)
-    by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
-    through = models.CharField(
-        max_length=64, blank=True, help_text=_("The program or tablet that did it.")
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.CASCADE, related_name="+", null=True, verbose_name=_("clinic")
     )
-    at = models.DateTimeField(default=timezone.now, db_index=True)
+    noun = models.CharField(_("what"), max_length=32, choices=nouns)
+    row = models.BigIntegerField(_("number"))
+    kind = models.CharField(_("kind"), max_length=8, choices=Kind.choices)
+    values = models.JSONField(_("values"), default=dict, encoder=DjangoJSONEncoder)
+    by = models.ForeignKey(
+        User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("by")
+    )
+    through = models.CharField(
+        _("by which program or device"),
+        max_length=64,
+        blank=True,
+        help_text=_("The program or tablet that did it."),
+    )
+    at = models.DateTimeField(_("at"), default=timezone.now, db_index=True)
 
     class Meta(ScopedModel.Meta):
         verbose_name = _("change")
@@ -77,7 +90,7 @@ class HistoryEntry(ScopedModel):
         indexes: ClassVar = [models.Index(fields=["noun", "row"], name="history_by_row")]
 
     def __str__(self) -> str:
-        return f"{self.noun} {self.row}: {self.get_kind_display()}"
+        return f"{self.get_noun_display()} {self.row}: {self.get_kind_display()}"
 
 
 @contextmanager
@@ -104,6 +117,7 @@ def doer() -> tuple[User | None, str]:
 
 def track(*tracked: type[Any]) -> None:
     """Keep the history of these models from the start of the process on."""
+    _tracked.extend(tracked)
     for model in tracked:
         pre_save.connect(_look, sender=model)
         post_save.connect(_on_save, sender=model)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+from django.apps import apps
 from django.contrib import admin
 from django.contrib.admin import RelatedOnlyFieldListFilter
 from django.http import HttpRequest
@@ -67,4 +68,6 @@ class HistoryAdmin(LogAdmin):
     @admin.display(description=gettext_lazy("fields"))
     def what(self, entry: HistoryEntry) -> str:
         """Name the fields."""
-        return ", ".join(entry.values)
+        fields = apps.get_model("rehab", entry.noun)._meta.get_fields()
+        names = {field.name: str(getattr(field, "verbose_name", field.name)) for field in fields}
+        return ", ".join(names.get(name, name) for name in entry.values)

@@ -235,7 +235,9 @@ class Patient(ClinicRow):
         max_length=32,
         help_text=_("What the screens say, so that patient and therapist can check."),
     )
-    pseudonym = models.CharField(max_length=16, unique=True, default=new_pseudonym, editable=False)
+    pseudonym = models.CharField(
+        _("pseudonym"), max_length=16, unique=True, default=new_pseudonym, editable=False
+    )
     body_mass_kg = models.FloatField(
         _("body mass (kg)"),
         null=True,

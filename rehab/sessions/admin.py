@@ -33,6 +33,7 @@ from rehab.sessions.models import (
     SessionMetric,
     Step,
     TrainingSession,
+    say_shared,
 )
 from rehab.sessions.presets import Preset
 from rehab.sessions.trend import with_figures
@@ -46,8 +47,13 @@ PARKED = 10_000  # where phases wait while they change places; no protocol has a
 class MeasureAdmin(ScopedAdmin):
     """Measures: the shared ones, and the clinic's own."""
 
-    list_display = ("name", "unit", "higher_is_better", "goal_max", "whose")
+    list_display = ("named", "unit", "higher_is_better", "goal_max", "whose")
     search_fields = ("name", "slug")
+
+    @admin.display(description=_("name"), ordering="name")
+    def named(self, measure: Measure) -> str:
+        """Say its name."""
+        return say_shared(measure)
 
     @admin.display(description=_("belongs to"), ordering="clinic")
     def whose(self, measure: Measure) -> str:
@@ -108,7 +114,7 @@ class ProtocolAdmin(ScopedAdmin):
     """Protocols: the shared ones, and the clinic's own."""
 
     change_form_template = "sessions/admin_protocol.html"
-    list_display = ("name", "whose", "phase_count", "length", "description")
+    list_display = ("named", "whose", "phase_count", "length", "about")
     search_fields = ("name", "description", "phases__name")
     inlines = (PhaseRows,)
     actions = row_actions = for_viewers = ("copy_to_clinic",)
@@ -121,6 +127,16 @@ class ProtocolAdmin(ScopedAdmin):
     def whose(self, protocol: Protocol) -> str:
         """Say whether all clinics have it."""
         return gettext("all clinics") if protocol.clinic_id is None else gettext("this clinic")
+
+    @admin.display(description=_("name"), ordering="name")
+    def named(self, protocol: Protocol) -> str:
+        """Say its name."""
+        return say_shared(protocol)
+
+    @admin.display(description=_("description"))
+    def about(self, protocol: Protocol) -> str:
+        """Say what it is for."""
+        return protocol.description if protocol.clinic_id else gettext(protocol.description)
 
     @admin.display(description=_("phases"))
     def phase_count(self, protocol: Protocol) -> int:

@@ -40,7 +40,10 @@ class SessionCorrection(ScopedModel):
     scope = PatientScope(clinic="session__clinic", patient="session__patient")
 
     session = models.ForeignKey(
-        TrainingSession, on_delete=models.PROTECT, related_name="corrections"
+        TrainingSession,
+        on_delete=models.PROTECT,
+        related_name="corrections",
+        verbose_name=_("session"),
     )
     part = models.CharField(_("what"), max_length=16, choices=Part.choices)
     old = models.TextField(_("before"), blank=True)

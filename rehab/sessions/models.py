@@ -276,7 +276,10 @@ class TrainingSession(ClinicRow):
     ended_at = models.DateTimeField(_("ended at"), null=True, blank=True)
     active_s = models.FloatField(_("walked (s)"), default=0.0, help_text=_("Time without pauses."))
     left_out = models.BooleanField(
-        default=False, editable=False, help_text=_("Corrected: in no figure, board or trend.")
+        _("left out"),
+        default=False,
+        editable=False,
+        help_text=_("Corrected: in no figure, board or trend."),
     )
     # Its row in the original GARRY's database, where it was imported from there: without steps.
     original_id = models.BigIntegerField(_("imported session"), null=True, editable=False)

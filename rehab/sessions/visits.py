@@ -27,8 +27,12 @@ class Visit(ClinicRow):
 
     scope = Scope(clinic="clinic")
 
-    clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="visits")
-    patient = models.ForeignKey(Patient, on_delete=models.CASCADE, related_name="visits")
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.PROTECT, related_name="visits", verbose_name=_("clinic")
+    )
+    patient = models.ForeignKey(
+        Patient, on_delete=models.CASCADE, related_name="visits", verbose_name=_("patient")
+    )
     day = models.DateField(_("day"))
     at = models.TimeField(_("time"), null=True, blank=True)
 

@@ -17,7 +17,9 @@ class Station(ClinicRow):
 
     scope = Scope(clinic="clinic", station="pk")
 
-    clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="stations")
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.PROTECT, related_name="stations", verbose_name=_("clinic")
+    )
     name = models.CharField(_("name"), max_length=64)
     pin_hash = models.CharField(max_length=128, blank=True, editable=False)
 
@@ -46,12 +48,16 @@ class Device(TokenRow):
     actor_kind = "device"
     scope = Scope(clinic="clinic")
 
-    clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="devices")
-    station = models.ForeignKey(Station, on_delete=models.CASCADE, related_name="devices")
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.PROTECT, related_name="devices", verbose_name=_("clinic")
+    )
+    station = models.ForeignKey(
+        Station, on_delete=models.CASCADE, related_name="devices", verbose_name=_("station")
+    )
     kind = models.CharField(_("kind"), max_length=16, choices=Kind.choices)
     name = models.CharField(_("name"), max_length=64)
     builtin = models.BooleanField(
-        default=False, editable=False, help_text=_("The server runs it itself.")
+        _("built in"), default=False, editable=False, help_text=_("The server runs it itself.")
     )
 
     class Meta(TokenRow.Meta):
@@ -85,7 +91,9 @@ class LeaveTries(ScopedModel):
 
     scope = Scope(clinic="station__clinic")
 
-    station = models.ForeignKey(Station, on_delete=models.CASCADE, related_name="+")
+    station = models.ForeignKey(
+        Station, on_delete=models.CASCADE, related_name="+", verbose_name=_("station")
+    )
     who = models.CharField(max_length=64)
     wrong = models.PositiveIntegerField(default=0)
     open_at = models.DateTimeField()

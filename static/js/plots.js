@@ -3,6 +3,7 @@
 
 import { number } from "garry/language";
 import { badge, isRemark, say } from "garry/marks";
+import { phaseName } from "garry/names";
 
 const LOW = 0.5, HIGH = 1.5;
 
@@ -30,7 +31,7 @@ export function drawStrip(svg, strides, marks, phases) {
   const parts = []; // names that somebody typed: set as text, never as markup
   const bounds = shown.flatMap(({ phase }, index) => (index && phase !== undefined && phase !== shown[index - 1].phase ? [index] : []));
   bounds.forEach((index, n) => {
-    const at = x(index) - dx / 2, name = phases[shown[index].phase]?.name ?? "";
+    const at = x(index) - dx / 2, name = phaseName(phases[shown[index].phase]?.name ?? "");
     drawing += `<path class="bound" d="M${at} 4V${height - 8}"/>`;
     const room = (n + 1 < bounds.length ? x(bounds[n + 1]) : width) - at;
     if (room < 8 * name.length) return;
