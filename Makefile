@@ -21,7 +21,7 @@ quiet = out=$$($(1) 2>&1) || { printf '%s\n' "$$out" >&2; exit 1; }
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help run test test-main test-postgres test-pure check format bench screenshots setup \
+.PHONY: help run test test-main test-postgres test-pure check format bench screenshots pictures setup \
 	constraints clean
 
 help: ## Say what can be made
@@ -70,6 +70,17 @@ bench: setup ## Measure speed (tests/bench)
 
 screenshots: setup ## Take pictures of the pages into screenshots/
 	$(PYTHON) -m pytest -m screenshots tests/screenshots $(ARGS)
+
+# docs/images: its name there, and of which picture it is a smaller copy.
+PICTURES = start:start-laptop patient-page:patient-laptop set-up:set-up-laptop report:report-laptop \
+	therapist:therapist-laptop past-sessions:past-sessions-laptop scores:scores-points-laptop \
+	pairing:pairing-tablet-portrait leave:walk-leave-tablet-landscape \
+	walking:walk-positive-hit-tablet-portrait patient:walk-positive-hit-tablet-landscape \
+	paused:walk-paused-tablet-portrait largest:walk-side-largest-tablet-portrait
+
+pictures: ## Copy the pictures that docs show into docs/images (after screenshots; needs pngquant)
+	for each in $(PICTURES); do pngquant 96 --force --speed 1 --strip \
+	    --output "docs/images/$${each%%:*}.png" "screenshots/$${each##*:}.png"; done
 
 setup: $(VENV)/.dev $(VENV)/.twin $(LIBRARIES) ## Install all that development needs
 
