@@ -27,7 +27,7 @@ run_tests = { $(1) -m pytest $(2) -m '$(3) and not realtime' \
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help run test test-main test-postgres test-pure check format bench screenshots messages setup \
+.PHONY: help run test test-main test-postgres test-pure check format bench screenshots pictures messages setup \
 	constraints clean
 
 help: ## Say what can be made
@@ -84,6 +84,17 @@ messages: setup ## Collect the pages' words into locale/ and compile the transla
 	    --add-location file --verbosity 0 --domain $$domain \
 	    --ignore tests --ignore node_modules || exit; done
 	$(PYTHON) manage.py compilemessages --ignore $(VENV) --verbosity 0
+
+# docs/images: its name there, and of which picture it is a smaller copy.
+PICTURES = start:start-laptop patient-page:patient-laptop set-up:set-up-laptop report:report-laptop \
+	therapist:therapist-laptop past-sessions:past-sessions-laptop scores:scores-points-laptop \
+	pairing:pairing-tablet-portrait leave:walk-leave-tablet-landscape \
+	walking:walk-positive-hit-tablet-portrait patient:walk-positive-hit-tablet-landscape \
+	paused:walk-paused-tablet-portrait largest:walk-side-largest-tablet-portrait
+
+pictures: ## Copy the pictures that docs show into docs/images (after screenshots; needs pngquant)
+	for each in $(PICTURES); do pngquant 96 --force --speed 1 --strip \
+	    --output "docs/images/$${each%%:*}.png" "screenshots/$${each##*:}.png"; done
 
 setup: $(VENV)/.dev $(VENV)/.twin $(LIBRARIES) ## Install all that development needs
 

@@ -1,8 +1,8 @@
 """Puts sessions to walk into a server's database: `python -m tests.walk_seed JSON` prints them.
 
 JSON is a list of sessions: {"valence", "name", "phases": [{"kind", …}], "goal", "minutes",
-"screen": {"screen_side", …}}, where anything may be left out. Each gets a station of its own with
-tokens for its devices.
+"screen": {"screen_side", …}, "pin"}, where anything may be left out. Each gets a station of its own
+with tokens for its devices.
 """
 
 from __future__ import annotations
@@ -106,6 +106,7 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
     from rehab.people.roles import Role
     from rehab.sessions.services import create_session
     from rehab.stations.models import Device, Station
+    from rehab.stations.pins import set_pin
     from rehab.training.goals import GoalRule, Target
     from rehab.training.phases import make_phase
 
@@ -120,7 +121,9 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
     made = []
     for index, wish in enumerate(wanted):
         name = f"{count}-{index}"
-        station = Station.everywhere.create(clinic=clinic, name=name)
+        station = Station(clinic=clinic, name=name)
+        set_pin(station, wish.get("pin", ""))
+        station.save()
         patient = Patient.everywhere.create(
             clinic=clinic,
             code=name,

@@ -111,18 +111,10 @@ FORGET = """
 from rehab.stations.models import LeaveTries
 LeaveTries.everywhere.all().delete()
 """
-PIN = """
-from rehab.sessions.models import TrainingSession
-from rehab.stations.pins import set_pin
-station = TrainingSession.everywhere.get(pk={session}).station
-set_pin(station, "4711")
-station.save()
-"""
 
 
 def test_nobody_leaves_a_tablet_without_the_pin(server: Server, browser: Browser) -> None:
-    (walk,) = make_walks(server, {})
-    run(server, PIN.format(session=walk.session))
+    (walk,) = make_walks(server, {"pin": "4711"})
     with page_with(browser, server, garry_tablet=walk.tablet) as page:
         page.goto("/tablet/")
         page.wait_for_selector("body.alone[data-look=ready]")

@@ -80,7 +80,7 @@ def test_pictures_of_a_walk(server: Server, stack: ExitStack) -> None:
     ]
     largest = {"screen": {"screen_text": "largest"}}
     wanted: list[dict[str, Any]] = [
-        *({"valence": valence} for valence in valences),
+        *({"valence": valence, "pin": "2468"} for valence in valences),
         *sides,
         largest,
         catch,

@@ -8,6 +8,7 @@ from django.shortcuts import redirect, render
 from django.templatetags.static import static
 from django.urls import reverse
 from django.utils import timezone
+from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_safe
 
@@ -63,7 +64,7 @@ def describe_app(request: HttpRequest) -> JsonResponse:
     """Let the tablet's browser install its page as an app that fills the screen."""
     mark = {"src": static("img/mark.svg"), "type": "image/svg+xml", "sizes": "any"}
     app = {
-        "name": "GARRY tablet",
+        "name": _("GARRY tablet"),
         "short_name": "GARRY",
         "id": reverse("tablet"),
         "start_url": reverse("tablet"),
