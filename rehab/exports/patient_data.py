@@ -23,6 +23,7 @@ FILES = {
     "sessions.csv": _lazy("a row for each session"),
     "steps.csv": _lazy("a row for each step"),
     "events.csv": _lazy("a row for each thing done or noted during a session"),
+    "corrections.csv": _lazy("a row for each correction of a session after its end"),
     "codebook.csv": _lazy("what every column means, with its unit"),
 }
 ABOUT = _lazy("""\

@@ -16,7 +16,10 @@ from typing import Any, NamedTuple
 from django.db.models import QuerySet
 
 from rehab.people.models import User
+from rehab.sessions.corrections import SessionCorrection
+from rehab.sessions.live.actor import read_log
 from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
+from rehab.training.fold import SessionFold
 from rehab.training.metrics import METRICS
 
 PAGE = 2_000  # rows held in memory
@@ -48,7 +51,9 @@ SESSIONS = Table(
         Column("started_at", "UTC", "When the patient began to walk."),
         Column("ended_at", "UTC", "When it ended."),
         Column("state", "", "ready, running, paused, finished or aborted (ended early)."),
-        Column("feedback_type", "", "positive, negative, binary or explicit."),
+        Column("feedback_type", "", "positive, negative, binary or explicit, as it began."),
+        Column("changed_to", "", "Feedback types it was changed to, with commas between."),
+        Column("left_out", "", "true: a therapist left it out of figures (corrections.csv)."),
         Column("measure", "", "What was trained; a2 is ankle push-off power."),
         Column("unit", "", "Unit of values and goals of this session."),
         Column("trained_side", "", "The leg whose steps count."),
@@ -90,6 +95,7 @@ STEPS = Table(
         Column("phase_kind", "", "baseline, familiarization, training, catch, washout, retention."),
         Column("phase_name", "", "Name of the phase."),
         Column("feedback", "", "true: the patient got feedback in this phase."),
+        Column("feedback_type", "", "The type in force; empty in a phase without feedback."),
         Column("rules_version", "", "Version of the rules that judged the step."),
         Column("extra", "JSON", "What else the source measured of it, by name."),
     ),
@@ -108,12 +114,27 @@ EVENTS = Table(
         Column("data", "JSON", "What the robot reported, or which device stopped it."),
     ),
 )
-TABLES = (SESSIONS, STEPS, EVENTS)
+CORRECTIONS = Table(
+    "corrections.csv",
+    (
+        Column("session", "", "Number of the session that was corrected after its end."),
+        Column("patient", "", "Pseudonym of who walked it, as it holds now."),
+        Column("at", "UTC", "When it was corrected."),
+        Column("part", "", "patient: who walked; counts: whether it counts; note: a note on it."),
+        Column("old", "", "What stood there before; patients by pseudonym."),
+        Column("new", "", "What holds from then on."),
+        Column("reason", "", "Why."),
+        Column("by", "", "Who did it; for researchers only that it was a person."),
+    ),
+)
+TABLES = (SESSIONS, STEPS, EVENTS, CORRECTIONS)
 STEP_FIELDS = (
     *("number", "time_s", "received_at", "side", "value", "gain", "shown", "goal", "performance"),
     *("hit", "points", "valid", "reasons", "phase", "rules_version", "extra"),
 )
-SIDE, REASONS, PHASE = (STEP_FIELDS.index(name) for name in ("side", "reasons", "phase"))
+NUMBER, SIDE, REASONS, PHASE = (
+    STEP_FIELDS.index(name) for name in ("number", "side", "reasons", "phase")
+)
 
 
 @dataclass(frozen=True)
@@ -150,6 +171,8 @@ class Selection:
                 session.ended_at,
                 session.state,
                 session.valence,
+                session.changed_to,
+                session.left_out,
                 session.measure.slug,
                 session.measure.unit,
                 session.trained_side,
@@ -174,13 +197,16 @@ class Selection:
                 for phase in session.plan["phases"]
             ]
             head = (session.pk, session.patient.pseudonym)
+            types = _types_of(session)
             for step in _pages(steps.filter(session=session), STEP_FIELDS, "number"):
                 *row, version, extra = step
                 trained = row[SIDE] == session.trained_side
                 row[REASONS] = " ".join(row[REASONS])
                 row.insert(SIDE + 1, trained)
                 phase = known[step[PHASE]]
-                yield (*head, *row, *phase, version, extra or None)
+                *_, feedback = phase
+                kind = next(slug for after, slug in types if after < step[NUMBER])
+                yield (*head, *row, *phase, kind if feedback else "", version, extra or None)
 
     def event_rows(self) -> Iterator[tuple[Any, ...]]:
         """Give the rows of ``EVENTS``."""
@@ -192,14 +218,32 @@ class Selection:
                 who = by if self.named or not by else "person"
                 yield (*head, *row, who, data or None)
 
+    def correction_rows(self) -> Iterator[tuple[Any, ...]]:
+        """Give the rows of ``CORRECTIONS``."""
+        names = ("pk", "at", "part", "old", "new", "reason", "by__username")
+        corrections = SessionCorrection.objects.visible_to(self.user).order_by("pk")
+        for session in self.read_sessions():
+            head = (session.pk, session.patient.pseudonym)
+            for _, *row, by in _pages(corrections.filter(session=session), names, "pk"):
+                yield (*head, *row, by if self.named or not by else "person")
+
     def read(self, table: Table) -> Iterator[tuple[Any, ...]]:
         """Give a table's rows."""
         rows = {
             SESSIONS.file: self.session_rows,
             STEPS.file: self.step_rows,
             EVENTS.file: self.event_rows,
+            CORRECTIONS.file: self.correction_rows,
         }
         return rows[table.file]()
+
+
+def _types_of(session: TrainingSession) -> list[tuple[int, str]]:
+    """Give after which step which feedback type was in force, the last one first."""
+    if not session.changed_to:
+        return [(-1, session.valence)]
+    switches = SessionFold.replay(session.to_plan(), read_log(session)).switches
+    return [*reversed(switches), (-1, session.valence)]
 
 
 def _pages(rows: QuerySet[Any], names: Sequence[str], key: str) -> Iterator[tuple[Any, ...]]:

@@ -3,10 +3,11 @@
 import django.core.serializers.json
 import django.db.models.deletion
 import django.utils.timezone
-import rehab.people.history
-import rehab.people.models
 from django.conf import settings
 from django.db import migrations, models
+
+import rehab.people.history
+import rehab.people.models
 
 
 class Migration(migrations.Migration):

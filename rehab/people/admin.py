@@ -180,6 +180,7 @@ class PatientAdmin(ScopedAdmin):
     )
     list_filter = ("paretic_side", "boards", "blinded", "simulated", "language", "created_at")
     list_select_related = ("clinic",)
+    ordering = ("nickname", "code")  # rows that are counted with others have no order of their own
     search_fields = ("nickname", "code")
     fields = (
         "code",

@@ -163,6 +163,16 @@ class CorrectionForm(forms.Form):
         )
 
 
+def forget_patient(patient: Patient, pseudonym: str) -> None:
+    """Let corrections lead to nobody: free words go, the pseudonym of old gives way to the new."""
+    rows = SessionCorrection.everywhere
+    rows.filter(session__patient=patient).update(reason="")
+    rows.filter(session__patient=patient, part=Part.NOTE).update(old="", new="")
+    for side in ("old", "new"):
+        named = rows.filter(part=Part.PATIENT, **{side: pseudonym})
+        named.update(**{side: patient.pseudonym})
+
+
 def find_note(session: TrainingSession, reader: Any) -> str:
     """Give the note that holds now; empty for none."""
     notes = SessionCorrection.objects.visible_to(reader).filter(session=session, part=Part.NOTE)

@@ -21,7 +21,9 @@ from rehab.people.audit import Act
 from rehab.people.consent import Purpose, withdraw
 from rehab.people.history import HistoryEntry, forget_values
 from rehab.people.models import Clinic, Ending, Erasing, Patient, User, new_pseudonym
+from rehab.sessions.corrections import forget_patient as forget_corrections
 from rehab.sessions.models import Remark, SessionEvent, TrainingSession
+from rehab.sessions.visits import Visit
 from rehab.training.changes import OPEN
 
 
@@ -52,6 +54,7 @@ def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) ->
     with transaction.atomic():
         _lock_closed(patient)
         withdraw(patient, Purpose.BOARDS, by, now)
+        known_as = patient.pseudonym
         patient.pseudonym = patient.code = new_pseudonym()
         patient.nickname = _("Erased")
         patient.body_mass_kg = patient.original_id = patient.alias = None
@@ -65,6 +68,8 @@ def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) ->
         SessionEvent.everywhere.filter(
             session__patient=patient, kind__in=[remark.value for remark in Remark]
         ).update(data={})
+        forget_corrections(patient, known_as)
+        Visit.everywhere.filter(patient=patient).delete()
         forget_values("Patient", patient.pk)
         LogEntry.objects.filter(
             content_type=ContentType.objects.get_for_model(Patient), object_id=str(patient.pk)

@@ -105,7 +105,8 @@ def read_today(user: User, now: datetime) -> list[Today]:
     """List who is expected at somebody's clinic today or was here: who walks first, who is done
     last, the others by time. ``now`` is the clinic's clock.
     """
-    patients = Patient.objects.visible_to(user).annotate(count=Count("sessions", distinct=True))
+    patients = Patient.objects.visible_to(user).filter(ended_at=None)
+    patients = patients.annotate(count=Count("sessions", distinct=True))
     visits = Visit.objects.visible_to(user).filter(day=now.date())
     expected = dict(visits.values_list("patient_id", "at"))
     midnight = now.replace(hour=0, minute=0, second=0, microsecond=0)

@@ -37,7 +37,7 @@ export function drawTypes(session, show) {
   if (choice.options.length !== session.types.length) choice.replaceChildren(...session.types.map(({ slug }) => new Option(label(slug), slug)));
   if (choice.dataset.of !== wanted) choice.value = choice.dataset.of = wanted; // not while somebody chooses
   choice.disabled = session.types.length < 2 || !next;
-  show("type-when", choice.disabled ? _("no further feedback phase") : session.next_valence ? fill(_("from %(phase)s on; now %(type)s"), { phase: phaseName(next.name), type: label(session.valence) }) : _("of the next phase: as now"));
+  show("type-when", choice.disabled ? _("no further feedback phase") : session.next_valence ? fill(_("from %(phase)s on; now %(type)s"), { phase: next ? phaseName(next.name) : _("the next phase"), type: label(session.valence) }) : _("of the next phase: as now"));
 }
 
 const MAIN = {

@@ -205,7 +205,8 @@ def walk_while_it_is_built(board) -> dict[str, float]:
     alone = commits(lambda: actor.fold.last_number < 300)
     kept = sorted(BoardCount.everywhere.values_list("figure", "rows"))
     entries.begin(board)
-    BoardEntry.everywhere.filter(pk__lte=BoardEntry.everywhere.order_by("pk")[BESIDE].pk).delete()
+    first = BoardEntry.everywhere.order_by("pk").values("pk")[:BESIDE]
+    BoardEntry.everywhere.filter(pk__in=list(first.values_list("pk", flat=True))).delete()
     builder = Builder()
     began = time.perf_counter()
     builder.wake()

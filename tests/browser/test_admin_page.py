@@ -94,8 +94,10 @@ def test_the_week_is_drawn_in_light_and_in_dark(page):
     expect(page.locator("[data-chart=types] .wanted")).to_have_count(1)
     bright = page.evaluate("getComputedStyle(document.body).backgroundColor")
     page.emulate_media(color_scheme="dark")
+    expect(page.locator("html")).to_have_attribute("data-pt", "dark")
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") != bright
     page.locator(".theme-toggle").click()  # the reader's own choice beats the device's
+    expect(page.locator("html")).to_have_attribute("data-pt", "light")
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == bright
 
 

@@ -181,6 +181,7 @@ FIND_CLASHES = """async ([phrases, long, looks]) => {
     return { left, right, width, top, bottom };
   };
   const found = [];
+  const ways = ["ltr right", "rtl right", "ltr left", "ltr center", "rtl left"];
   const look = (name, words) => {
     const texts = [...document.querySelectorAll(
       "header b span, header .time, header button, .words span, .sub, .label, .key, .run span, " +
@@ -189,7 +190,8 @@ FIND_CLASHES = """async ([phrases, long, looks]) => {
     for (const [i, one] of texts.entries()) {
       const a = box(one);
       const own = one.textContent || one.className.baseVal;
-      const which = `${body.dataset.text} ${document.dir} ${name} "${words}": ${own}`;
+      const { text, side } = body.dataset;
+      const which = `${text} ${document.dir} ${side} ${name} "${words}": ${own}`;
       const outer = one.matches("header b span") ? { left: 0, right: innerWidth } : a;
       const sideways = outer.left < -1 || outer.right > innerWidth + 1;
       if (sideways || a.top < -1 || a.bottom > innerHeight + 1) found.push(`${which} leaves`);
@@ -203,8 +205,10 @@ FIND_CLASHES = """async ([phrases, long, looks]) => {
     }
   };
   for (const size of ["normal", "large", "largest"]) {
-    for (const dir of ["ltr", "rtl"]) {
+    for (const way of size === "largest" ? ways : ways.slice(0, 1)) {
+      const [dir, side] = way.split(" ");
       body.dataset.text = size;
+      body.dataset.side = side;
       document.dir = dir;
       dispatchEvent(new Event("resize"));
       for (const words of phrases) {
@@ -219,7 +223,7 @@ FIND_CLASHES = """async ([phrases, long, looks]) => {
         draw(name, session, "");
         fit();
         look(name, "");
-        for (const words of long) {
+        for (const words of long.slice(1, 3)) {
           draw(name, session, "");
           document.querySelector(".words span").textContent = words;
           document.querySelector(".sub").textContent = long[0];
@@ -246,7 +250,7 @@ def test_words_of_every_size_stay_in_their_place(
         page.emulate_media(reduced_motion="reduce")
         page.goto(walk.path)
         page.wait_for_selector("body[data-look=ready]")
-        clashes = page.evaluate(FIND_CLASHES, [[*bands, *LONG], LONG, LOOKS])
+        clashes = page.evaluate(FIND_CLASHES, [sorted({*bands, *LONG}), LONG, LOOKS])
     assert not clashes, "\n".join(clashes[:40])
 
 

@@ -24,9 +24,13 @@ from rehab.people.audit import Act, AuditEntry
 from rehab.people.consent import Purpose, withdraw
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
+from rehab.sessions.corrections import Part, correct_session
 from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
 from rehab.stations.models import Station
+from rehab.training.changes import Change, ChangeKind
+from rehab.training.phases import make_phase
 from tests.archives import body_of, open_archive, rows_of
+from tests.walks import walk
 from tests.world import World, build_world, mark
 
 NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
@@ -60,7 +64,7 @@ def test_a_patients_file_holds_everything_that_is_kept(world):
     files = fetch(world, Role.PT)
     assert set(files) == {
         *("README.txt", "patient.json", "consent.json", "codebook.csv"),
-        *("sessions.csv", "steps.csv", "events.csv"),
+        *("sessions.csv", "steps.csv", "events.csv", "corrections.csv"),
     }
     who = json.loads(files["patient.json"])
     assert (who["nickname"], who["code"]) == (world.patient.nickname, world.patient.code)
@@ -92,6 +96,33 @@ def test_read_back_the_numbers_are_the_same_to_the_last_digit(world):
     session = rows_of(files["sessions.csv"])[0]
     for metric in SessionMetric.everywhere.filter(session=world.session):
         assert to_number(session[metric.slug]) == metric.value
+
+
+def test_each_step_says_under_which_feedback_type_it_was_taken(world):
+    phases = (make_phase("training", strides=2), make_phase("catch"), make_phase("training"))
+    session = walk(
+        world.patient,
+        "positive",
+        [
+            *(2.5, Change(ChangeKind.VALENCE, "negative"), 1.5, 2.5),
+            *(Change(ChangeKind.PHASE, 2), 1.5, 2.5),
+        ],
+        phases=phases,
+    )
+    lead = world.people[Role.LEAD]
+    correct_session(session, {Part.COUNTS: "no"}, "The sensor slipped.", lead, NOW)
+    files = fetch(world)
+    steps = [row for row in rows_of(files["steps.csv"]) if row["session"] == str(session.pk)]
+    assert [row["feedback_type"] for row in steps] == [
+        *("positive", "positive", "", "negative", "negative")
+    ]
+    assert [row["points"] for row in steps] == ["1", "0", "", "-1", "0"]
+    (told,) = (row for row in rows_of(files["sessions.csv"]) if row["session"] == str(session.pk))
+    assert (told["changed_to"], told["left_out"]) == ("negative", "true")
+    rows = rows_of(files["corrections.csv"])
+    (corrected,) = (row for row in rows if row["session"] == str(session.pk))
+    assert (corrected["part"], corrected["old"], corrected["new"]) == ("counts", "yes", "no")
+    assert (corrected["reason"], corrected["by"]) == ("The sensor slipped.", lead.username)
 
 
 def test_the_codebook_says_what_every_column_means(world):

@@ -19,6 +19,7 @@ from rehab.people.audit import Act, AuditEntry
 from rehab.people.history import HistoryEntry
 from rehab.people.models import Ending, Erasing, Patient
 from rehab.people.roles import Role
+from rehab.sessions.corrections import Part, SessionCorrection, correct_session
 from rehab.sessions.endings import (
     StillOpen,
     end_program,
@@ -29,6 +30,7 @@ from rehab.sessions.endings import (
 )
 from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
 from rehab.sessions.services import create_session
+from rehab.sessions.visits import Visit
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from tests.world import World, build_world, mark, scoped_models
@@ -143,6 +145,11 @@ def test_erasing_leaves_nothing_that_leads_to_the_person(world):
     SessionEvent.everywhere.create(
         session=world.session, after_number=1, kind="pain", at=NOW, data={"note": "CASE-4711"}
     )
+    other = Patient.everywhere.create(clinic=world.clinic, code="other", nickname="Other")
+    lead_user = world.people[Role.LEAD]
+    for walker in (other, patient):  # given to somebody else, and back
+        changes = {Part.PATIENT: walker.pseudonym, Part.NOTE: f"A note of osamunde {walker.code}"}
+        correct_session(world.session, changes, "because CASE-47", lead_user, NOW)
     patient.refresh_from_db()
     known = [patient.pseudonym, patient.alias, "990017", "880018", "87.125", "osamunde", "CASE-47"]
     assert all(one in everything_stored() for one in known)
@@ -156,6 +163,9 @@ def test_erasing_leaves_nothing_that_leads_to_the_person(world):
     assert patient.pseudonym == patient.code
     assert not AuditEntry.everywhere.filter(patient=patient).exists()
     assert not BoardEntry.everywhere.filter(patient=patient).exists()
+    assert not Visit.everywhere.filter(patient=patient).exists()
+    walked = SessionCorrection.everywhere.filter(part=Part.PATIENT).order_by("pk")
+    assert [row.new for row in walked][-2:] == [other.pseudonym, patient.pseudonym]
 
 
 def test_erasing_keeps_the_figures_and_says_who_did_it(world):
