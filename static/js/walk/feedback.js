@@ -1,6 +1,6 @@
 // A step in words, emblem and number, and everything else the page says. Draws only what has changed.
 
-import { _, fill, number as decimal } from "garry/language";
+import { _, fill, n_, number as decimal } from "garry/language";
 import { isStill } from "garry/walk/motion";
 import { count, partLeft, signed, spoken, timeLeft, wordsFor } from "garry/walk/words";
 
@@ -80,7 +80,7 @@ export function createFeedback(body) {
     key.dataset.long = Math.min(text.length, 6);
     run.dataset.streak = streak ?? "none";
     beads.forEach((bead, i) => bead.classList.toggle("on", streak > i));
-    set(runWords, streak === null ? fill(_("Step %(number)s"), { number }) : fill(_("%(streak)s in a row"), { streak }));
+    set(runWords, streak === null ? fill(_("Step %(number)s"), { number }) : n_("%(count)s in a row", "%(count)s in a row", streak));
   }
 
   function drawPart(session) {
