@@ -16,11 +16,12 @@ from django.utils.translation import gettext_lazy as _
 # Model → heading, and one line that says what it is. What has no row here stands under "More".
 PATIENTS, FEEDBACK = _("Patients & sessions"), _("Feedback & protocols")
 BOARDS, PLACES = _("Leaderboards"), _("Places & devices")
-PEOPLE, MORE = _("People"), _("More")
+PEOPLE, RECORDS, MORE = _("People"), _("Records"), _("More")
 HEADINGS = {
     "Patient": (PATIENTS, _("Who walks: code, nickname, leg, what they agreed to.")),
     "TrainingSession": (PATIENTS, _("Everything that was walked, to find and to read.")),
     "Preset": (FEEDBACK, _("Set-ups for one tap: type, goal, minutes, protocol, robot.")),
+    "FeedbackType": (FEEDBACK, _("What a step earns, and which words answer it.")),
     "Protocol": (FEEDBACK, _("The phases of a session: baseline, training, catch, washout.")),
     "Gesture": (FEEDBACK, _("What the robot does, composed of moves.")),
     "Measure": (FEEDBACK, _("What is trained: A2 and others, with their units.")),
@@ -29,7 +30,9 @@ HEADINGS = {
     "Device": (PLACES, _("What dials in from a station, and the token it does so with.")),
     "User": (PEOPLE, _("Who works here, and what their role lets them do.")),
     "ApiToken": (PEOPLE, _("What lets programs read and steer.")),
-    "Clinic": (PEOPLE, _("Name, language, clock, second factor.")),
+    "Clinic": (PEOPLE, _("Name, language, clock, second factor, how long data is kept.")),
+    "AuditEntry": (RECORDS, _("Who looked at what, took it out, or steered the robot.")),
+    "HistoryEntry": (RECORDS, _("Who changed what of people and settings.")),
 }
 
 
