@@ -191,8 +191,9 @@ def tidy() -> None:
     """
     tables = ", ".join(model._meta.db_table for model in (BoardEntry, BoardCount))
     if connection.vendor == "postgresql":
+        how = "ANALYZE" if connection.in_atomic_block else "VACUUM (ANALYZE)"
         with connection.cursor() as cursor:
-            cursor.execute(f"VACUUM (ANALYZE) {tables}")
+            cursor.execute(f"{how} {tables}")
 
 
 def make_entry(board: Leaderboard, row: Figure) -> BoardEntry:
