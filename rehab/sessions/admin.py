@@ -330,7 +330,10 @@ class TrainingSessionAdmin(ScopedAdmin):
     def _for(self, request: HttpRequest, names: tuple[str, ...]) -> tuple[str, ...]:
         if person(request).role != Role.RESEARCHER:
             return names
-        return tuple("pseudonym" if name == "patient" else name for name in names)
+        # A source may be a file that is named after a person.
+        return tuple(
+            "pseudonym" if name == "patient" else name for name in names if name != "source"
+        )
 
     @admin.display(description=_("patient"), ordering="patient__pseudonym")
     def pseudonym(self, session: TrainingSession) -> str:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from ninja import Field, Schema
 from pydantic import AfterValidator, field_validator
 
 from rehab.people.api import PatientName, Short
-from rehab.people.api_base import Given, Key, Moment, Paging, Whole, Words, left_out
+from rehab.people.api_base import Given, Key, Moment, Paging, Whole, Words, left_out, sees_names
 from rehab.sessions.models import SessionMetric, TrainingSession
 from rehab.training.changes import ChangeKind, State
 from rehab.training.metrics import METRICS
@@ -47,7 +47,9 @@ class SessionOut(Schema):
     trained_side: str | None
     protocol: str | None = Field(None, alias="protocol.name")
     station: str | None = Field(None, alias="station.name")
-    source: str
+    source: str | None = Field(
+        description="Null for researchers: a file may be named after a person."
+    )
     simulated: bool
     left_out: bool = Field(description="Corrected: in no figure, board or trend.")
     imported: bool = Field(description="From the original GARRY, without steps.")
@@ -62,6 +64,11 @@ class SessionOut(Schema):
     def resolve_imported(session: TrainingSession) -> bool:
         """Say whether it has no steps of its own."""
         return session.original_id is not None
+
+    @staticmethod
+    def resolve_source(session: TrainingSession, context: Any) -> str | None:
+        """Give where its steps come from, to those who know the patient."""
+        return session.source if sees_names(context) else None
 
     @staticmethod
     def resolve_trained_side(session: TrainingSession) -> str | None:

@@ -6,6 +6,8 @@ from datetime import UTC, datetime
 from typing import Any
 
 import pytest
+from django.test import Client
+from django.urls import reverse
 
 from rehab.people.models import Patient
 from rehab.people.roles import Role
@@ -68,6 +70,16 @@ def test_researchers_get_pseudonyms_and_nothing_else_of_a_patient(world):
     program = program_of(world, Role.RESEARCHER)
     nobody = {"id": None, "code": None, "nickname": None, "pseudonym": world.patient.pseudonym}
     assert program.get(f"/sessions/{world.session.pk}")[1]["patient"] == nobody
+    TrainingSession.everywhere.update(source="Recording rosamunde.csv")
+    assert program.get(f"/sessions/{world.session.pk}")[1]["source"] is None
+    researcher = Client()
+    researcher.force_login(world.people[Role.RESEARCHER])
+    for page in (
+        reverse("session", args=[world.session.pk]),
+        reverse("report", args=[world.session.pk]),
+        reverse("admin:rehab_trainingsession_change", args=[world.session.pk]),
+    ):
+        assert b"osamunde" not in researcher.get(page).content
     _, page = program.get("/sessions", pseudonym=world.patient.pseudonym)
     assert [row["id"] for row in page["items"]] == [world.session.pk]
     assert program.get("/sessions", pseudonym="P-NOBODY")[1]["total"] == 0

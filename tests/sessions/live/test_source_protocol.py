@@ -331,11 +331,11 @@ async def test_plain_text_before_a_session_runs_is_refused_with_the_socket_open(
 async def test_a_client_that_sent_nothing_but_its_token_may_wait_for_the_patient(
     place, begun, monkeypatch
 ):
-    monkeypatch.setattr(Socket, "first_frame_s", 0.02)
+    monkeypatch.setattr(Socket, "first_frame_s", 0.5)
     await begun(place)
     source = await SourceCaller().dial()
     await source.say({"token": place.tokens["source"]})
-    await asyncio.sleep(0.04)
+    await asyncio.sleep(0.6)
     await source.say("4, 3")
     await source.acked(1)
 
