@@ -331,9 +331,8 @@ class TrainingSessionAdmin(ScopedAdmin):
         if person(request).role != Role.RESEARCHER:
             return names
         # A source may be a file that is named after a person.
-        return tuple(
-            "pseudonym" if name == "patient" else name for name in names if name != "source"
-        )
+        seen = (name for name in names if name != "source")
+        return tuple("pseudonym" if name == "patient" else name for name in seen)
 
     @admin.display(description=_("patient"), ordering="patient__pseudonym")
     def pseudonym(self, session: TrainingSession) -> str:

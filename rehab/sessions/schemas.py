@@ -47,9 +47,7 @@ class SessionOut(Schema):
     trained_side: str | None
     protocol: str | None = Field(None, alias="protocol.name")
     station: str | None = Field(None, alias="station.name")
-    source: str | None = Field(
-        description="Null for researchers: a file may be named after a person."
-    )
+    source: str | None = Field(description="Null for researchers: files may be named after people.")
     simulated: bool
     left_out: bool = Field(description="Corrected: in no figure, board or trend.")
     imported: bool = Field(description="From the original GARRY, without steps.")
