@@ -10,7 +10,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-from django.db.models import Count, F, Max, Min, QuerySet, Sum
+from django.db.models import Count, F, OuterRef, Q, QuerySet, Subquery, Sum, Value
+from django.db.models.functions import Concat, Left
 
 from rehab.boards.figures import Figure
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
@@ -18,6 +19,7 @@ from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 Ties = Leaderboard.Ties
 Columns = tuple[int, int, int | None, str]
 COLUMNS = ("patient_id", "figure", "stake", "key")
+MERIT, KEY = 10, 44  # digits of a key that say the figure, and all (figures.py, make_key)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,18 +111,27 @@ class Stored:
 
     def find(self, patient_id: int) -> Placed | None:
         """Give a patient's row. Its place: all whose figures are better, and one."""
-        for row in self.find_rows().filter(patient=patient_id).values_list(*COLUMNS):
+        rows = self.find_rows().filter(patient=patient_id)
+        columns: tuple[str, ...] = COLUMNS
+        if self._board.ties == Ties.EARLIER:
+            rows, columns = self._with_ends(rows), (*COLUMNS, "first", "last")
+        for found in rows.values_list(*columns):
+            row: Columns = found[:4]
+            ends: tuple[str, ...] = found[4:]
             figure = row[1]
             better = "figure__gt" if self._board.higher_is_better else "figure__lt"
-            sums = self._counts.filter(**{better: figure}).aggregate(
-                rows=Sum("rows", default=0), figures=Count("pk")
+            sums = self._counts.aggregate(
+                ahead=Sum("rows", filter=Q(**{better: figure}), default=0),
+                figures=Count("pk", filter=Q(**{better: figure})),
+                equals=Sum("rows", filter=Q(figure=figure), default=1),
             )
-            shared = 1 + sums["rows"]
+            shared = 1 + sums["ahead"]
             match self._board.ties:
                 case Ties.DENSE:
                     return make_placed(row, shared, 1 + sums["figures"])
                 case Ties.EARLIER:
-                    return make_placed(row, shared, shared + self._count_equals_before(row))
+                    before = self._count_equals_before(row[3], ends, sums["equals"])
+                    return make_placed(row, shared, shared + before)
             return make_placed(row, shared, shared)
         return None
 
@@ -159,20 +170,25 @@ class Stored:
                 return make_placed(row, shared, beside.rank + step)
         return make_placed(row, shared, shared)
 
-    def _count_equals_before(self, row: Columns) -> int:
+    def _with_ends(self, rows: QuerySet[BoardEntry]) -> QuerySet[BoardEntry]:
+        """Have rows know the first and the last key of their figure."""
+        merit = Left(OuterRef("key"), MERIT)
+        above = Concat(merit, Value("9" * (KEY - MERIT)))
+        equals = self.find_rows().filter(key__gt=merit, key__lte=above).values("key")
+        return rows.annotate(
+            first=Subquery(equals.order_by("-key")[:1]), last=Subquery(equals.order_by("key")[:1])
+        )
+
+    def _count_equals_before(self, key: str, ends: tuple[str, ...], size: int) -> int:
         """Count the rows of the same figure that stand before one, from the nearer end.
 
         A figure may have some ten thousand rows; which end is nearer is guessed from the keys.
         """
-        _, figure, _, key = row
-        merit = key[:10]
-        equals = self.find_rows().filter(key__gt=merit, key__lt=f"{int(merit) + 1:010d}")
-        ends = equals.aggregate(last=Min("key"), first=Max("key"))
-        last, mine, first = (int(one[10:]) for one in (ends["last"], key, ends["first"]))
-        if 2 * mine >= first + last:
-            return equals.filter(key__gt=key).count()
-        size = self._counts.filter(figure=figure).values_list("rows", flat=True)[0]
-        return size - 1 - equals.filter(key__lt=key).count()
+        rows, (first, last) = self.find_rows(), ends
+        highest, mine, lowest = (int(one[MERIT:]) for one in (first, key, last))
+        if 2 * mine >= highest + lowest:
+            return rows.filter(key__gt=key, key__lte=first).count()
+        return size - 1 - rows.filter(key__gte=last, key__lt=key).count()
 
 
 def make_placed(row: Columns, shared: int, rank: int) -> Placed:
