@@ -485,7 +485,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 @pytest.mark.parametrize(
     ("fault", "place"), FAULTS.items(), ids=lambda one: getattr(one, "__name__", "")
 )
