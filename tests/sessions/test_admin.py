@@ -15,6 +15,7 @@ from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
 from rehab.boards.models import Leaderboard
+from rehab.people.consent import Purpose, give
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection
@@ -130,6 +131,7 @@ def test_what_was_looked_for_stays_in_the_form_beside_the_other_filters(world, w
 def test_a_researcher_finds_by_pseudonym_alone(world, walked):
     client = client_of(world, Role.RESEARCHER)
     rosa = walked["weak"].patient
+    give(rosa, Purpose.RESEARCH, None, NOW)
     assert found(client, walked, who=rosa.pseudonym) == {"weak", "strong"}
     page = client.get(SESSIONS).content.decode()
     assert "Rosa" not in page
