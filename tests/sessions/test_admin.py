@@ -131,7 +131,8 @@ def test_what_was_looked_for_stays_in_the_form_beside_the_other_filters(world, w
 def test_a_researcher_finds_by_pseudonym_alone(world, walked):
     client = client_of(world, Role.RESEARCHER)
     rosa = walked["weak"].patient
-    give(rosa, Purpose.RESEARCH, None, NOW)
+    for name in ("weak", "told"):
+        give(walked[name].patient, Purpose.RESEARCH, None, NOW)
     assert found(client, walked, who=rosa.pseudonym) == {"weak", "strong"}
     page = client.get(SESSIONS).content.decode()
     assert "Rosa" not in page
