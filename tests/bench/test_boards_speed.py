@@ -23,7 +23,7 @@ AIMED = ("top20", "own_standard", "own_dense", "own_earlier", "neighbors")
 PATIENTS = 300
 TRIES = 5
 BESIDE = 20_000  # rows that are made anew while somebody walks; the others only looked at
-HELD_MS = 50.0  # no step's commit waits longer for a board
+HELD_MS = 50.0  # no step's commit waits longer for a board than it would without
 POSTGRES = os.environ.get("DATABASE_URL", "postgres://postgres@127.0.0.1:5432/postgres")
 
 # Runs in a process of its own, on a database of its own: prints its figures as JSON.
@@ -245,7 +245,7 @@ def tell(name: str, found: dict[str, float]) -> None:
     for figure, value in found.items():
         if figure in {f"{name}_p99_ms" for name in AIMED}:
             assert value <= AIM_MS, figure
-    assert found["commit_beside_p99_ms"] <= HELD_MS
+    assert found["commit_beside_p99_ms"] <= found["commit_alone_p99_ms"] + HELD_MS
 
 
 def test_a_million_sessions_on_sqlite(tmp_path):
