@@ -10,6 +10,7 @@
 //   says so in words).
 
 import { _ } from "garry/language";
+import { refusal } from "garry/names";
 
 const SILENCE_MS = 12_000; // the server says something every 5 s
 const DOUBT_MS = 6_000; // after which an old socket is not trusted when the tablet wakes up
@@ -81,7 +82,7 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
         answer(message.id);
         break;
       case "error":
-        why = message.message;
+        why = refusal(message);
         if (message.id) answer(message.id, new Error(why));
     }
     if (message.frame) confirm(message.frame);

@@ -55,6 +55,15 @@ const REASONS = {
   no_push_off: _("no push-off"),
 };
 
+// What ends a page's connection or refuses an order, by its code; others come with words of their own.
+const REFUSALS = {
+  sign_in: _("Sign in again, or pair the tablet again."),
+  no_session: _("There is no such session for you."),
+  not_open: _("The session is not open. Load the page again."),
+  not_stored: _("It could not be stored. Try again."),
+};
+
+export const refusal = ({ code, message }) => REFUSALS[code] ?? message;
 export const typeName = (slug, label = slug) => TYPES[slug] ?? label;
 export const phaseName = (name) => PHASES[name] ?? name;
 export const remarkName = (kind) => REMARKS[kind] ?? kind.replaceAll("_", " ");

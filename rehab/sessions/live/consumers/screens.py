@@ -135,7 +135,7 @@ class ScreenConsumer(Socket):
             value = self.pauses_as.value
         live, by = self.live, self.actor if isinstance(self.actor, User) else None
         if live is None:
-            raise Closing(4004, "no_session", "The session is not open. Connect again.")
+            raise Closing(4004, "not_open", "The session is not open. Connect again.")
         if kind not in (self.changes if by else self.tablet_changes):
             await self._refuse(mark, "refused", "That is changed on the therapist's page.")
             return
@@ -153,7 +153,7 @@ class ScreenConsumer(Socket):
         what, value = read_remark(message)
         live, by = self.live, self.actor
         if live is None:
-            raise Closing(4004, "no_session", "The session is not open. Connect again.")
+            raise Closing(4004, "not_open", "The session is not open. Connect again.")
         if self.audience is not Audience.MONITOR or not isinstance(by, User):
             await self._refuse(mark, "refused", "That is noted on the therapist's page.")
         elif live.actor.fold.state in ENDED:
@@ -171,7 +171,7 @@ class ScreenConsumer(Socket):
         order = read_order(message, *self.robot_orders)
         live, by = self.live, self.actor if isinstance(self.actor, User) else None
         if live is None:
-            raise Closing(4004, "no_session", "The session is not open. Connect again.")
+            raise Closing(4004, "not_open", "The session is not open. Connect again.")
         sessions = self.runtime.at_station_of(live)
         if order == "stop":
             device = {"device": self.actor.pk} if isinstance(self.actor, Device) else {}
