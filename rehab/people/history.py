@@ -28,7 +28,7 @@ from rehab.people.scope import Scope, ScopedModel
 
 # What no person changes, or what time alone does.
 LEFT_OUT = {"id", "created_at", "last_login", "last_seen_at", "token_hash", "epoch", "owner"}
-SECRET = {"password"}  # it is noted that it changed, never what it was
+SECRET = {"password", "pin_hash"}  # it is noted that it changed, never what it was
 HIDDEN = "•••"
 BEFORE = "row before the save"
 M2M_ACTIONS = {"post_add": 1, "post_remove": 0, "pre_clear": 0}  # place of the keys: old, new

@@ -15,6 +15,7 @@ from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.people.tokens import ApiToken
 from rehab.stations.models import Device
+from rehab.stations.pins import set_pin
 from tests.world import World, build_world, mark
 
 pytestmark = pytest.mark.django_db
@@ -74,10 +75,14 @@ def test_a_save_that_changes_nothing_is_no_change(world):
     assert HistoryEntry.everywhere.count() == before
 
 
-def test_passwords_and_tokens_are_never_kept(world):
+def test_passwords_pins_and_tokens_are_never_kept(world):
     user = world.people[Role.PT]
     user.set_password("correct horse battery")
     user.save()
+    station = world.device.station
+    set_pin(station, "4711")
+    station.save()
+    assert last_of(station).values["pin_hash"] == ["", history.HIDDEN]
     assert last_of(user).values["password"] == [history.HIDDEN, history.HIDDEN]
     world.device.new_token()
     world.device.save()
