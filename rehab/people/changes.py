@@ -79,6 +79,8 @@ def _say(user: Any, field: Field[Any, Any] | None, value: Any) -> str:
         return "–"
     if isinstance(value, bool):
         return _("yes") if value else _("no")
+    if isinstance(value, dict):  # words by language, say
+        return "; ".join(f"{name}: {said}" for name, said in value.items()) or "–"
     related: Any = getattr(field, "related_model", None)
     keys = value if isinstance(value, list) else [value]
     if related is not None:

@@ -92,7 +92,7 @@ def test_an_app_and_its_recovery_codes(page: Page, server: Server) -> None:
     sign_in(page, server)
     page.fill("#id_code", recovery_codes[0])
     page.tap("[type=submit]")
-    expect(page.locator("h1").first).to_contain_text("Patients")
+    expect(page.locator("h1").first).to_contain_text("Today")
 
 
 def test_a_clinic_that_asks_for_it(page: Page, server: Server) -> None:
@@ -109,7 +109,7 @@ def test_a_clinic_that_asks_for_it(page: Page, server: Server) -> None:
     sign_in(page, server)
     page.tap("a:has-text('Authenticator app')")
     set_up_app(page)
-    expect(page.locator("h1").first).to_contain_text("Patients")
+    expect(page.locator("h1").first).to_contain_text("Today")
 
 
 def test_a_passkey(page: Page, server: Server) -> None:

@@ -52,7 +52,16 @@ def entries():
 SILENT = {
     *("account", "own-password", "set-up-second-factor", "add-app", "add-passkey"),
     *("remove-authenticator", "recovery-codes", "pair", "consent-text", "export"),
-    *("home", "healthz", "tablet", "tablet-app", "tablet-state", "sign-in", "second-factor"),
+    *(
+        "catalog",
+        "home",
+        "healthz",
+        "tablet",
+        "tablet-app",
+        "tablet-state",
+        "sign-in",
+        "second-factor",
+    ),
     *("api:api-root", "api:openapi-json", "api:openapi-view", "api:show_me"),
     *("api:list_protocols", "api:list_stations", "api:list_boards"),
     *("admin:login", "admin:logout", "admin:jsi18n"),
@@ -62,7 +71,10 @@ SILENT = {
 
 def is_silent(name: str) -> bool:
     """Say, independently of the code under test, whether a route shows nothing of patients."""
-    bare = {"clinic", "user", "apitoken", "station", "device", "measure", "protocol", "gesture"}
+    bare = {
+        *("clinic", "user", "apitoken", "station", "device", "measure", "protocol", "gesture"),
+        *("feedbacktype", "preset"),
+    }
     return name in SILENT or any(name.startswith(f"admin:rehab_{noun}_") for noun in bare)
 
 

@@ -24,7 +24,6 @@ from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.boards.standings import Stored
 from rehab.people import api as people_api
 from rehab.people.access import for_roles, public
-from rehab.people.admin import PatientAdmin
 from rehab.people.admin_base import ScopedOptions
 from rehab.people.models import Patient
 from rehab.people.roles import Right, Role, rights_of
@@ -447,7 +446,7 @@ def test_an_autocomplete_of_every_row_is_caught(worlds, monkeypatch):
 
 def test_an_unscoped_admin_queryset_is_caught(worlds, monkeypatch):
     monkeypatch.setattr(
-        PatientAdmin, "get_queryset", lambda self, request: Patient.everywhere.all()
+        ScopedOptions, "get_queryset", lambda self, request: self.model.everywhere.all()
     )
     leaks, _ = find_leaks(worlds, all_actors(*worlds), under="/admin/rehab/patient/")
     assert "pt of birch: /admin/rehab/patient/ shows Patient of amber" in leaks

@@ -11,6 +11,7 @@ from django.urls import reverse
 
 from rehab.boards import entries
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.people.consent import Purpose, give
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions import corrections
@@ -225,6 +226,8 @@ def test_a_session_that_still_runs_is_ended_first(world, rosa):
 
 
 def test_a_researcher_reads_corrections_by_pseudonym_and_makes_none(world, rosa, omar):
+    for patient in (rosa, omar):
+        give(patient, Purpose.RESEARCH, None, NOW)
     session = walk(rosa, "positive", strides(3, 1))
     correct(world, session, patient=omar.pk)
     assert correct(world, session, Role.RESEARCHER, counts="no").status_code == 403

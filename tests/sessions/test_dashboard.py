@@ -12,6 +12,7 @@ from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 
+from rehab.people.consent import Purpose, give
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.dashboard import find_matters, look, read_today, read_week
@@ -186,6 +187,7 @@ def test_a_therapist_is_led_to_the_monitor_of_who_walks(world, rosa):
 
 
 def test_a_researcher_sees_pseudonyms_and_no_station(world, rosa):
+    give(rosa, Purpose.RESEARCH, None, timezone.now())
     session = ago(rosa, "positive", strides(3, 1), timezone.now(), end=None)
     page = front(world.people[Role.RESEARCHER])
     assert rosa.pseudonym in page

@@ -30,7 +30,7 @@ from rehab.sessions.live.consumers import source as source_consumers
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.models import Step, TrainingSession
-from rehab.training.changes import Change, ChangeKind
+from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.fold import SessionFold
 from rehab.training.phases import make_phase
 from rehab.training.steps import Measurement, Side
@@ -307,7 +307,7 @@ class Sources(RuleBasedStateMachine):
         await TrainingSession.everywhere.filter(pk=self.session.pk).aupdate(owner=ended)
         assert await runtimes.current().recover() == (self.state == "running")
         if self.state == "running":
-            self.log.append(Change(ChangeKind.PAUSE))
+            self.log.append(Change(ChangeKind.PAUSE, PauseReason.RESTART))
             self.state = "paused"
 
     async def _end(self, runtime: runtimes.Runtime) -> None:
