@@ -4,12 +4,9 @@ import asyncio
 import os
 import time
 
-import pytest
-
 from tests.torture import Torture
 
 
-@pytest.mark.realtime
 def test_three_kills_lose_nothing(tmp_path, capsys):
     seed = int(os.environ.get("GARRY_TEST_SEED", time.time_ns() % 1_000_000))
     with capsys.disabled():

@@ -8,7 +8,6 @@ import pytest
 pytest.importorskip("django")
 
 
-@pytest.mark.realtime
 def test_restarts_lose_no_stride(tmp_path):
     from tests.sources_restarts import walk_with_restarts
 
