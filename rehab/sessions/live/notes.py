@@ -6,10 +6,12 @@ from __future__ import annotations
 
 import asyncio
 import contextvars
+import logging
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from channels.db import database_sync_to_async
+from django.db import DatabaseError
 from django.utils import timezone
 
 from rehab.people import audit
@@ -17,6 +19,8 @@ from rehab.people.audit import Act
 from rehab.people.lockout import find_address
 from rehab.sessions.live.admission import Actor, headers_of
 from rehab.sessions.models import TrainingSession
+
+log = logging.getLogger(__name__)
 
 
 class Note(NamedTuple):
@@ -50,10 +54,15 @@ class Notes:
             self._writing = loop.create_task(self._write(), context=contextvars.Context())
 
     async def _write(self) -> None:
-        while self._waiting:
-            notes, self._waiting = self._waiting, []
-            await database_sync_to_async(_store)(notes)
-        self._writing = None
+        notes: list[Note] = []
+        try:
+            while self._waiting:
+                notes, self._waiting = self._waiting, []
+                await database_sync_to_async(_store)(notes)
+        except DatabaseError:  # care goes on, and later notes are tried again
+            log.exception("The audit log missed what sockets told it: %s", notes)
+        finally:
+            self._writing = None
 
     async def settled(self) -> None:
         """Wait until all is written."""

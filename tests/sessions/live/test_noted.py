@@ -10,6 +10,8 @@ from django.db import DatabaseError
 
 from rehab.people import audit
 from rehab.people.audit import Act, AuditEntry, Recent
+from rehab.sessions.live import notes as notes_module
+from rehab.sessions.live import runtime as runtimes
 from tests.sessions.live.callers import turns
 
 pytestmark = pytest.mark.django_db(transaction=True)
@@ -92,3 +94,21 @@ async def test_a_log_that_cannot_be_written_stops_no_step_and_no_robot(place, be
     await source.walk(4.0)
     await monitor.say(STOP)
     assert await robot.hear("stop") == {"type": "stop"}
+
+
+async def test_after_a_log_that_could_not_be_written_it_goes_on(place, begun, monkeypatch):
+    def fail(notes):
+        raise DatabaseError("the server is gone")
+
+    missed = []
+    monkeypatch.setattr(notes_module.log, "exception", lambda *told: missed.append(told))
+    session = await begun(place)
+    with monkeypatch.context() as broken:
+        broken.setattr(notes_module, "_store", fail)
+        await place.monitor(session).watch()
+        await runtimes.current().notes.settled()
+    assert len(missed) == 1
+    tablet = place.tablet(session)
+    await tablet.watch()
+    await tablet.say(STOP)
+    assert [row[0] for row in await noted(2)] == [Act.VIEW, Act.ROBOT_STOP]
