@@ -59,6 +59,7 @@ def _sum_up(plan: SessionPlan, review: Review, point: Point | None) -> list[tupl
     figures, target = review.figures, plan.target
     walked, baseline = (point.walked, point.baseline) if point else (None, None)
     unit, lost = plan.measure.unit, figures["missing"] + figures["invalid"]
+    scored = plan.valence.has_points or figures["score"] is not None
     wanted = _("wanted %(rate)s") % {"rate": say_rate(target.hit_rate)} if target.hit_rate else ""
     planned = ""
     if target.duration_s:
@@ -85,8 +86,8 @@ def _sum_up(plan: SessionPlan, review: Review, point: Point | None) -> list[tupl
         (_("Walked"), say_duration(figures["active_s"]), planned),
         (
             _("Score"),
-            say_number(figures["score"], 0) if plan.valence.has_points else "–",
-            _("points") if plan.valence.has_points else _("this type has no points"),
+            say_number(figures["score"], 0) if scored else "–",
+            _("points") if scored else _("this type has no points"),
         ),
     ]
 
