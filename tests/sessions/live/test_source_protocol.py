@@ -12,7 +12,7 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers import source as source_module
 from rehab.sessions.live.consumers.base import Socket
 from rehab.sessions.models import SessionEvent, Step, TrainingSession
-from rehab.training.changes import Change, ChangeKind
+from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
 from tests.sessions.live.callers import SourceCaller, a_step, change, turns
@@ -354,3 +354,23 @@ async def test_who_changed_what_is_in_the_log(place, begun):
     event = await SessionEvent.everywhere.select_related("by").aget(kind="goal")
     assert (event.after_number, event.old, event.value, event.by) == (1, 3.0, 4.5, place.pt)
     assert (await TrainingSession.everywhere.aget(pk=session.pk)).goal == 4.5
+
+
+async def test_nothing_comes_before_the_welcome(place, begun):
+    """Also where a page joins just then, and the session is paused by a server that came back."""
+    session = await begun(place)
+    live = await runtimes.current().session(session.pk)
+    live._joining += 1  # a page that is on its way in
+    live._admits.clear()
+    live.asked_for = False
+    source = await place.source().dial()
+    await source.say({"type": "hello", "version": 1, "run": "r1", "last": 0})
+    async with asyncio.timeout(10):
+        while not live.asked_for:
+            await turns()
+    await turns()
+    await live.change(Change(ChangeKind.PAUSE, PauseReason.RESTART.value), None, NOW)
+    live._joining -= 1
+    live._admits.set()
+    assert (await source.hear())["type"] == "welcome"
+    assert source.heard[0]["state"] == "paused"

@@ -106,6 +106,8 @@ class DeviceSocket(Socket):
             live = await self.runtime.session(session_id)
         except OwnedElsewhere as problem:
             raise Closing(4409, "busy", str(problem)) from None
+        # Here, not later: from its place on until its welcome nothing may come between.
+        await live.admission()
         other: Peer | None = getattr(live, self.slot)
         if other is not None and other is not self:
             if other.device_id != self.device_id:

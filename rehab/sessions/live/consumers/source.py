@@ -58,7 +58,6 @@ class SourceConsumer(DeviceSocket):
 
     async def attached(self, live: LiveSession) -> None:
         """Say where the session stands and which step is wanted next."""
-        await live.admission()
         clock = live.source_clock
         if clock is not None and clock.run == self.lateness.run and not self.lateness.is_known:
             self.lateness = clock
