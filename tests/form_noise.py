@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from rehab.people.models import User
 from rehab.people.roles import Role
 from tests.api_noise import JUNK_TEXTS
+from tests.archives import body_of
 from tests.noise import TELLTALES, draw
 from tests.people.test_tenancy import Route, all_routes, what_leaks
 from tests.world import Actor, World, build_world, fill_board
@@ -135,7 +136,7 @@ class Site:
         key = actor.label, route.url
         if key not in self._forms:
             page = self.client(actor).get(route.url)
-            self._forms[key] = dict(Form(page.content.decode(errors="replace")).fields)
+            self._forms[key] = dict(Form(body_of(page).decode(errors="replace")).fields)
         return self._forms[key]
 
     def send(self, name: str, noise: Noise) -> tuple[Actor, Route, Any]:

@@ -211,6 +211,8 @@ def read_report(message: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(report, dict):
         raise BadFrame('"report" is an object.')
     check_plain(report)
+    if not isinstance(report.get("kind", ""), str):
+        raise BadFrame('"kind" of a report is a name.')
     match report.get("kind"):
         case "status":
             read_name(report, "base")
