@@ -10,16 +10,10 @@ from rehab.people.history import HistoryEntry
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.tokens import ApiToken
 from rehab.sessions.corrections import SessionCorrection
-from rehab.sessions.models import (
-    Measure,
-    Protocol,
-    ProtocolPhase,
-    SessionEvent,
-    SessionMetric,
-    Step,
-    TrainingSession,
-)
+from rehab.sessions.log import SessionEvent, SessionMetric, Step
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.presets import Preset
+from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase
 from rehab.sessions.visits import Visit
 from rehab.stations.models import Device, LeaveTries, Station
 

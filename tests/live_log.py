@@ -12,7 +12,8 @@ import django
 def read(session_id: int) -> dict[str, Any]:
     """Give a session's step numbers, and whether folding its log again gives the same verdicts."""
     from rehab.sessions.live.actor import read_log
-    from rehab.sessions.models import Step, TrainingSession
+    from rehab.sessions.log import Step
+    from rehab.sessions.models import TrainingSession
     from rehab.training.changes import Change
     from rehab.training.fold import SessionFold
 

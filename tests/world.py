@@ -23,16 +23,10 @@ from rehab.people.tokens import ApiToken
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.live.actor import Row, SessionActor
 from rehab.sessions.live.writer import Job, commit
-from rehab.sessions.models import (
-    Measure,
-    Protocol,
-    ProtocolPhase,
-    SessionEvent,
-    SessionMetric,
-    Step,
-    TrainingSession,
-)
+from rehab.sessions.log import SessionEvent, SessionMetric, Step
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.presets import Preset
+from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase
 from rehab.sessions.services import create_session
 from rehab.sessions.visits import Visit
 from rehab.stations.models import Device, LeaveTries, Pairing, Station

@@ -15,7 +15,7 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.periods import Period, period_of
 from rehab.boards.rules import TYPED
 from rehab.people.models import Patient
-from rehab.sessions.models import SessionMetric
+from rehab.sessions.log import SessionMetric
 from rehab.training.changes import State
 from rehab.training.valences import VALENCES
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from rehab.people.models import User
-from rehab.sessions.models import SessionMetric, TrainingSession
+from rehab.sessions.log import SessionMetric
+from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
 from rehab.training.valences import Valence
 

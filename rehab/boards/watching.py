@@ -13,7 +13,8 @@ from rehab.boards import building, entries
 from rehab.boards.models import Leaderboard
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.corrections import Part, SessionCorrection
-from rehab.sessions.models import SessionMetric, TrainingSession, figures_stored
+from rehab.sessions.log import SessionMetric, figures_stored
+from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
 
 

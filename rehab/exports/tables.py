@@ -18,7 +18,8 @@ from django.db.models import QuerySet
 from rehab.people.models import User
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.live.actor import read_log
-from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
+from rehab.sessions.log import SessionEvent, SessionMetric, Step
+from rehab.sessions.models import TrainingSession
 from rehab.training.fold import SessionFold
 from rehab.training.metrics import METRICS
 

@@ -25,17 +25,10 @@ from rehab.sessions.corrections import SessionCorrection, may_correct, tell_corr
 from rehab.sessions.cues import list_gestures
 from rehab.sessions.finding import Finder
 from rehab.sessions.forms import STRIDE_S, minutes_of
-from rehab.sessions.models import (
-    Measure,
-    Protocol,
-    ProtocolPhase,
-    SessionEvent,
-    SessionMetric,
-    Step,
-    TrainingSession,
-    say_shared,
-)
+from rehab.sessions.log import SessionEvent, SessionMetric, Step
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.presets import Preset
+from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase, say_shared
 from rehab.sessions.trend import with_figures
 from rehab.sessions.words import at_clinic
 from rehab.training.changes import OPEN, State

@@ -18,7 +18,9 @@ from rehab.people.roles import Role
 from rehab.sessions.forms import SessionForm, like_last_time
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import NotStored
-from rehab.sessions.models import Protocol, SessionMetric, Step, TrainingSession
+from rehab.sessions.log import SessionMetric, Step
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.protocols import Protocol
 from rehab.sessions.schemas import (
     ChangeGiven,
     Choice,

@@ -16,7 +16,8 @@ from rehab.people.access import clinic_of
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Right, Role, rights_of
 from rehab.sessions.live import runtime
-from rehab.sessions.models import SessionMetric, Step, TrainingSession
+from rehab.sessions.log import SessionMetric, Step
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.trend import with_figures
 from rehab.sessions.words import at_clinic, say_duration, say_number, say_rate
 from rehab.stations.models import Device, Station

@@ -63,7 +63,7 @@ PROTOCOLS: dict[str, tuple[str, tuple[Phase, ...]]] = {
 
 def install_defaults(using: str = "default", **_signal: Any) -> None:
     """Add what is missing of the shared rows; rows that are there stay as they are."""
-    from rehab.sessions.models import Measure, Protocol, ProtocolPhase
+    from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase
 
     with transaction.atomic(using=using):
         Measure.everywhere.using(using).get_or_create(

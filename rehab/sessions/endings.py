@@ -22,7 +22,8 @@ from rehab.people.consent import Purpose, withdraw
 from rehab.people.history import HistoryEntry, forget_values
 from rehab.people.models import Clinic, Ending, Erasing, Patient, User, new_pseudonym
 from rehab.sessions.corrections import forget_patient as forget_corrections
-from rehab.sessions.models import Remark, SessionEvent, TrainingSession
+from rehab.sessions.log import Remark, SessionEvent
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.visits import Visit
 from rehab.training.changes import OPEN
 

@@ -20,7 +20,9 @@ from rehab.people.access import clinic_of
 from rehab.people.consent import Purpose, give, join_boards
 from rehab.people.models import SIDES, Boards, Patient, User
 from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
-from rehab.sessions.models import Protocol, SessionEvent, TrainingSession
+from rehab.sessions.log import SessionEvent
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.protocols import Protocol
 from rehab.sessions.services import create_session
 from rehab.sessions.words import LEVELS, RECORDING, SIMULATED, say_source
 from rehab.sources.recording import RecordingError, read_recording

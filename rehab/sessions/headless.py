@@ -13,7 +13,8 @@ from django.utils import timezone
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.session import LiveSession
-from rehab.sessions.models import Step, TrainingSession
+from rehab.sessions.log import Step
+from rehab.sessions.models import TrainingSession
 from rehab.sources.recording import Recording
 from rehab.sources.synthetic import SyntheticWalker
 from rehab.training.changes import ChangeKind

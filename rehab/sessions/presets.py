@@ -16,7 +16,7 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.scope import ClinicRow, Scope
 from rehab.sessions.cues import USUAL, name_gestures
 from rehab.sessions.forms import LIVE, SessionForm
-from rehab.sessions.models import Protocol
+from rehab.sessions.protocols import Protocol
 from rehab.sessions.words import LEVELS, SIMULATED, say_quantity, say_rate
 from rehab.sources.synthetic import PROFILES
 from rehab.training.goals import GoalRule, Target

@@ -12,7 +12,8 @@ from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
 
 from rehab.people.models import User
-from rehab.sessions.models import Remark, RobotEntry, SessionEvent, TrainingSession
+from rehab.sessions.log import Remark, RobotEntry, SessionEvent
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.review import Review, review_session
 from rehab.sessions.trend import Point, read_trend
 from rehab.sessions.words import (

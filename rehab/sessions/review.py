@@ -13,7 +13,8 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.models import User
 from rehab.sessions.facts import MARKED_CHANGES
 from rehab.sessions.live.actor import read_log
-from rehab.sessions.models import Remark, RobotEntry, SessionEvent, Step, TrainingSession
+from rehab.sessions.log import Remark, RobotEntry, SessionEvent, Step
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.trend import figures_of
 from rehab.sessions.words import LEVELS, say_duration, say_number, say_quantity, say_rate
 from rehab.training.changes import ChangeKind, PauseReason

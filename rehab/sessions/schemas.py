@@ -10,7 +10,8 @@ from pydantic import AfterValidator, field_validator
 
 from rehab.people.api import PatientName, Short
 from rehab.people.api_base import Given, Key, Moment, Paging, Whole, Words, left_out, sees_names
-from rehab.sessions.models import SessionMetric, TrainingSession
+from rehab.sessions.log import SessionMetric
+from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ChangeKind, State
 from rehab.training.metrics import METRICS
 from rehab.training.steps import Side

@@ -12,7 +12,8 @@ from rehab.feedback.valences import valences_of
 from rehab.people.models import Patient, User
 from rehab.sessions.cues import find_composed, quiet_cue
 from rehab.sessions.live import runtime
-from rehab.sessions.models import Measure, Protocol, TrainingSession
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.protocols import Measure, Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind, PauseReason, Value
 from rehab.training.goals import GoalRule, Target

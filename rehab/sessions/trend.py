@@ -12,7 +12,8 @@ from typing import Any
 from django.db.models import Avg, Count, F, OuterRef, QuerySet, Subquery
 
 from rehab.people.models import User
-from rehab.sessions.models import SessionMetric, Step, TrainingSession
+from rehab.sessions.log import SessionMetric, Step
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.words import say_day, say_duration, say_number, say_quantity, say_rate
 from rehab.training.phases import Phase
 

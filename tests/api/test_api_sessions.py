@@ -11,7 +11,9 @@ from django.urls import reverse
 
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.models import Protocol, SessionMetric, Step, TrainingSession
+from rehab.sessions.log import SessionMetric, Step
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.protocols import Protocol
 from rehab.sessions.services import create_session
 from rehab.stations.models import Station
 from rehab.training.goals import GoalRule

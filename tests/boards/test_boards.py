@@ -20,7 +20,8 @@ from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.boards.showing import Viewer, show_after, show_waiting
 from rehab.boards.standings import Listed, Stored
 from rehab.people.models import Clinic, Patient
-from rehab.sessions.models import SessionMetric, TrainingSession
+from rehab.sessions.log import SessionMetric
+from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device, Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase

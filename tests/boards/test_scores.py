@@ -17,7 +17,8 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.ranking import SHOWN, By, Figures, cut, rank, ranking_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.models import SessionMetric, TrainingSession
+from rehab.sessions.log import SessionMetric
+from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ChangeKind
 from rehab.training.phases import make_phase
 from rehab.training.valences import VALENCES

@@ -29,7 +29,7 @@ WALKED = """
 from django.utils import timezone
 from rehab.people.first_start import first_clinic
 from rehab.people.models import Patient
-from rehab.sessions.models import Protocol
+from rehab.sessions.protocols import Protocol
 from rehab.stations.models import Station
 from tests.walks import visit
 rosa = Patient.everywhere.create(

@@ -18,7 +18,7 @@ SEED = """
 from django.utils import timezone
 from rehab.people.first_start import first_clinic
 from rehab.people.models import Patient
-from rehab.sessions.models import Protocol
+from rehab.sessions.protocols import Protocol
 from tests.walks import strides, walk
 rosa = Patient.everywhere.create(
     clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"

@@ -332,7 +332,7 @@ LONG_DAY = """
 from django.utils import timezone
 from rehab.people.first_start import first_clinic
 from rehab.people.models import Patient
-from rehab.sessions.models import Remark, SessionEvent
+from rehab.sessions.log import Remark, SessionEvent
 from tests.walks import visit, walk
 long = Patient.everywhere.create(
     clinic=first_clinic(), code="C" * 32, nickname="Maximiliana-Konstantina-Schmidt.",

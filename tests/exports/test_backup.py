@@ -23,7 +23,7 @@ from django.db import connection
 from rehab.exports import backup, sealed
 from rehab.exports.backup import LEFT_OUT, backed_up, read_lines, write_backup
 from rehab.people.models import Clinic, Patient, User
-from rehab.sessions.models import Step
+from rehab.sessions.log import Step
 from tests.servers import ROOT, clean_environment
 from tests.walks import HIT, MISS, walk
 from tests.world import NOW, build_world

@@ -25,7 +25,8 @@ from rehab.people.consent import Purpose, withdraw
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.corrections import Part, correct_session
-from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
+from rehab.sessions.log import SessionEvent, SessionMetric, Step
+from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase

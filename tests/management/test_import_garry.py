@@ -17,7 +17,8 @@ from django.test import Client
 
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.models import SessionMetric, Step, TrainingSession
+from rehab.sessions.log import SessionMetric, Step
+from rehab.sessions.models import TrainingSession
 from tests.programs import Program, token_of
 
 pytestmark = pytest.mark.django_db

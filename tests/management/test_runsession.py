@@ -13,7 +13,8 @@ import pytest
 from django.core.management import CommandError, call_command
 
 from rehab.sessions.headless import Pace, run_session
-from rehab.sessions.models import Step, TrainingSession
+from rehab.sessions.log import Step
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import create_session
 from rehab.sources.recording import read_recording
 from rehab.training.goals import GoalRule

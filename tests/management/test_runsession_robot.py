@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from django.core.management import call_command
 
-from rehab.sessions.models import Step
+from rehab.sessions.log import Step
 from tests.data import recording
 
 pytestmark = pytest.mark.django_db(transaction=True)  # the writer has its own connection

@@ -49,7 +49,7 @@ create_session(patient, valence="positive", goal=GoalRule(value=3.0),
 """
 READ_LOG = """
 import django, json; django.setup()
-from rehab.sessions.models import SessionEvent
+from rehab.sessions.log import SessionEvent
 events = SessionEvent.everywhere.filter(kind__startswith="robot_").order_by("pk")
 print(json.dumps([[event.kind, event.data] for event in events]))
 """

@@ -16,7 +16,9 @@ from rehab.people.audit import Act, AppendOnly, AuditEntry, Recent, shorten
 from rehab.people.models import Clinic, Patient
 from rehab.people.roles import Role
 from rehab.people.tokens import ApiToken
-from rehab.sessions.models import Measure, Protocol, Step, TrainingSession
+from rehab.sessions.log import Step
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.protocols import Measure, Protocol
 from rehab.stations.models import Device
 from tests.archives import body_of
 from tests.people.test_tenancy import all_routes, walk_patterns

@@ -25,7 +25,8 @@ from rehab.people.consent import (
 )
 from rehab.people.models import Boards, Clinic, Patient
 from rehab.people.roles import Role
-from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
+from rehab.sessions.log import SessionEvent, SessionMetric, Step
+from rehab.sessions.models import TrainingSession
 from tests.world import World, build_world
 
 pytestmark = pytest.mark.django_db

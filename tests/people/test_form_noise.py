@@ -7,7 +7,7 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.people.roles import Role
-from rehab.sessions.models import Protocol
+from rehab.sessions.protocols import Protocol
 from tests.form_noise import run_noise
 from tests.world import build_world
 

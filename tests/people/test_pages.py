@@ -148,7 +148,7 @@ def test_a_host_makes_clinics_and_their_leads(world):
 
 
 def test_shared_rows_are_the_hosts_to_change(world):
-    from rehab.sessions.models import Measure, Protocol
+    from rehab.sessions.protocols import Measure, Protocol
 
     client = signed_in(world, Role.LEAD)
     for model in (Measure, Protocol):

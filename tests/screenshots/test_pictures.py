@@ -73,7 +73,9 @@ from rehab.people.first_start import first_clinic
 from rehab.gestures.models import Gesture
 from rehab.people.models import Patient, User
 from rehab.sessions.corrections import Part, correct_session
-from rehab.sessions.models import Protocol, SessionEvent, TrainingSession
+from rehab.sessions.log import SessionEvent
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.protocols import Protocol
 from rehab.sessions.presets import Preset
 from rehab.sessions.visits import plan_visit
 from rehab.stations.models import Device, Station

@@ -19,8 +19,9 @@ from rehab.people.consent import Purpose, give
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection
-from rehab.sessions.models import Protocol, ProtocolPhase, TrainingSession
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.presets import Preset
+from rehab.sessions.protocols import Protocol, ProtocolPhase
 from rehab.stations.models import Device, Station, find_device
 from tests.walks import strides, walk
 from tests.world import NOW, World, build_world

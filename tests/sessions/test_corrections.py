@@ -17,7 +17,8 @@ from rehab.people.roles import Role
 from rehab.sessions import corrections
 from rehab.sessions.corrections import Part, SessionCorrection, correct_session
 from rehab.sessions.dashboard import read_week
-from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
+from rehab.sessions.log import SessionEvent, SessionMetric, Step
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.takehome import sum_up_for_home
 from rehab.sessions.trend import read_trend
 from tests.walks import strides, walk

@@ -28,7 +28,8 @@ from rehab.sessions.endings import (
     overdue,
     reopen_program,
 )
-from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
+from rehab.sessions.log import SessionEvent, SessionMetric, Step
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import create_session
 from rehab.sessions.visits import Visit
 from rehab.training.goals import GoalRule

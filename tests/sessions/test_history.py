@@ -16,7 +16,7 @@ from django.utils import timezone
 from rehab.people.consent import Purpose, give
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.models import RobotEntry, SessionEvent, Step
+from rehab.sessions.log import RobotEntry, SessionEvent, Step
 from rehab.sessions.trend import SESSIONS, read_trend
 from rehab.sessions.words import at_clinic, say_day, say_duration, say_number, say_rate
 from rehab.training.changes import Change, ChangeKind

@@ -15,7 +15,8 @@ from rehab.people.models import Clinic, Patient
 from rehab.people.scope import CrossClinic
 from rehab.sessions.live.actor import SessionActor, StepRow
 from rehab.sessions.live.writer import STEP_COLUMNS
-from rehab.sessions.models import SessionEvent, SessionMetric, Step, TrainingSession
+from rehab.sessions.log import SessionEvent, SessionMetric, Step
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import create_session
 from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind, Refused

@@ -11,8 +11,9 @@ from django.test import Client
 from rehab.gestures.models import Gesture
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.models import Protocol, TrainingSession
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.presets import Preset
+from rehab.sessions.protocols import Protocol
 from rehab.stations.models import Station
 from tests.world import World, build_world, mark
 

@@ -11,7 +11,8 @@ from django.test import Client
 from rehab.people.consent import Purpose, give
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.models import SessionEvent, TrainingSession
+from rehab.sessions.log import SessionEvent
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.report import draw_chart, write_report
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase

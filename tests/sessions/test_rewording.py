@@ -13,7 +13,7 @@ from rehab.feedback.models import FeedbackType
 from rehab.people.roles import Role
 from rehab.sessions.live import owners
 from rehab.sessions.live.actor import SessionActor
-from rehab.sessions.models import SessionEvent
+from rehab.sessions.log import SessionEvent
 from rehab.sessions.services import create_session
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase

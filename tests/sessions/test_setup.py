@@ -8,7 +8,8 @@ from django.test import Client
 from rehab.gestures.models import Gesture
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.models import Protocol, TrainingSession
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.protocols import Protocol
 from rehab.sessions.services import change_session, create_session
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind

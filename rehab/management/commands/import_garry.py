@@ -14,8 +14,10 @@ from django.db import transaction
 
 from rehab.people.first_start import first_clinic, prepare_database
 from rehab.people.models import Clinic, Patient
-from rehab.sessions.models import Measure, SessionMetric, TrainingSession
+from rehab.sessions.log import SessionMetric
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.original import Damaged, Original, OriginalSession, read_original
+from rehab.sessions.protocols import Measure
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting

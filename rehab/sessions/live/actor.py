@@ -9,14 +9,8 @@ from typing import Any, NamedTuple
 
 from rehab.people.models import User
 from rehab.sessions.facts import MARKED_CHANGES, change_mark
-from rehab.sessions.models import (
-    Remark,
-    RobotEntry,
-    SessionEvent,
-    SessionMetric,
-    Step,
-    TrainingSession,
-)
+from rehab.sessions.log import Remark, RobotEntry, SessionEvent, SessionMetric, Step
+from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ENDED, Change, ChangeKind, State, Value
 from rehab.training.fold import SessionFold
 from rehab.training.metrics import measure_session

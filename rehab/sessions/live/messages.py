@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
-from rehab.sessions.models import Remark
+from rehab.sessions.log import Remark
 from rehab.training.changes import ChangeKind
 from rehab.training.steps import InvalidMeasurement, Measurement, Side
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from channels.db import database_sync_to_async
 
-from rehab.sessions.models import SessionEvent, Step
+from rehab.sessions.log import SessionEvent, Step
 from rehab.training.changes import ChangeKind
 from rehab.training.measures import Measure
 from rehab.training.steps import Measurement, Reason, add_reason, find_reasons

@@ -28,7 +28,8 @@ from rehab.sessions.live.children import Children
 from rehab.sessions.live.notes import Notes
 from rehab.sessions.live.session import RECENT, LiveSession
 from rehab.sessions.live.writer import Writer
-from rehab.sessions.models import RobotEntry, SessionEvent, Step, TrainingSession
+from rehab.sessions.log import RobotEntry, SessionEvent, Step
+from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ENDED, OPEN, Change, ChangeKind, PauseReason, State, Value
 
 log = logging.getLogger(__name__)

@@ -19,7 +19,8 @@ from typing import Any
 from django.db import close_old_connections, connection, transaction
 
 from rehab.sessions.live.actor import Row, StepRow, Summary
-from rehab.sessions.models import SessionEvent, SessionMetric, TrainingSession, figures_stored
+from rehab.sessions.log import SessionEvent, SessionMetric, figures_stored
+from rehab.sessions.models import TrainingSession
 
 log = logging.getLogger(__name__)
 

@@ -10,7 +10,8 @@ from django.views.decorators.http import require_safe
 from rehab.people.access import for_roles, person
 from rehab.people.roles import Role
 from rehab.sessions.live.messages import BORG_MAX
-from rehab.sessions.models import EVENTS, Remark, TrainingSession
+from rehab.sessions.log import EVENTS, Remark
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.words import LEVELS
 from rehab.training.plans import ROBOT_LEVELS
 

@@ -13,7 +13,8 @@ from django.test import Client
 
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.models import Step, TrainingSession
+from rehab.sessions.log import Step
+from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import create_session
 from rehab.stations.models import Device, Station
 from rehab.training.changes import ChangeKind

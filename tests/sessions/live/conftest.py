@@ -14,7 +14,8 @@ from django.db import connections
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import writer as writers
-from rehab.sessions.models import Step, TrainingSession
+from rehab.sessions.log import Step
+from rehab.sessions.models import TrainingSession
 from tests.sessions.live.callers import Caller, Place, build_place, change, open_session
 
 

@@ -7,7 +7,8 @@ from typing import Any
 
 from rehab.sessions.live.consumers import base
 from rehab.sessions.live.messages import MAX_FRAME
-from rehab.sessions.models import Step, TrainingSession
+from rehab.sessions.log import Step
+from rehab.sessions.models import TrainingSession
 from tests.sessions.live.callers import (
     Caller,
     Message,

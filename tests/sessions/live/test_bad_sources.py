@@ -11,7 +11,8 @@ from django.utils import timezone
 
 from rehab.sessions.live import owners
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.models import Step, TrainingSession
+from rehab.sessions.log import Step
+from rehab.sessions.models import TrainingSession
 from tests.sessions.live.callers import (
     Message,
     RobotCaller,

@@ -8,7 +8,7 @@ import pytest
 
 from rehab.sessions.live.consumers import source as source_module
 from rehab.sessions.live.lateness import LATE_S, Lateness
-from rehab.sessions.models import Step
+from rehab.sessions.log import Step
 from tests.sessions.live.callers import a_step
 
 

@@ -13,7 +13,8 @@ from rehab.people.models import Clinic
 from rehab.sessions.live import hub
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.actor import SessionActor
-from rehab.sessions.models import SessionEvent, TrainingSession
+from rehab.sessions.log import SessionEvent
+from rehab.sessions.models import TrainingSession
 from rehab.training.valences import Cue
 from robot.trial import admit_gesture
 from tests.sessions.live.callers import Message, change, turns

@@ -11,7 +11,8 @@ from asgiref.sync import sync_to_async
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers import source as source_module
 from rehab.sessions.live.consumers.base import Socket
-from rehab.sessions.models import SessionEvent, Step, TrainingSession
+from rehab.sessions.log import SessionEvent, Step
+from rehab.sessions.models import TrainingSession
 from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase

@@ -29,7 +29,8 @@ from rehab.sessions.live.actor import SessionActor, read_log
 from rehab.sessions.live.consumers import source as source_consumers
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.live.writer import Writer
-from rehab.sessions.models import Step, TrainingSession
+from rehab.sessions.log import Step
+from rehab.sessions.models import TrainingSession
 from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.fold import SessionFold
 from rehab.training.phases import make_phase

@@ -6,7 +6,8 @@ import pytest
 from asgiref.sync import sync_to_async
 
 from rehab.sessions.live import runtime
-from rehab.sessions.models import SessionEvent, TrainingSession
+from rehab.sessions.log import SessionEvent
+from rehab.sessions.models import TrainingSession
 from rehab.training.phases import make_phase
 from rehab.training.valences import Cue
 from tests.sessions.live.test_robots import restart

@@ -17,7 +17,7 @@ from rehab.sessions.live import hub
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.live.past import PAGE
-from rehab.sessions.models import Remark, SessionEvent
+from rehab.sessions.log import Remark, SessionEvent
 from rehab.sessions.services import change_session, create_session
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule

@@ -18,7 +18,8 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import writer as writers
 from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.live.writer import Fenced, Job, Refolded, Writer
-from rehab.sessions.models import SessionEvent, Step, TrainingSession
+from rehab.sessions.log import SessionEvent, Step
+from rehab.sessions.models import TrainingSession
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.steps import Measurement, Side
 from tests.sessions.live.callers import a_step, change, turns

@@ -1,0 +1,183 @@
+"""The log of what happened in a session: its steps, its events, and the figures it came to."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import ClassVar
+
+from django.db import models
+from django.dispatch import Signal
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.consent import PatientScope
+from rehab.people.models import SIDES, User
+from rehab.people.scope import ScopedModel
+from rehab.sessions.models import TrainingSession
+from rehab.training.changes import ChangeKind
+from rehab.training.metrics import METRICS
+
+
+class Step(ScopedModel):
+    """A scored stride. Rows are only ever added."""
+
+    scope = PatientScope(
+        clinic="session__clinic", station="session__station", patient="session__patient"
+    )
+
+    session = models.ForeignKey(
+        TrainingSession, on_delete=models.PROTECT, related_name="steps", verbose_name=_("session")
+    )
+    number = models.PositiveIntegerField(_("number"))
+    time_s = models.FloatField(_("time (s)"), help_text=_("The source's clock."))
+    received_at = models.DateTimeField(_("received at"), help_text=_("The server's clock."))
+    side = models.CharField(_("side"), max_length=8, choices=SIDES)
+    value = models.FloatField(_("value"), null=True)
+    gain = models.FloatField(_("gain"))
+    shown = models.FloatField(_("shown"), null=True)
+    goal = models.FloatField(_("goal"), null=True)
+    performance = models.FloatField(_("performance"), null=True)
+    hit = models.BooleanField(_("hit"), null=True)
+    points = models.SmallIntegerField(_("points"), null=True)
+    valid = models.BooleanField(_("valid"))
+    reasons = models.JSONField(_("reasons"), default=list)
+    phase = models.PositiveSmallIntegerField(
+        _("phase"), help_text=_("Index into the plan's phases.")
+    )
+    rules_version = models.PositiveSmallIntegerField(_("rules version"))
+    extra = models.JSONField(_("extra"), default=dict)
+
+    class Meta(ScopedModel.Meta):
+        verbose_name = _("step")
+        verbose_name_plural = _("steps")
+        ordering: ClassVar = ["session", "number"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(fields=["session", "number"], name="step_number_once")
+        ]
+
+    def __str__(self) -> str:
+        return gettext("Step %(number)d") % {"number": self.number}
+
+
+class RobotEntry(StrEnum):
+    """What the log keeps of a session's robot. It alters no score: folding passes it over."""
+
+    STOP = "robot_stop"
+    ARM = "robot_arm"
+    DECISION = "robot_decision"
+    GESTURE = "robot_gesture"
+
+
+class Remark(StrEnum):
+    """What a PT notes with one tap while somebody walks. It alters no score either."""
+
+    REST = "rest"
+    PAIN = "pain"
+    DIZZINESS = "dizziness"
+    NEAR_FALL = "near_fall"
+    FALL = "fall"
+    HANDRAIL = "handrail"
+    VERBAL_CUE = "verbal_cue"
+    BORG = "borg"  # felt exertion, Borg CR10: 0 to 10 in ``value``
+
+
+EVENTS = {
+    ChangeKind.START: _("start"),
+    ChangeKind.PAUSE: _("pause"),
+    ChangeKind.RESUME: _("resume"),
+    ChangeKind.FINISH: _("finish"),
+    ChangeKind.ABORT: _("abort"),
+    ChangeKind.GOAL: _("goal"),
+    ChangeKind.GAIN: _("gain"),
+    ChangeKind.PHASE: _("phase"),
+    ChangeKind.ACTIVATION_THRESHOLD: _("activation threshold"),
+    ChangeKind.ROBOT_INTENSITY: _("robot intensity"),
+    ChangeKind.VALENCE: _("feedback type"),
+    ChangeKind.WORDS: _("words"),
+    ChangeKind.WORDS_SHOWN: _("words shown"),
+    ChangeKind.CHART_STYLE: _("chart style"),
+    RobotEntry.STOP: _("robot stop"),
+    RobotEntry.ARM: _("robot arm"),
+    RobotEntry.DECISION: _("robot decision"),
+    RobotEntry.GESTURE: _("robot gesture"),
+    Remark.REST: _("rest"),
+    Remark.PAIN: _("pain"),
+    Remark.DIZZINESS: _("dizziness"),
+    Remark.NEAR_FALL: _("near fall"),
+    Remark.FALL: _("fall"),
+    Remark.HANDRAIL: _("handrail"),
+    Remark.VERBAL_CUE: _("verbal cue"),
+    Remark.BORG: _("borg"),
+}
+
+
+class SessionEvent(ScopedModel):
+    """What was done to a session, noted of it, or done by its robot, ordered against its steps.
+    Rows are only added.
+
+    ``data``: what the robot reported; which device stopped it where that was no person; as
+    ``value`` (and ``old``) what a change was to that is no number: a name, or words and their type.
+    """
+
+    scope = PatientScope(
+        clinic="session__clinic", station="session__station", patient="session__patient"
+    )
+
+    session = models.ForeignKey(
+        TrainingSession, on_delete=models.PROTECT, related_name="events", verbose_name=_("session")
+    )
+    after_number = models.PositiveIntegerField(
+        _("after number"), help_text=_("The last step before it; 0 for none.")
+    )
+    kind = models.CharField(
+        _("kind"), max_length=32, choices=[(kind.value, words) for kind, words in EVENTS.items()]
+    )
+    old = models.FloatField(_("old"), null=True)
+    value = models.FloatField(_("value"), null=True)
+    by = models.ForeignKey(
+        User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("by")
+    )
+    at = models.DateTimeField(_("at"))
+    data = models.JSONField(_("data"), default=dict)
+
+    class Meta(ScopedModel.Meta):
+        verbose_name = _("session event")
+        verbose_name_plural = _("session events")
+        ordering: ClassVar = ["session", "pk"]
+
+    def __str__(self) -> str:
+        return self.get_kind_display()
+
+
+# Sent with ``sessions``, a set of keys, within the transaction that stores their figures.
+figures_stored = Signal()
+
+
+class SessionMetric(ScopedModel):
+    """A figure of an ended session: what boards and reports rank and compare."""
+
+    scope = PatientScope(
+        clinic="session__clinic", station="session__station", patient="session__patient"
+    )
+
+    session = models.ForeignKey(
+        TrainingSession, on_delete=models.CASCADE, related_name="metrics", verbose_name=_("session")
+    )
+    slug = models.CharField(
+        _("slug"),
+        max_length=32,
+        choices=[(metric.slug, _(metric.label)) for metric in METRICS.values()],
+    )
+    value = models.FloatField(_("value"))
+
+    class Meta(ScopedModel.Meta):
+        verbose_name = _("session metric")
+        verbose_name_plural = _("session metrics")
+        ordering: ClassVar = ["session", "slug"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(fields=["session", "slug"], name="session_metric_once")
+        ]
+        indexes: ClassVar = [models.Index(fields=["slug", "value"], name="metric_by_value")]
+
+    def __str__(self) -> str:
+        return f"{self.get_slug_display()}: {self.value:g}"
