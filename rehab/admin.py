@@ -6,6 +6,7 @@ from rehab.gestures import admin as gestures
 from rehab.people import admin as people
 from rehab.people import log_admin as logs
 from rehab.sessions import admin as sessions
+from rehab.sessions import protocol_admin as protocols
 from rehab.stations import admin as stations
 
-__all__ = ["boards", "feedback", "gestures", "logs", "people", "sessions", "stations"]
+__all__ = ["boards", "feedback", "gestures", "logs", "people", "protocols", "sessions", "stations"]

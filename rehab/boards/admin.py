@@ -5,28 +5,21 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from csp.constants import SELF
-from csp.decorators import csp_replace
 from django import forms
 from django.contrib import admin
-from django.core.exceptions import PermissionDenied
 from django.db.models import Max, Q, QuerySet
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import render
-from django.urls import URLPattern, path
 from django.utils import timezone
-from django.utils.decorators import method_decorator
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
-from django.views.decorators.clickjacking import xframe_options_sameorigin
-from django.views.decorators.http import require_safe
 
 from rehab.boards import entries
 from rehab.boards.forms import LeaderboardForm
 from rehab.boards.models import Leaderboard
 from rehab.boards.showing import Viewer
 from rehab.people.access import person
-from rehab.people.admin_base import ScopedAdmin
+from rehab.people.admin_preview import PreviewAdmin, find_faults
 from rehab.people.models import Boards, Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
@@ -36,7 +29,7 @@ SEEN_AS = 60  # patients to see a preview as, those who walked last first
 
 
 @admin.register(Leaderboard)
-class LeaderboardAdmin(ScopedAdmin):
+class LeaderboardAdmin(PreviewAdmin):
     """Leaderboards of the clinic."""
 
     form = LeaderboardForm
@@ -99,11 +92,6 @@ class LeaderboardAdmin(ScopedAdmin):
         ),
     )
 
-    def get_urls(self) -> list[URLPattern]:
-        """Give the addresses, the preview's among them."""
-        preview = self.admin_site.admin_view(self.preview)
-        return [path("preview/", preview, name="rehab_leaderboard_preview"), *super().get_urls()]
-
     def formfield_for_choice_field(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
         """Offer what this person may build: boards across clinics are the host's, and only they."""
         if db_field.name == "among":
@@ -134,26 +122,13 @@ class LeaderboardAdmin(ScopedAdmin):
         context["built"] = None if board is None else entries.measure_progress(board)
         return super().render_change_form(request, context, *args, **kwargs)
 
-    @method_decorator(require_safe)
-    @method_decorator(xframe_options_sameorigin)
-    @method_decorator(csp_replace({"frame-ancestors": [SELF]}))
-    def preview(self, request: HttpRequest) -> HttpResponse:
-        """Show the board that a form describes, of the clinic's own sessions. Stores nothing.
-
-        Refuses whoever could not save it.
-        """
-        row = self.get_object(request, request.GET.get("board", "")) or None
-        may = self.has_change_permission if row else self.has_add_permission
-        if not may(request, *([row] if row else [])):
-            raise PermissionDenied
+    def draw(self, request: HttpRequest, row: Leaderboard | None) -> HttpResponse:
+        """Show the board, made of the clinic's own sessions."""
         given = request.GET.copy()
         given["name"] = given.get("name", "").strip() or gettext("Leaderboard")
         form = self.get_form(request, row, change=row is not None)(given, instance=row)
         if not form.is_valid():
-            faults = [
-                (form.fields[name].label if name in form.fields else "", " ".join(problems))
-                for name, problems in form.errors.items()
-            ]
+            faults = list(find_faults(form))
             return render(request, "boards/preview_faults.html", {"faults": faults})
         if form.instance.clinic_id is None:
             fault = gettext(

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
-from csp.constants import SELF
-from csp.decorators import csp_replace
 from django import forms
 from django.contrib import admin, messages
 from django.core.exceptions import PermissionDenied
 from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
-from django.urls import URLPattern, path, reverse
-from django.utils.decorators import method_decorator
+from django.urls import reverse
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy, override
-from django.views.decorators.clickjacking import xframe_options_sameorigin
-from django.views.decorators.http import require_safe
 
 from rehab.feedback.forms import BandForm, BandFormSet, FeedbackTypeForm, word_fields
 from rehab.feedback.models import FeedbackBand, FeedbackType, words_edited
@@ -26,7 +22,8 @@ from rehab.feedback.valences import usual_valence, valences_of
 from rehab.feedback.wording import FALLBACK
 from rehab.gestures.choices import gesture_choices
 from rehab.people.access import clinic_of, person
-from rehab.people.admin_base import ScopedAdmin, ScopedOptions
+from rehab.people.admin_base import ScopedOptions
+from rehab.people.admin_preview import PreviewAdmin, find_faults
 from rehab.people.models import LANGUAGES
 from rehab.training.valences import BANDS_MAX, VALENCES
 
@@ -54,7 +51,7 @@ class BandRows(ScopedOptions, admin.TabularInline):
 
 
 @admin.register(FeedbackType)
-class FeedbackTypeAdmin(ScopedAdmin):
+class FeedbackTypeAdmin(PreviewAdmin):
     """Feedback types of the clinic."""
 
     form = FeedbackTypeForm
@@ -69,11 +66,6 @@ class FeedbackTypeAdmin(ScopedAdmin):
         slug = obj.slug if obj and obj.pk else request.GET.get("slug") or request.POST.get("slug")
         form = FeedbackTypeForm(initial={"slug": slug})
         return [name for name in self.fields if name in form.fields]
-
-    def get_urls(self) -> list[URLPattern]:
-        """Give the addresses, the preview's among them."""
-        preview = self.admin_site.admin_view(self.preview)
-        return [path("preview/", preview, name="rehab_feedbacktype_preview"), *super().get_urls()]
 
     def formfield_for_dbfield(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
         """Offer the gestures that this person's clinic has."""
@@ -186,18 +178,8 @@ class FeedbackTypeAdmin(ScopedAdmin):
 
         transaction.on_commit(tell)
 
-    @method_decorator(require_safe)
-    @method_decorator(xframe_options_sameorigin)
-    @method_decorator(csp_replace({"frame-ancestors": [SELF]}))
-    def preview(self, request: HttpRequest) -> HttpResponse:
-        """Show what a patient would see of each band that a form describes. Stores nothing.
-
-        Refuses whoever could not save it.
-        """
-        row = self.get_object(request, request.GET.get("row", "")) or None
-        may = self.has_change_permission if row else self.has_add_permission
-        if not may(request, *([row] if row else [])):
-            raise PermissionDenied
+    def draw(self, request: HttpRequest, row: FeedbackType | None) -> HttpResponse:
+        """Show what a patient would see of each band."""
         given = request.GET
         language = given.get("seen_in", "")
         if language not in dict(LANGUAGES):
@@ -212,7 +194,7 @@ class FeedbackTypeAdmin(ScopedAdmin):
             context["valence"] = form.instance.to_valence(language, bands.bands(language))
             context["seen"] = list(show_bands(context["valence"]))
         else:
-            context["faults"] = list(find_faults(form, bands))
+            context["faults"] = [*find_faults(form), *find_row_faults(form, bands)]
         with override(language):
             return render(request, "feedback/preview.html", context)
 
@@ -236,12 +218,9 @@ def initial_bands(slug: str) -> list[dict[str, Any]]:
     ]
 
 
-def find_faults(form: Any, bands: Any) -> Any:
-    """Give what is wrong with a form: the field's label and the words."""
-    for name, problems in form.errors.items():
-        yield (form.fields[name].label if name in form.fields else "", " ".join(problems))
+def find_row_faults(form: Any, bands: Any) -> Iterator[tuple[str, str]]:
+    """Give what is wrong with the bands, once nothing is wrong with the type they belong to."""
     if not form.errors:
         for row in bands.forms:
-            for name, problems in row.errors.items():
-                yield (row.fields[name].label if name in row.fields else "", " ".join(problems))
+            yield from find_faults(row)
         yield from (("", problem) for problem in bands.non_form_errors())

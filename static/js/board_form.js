@@ -1,7 +1,8 @@
 // The form that a leaderboard is built in: hides what does not apply, keeps choices that go together
 // together, and shows the board as it would look after each change.
 
-const PAUSE_MS = 300; // after the last change, before the preview is drawn again
+import { showPreview } from "garry/preview";
+
 const SUMS = ["steps", "score", "active_minutes", "attended", "target_met"];
 const COUNTED = ["attended", "target_met"];
 
@@ -10,10 +11,7 @@ const preview = document.querySelector(".preview");
 if (form && preview) build();
 
 function build() {
-  const frame = preview.querySelector("iframe");
   const facts = preview.querySelector(".facts");
-  const seenAs = preview.querySelector("#seen_as");
-  let waiting;
 
   function value(name) {
     const field = form.elements[name];
@@ -75,26 +73,12 @@ function build() {
     show("min_participants", !own);
   }
 
-  function draw() {
-    const chosen = new FormData(form);
-    for (const name of ["csrfmiddlewaretoken", "_save"]) chosen.delete(name);
-    if (preview.dataset.board) chosen.set("board", preview.dataset.board);
-    chosen.set("seen_as", seenAs.value);
-    frame.src = `${preview.dataset.preview}?${new URLSearchParams(chosen)}`;
-  }
-
-  frame.addEventListener("load", () => {
-    facts.textContent = frame.contentDocument?.body?.dataset.facts ?? "";
-  });
-  preview.addEventListener("change", draw);
   form.addEventListener("change", ({ target }) => {
     follow(target.name);
     hide();
   });
-  form.addEventListener("input", () => {
-    clearTimeout(waiting);
-    waiting = setTimeout(draw, PAUSE_MS);
-  });
   hide();
-  draw();
+  showPreview(form, preview, (drawn) => {
+    facts.textContent = drawn.body?.dataset.facts ?? "";
+  });
 }

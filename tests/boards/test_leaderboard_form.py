@@ -142,7 +142,7 @@ def test_what_is_seen_in_the_preview_is_what_the_tablet_shows(world):
     board = Leaderboard.everywhere.get()
     client = client_of(world.people[Role.PT])
     fields = filled(**{name: getattr(board, name) for name in filled()})
-    preview = client.get(PREVIEW, fields | {"board": board.pk, "seen_as": world.patient.pk})
+    preview = client.get(PREVIEW, fields | {"row": board.pk, "seen_as": world.patient.pk})
     shown = client.get(reverse("scores", kwargs={"session_id": world.session.pk}))
     rows = [
         answer.content.decode().split("<ol>")[1].split("</ol>")[0] for answer in (preview, shown)
