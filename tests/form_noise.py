@@ -22,7 +22,7 @@ from rehab.people.roles import Role
 from tests.api_noise import JUNK_TEXTS
 from tests.archives import body_of
 from tests.noise import TELLTALES, draw
-from tests.people.test_tenancy import Route, all_routes, what_leaks
+from tests.tenancy import Route, all_routes, what_leaks
 from tests.world import Actor, World, build_world, fill_board
 
 SLOWEST_S = 5.0  # no answer may hold the server up

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from html.parser import HTMLParser
 
 import pytest
-from django.test import Client
 from django.urls import get_resolver, reverse
 from django.utils import translation
 from django.utils.translation import trans_real
@@ -18,7 +17,7 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
-from tests.world import World, build_world, fill_board
+from tests.world import World, build_world, fill_board, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -168,8 +167,7 @@ def walk(resolver, names=()):
 
 def pages(world: World, admin: bool = False) -> Iterator[tuple[str, Page]]:
     """Open every page that a clinic's lead may open."""
-    client = Client()
-    client.force_login(User.everywhere.select_related("clinic").get(pk=world.people[Role.LEAD].pk))
+    client = signed_in(User.everywhere.select_related("clinic").get(pk=world.people[Role.LEAD].pk))
     for name, path in paths(world, admin):
         answer = client.get(path)
         html = answer.headers.get("Content-Type", "").startswith("text/html")

@@ -9,6 +9,7 @@ from typing import Any
 from django.apps import apps
 from django.contrib.auth.models import AnonymousUser
 from django.db.models import Model
+from django.test import Client
 
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.feedback.models import FeedbackBand, FeedbackType
@@ -249,6 +250,18 @@ def fill_board(world: World) -> None:
             SessionMetric.everywhere.create(
                 session=walked, slug=figure.slug, value=figure.value - number / 100
             )
+
+
+def signed_in(user: User, **options: Any) -> Client:
+    """Give a browser in which somebody is signed in."""
+    client = Client(**options)
+    client.force_login(user)
+    return client
+
+
+def client_of(world: World, role: Role = Role.PT, **options: Any) -> Client:
+    """Give the browser of a clinic's person of that role."""
+    return signed_in(world.people[role], **options)
 
 
 @dataclass(frozen=True)

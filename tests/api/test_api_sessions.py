@@ -6,7 +6,6 @@ from datetime import UTC, datetime
 from typing import Any
 
 import pytest
-from django.test import Client
 from django.urls import reverse
 
 from rehab.people.models import Patient
@@ -20,7 +19,7 @@ from rehab.training.goals import GoalRule
 from rehab.training.metrics import METRICS
 from rehab.training.phases import make_phase
 from tests.programs import Program, program_of
-from tests.world import World, build_world
+from tests.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -74,8 +73,7 @@ def test_researchers_get_pseudonyms_and_nothing_else_of_a_patient(world):
     assert program.get(f"/sessions/{world.session.pk}")[1]["patient"] == nobody
     TrainingSession.everywhere.update(source="Recording rosamunde.csv")
     assert program.get(f"/sessions/{world.session.pk}")[1]["source"] is None
-    researcher = Client()
-    researcher.force_login(world.people[Role.RESEARCHER])
+    researcher = client_of(world, Role.RESEARCHER)
     for page in (
         reverse("session", args=[world.session.pk]),
         reverse("report", args=[world.session.pk]),

@@ -23,7 +23,7 @@ from rehab.people.roles import Role
 from rehab.sessions import api as sessions_api
 from rehab.sessions.models import TrainingSession
 from tests.programs import ROOT, program_of
-from tests.world import World, build_world, mark, scoped_models
+from tests.world import World, build_world, mark, scoped_models, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -157,8 +157,7 @@ def test_every_call_says_what_it_may_answer_and_is_in_the_documentation():
 
 
 def test_a_host_reads_nothing_but_who_it_is():
-    host = Client()
-    host.force_login(User.everywhere.create_user("root", role=Role.HOST))
+    host = signed_in(User.everywhere.create_user("root", role=Role.HOST))
     world = build_world("amber")
     for call in calls():
         method, path = call.split()

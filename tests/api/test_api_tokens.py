@@ -12,7 +12,7 @@ from rehab.people.access import UndeclaredView
 from rehab.people.roles import Role
 from rehab.people.tokens import ApiToken
 from tests.programs import ROOT, Program, program_of, token_of
-from tests.world import World, build_world
+from tests.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -23,8 +23,7 @@ def world() -> World:
 
 
 def test_a_lead_makes_a_token_that_is_shown_once_and_works_until_it_is_revoked(world):
-    client = Client()
-    client.force_login(world.people[Role.LEAD])
+    client = client_of(world, Role.LEAD)
     form = {"name": "Export", "user": world.people[Role.PT].pk, "role": "researcher"}
     page = client.post("/admin/rehab/apitoken/add/", form, follow=True).content.decode()
     token = re.search(r"one time only: (\S+?)<", page).group(1)
@@ -42,8 +41,7 @@ def test_a_lead_makes_a_token_that_is_shown_once_and_works_until_it_is_revoked(w
 
 
 def test_a_token_carries_no_role_that_its_account_lacks(world):
-    client = Client()
-    client.force_login(world.people[Role.LEAD])
+    client = client_of(world, Role.LEAD)
     form = {"name": "Export", "user": world.people[Role.RESEARCHER].pk, "role": "pt"}
     page = client.post("/admin/rehab/apitoken/add/", form).content.decode()
     assert "choose that role, or one below" in page
@@ -52,8 +50,7 @@ def test_a_token_carries_no_role_that_its_account_lacks(world):
 
 def test_only_leads_see_tokens(world):
     for role in (Role.PT, Role.RESEARCHER):
-        client = Client()
-        client.force_login(world.people[role])
+        client = client_of(world, role)
         assert client.get("/admin/rehab/apitoken/").status_code == 403
 
 
@@ -93,8 +90,7 @@ def test_a_device_is_no_person(world):
 
 
 def test_a_browser_that_is_signed_in_calls_too_but_changes_nothing_from_a_foreign_page(world):
-    client = Client(enforce_csrf_checks=True)
-    client.force_login(world.people[Role.PT])
+    client = client_of(world, enforce_csrf_checks=True)
     assert client.get(f"{ROOT}/me").json()["role"] == "pt"
     body = {"code": "K1", "nickname": "Rosa"}
     url = f"{ROOT}/patients"

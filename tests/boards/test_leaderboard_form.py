@@ -4,14 +4,13 @@ from typing import Any
 
 import pytest
 from django.core.exceptions import ValidationError
-from django.test import Client
 from django.urls import reverse, reverse_lazy
 
 from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.people.aliases import MANNERS, draw_alias, words
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
-from tests.world import World, build_world, fill_board
+from tests.world import World, build_world, client_of, fill_board, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -95,12 +94,6 @@ def world() -> World:
     return build_world("amber")
 
 
-def client_of(user) -> Client:
-    client = Client()
-    client.force_login(user)
-    return client
-
-
 def filled(**fields) -> dict[str, Any]:
     """What a form sends that was only given a name."""
     board = Leaderboard(name="Board")
@@ -113,7 +106,7 @@ PREVIEW = reverse_lazy("admin:rehab_leaderboard_preview")
 
 
 def test_one_name_is_enough_to_save_a_board(world):
-    client = client_of(world.people[Role.PT])
+    client = client_of(world)
     answer = client.post(reverse("admin:rehab_leaderboard_add"), filled())
     assert answer.status_code == 302, answer.context["errors"]
     board = Leaderboard.everywhere.get(name="Board")
@@ -122,7 +115,7 @@ def test_one_name_is_enough_to_save_a_board(world):
 
 def test_a_preview_shows_the_clinics_own_rows_and_stores_nothing(world):
     fill_board(world)
-    client = client_of(world.people[Role.PT])
+    client = client_of(world)
     counts = [model.everywhere.count() for model in (Leaderboard, BoardEntry)]
     wanted = filled(
         among="clinic", entry="best", names="code", min_valid_strides=1, period="all", name=""
@@ -140,7 +133,7 @@ def test_a_preview_shows_the_clinics_own_rows_and_stores_nothing(world):
 def test_what_is_seen_in_the_preview_is_what_the_tablet_shows(world):
     fill_board(world)
     board = Leaderboard.everywhere.get()
-    client = client_of(world.people[Role.PT])
+    client = client_of(world)
     fields = filled(**{name: getattr(board, name) for name in filled()})
     preview = client.get(PREVIEW, fields | {"row": board.pk, "seen_as": world.patient.pk})
     shown = client.get(reverse("scores", kwargs={"session_id": world.session.pk}))
@@ -151,14 +144,14 @@ def test_what_is_seen_in_the_preview_is_what_the_tablet_shows(world):
 
 
 def test_a_preview_says_what_cannot_be(world):
-    client = client_of(world.people[Role.PT])
+    client = client_of(world)
     page = client.get(PREVIEW, filled(metric="score", types="all")).content.decode()
     assert "<b>Measure</b> Points of different feedback types cannot be compared" in page
 
 
 def test_a_group_has_patients_of_the_own_clinic_and_enough_of_them(world):
     other = build_world("birch")
-    client = client_of(world.people[Role.PT])
+    client = client_of(world)
     wanted = filled(among="group", entry="best")
     few = client.get(PREVIEW, wanted | {"group": [world.patient.pk]}).content.decode()
     assert "Choose at least 5 patients." in few
@@ -170,13 +163,13 @@ def test_a_group_has_patients_of_the_own_clinic_and_enough_of_them(world):
     ("role", "status"), [(Role.LEAD, 200), (Role.PT, 200), (Role.RESEARCHER, 403)]
 )
 def test_who_may_not_build_a_board_sees_no_preview(world, role, status):
-    assert client_of(world.people[role]).get(PREVIEW, filled()).status_code == status
+    assert client_of(world, role).get(PREVIEW, filled()).status_code == status
 
 
 def test_only_a_host_builds_boards_across_clinics_and_sees_no_patient_in_it(world):
-    host = client_of(User.everywhere.create_user("host", role=Role.HOST))
+    host = signed_in(User.everywhere.create_user("host", role=Role.HOST))
     wanted = filled(name="Across", among="across", entry="best")
-    pt = client_of(world.people[Role.PT])
+    pt = client_of(world)
     assert "not one of the available choices" in pt.get(PREVIEW, wanted).content.decode()
     preview = host.get(PREVIEW, wanted).content.decode()
     assert "a host does not see" in preview
@@ -200,7 +193,7 @@ def test_animal_names_are_drawn_on_agreeing_and_again_on_demand(world):
     patient.refresh_from_db()
     first = patient.alias
     assert str(first).split()[0] in words(MANNERS)
-    client = client_of(world.people[Role.PT])
+    client = client_of(world)
     sent = {"action": "draw_aliases", "_selected_action": [patient.pk]}
     assert client.post(reverse("admin:rehab_patient_changelist"), sent).status_code == 302
     patient.refresh_from_db()

@@ -23,7 +23,7 @@ from rehab.training.changes import ChangeKind
 from rehab.training.phases import make_phase
 from rehab.training.valences import VALENCES
 from tests.walks import HIT, MISS, strides, walk
-from tests.world import World, build_world
+from tests.world import World, build_world, client_of, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -54,9 +54,7 @@ def patient(world) -> Patient:
 
 @pytest.fixture
 def client(world) -> Client:
-    client = Client()
-    client.force_login(world.people[Role.PT])
-    return client
+    return client_of(world)
 
 
 def url_of(session: TrainingSession) -> str:
@@ -222,8 +220,7 @@ def test_nobody_else_opens_it(world, patient):
         (other.people[Role.LEAD], 404),
         (world.people[Role.LEAD], 200),
     ):
-        client = Client()
-        client.force_login(person)
+        client = signed_in(person)
         assert client.get(url_of(session)).status_code == status
     assert Client().get(url_of(session)).status_code == 302
     assert client.post(url_of(session)).status_code == 405

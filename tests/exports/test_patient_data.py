@@ -32,7 +32,7 @@ from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.archives import body_of, open_archive, rows_of
 from tests.walks import walk
-from tests.world import World, build_world, mark
+from tests.world import World, build_world, client_of, mark
 
 NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 NAMED = {Patient, User, Station}
@@ -41,12 +41,6 @@ NAMED = {Patient, User, Station}
 @pytest.fixture
 def world(db) -> World:
     return build_world("amber")
-
-
-def client_of(world: World, role: Role) -> Client:
-    client = Client()
-    client.force_login(world.people[role])
-    return client
 
 
 def fetch(world: World, role: Role = Role.LEAD) -> dict[str, str]:

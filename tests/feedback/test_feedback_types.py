@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from django.test import Client
 from django.urls import reverse
 
 from rehab.feedback.admin import initial_bands
@@ -13,7 +12,7 @@ from rehab.feedback.valences import valences_of
 from rehab.feedback.wording import words_in
 from rehab.people.roles import Role
 from rehab.training.valences import VALENCES, Cue
-from tests.world import build_world, mark
+from tests.world import build_world, client_of, mark
 
 pytestmark = pytest.mark.django_db
 
@@ -25,16 +24,6 @@ PREVIEW = reverse("admin:rehab_feedbacktype_preview")
 @pytest.fixture
 def world():
     return build_world("amber")
-
-
-@pytest.fixture
-def client_of(world):
-    def sign_in(role):
-        client = Client()
-        client.force_login(world.people[role])
-        return client
-
-    return sign_in
 
 
 def form(slug, **changes):
@@ -58,25 +47,25 @@ def test_without_a_row_the_rules_defaults_hold(world):
 
 
 @pytest.mark.parametrize("slug", ["positive", "binary", "explicit"])
-def test_a_type_taken_over_as_it_is_says_what_it_said(world, client_of, slug):
-    page = client_of(Role.PT).get(f"{ADD}?slug={slug}")
+def test_a_type_taken_over_as_it_is_says_what_it_said(world, slug):
+    page = client_of(world).get(f"{ADD}?slug={slug}")
     assert page.status_code == 200
     assert VALENCES[slug].bands[-1].words in page.content.decode()
-    answer = client_of(Role.PT).post(f"{ADD}?slug={slug}", form(slug))
+    answer = client_of(world).post(f"{ADD}?slug={slug}", form(slug))
     assert answer.status_code == 302, answer.context["errors"]
     assert valences_of(world.clinic.pk)[slug] == VALENCES[slug]
 
 
-def test_the_list_shows_all_four_and_which_are_edited(world, client_of):
-    page = client_of(Role.PT).get(LIST).content.decode()
+def test_the_list_shows_all_four_and_which_are_edited(world):
+    page = client_of(world).get(LIST).content.decode()
     for slug in set(VALENCES) - {"negative"}:
         assert f"?slug={slug}" in page
     assert page.count("edited here") == 1
     assert mark("amber", FeedbackType) in page
 
 
-def test_a_researcher_looks_and_edits_nothing(world, client_of):
-    row, client = world.rows[FeedbackType], client_of(Role.RESEARCHER)
+def test_a_researcher_looks_and_edits_nothing(world):
+    row, client = world.rows[FeedbackType], client_of(world, Role.RESEARCHER)
     assert "?slug=" not in client.get(LIST).content.decode()
     url = reverse("admin:rehab_feedbacktype_change", args=[row.pk])
     assert client.get(url).status_code == 200
@@ -84,11 +73,11 @@ def test_a_researcher_looks_and_edits_nothing(world, client_of):
     assert client.get(PREVIEW, form("positive")).status_code == 403
 
 
-def test_a_type_that_is_edited_already_is_not_added_again(world, client_of):
+def test_a_type_that_is_edited_already_is_not_added_again(world):
     row = world.rows[FeedbackType]
-    answer = client_of(Role.PT).get(f"{ADD}?slug=negative")
+    answer = client_of(world).get(f"{ADD}?slug=negative")
     assert answer.headers["Location"] == reverse("admin:rehab_feedbacktype_change", args=[row.pk])
-    assert client_of(Role.PT).get(f"{ADD}?slug=happy").status_code == 200  # the list
+    assert client_of(world).get(f"{ADD}?slug=happy").status_code == 200  # the list
 
 
 @pytest.mark.parametrize(
@@ -104,18 +93,16 @@ def test_a_type_that_is_edited_already_is_not_added_again(world, client_of):
         ("binary", {"miss_points": "1"}, "0 to 1000 points"),
     ],
 )
-def test_what_the_rules_refuse_the_form_refuses_and_the_preview_says(
-    world, client_of, slug, changes, why
-):
-    client = client_of(Role.LEAD)
+def test_what_the_rules_refuse_the_form_refuses_and_the_preview_says(world, slug, changes, why):
+    client = client_of(world, Role.LEAD)
     given = form(slug, **changes)
     assert why.lower() in client.post(f"{ADD}?slug={slug}", given).content.decode().lower()
     assert not FeedbackType.everywhere.filter(slug=slug).exists()
     assert client.get(PREVIEW, given).context["faults"]
 
 
-def test_explicit_has_neither_points_nor_gestures_to_edit(world, client_of):
-    client = client_of(Role.PT)
+def test_explicit_has_neither_points_nor_gestures_to_edit(world):
+    client = client_of(world)
     page = client.get(f"{ADD}?slug=explicit").content.decode()
     assert 'name="hit_points"' not in page
     assert 'name="cue_above"' not in page
@@ -124,9 +111,9 @@ def test_explicit_has_neither_points_nor_gestures_to_edit(world, client_of):
     assert (mine.has_points, mine.cue) == (False, Cue())
 
 
-def test_the_preview_shows_each_band_and_stores_nothing(world, client_of):
+def test_the_preview_shows_each_band_and_stores_nothing(world):
     given = form("positive", **{"bands-4-words_en": "Like a spring!", "hit_points": "7"})
-    page = client_of(Role.PT).get(PREVIEW, given)
+    page = client_of(world).get(PREVIEW, given)
     assert page.headers["X-Frame-Options"] == "SAMEORIGIN"
     seen = page.context["seen"]
     assert [(one.words, one.sign, one.confetti) for one in seen][-1] == (

@@ -9,9 +9,8 @@ import pytest
 from django.test import Client
 
 from rehab.gestures.models import Gesture
-from rehab.people.roles import Role
 from robot.trial import admit_gesture
-from tests.world import World, build_world
+from tests.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -26,9 +25,7 @@ def world() -> World:
 
 @pytest.fixture
 def pt(world: World) -> Client:
-    client = Client()
-    client.force_login(world.people[Role.PT])
-    return client
+    return client_of(world)
 
 
 def filled(name: str, steps: list[dict[str, Any]], stored: int = 0) -> dict[str, Any]:

@@ -13,13 +13,13 @@ from zoneinfo import ZoneInfo
 
 import pytest
 from django.core.management import CommandError, call_command
-from django.test import Client
 
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from tests.programs import Program, token_of
+from tests.world import signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -301,8 +301,7 @@ def test_a_start_before_midnight_keeps_its_own_day(file, clinic):
 def test_pages_and_api_tell_an_imported_session_without_strides(file, clinic):
     run(file)
     pt = User.everywhere.create_user("pt", role=Role.PT, clinic=clinic)
-    client = Client()
-    client.force_login(pt)
+    client = signed_in(pt)
     session = TrainingSession.everywhere.filter(valence="positive").first()
     score = SessionMetric.everywhere.get(session=session).value
     page = client.get(f"/sessions/{session.pk}/details/").content.decode()

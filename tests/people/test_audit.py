@@ -21,8 +21,8 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocols import Measure, Protocol
 from rehab.stations.models import Device
 from tests.archives import body_of
-from tests.people.test_tenancy import all_routes, walk_patterns
-from tests.world import World, build_world, mark
+from tests.tenancy import all_routes, walk_patterns
+from tests.world import World, build_world, client_of, mark
 
 pytestmark = pytest.mark.django_db
 NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
@@ -36,12 +36,6 @@ def nothing_noted_yet(monkeypatch):
 @pytest.fixture
 def world() -> World:
     return build_world("amber")
-
-
-def client_of(world: World, role: Role = Role.LEAD, **options) -> Client:
-    client = Client(**options)
-    client.force_login(world.people[role])
-    return client
 
 
 def entries():
@@ -151,7 +145,7 @@ def test_a_tablet_is_noted_as_itself(world):
 
 
 def test_a_page_that_asks_again_and_again_is_noted_once_in_five_minutes(world, monkeypatch):
-    client = client_of(world)
+    client = client_of(world, Role.LEAD)
     url = reverse("session", kwargs={"session_id": world.session.pk})
     for minutes, count in ((0, 1), (1, 1), (4, 1), (5, 2), (9, 2), (10, 3)):
         monkeypatch.setattr(timezone, "now", lambda m=minutes: NOW + timedelta(minutes=m))
@@ -174,7 +168,7 @@ def test_changes_are_noted_each_time_and_refusals_never(world):
 def test_a_page_costs_at_most_two_statements_more_and_one_that_polls_none(
     world, django_assert_num_queries, django_assert_max_num_queries
 ):
-    client = client_of(world)
+    client = client_of(world, Role.LEAD)
     request = client.get(reverse("monitor", kwargs={"session_id": world.session.pk})).wsgi_request
     request.resolver_match = get_resolver().resolve(request.path)
     response = client.get(request.path)
@@ -191,7 +185,7 @@ def test_care_goes_on_when_the_log_cannot_be_written_but_nothing_is_given_out(wo
 
     monkeypatch.setattr(AuditEntry.everywhere, "bulk_create", fail)
     monkeypatch.setattr(AuditEntry, "save", fail)
-    client = client_of(world, raise_request_exception=False)
+    client = client_of(world, Role.LEAD, raise_request_exception=False)
     key = {"patient_id": world.patient.pk}
     assert client.get(reverse("patient", kwargs=key)).status_code == 200
     assert client.get(reverse("patient-data", kwargs=key)).status_code == 500
@@ -223,7 +217,7 @@ def test_entries_cannot_be_changed_or_deleted(world):
 def test_leads_read_it_in_the_admin_and_nobody_writes_there(world):
     audit.note(Act.EXPORT, world.people[Role.PT], patient=world.patient.pk, about="here")
     entry = entries().get()
-    lead = client_of(world)
+    lead = client_of(world, Role.LEAD)
     changelist = reverse("admin:rehab_auditentry_changelist")
     assert "here" in lead.get(changelist).content.decode()
     for key, value in (

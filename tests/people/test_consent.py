@@ -27,7 +27,7 @@ from rehab.people.models import Boards, Clinic, Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from tests.world import World, build_world
+from tests.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
@@ -41,9 +41,7 @@ def world() -> World:
 
 @pytest.fixture
 def pt(world) -> Client:
-    client = Client()
-    client.force_login(world.people[Role.PT])
-    return client
+    return client_of(world)
 
 
 def tap(client: Client, patient: Patient, purpose: str, says: str) -> Patient:
@@ -88,8 +86,7 @@ def test_new_words_are_a_new_version_and_old_consent_stays_with_the_old_ones(wor
 def test_a_lead_writes_the_words_and_others_do_not(world, pt):
     url = reverse("consent-text")
     assert pt.get(url).status_code == 403
-    lead = Client()
-    lead.force_login(world.people[Role.LEAD])
+    lead = client_of(world, Role.LEAD)
     assert lead.post(url, {"text": "First line\r\nsecond"}).status_code == 302
     assert current_text(world.clinic).text == "First line\nsecond"
     assert lead.post(url, {"text": " "}).status_code == 200  # refused
@@ -152,8 +149,7 @@ def test_boards_with_others_need_consent(world):
 
 def test_the_admin_refuses_boards_without_consent(world):
     withdraw(world.patient, Purpose.BOARDS, None, NOW)
-    lead = Client()
-    lead.force_login(world.people[Role.LEAD])
+    lead = client_of(world, Role.LEAD)
     url = reverse("admin:rehab_patient_change", args=[world.patient.pk])
     given = {"code": "c", "nickname": "n", "language": "en", "boards": "clinic"}
     page = lead.post(url, given)
@@ -187,8 +183,7 @@ def test_researchers_see_sessions_of_those_only_who_agreed(world, pt):
     tap(pt, world.patient, "research", "no")
     assert seen(world) == {False}
     assert seen(world, Role.PT) == {True}
-    client = Client()
-    client.force_login(world.people[Role.RESEARCHER])
+    client = client_of(world, Role.RESEARCHER)
     url = reverse("session", kwargs={"session_id": world.session.pk})
     assert client.get(url).status_code == 404
     assert client.get("/api/v1/sessions").json()["total"] == 0

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from django.test import Client
 from django.urls import reverse
 
 from rehab.people.roles import Role
 from rehab.sessions.protocols import Protocol
 from tests.form_noise import run_noise
-from tests.world import build_world
+from tests.world import build_world, client_of
 
 REQUESTS = 230  # tests/bench has 10,000
 
@@ -25,8 +24,7 @@ def test_noise_to_every_form_fails_nowhere_and_leaks_nothing(capsys):
 @pytest.mark.parametrize("page", ["change", "delete"])
 def test_a_form_that_names_no_field_to_find_its_row_by(page):
     world = build_world("amber")
-    browser = Client()
-    browser.force_login(world.people[Role.LEAD])
+    browser = client_of(world, Role.LEAD)
     row = world.rows[Protocol]
     address = reverse(f"admin:rehab_protocol_{page}", kwargs={"object_id": row.pk})
     assert browser.get(address, {"_to_field": ""}).status_code == 200

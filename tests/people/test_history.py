@@ -16,7 +16,7 @@ from rehab.people.roles import Role
 from rehab.people.tokens import ApiToken
 from rehab.stations.models import Device
 from rehab.stations.pins import set_pin
-from tests.world import World, build_world, mark
+from tests.world import World, build_world, client_of, mark
 
 pytestmark = pytest.mark.django_db
 
@@ -24,12 +24,6 @@ pytestmark = pytest.mark.django_db
 @pytest.fixture
 def world() -> World:
     return build_world("amber")
-
-
-def client_of(world: World, role: Role = Role.LEAD) -> Client:
-    client = Client()
-    client.force_login(world.people[role])
-    return client
 
 
 def last_of(row) -> HistoryEntry:
@@ -71,7 +65,7 @@ def test_a_program_is_named_beside_its_person(world):
 def test_a_save_that_changes_nothing_is_no_change(world):
     before = HistoryEntry.everywhere.count()
     world.patient.save()
-    client_of(world)  # signing in writes the time into the account
+    client_of(world, Role.LEAD)  # signing in writes the time into the account
     assert HistoryEntry.everywhere.count() == before
 
 
@@ -93,7 +87,7 @@ def test_passwords_pins_and_tokens_are_never_kept(world):
 
 def test_revoking_a_token_in_the_admin_is_on_record(world):
     chosen = {"action": "revoke_tokens", "_selected_action": [world.device.pk]}
-    client_of(world).post(reverse("admin:rehab_device_changelist"), chosen)
+    client_of(world, Role.LEAD).post(reverse("admin:rehab_device_changelist"), chosen)
     entry = last_of(Device.everywhere.get(pk=world.device.pk))
     assert entry.by == world.people[Role.LEAD]
     assert list(entry.values) == ["revoked_at"]
@@ -113,7 +107,7 @@ def test_a_rows_page_tells_its_changes_and_those_of_its_parts(world):
     step.save()
     GestureStep.everywhere.create(gesture=step.gesture, position=2, hold_s=1.0).delete()
     url = reverse("admin:rehab_gesture_history", args=[step.gesture_id])
-    words = client_of(world).get(url).content.decode()
+    words = client_of(world, Role.LEAD).get(url).content.decode()
     assert "1.0 → 2.5" in words
     assert "Deleted: step" in words
 
@@ -122,7 +116,7 @@ def test_a_choice_and_a_row_are_told_in_words(world):
     world.device.kind = "robot"
     world.device.save()
     url = reverse("admin:rehab_device_history", args=[world.device.pk])
-    assert "Source of steps → Robot" in client_of(world).get(url).content.decode()
+    assert "Source of steps → Robot" in client_of(world, Role.LEAD).get(url).content.decode()
 
 
 def test_each_role_reads_the_changes_of_what_it_may_read_and_of_its_clinic(world):
@@ -156,4 +150,4 @@ def test_erased_values_are_gone_but_not_who_and_when(world):
     entry = last_of(world.patient)
     assert entry.values["nickname"] is None
     url = reverse("admin:rehab_patient_history", args=[world.patient.pk])
-    assert "erased" in client_of(world).get(url).content.decode()
+    assert "erased" in client_of(world, Role.LEAD).get(url).content.decode()

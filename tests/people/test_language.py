@@ -14,7 +14,7 @@ from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.stations import tablets
 from rehab.stations.models import Device
-from tests.world import World, build_world
+from tests.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -26,9 +26,7 @@ def world() -> World:
 
 @pytest.fixture
 def pt(world: World) -> Client:
-    client = Client()
-    client.force_login(world.people[Role.PT])
-    return client
+    return client_of(world)
 
 
 def spoken(client: Client, path: str, browser: str = "en") -> str:

@@ -3,12 +3,11 @@
 import re
 
 import pytest
-from django.test import Client
 
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.stations.models import Device, Station, find_device
-from tests.world import World, build_world
+from tests.world import World, build_world, client_of, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -16,12 +15,6 @@ pytestmark = pytest.mark.django_db
 @pytest.fixture
 def world() -> World:
     return build_world("amber")
-
-
-def signed_in(world: World, role: Role) -> Client:
-    client = Client()
-    client.force_login(world.people[role])
-    return client
 
 
 def test_the_front_page_says_what_can_be_done(client):
@@ -42,7 +35,7 @@ def test_pages_allow_no_foreign_script(client):
 
 
 def test_a_therapist_reads_date_start_duration_score_type_and_goal(world):
-    row = signed_in(world, Role.PT).get("/admin/rehab/trainingsession/").content.decode()
+    row = client_of(world).get("/admin/rehab/trainingsession/").content.decode()
     cells = dict(re.findall(r'class="field-(\w+)[^"]*">(?:<a[^>]*>)?([^<]*)', row))
     assert cells["date"] == "Nov. 21, 2026"
     assert cells["start_time"] == "10:00:00"
@@ -54,7 +47,7 @@ def test_a_therapist_reads_date_start_duration_score_type_and_goal(world):
 
 
 def test_a_therapist_cannot_edit_the_log(world):
-    client = signed_in(world, Role.PT)
+    client = client_of(world)
     for name in ("trainingsession", "step", "sessionevent", "sessionmetric"):
         assert client.get(f"/admin/rehab/{name}/add/").status_code == 403
         row = next(row for kind, row in world.rows.items() if kind.__name__.lower() == name)
@@ -65,7 +58,7 @@ def test_a_therapist_cannot_edit_the_log(world):
 
 
 def test_a_researcher_finds_sessions_by_pseudonym_and_no_other_way(world):
-    client = signed_in(world, Role.RESEARCHER)
+    client = client_of(world, Role.RESEARCHER)
     url = "/admin/rehab/trainingsession/"
     assert world.patient.pseudonym in client.get(url).content.decode()
     detail = client.get(f"{url}{world.session.pk}/change/").content.decode()
@@ -79,13 +72,13 @@ def test_a_researcher_finds_sessions_by_pseudonym_and_no_other_way(world):
 def test_a_new_patient_belongs_to_the_therapists_clinic(world):
     form = {"code": "K7-204", "nickname": "Rosa", "paretic_side": "left"}
     form |= {"language": "es", "boards": "own"}
-    signed_in(world, Role.PT).post("/admin/rehab/patient/add/", form)
+    client_of(world).post("/admin/rehab/patient/add/", form)
     assert Patient.everywhere.get(code="K7-204").clinic == world.clinic
 
 
 def test_a_code_that_is_taken_is_refused_in_words(world):
     form = {"code": world.patient.code, "nickname": "Rosa", "language": "en"}
-    page = signed_in(world, Role.PT).post("/admin/rehab/patient/add/", form)
+    page = client_of(world).post("/admin/rehab/patient/add/", form)
     assert page.status_code == 200
     assert "already exists" in page.content.decode()
 
@@ -93,13 +86,13 @@ def test_a_code_that_is_taken_is_refused_in_words(world):
 def test_a_form_refuses_a_station_of_another_clinic(world):
     birch = build_world("birch")
     form = {"station": birch.rows[Station].pk, "kind": "source", "name": "Stray"}
-    page = signed_in(world, Role.LEAD).post("/admin/rehab/device/add/", form)
+    page = client_of(world, Role.LEAD).post("/admin/rehab/device/add/", form)
     assert "Select a valid choice" in page.content.decode()
     assert not Device.everywhere.filter(name="Stray").exists()
 
 
 def test_a_new_devices_token_is_shown_once_and_opens_until_revoked(world):
-    client = signed_in(world, Role.LEAD)
+    client = client_of(world, Role.LEAD)
     form = {"station": world.rows[Station].pk, "kind": "source", "name": "Treadmill"}
     page = client.post("/admin/rehab/device/add/", form, follow=True).content.decode()
     token = re.search(r"one time only: (\S+?)<", page).group(1)
@@ -112,7 +105,7 @@ def test_a_new_devices_token_is_shown_once_and_opens_until_revoked(world):
 
 
 def test_a_lead_makes_accounts_of_the_own_clinic_and_never_a_host(world):
-    client = signed_in(world, Role.LEAD)
+    client = client_of(world, Role.LEAD)
     form = {
         "username": "new-pt",
         "usable_password": "true",
@@ -128,8 +121,7 @@ def test_a_lead_makes_accounts_of_the_own_clinic_and_never_a_host(world):
 
 
 def test_a_host_makes_clinics_and_their_leads(world):
-    client = Client()
-    client.force_login(User.everywhere.create_user("host", role=Role.HOST))
+    client = signed_in(User.everywhere.create_user("host", role=Role.HOST))
     given = {"name": "Oak", "language": "en", "time_zone": "UTC", "keep_log_months": 36}
     client.post("/admin/rehab/clinic/add/", given)
     oak = Clinic.everywhere.get(name="Oak")
@@ -150,7 +142,7 @@ def test_a_host_makes_clinics_and_their_leads(world):
 def test_shared_rows_are_the_hosts_to_change(world):
     from rehab.sessions.protocols import Measure, Protocol
 
-    client = signed_in(world, Role.LEAD)
+    client = client_of(world, Role.LEAD)
     for model in (Measure, Protocol):
         shared = model.everywhere.filter(clinic=None).first()
         url = f"/admin/rehab/{model._meta.model_name}/{shared.pk}/"

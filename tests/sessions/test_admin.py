@@ -24,7 +24,7 @@ from rehab.sessions.presets import Preset
 from rehab.sessions.protocols import Protocol, ProtocolPhase
 from rehab.stations.models import Device, Station, find_device
 from tests.walks import strides, walk
-from tests.world import NOW, World, build_world
+from tests.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -34,12 +34,6 @@ SESSIONS = "/admin/rehab/trainingsession/"
 @pytest.fixture
 def world() -> World:
     return build_world("amber")
-
-
-def client_of(world: World, role: Role = Role.PT) -> Client:
-    client = Client()
-    client.force_login(world.people[role])
-    return client
 
 
 def patient_of(world: World, name: str) -> Patient:

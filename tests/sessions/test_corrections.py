@@ -6,7 +6,6 @@ import re
 from typing import Any
 
 import pytest
-from django.test import Client
 from django.urls import reverse
 
 from rehab.boards import entries
@@ -22,7 +21,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.takehome import sum_up_for_home
 from rehab.sessions.trend import read_trend
 from tests.walks import strides, walk
-from tests.world import NOW, World, build_world
+from tests.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -46,12 +45,6 @@ def rosa(world: World) -> Patient:
 @pytest.fixture
 def omar(world: World) -> Patient:
     return patient_of(world, "Omar", boards="clinic")
-
-
-def client_of(world: World, role: Role = Role.PT) -> Client:
-    client = Client()
-    client.force_login(world.people[role])
-    return client
 
 
 def correct(world: World, session: TrainingSession, role: Role = Role.PT, **changes):

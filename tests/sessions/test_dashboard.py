@@ -8,7 +8,6 @@ from datetime import datetime, timedelta
 from zoneinfo import ZoneInfo
 
 import pytest
-from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 
@@ -21,7 +20,7 @@ from rehab.stations.models import Device, Station
 from rehab.stations.presence import say_seen
 from rehab.training.changes import ChangeKind, State
 from tests.walks import RIGHT, strides, walk
-from tests.world import World, build_world, mark
+from tests.world import World, build_world, client_of, mark, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -54,12 +53,6 @@ def rosa(world: World) -> Patient:
 def ago(patient: Patient, valence: str, walked, moment: datetime, **how) -> TrainingSession:
     """Let somebody walk from a moment on."""
     return walk(patient, valence, walked, now=moment, **how)
-
-
-def client_of(user: User) -> Client:
-    client = Client()
-    client.force_login(user)
-    return client
 
 
 # --- this week ----------------------------------------------------------------------------------
@@ -172,7 +165,7 @@ def test_it_is_said_when_a_device_was_there(ago, words):
 
 
 def front(user: User) -> str:
-    answer = client_of(user).get("/admin/")
+    answer = signed_in(user).get("/admin/")
     assert answer.status_code == 200
     return answer.content.decode()
 
@@ -228,7 +221,7 @@ def test_models_stand_under_headings_with_a_line_each(world):
 def test_the_front_page_costs_the_same_however_much_was_walked(
     world, rosa, django_assert_num_queries, django_assert_max_num_queries
 ):
-    pt = client_of(world.people[Role.PT])
+    pt = client_of(world)
     now = timezone.now()
     ago(rosa, "positive", strides(2, 1), now)
     pt.get("/admin/")

@@ -34,7 +34,7 @@ from rehab.sessions.services import create_session
 from rehab.sessions.visits import Visit
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
-from tests.world import World, build_world, mark, scoped_models
+from tests.world import World, build_world, client_of, mark, scoped_models
 
 pytestmark = pytest.mark.django_db
 NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
@@ -43,12 +43,6 @@ NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 @pytest.fixture
 def world() -> World:
     return build_world("amber")
-
-
-def client_of(world: World, role: Role = Role.PT) -> Client:
-    client = Client()
-    client.force_login(world.people[role])
-    return client
 
 
 def page_of(world: World, client: Client) -> str:

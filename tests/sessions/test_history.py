@@ -22,7 +22,7 @@ from rehab.sessions.words import at_clinic, say_day, say_duration, say_number, s
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.walks import GOAL, HIT, MISS, RIGHT, Walked, strides, walk
-from tests.world import World, build_world
+from tests.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -42,12 +42,6 @@ def patient(world) -> Patient:
 @pytest.fixture
 def client(world) -> Client:
     return client_of(world, Role.PT)
-
-
-def client_of(world: World, role: Role) -> Client:
-    client = Client()
-    client.force_login(world.people[role])
-    return client
 
 
 def history(client: Client, patient: Patient, asked: str = "") -> str:

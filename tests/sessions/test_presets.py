@@ -15,7 +15,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.presets import Preset
 from rehab.sessions.protocols import Protocol
 from rehab.stations.models import Station
-from tests.world import World, build_world, mark
+from tests.world import World, build_world, client_of, mark
 
 pytestmark = pytest.mark.django_db
 
@@ -27,9 +27,7 @@ def world() -> World:
 
 @pytest.fixture
 def pt(world: World) -> Client:
-    client = Client()
-    client.force_login(world.people[Role.PT])
-    return client
+    return client_of(world)
 
 
 @pytest.fixture
@@ -211,8 +209,7 @@ def test_the_admin_refuses_what_could_not_be_walked(pt, world):
 
 
 def test_a_researcher_reads_presets_and_changes_none(world):
-    client = Client()
-    client.force_login(world.people[Role.RESEARCHER])
+    client = client_of(world, Role.RESEARCHER)
     key = world.rows[Preset].pk
     assert client.get("/admin/rehab/preset/").status_code == 200
     assert client.get("/admin/rehab/preset/add/").status_code == 403

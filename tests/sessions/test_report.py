@@ -6,7 +6,6 @@ import html
 import re
 
 import pytest
-from django.test import Client
 
 from rehab.people.consent import Purpose, give
 from rehab.people.models import Patient
@@ -17,7 +16,7 @@ from rehab.sessions.report import draw_chart, write_report
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.walks import HIT, MISS, RIGHT, Walked, walk
-from tests.world import NOW, World, build_world
+from tests.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -36,8 +35,7 @@ def patient(world: World) -> Patient:
 
 def read(world: World, session: TrainingSession, role: Role = Role.PT) -> str:
     """Give the page's words."""
-    client = Client()
-    client.force_login(world.people[role])
+    client = client_of(world, role)
     page = client.get(f"/sessions/{session.pk}/report/").content.decode()
     paper = page.split("<article")[1].split("</article>")[0]
     text = html.unescape(re.sub(r"<[^>]+>", " ", paper)).replace("\N{NO-BREAK SPACE}", " ")

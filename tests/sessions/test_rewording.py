@@ -6,7 +6,6 @@ import os
 import socket
 
 import pytest
-from django.test import Client
 from django.urls import reverse
 
 from rehab.feedback.models import FeedbackType
@@ -17,7 +16,7 @@ from rehab.sessions.log import SessionEvent
 from rehab.sessions.services import create_session
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
-from tests.world import build_world
+from tests.world import build_world, client_of
 
 pytestmark = pytest.mark.django_db(transaction=True)
 
@@ -29,9 +28,7 @@ def world():
 
 @pytest.fixture
 def pt(world):
-    client = Client()
-    client.force_login(world.people[Role.PT])
-    return client
+    return client_of(world)
 
 
 def begin(world, valence="positive", language="en"):

@@ -18,7 +18,7 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.valences import Cue
 from robot.composed import read_gesture
 from robot.motion import HOME
-from tests.world import World, build_world
+from tests.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -30,9 +30,7 @@ def world() -> World:
 
 @pytest.fixture
 def pt(world: World) -> Client:
-    client = Client()
-    client.force_login(world.people[Role.PT])
-    return client
+    return client_of(world)
 
 
 @pytest.fixture

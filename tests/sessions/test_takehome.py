@@ -6,14 +6,13 @@ import html
 import re
 
 import pytest
-from django.test import Client
 from django.urls import reverse
 
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.training.phases import make_phase
 from tests.walks import HIT, MISS, RIGHT, walk
-from tests.world import World, build_world
+from tests.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -32,8 +31,7 @@ def patient(world: World) -> Patient:
 
 def read(world: World, patient: Patient, role: Role = Role.PT) -> str:
     """Give the page's words."""
-    client = Client()
-    client.force_login(world.people[role])
+    client = client_of(world, role)
     page = client.get(reverse("take-home", kwargs={"patient_id": patient.pk})).content.decode()
     paper = page.split("<article")[1].split("</article>")[0]
     text = html.unescape(re.sub(r"<[^>]+>", " ", paper)).replace("\N{NO-BREAK SPACE}", " ")

@@ -13,7 +13,7 @@ from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.visits import Progress, Visit, plan_visit, read_today, usual_time
 from tests.walks import HIT, walk
-from tests.world import NOW, World, build_world
+from tests.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -33,9 +33,7 @@ def patient(world: World, name: str) -> Patient:
 
 
 def pt_of(world: World) -> Client:
-    client = Client()
-    client.force_login(world.people[Role.PT])
-    return client
+    return client_of(world)
 
 
 def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):

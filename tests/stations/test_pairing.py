@@ -10,10 +10,9 @@ from django.test import Client
 from django.utils import timezone
 
 from rehab.people.models import UNAMBIGUOUS
-from rehab.people.roles import Role
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device, Pairing, Station
-from tests.world import World, build_world
+from tests.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -30,9 +29,7 @@ def world() -> World:
 
 @pytest.fixture
 def pt(world: World) -> Client:
-    client = Client()
-    client.force_login(world.people[Role.PT])
-    return client
+    return client_of(world)
 
 
 @pytest.fixture

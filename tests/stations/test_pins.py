@@ -12,7 +12,7 @@ from rehab.people.roles import Role
 from rehab.stations.models import Device, LeaveTries, Station
 from rehab.stations.pins import FREE_TRIES, LONGEST_WAIT, PinRefused, check_pin, set_pin
 from rehab.stations.tablets import COOKIE
-from tests.world import NOW, World, build_world
+from tests.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 SCREEN = "tablet 1"
@@ -139,16 +139,14 @@ def test_a_station_of_another_clinic_opens_nothing(tablet):
     client, _ = tablet
     answer = client.post("/tablets/leave/", {"station": birch.rows[Station].pk})
     assert answer.status_code == 404
-    pt = Client()
-    pt.force_login(birch.people[Role.PT])
+    pt = client_of(birch)
     assert pt.post("/tablets/leave/", {"station": tablet[1].station_id}).status_code == 404
     stranger = Client().post("/tablets/leave/", {"station": tablet[1].station_id})
     assert stranger.headers["Location"].startswith("/sign-in/")
 
 
 def test_a_lead_sets_and_removes_the_pin_in_the_admin(world, station):
-    lead = Client()
-    lead.force_login(world.people[Role.LEAD])
+    lead = client_of(world, Role.LEAD)
     url, kept = f"/admin/rehab/station/{station.pk}/change/", station.pin_hash
     given = {"name": "Bay 5", "devices-TOTAL_FORMS": 0, "devices-INITIAL_FORMS": 0}
     assert kept not in lead.get(url).content.decode()

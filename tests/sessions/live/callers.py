@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from channels.testing import WebsocketCommunicator
-from django.test import Client
 
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
@@ -21,6 +20,7 @@ from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.phases import Phase, make_phase
 from rehab.training.valences import Cue
+from tests.world import signed_in
 
 PATIENCE_S = 10.0  # only a failing test waits so long
 OWN_PAGE = "http://localhost:8000"
@@ -296,8 +296,7 @@ def build_place(name: str, clinic: Clinic | None = None, spares: int = 0) -> Pla
     for role in Role:
         home = None if role == Role.HOST else clinic
         user = User.everywhere.create_user(f"{role.value}-{name}", role=role, clinic=home)
-        browser = Client()
-        browser.force_login(user)
+        browser = signed_in(user)
         _keys[user.pk] = browser.cookies["sessionid"].value
         people[role] = user
     station = Station.everywhere.create(clinic=clinic, name=name)

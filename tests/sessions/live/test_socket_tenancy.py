@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 from asgiref.sync import sync_to_async
 from channels.db import database_sync_to_async
-from django.test import Client
 
 from rehab import routing
 from rehab.people.models import User
@@ -25,7 +24,7 @@ from rehab.stations.models import Device, Station
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
 from tests.sessions.live.callers import OWN_PAGE, Caller
-from tests.world import Actor, World, all_actors, build_world
+from tests.world import Actor, World, all_actors, build_world, signed_in
 
 # Who gets in, by the words of docs/protocol.md: roles, and kinds of device.
 MAY_OPEN: dict[type, set[str]] = {
@@ -56,8 +55,7 @@ class Everyone:
         self.cookies: dict[str, str] = {}
         for actor in self.actors:
             if isinstance(actor.subject, User):
-                browser = Client()
-                browser.force_login(actor.subject)
+                browser = signed_in(actor.subject)
                 self.cookies[actor.label] = browser.cookies["sessionid"].value
 
     @staticmethod
