@@ -6,13 +6,13 @@ from datetime import datetime
 from typing import Annotated, Any, Literal
 
 from ninja import Field, Schema
-from pydantic import AfterValidator, field_validator
+from pydantic import AfterValidator
 
 from rehab.people.api import PatientName, Short
 from rehab.people.api_base import Given, Key, Moment, Paging, Whole, Words, left_out, sees_names
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import ChangeKind, State
+from rehab.training.changes import ASKED, ChangeKind, State
 from rehab.training.metrics import METRICS
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES, find_valence
@@ -22,6 +22,18 @@ FeedbackType = Annotated[
     str,
     AfterValidator(lambda slug: find_valence(slug).slug),
     Field(json_schema_extra={"enum": list(VALENCES)}),
+]
+
+
+def read_kind(kind: str) -> ChangeKind:
+    """Give the change of that name. Raises ValueError for one that is not made here."""
+    if kind not in ASKED:
+        raise ValueError(f"A change is one of: {', '.join(ASKED)}.")
+    return ChangeKind(kind)
+
+
+AskedKind = Annotated[
+    str, AfterValidator(read_kind), Field(json_schema_extra={"enum": list(ASKED)})
 ]
 
 
@@ -108,20 +120,12 @@ class SessionGiven(Given):
 class ChangeGiven(Given):
     """What is to be changed of a session, as on the therapist's page."""
 
-    kind: ChangeKind = Field(strict=False)
+    kind: AskedKind
     value: float | str | None = Field(
         None,
         description="The new goal, gain, threshold, intensity or phase; 1 or 0 for words shown; "
         "the name of a valence or chart style; nothing for the others.",
     )
-
-    @field_validator("kind")
-    @classmethod
-    def check_kind(cls, kind: ChangeKind) -> ChangeKind:
-        """Refuse what is edited in the admin."""
-        if kind is ChangeKind.WORDS:
-            raise ValueError("Words are edited with their feedback type, in the admin.")
-        return kind
 
 
 class StepOut(Schema):

@@ -39,6 +39,10 @@ class ChangeKind(StrEnum):
     CHART_STYLE = "chart_style"
 
 
+# What pages and programs ask for. Words are edited with their feedback type, for all open sessions.
+ASKED = tuple(kind for kind in ChangeKind if kind is not ChangeKind.WORDS)
+
+
 class PauseReason(StrEnum):
     """Why a session is paused."""
 

@@ -271,7 +271,7 @@ def test_a_session_is_started_steered_paused_and_finished(world, pt, rosa):
     status, problem = pt.post(path, kind="valence", value=2)
     assert (status, "can be changed to one of" in problem["fields"]["value"]) == (409, True)
     status, problem = pt.post(path, kind="words", value="Go!")
-    assert (status, "in the admin" in problem["fields"]["kind"]) == (422, True)
+    assert (status, "start, pause" in problem["fields"]["kind"]) == (422, True)
     status, ended = pt.post(path, kind="finish")
     assert (status, ended["state"]) == (200, "finished")
     session = TrainingSession.everywhere.get(pk=told["id"])

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from rehab.sessions.log import Remark
-from rehab.training.changes import ChangeKind
+from rehab.training.changes import ASKED, ChangeKind
 from rehab.training.steps import InvalidMeasurement, Measurement, Side
 
 MAX_FRAME = 64 * 1024
@@ -124,17 +124,14 @@ def read_plain(text: str) -> tuple[float | None, float | None] | None:
     return (value if math.isfinite(value) else None, goal if math.isfinite(goal) else None)
 
 
-# What is changed to a name, and what is changed elsewhere than on a session's pages.
-NAMED = frozenset({ChangeKind.VALENCE, ChangeKind.CHART_STYLE})
-ELSEWHERE = frozenset({ChangeKind.WORDS})
+NAMED = frozenset({ChangeKind.VALENCE, ChangeKind.CHART_STYLE})  # changed to a name
 
 
 def read_change(message: dict[str, Any]) -> tuple[ChangeKind, float | str | None]:
     """Read what a person wants changed. Raises BadFrame."""
-    known = [kind for kind in ChangeKind if kind not in ELSEWHERE]
     kind = message.get("kind")
-    if kind not in known:
-        raise BadFrame(f'"kind" is one of: {", ".join(known)}.')
+    if kind not in ASKED:
+        raise BadFrame(f'"kind" is one of: {", ".join(ASKED)}.')
     if kind in NAMED:
         return ChangeKind(kind), read_name(message, "value")
     return ChangeKind(kind), _optional_number(message, "value")
