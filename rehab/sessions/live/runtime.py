@@ -28,9 +28,18 @@ from rehab.sessions.live.children import Children
 from rehab.sessions.live.notes import Notes
 from rehab.sessions.live.session import RECENT, LiveSession
 from rehab.sessions.live.writer import Writer
-from rehab.sessions.log import RobotEntry, SessionEvent, Step
+from rehab.sessions.log import Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import ENDED, OPEN, Change, ChangeKind, PauseReason, State, Value
+from rehab.training.changes import (
+    ENDED,
+    OPEN,
+    Change,
+    ChangeKind,
+    PauseReason,
+    Refused,
+    State,
+    Value,
+)
 
 log = logging.getLogger(__name__)
 
@@ -56,6 +65,7 @@ class Runtime:
         self.waiting: dict[int, set[Callable[[int], None]]] = defaultdict(set)
         self.notes = Notes()
         self.sockets: set[Any] = set()  # whoever must be closed when the server stops
+        self.asked: set[asyncio.Task[None]] = set()  # what pages asked for and is under way
         self.children = Children(settings.DATA_DIR / "children.json")
         self.address = sources.local_address(settings.HOST, settings.PORT)  # where children dial in
         self._opening: dict[int, asyncio.Task[LiveSession]] = {}
@@ -125,6 +135,14 @@ class Runtime:
             waiting = await sync_to_async(_newest_open)(live.station_id)
             if waiting is not None:
                 self.announce(waiting, live.station_id)
+
+    async def remark(self, session_id: int, what: Remark, value: float | None, by: User) -> None:
+        """Note something of a session; committed when this returns. Raises what ``change`` does."""
+        live = await self.session(session_id)
+        await live.admission()  # so that it keeps its place among changes
+        if live.actor.fold.state in ENDED:
+            raise Refused("The session has ended.")
+        await live.remark(what, value, by, timezone.now())
 
     def at_station_of(self, live: LiveSession) -> list[LiveSession]:
         """Give a session and the other live ones of its station: the robot may be with them."""
@@ -205,6 +223,7 @@ class Runtime:
             await self._ticker
         closing = [socket.shut(4012) for socket in list(self.sockets)]
         await asyncio.gather(*closing, self.notes.settled(), return_exceptions=True)
+        await asyncio.gather(*self.asked, return_exceptions=True)
         await self.loop.run_in_executor(None, self.writer.close)
         await asyncio.sleep(0)  # the writer's last reports
         held = [(live.id, live.actor.session.epoch) for live in self.sessions.values()]

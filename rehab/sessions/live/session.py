@@ -108,6 +108,7 @@ class LiveSession:
         self._on_failure = on_failure
         self._joining = 0
         self._admits = asyncio.Event()
+        self._queue = asyncio.Lock()  # fair: who asks for it first has it first
 
     @property
     def next_number(self) -> int:
@@ -327,9 +328,13 @@ class LiveSession:
         return sorted([*self.actor.marks, *switches], key=lambda mark: mark["after"])
 
     async def admission(self) -> None:
-        """Wait while a viewer joins. Whoever takes steps or changes asks first."""
-        while self._joining:
-            await self._admits.wait()
+        """Wait while a viewer joins. Whoever takes steps or changes asks first.
+
+        Those who wait go on in the order in which they came.
+        """
+        async with self._queue:
+            while self._joining:
+                await self._admits.wait()
 
     async def settled(self) -> None:
         """Wait until everything taken so far is committed. Raises NotStored."""

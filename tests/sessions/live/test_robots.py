@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import copy
 from typing import Any
 
@@ -186,6 +187,49 @@ async def test_a_stop_waits_for_no_disk_and_overtakes_an_arming(place, begun, st
     assert "arm" not in [message["type"] for message in robot.heard]
     kinds = [row["kind"] for row in await log_of(session)]
     assert kinds == ["robot_stop", "robot_arm", "robot_stop"]
+
+
+ASKED = [
+    {"type": "change", "kind": "goal", "value": 3.5, "id": "x"},
+    {"type": "change", "kind": "pause", "id": "x"},
+    {"type": "remark", "what": "pain", "id": "x"},
+]
+
+
+@pytest.mark.parametrize("asked", ASKED, ids=["goal", "pause", "remark"])
+async def test_a_stop_waits_for_nothing_that_its_page_asked_for_before(place, begun, stall, asked):
+    session = await begun(place)
+    robot, monitor = await place.robot().dial(), place.monitor(session)
+    await robot.hello()
+    await monitor.watch()
+    stall.begin()
+    await monitor.say(asked)
+    await turns()
+    await monitor.say(STOP)
+    await robot.hear("stop")
+    assert "done" not in [message["type"] for message in await monitor.overhear()]
+    stall.end()
+    await monitor.hear("done")
+    await monitor.until(is_stopped(True))
+
+
+async def test_a_stop_waits_for_no_source_that_ends_with_its_session(place, begun, monkeypatch):
+    session = await begun(place)
+    ended = asyncio.Event()
+
+    async def end_slowly(name: str) -> None:
+        await ended.wait()
+
+    monkeypatch.setattr(runtimes.current().children, "stop", end_slowly)
+    robot, monitor = await place.robot().dial(), place.monitor(session)
+    await robot.hello()
+    await monitor.watch()
+    await monitor.say({"type": "change", "kind": "finish", "id": "x"})
+    await robot.hear("state")
+    await monitor.say(STOP)
+    await robot.hear("stop")
+    ended.set()
+    await monitor.hear("done")
 
 
 async def test_reports_are_shown_and_decisions_and_gestures_kept(place, begun):
