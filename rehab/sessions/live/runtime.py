@@ -26,7 +26,7 @@ from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.live.admission import find_unwelcome, keep_signed_in
 from rehab.sessions.live.children import Children
 from rehab.sessions.live.notes import Notes
-from rehab.sessions.live.session import RECENT, LiveSession
+from rehab.sessions.live.session import RECENT, LiveSession, Stop
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
@@ -69,6 +69,7 @@ class Runtime:
         self.children = Children(settings.DATA_DIR / "children.json")
         self.address = sources.local_address(settings.HOST, settings.PORT)  # where children dial in
         self._opening: dict[int, asyncio.Task[LiveSession]] = {}
+        self._unlogged_stops: dict[str, Stop] = {}  # at places whose sessions were all dropped
         self._ticker = self.loop.create_task(self._tick())
 
     def _call(self, function: Callable[[], None]) -> None:
@@ -98,13 +99,36 @@ class Runtime:
     async def _open(self, session_id: int) -> LiveSession:
         actor, recent, stopped = await sync_to_async(_load)(session_id)
         live = LiveSession(actor, self.writer, recent, self._drop, robot_stopped=stopped)
+        self._take_over_stops(live)
         self.sessions[session_id] = live
         if live.actor.fold.state in OPEN and not self.draining:
             await sources.run_source(self.children, actor.session, self.address)
         return live
 
+    def _take_over_stops(self, live: LiveSession) -> None:
+        """Let a stop hold in a session that has just been loaded, though no log has it yet."""
+        kept = self._unlogged_stops.pop(live.place, None)
+        if kept is not None:
+            live.stop_robot(*kept)
+        for other in self._others_at_place_of(live):
+            if other.robot_stopped and other.unlogged_stop is not None:
+                live.stop_robot(*other.unlogged_stop)
+            elif other.robot_stopped:  # committed since the log was read
+                live.robot_stopped = True
+
     def _drop(self, live: LiveSession, problem: Exception) -> None:
-        """Forget a session that could not be written: its log is right, its fold is not."""
+        """Forget a session that could not be written: its log is right, its fold is not.
+
+        But for a stop of the robot, which holds all the same: another session of the place keeps
+        it, or the next one that is loaded.
+        """
+        stop, live.unlogged_stop = live.unlogged_stop, None
+        if stop is not None:
+            heirs = self._others_at_place_of(live)
+            for heir in heirs:
+                heir.stop_robot(*stop)
+            if not heirs:
+                self._unlogged_stops[live.place] = stop
         if self.sessions.get(live.id) is not live:
             return
         log.error("Session %s is rebuilt from its log: %s", live.id, problem)
@@ -146,9 +170,11 @@ class Runtime:
 
     def at_station_of(self, live: LiveSession) -> list[LiveSession]:
         """Give a session and the other live ones of its station: the robot may be with them."""
-        there = self.sessions.values() if live.station_id is not None else ()
-        others = [one for one in there if one.station_id == live.station_id and one is not live]
-        return [live, *others]
+        return [live, *self._others_at_place_of(live)]
+
+    def _others_at_place_of(self, live: LiveSession) -> list[LiveSession]:
+        there = self.sessions.values()
+        return [one for one in there if one.place == live.place and one is not live]
 
     def announce(self, session_id: int, station_id: int | None) -> None:
         """Tell the devices of a station that a session is there for them."""
