@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import contextvars
 import gc
 import logging
@@ -11,7 +10,7 @@ import sys
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from asgiref.sync import sync_to_async
@@ -44,7 +43,7 @@ from rehab.training.changes import (
 log = logging.getLogger(__name__)
 
 HEARTBEAT_S = 0.25  # to robots, which stand still after 0.65 s of silence
-SWEEP = 20  # heartbeats; then pages hear one too, and idle sessions are swept
+SWEEP = 20  # heartbeats; then pages hear one too, idle sessions go, sign-ins are looked at
 CHECKPOINT = 8  # heartbeats
 HEARTBEAT = to_text({"type": "heartbeat"})
 # Python's full collections take 200 ms with 2,000 sockets (stack.md, T4): make them rare.
@@ -70,7 +69,18 @@ class Runtime:
         self.address = sources.local_address(settings.HOST, settings.PORT)  # where children dial in
         self._opening: dict[int, asyncio.Task[LiveSession]] = {}
         self._unlogged_stops: dict[str, Stop] = {}  # at places whose sessions were all dropped
-        self._ticker = self.loop.create_task(self._tick())
+        # Each is a task of its own: robots stop when nothing is heard, so no heartbeat may wait
+        # for the disk, whatever else does.
+        self.routines = [
+            self.loop.create_task(self._repeat(beats, work), context=contextvars.Context())
+            for beats, work in (
+                (1, self._beat_for_robots),
+                (SWEEP, self._beat_for_pages),
+                (SWEEP, self._close_idle),
+                (SWEEP, self._look_after_sign_ins),
+                (CHECKPOINT, self._move_log),
+            )
+        ]
 
     def _call(self, function: Callable[[], None]) -> None:
         self.loop.call_soon_threadsafe(function)
@@ -195,27 +205,35 @@ class Runtime:
                 log.exception("Session %s could not be recovered", session_id)
         return len(left)
 
-    async def _tick(self) -> None:
-        ticks = 0
+    async def _repeat(self, beats: int, work: Callable[[], Awaitable[None]]) -> None:
+        """Do something again and again. Where it fails that is logged, and it is tried again."""
         while True:
-            await asyncio.sleep(HEARTBEAT_S)
-            ticks += 1
-            for live in list(self.sessions.values()):
-                if live.robot is not None:
-                    live.robot.tell({"type": "heartbeat", "watched": live.is_watched})
-                if ticks % SWEEP == 0:
-                    presence = live.presence(timezone.now())
-                    quality = to_text({"type": "heartbeat", "presence": presence})
-                    for viewer in live.channel.viewers:
-                        monitors = viewer.audience is Audience.MONITOR
-                        viewer.beat(quality if monitors else HEARTBEAT)
-                    if live.is_idle and not live.asked_for:
-                        await self._close(live)
-                    live.asked_for = False  # whoever gets it now has until the next sweep to join
-            if ticks % SWEEP == 0:
-                await self._look_after_sign_ins()
-            if ticks % CHECKPOINT == 0:
-                await self.loop.run_in_executor(None, _checkpoint)
+            await asyncio.sleep(beats * HEARTBEAT_S)
+            try:
+                await work()
+            except Exception:
+                log.exception("What is done every %.2f s failed", beats * HEARTBEAT_S)
+
+    async def _beat_for_robots(self) -> None:
+        for live in self.sessions.values():
+            if live.robot is not None:
+                live.robot.tell({"type": "heartbeat", "watched": live.is_watched})
+
+    async def _beat_for_pages(self) -> None:
+        for live in self.sessions.values():
+            presence = live.presence(timezone.now())
+            quality = to_text({"type": "heartbeat", "presence": presence})
+            for viewer in live.channel.viewers:
+                viewer.beat(quality if viewer.audience is Audience.MONITOR else HEARTBEAT)
+
+    async def _close_idle(self) -> None:
+        for live in list(self.sessions.values()):
+            if self.sessions.get(live.id) is live and live.is_idle and not live.asked_for:
+                await self._close(live)
+            live.asked_for = False  # whoever gets it now has until the next sweep to join
+
+    async def _move_log(self) -> None:
+        await self.loop.run_in_executor(None, _checkpoint)
 
     async def _look_after_sign_ins(self) -> None:
         """Keep people signed in while their page shows a training that runs; end the sockets of
@@ -223,12 +241,9 @@ class Runtime:
         """
         sockets = [socket for socket in self.sockets if socket.actor is not None]
         running = [one.scope for one in sockets if one.live is not None and one.live.is_running]
-        try:
-            await keep_signed_in(running)
-            for index in await find_unwelcome([(one.actor, one.scope) for one in sockets]):
-                sockets[index].send_off()
-        except DatabaseError:
-            log.exception("Tokens could not be looked at")  # the next sweep will
+        await keep_signed_in(running)
+        for index in await find_unwelcome([(one.actor, one.scope) for one in sockets]):
+            sockets[index].send_off()
 
     async def _close(self, live: LiveSession) -> None:
         """Take a session that nobody needs out of memory; its log brings it back."""
@@ -238,15 +253,15 @@ class Runtime:
         try:
             await sync_to_async(owners.release)(live.id, live.actor.session.epoch)
         except DatabaseError:
-            log.exception("Session %s could not be given up", live.id)  # the heartbeat goes on
+            log.exception("Session %s could not be given up", live.id)  # others can
 
     async def drain(self) -> None:
         """Close every socket so that clients come back, commit everything, stop."""
         self.draining = True
         await self.children.stop_all()
-        self._ticker.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await self._ticker
+        for routine in self.routines:
+            routine.cancel()
+        await asyncio.gather(*self.routines, return_exceptions=True)
         closing = [socket.shut(4012) for socket in list(self.sockets)]
         await asyncio.gather(*closing, self.notes.settled(), return_exceptions=True)
         await asyncio.gather(*self.asked, return_exceptions=True)
