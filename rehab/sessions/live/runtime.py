@@ -67,7 +67,7 @@ class Runtime:
         self.asked: set[asyncio.Task[None]] = set()  # what pages asked for and is under way
         self.children = Children(settings.DATA_DIR / "children.json")
         self.address = sources.local_address(settings.HOST, settings.PORT)  # where children dial in
-        self._opening: dict[int, asyncio.Task[LiveSession]] = {}
+        self._opening: dict[int, asyncio.Task[None]] = {}
         self._unlogged_stops: dict[str, Stop] = {}  # at places whose sessions were all dropped
         # Each is a task of its own: robots stop when nothing is heard, so no heartbeat may wait
         # for the disk, whatever else does.
@@ -90,30 +90,39 @@ class Runtime:
 
         Raises TrainingSession.DoesNotExist and OwnedElsewhere.
         """
-        live = self.sessions.get(session_id)
-        if live is not None:
-            live.asked_for = True
-            return live
-        if session_id not in self._opening:
-            # A context of its own: a request's ends with the request, others wait for this too.
-            self._opening[session_id] = self.loop.create_task(
-                self._open(session_id), context=contextvars.Context()
-            )
-        try:
-            return await asyncio.shield(self._opening[session_id])
-        finally:
-            task = self._opening.get(session_id)
-            if task is not None and task.done():
-                del self._opening[session_id]
+        while (live := self.sessions.get(session_id)) is None:
+            if session_id not in self._opening:
+                # A context of its own: a request's ends with the request, others wait for this too.
+                self._opening[session_id] = self.loop.create_task(
+                    self._open(session_id), context=contextvars.Context()
+                )
+            try:
+                await asyncio.shield(self._opening[session_id])
+            finally:
+                task = self._opening.get(session_id)
+                if task is not None and task.done():
+                    del self._opening[session_id]
+        live.asked_for = True
+        return live
 
-    async def _open(self, session_id: int) -> LiveSession:
+    async def admitted(self, session_id: int) -> LiveSession:
+        """Give a live session at a moment when no viewer joins it. Raises what ``session`` does.
+
+        Until the next ``await`` it is the one in memory: what is attached to it is told of its end.
+        """
+        while True:
+            live = await self.session(session_id)
+            await live.admission()
+            if self.sessions.get(session_id) is live:
+                return live
+
+    async def _open(self, session_id: int) -> None:
         actor, recent, stopped = await sync_to_async(_load)(session_id)
         live = LiveSession(actor, self.writer, recent, self._drop, robot_stopped=stopped)
         self._take_over_stops(live)
         self.sessions[session_id] = live
         if live.actor.fold.state in OPEN and not self.draining:
             await sources.run_source(self.children, actor.session, self.address)
-        return live
 
     def _take_over_stops(self, live: LiveSession) -> None:
         """Let a stop hold in a session that has just been loaded, though no log has it yet."""
@@ -139,10 +148,9 @@ class Runtime:
                 heir.stop_robot(*stop)
             if not heirs:
                 self._unlogged_stops[live.place] = stop
-        if self.sessions.get(live.id) is not live:
-            return
-        log.error("Session %s is rebuilt from its log: %s", live.id, problem)
-        del self.sessions[live.id]
+        if self.sessions.get(live.id) is live:
+            log.error("Session %s is rebuilt from its log: %s", live.id, problem)
+            del self.sessions[live.id]
         for peer in (live.source, live.robot):
             if peer is not None:
                 peer.send_away(4011, "not_stored", "A step could not be stored. Connect again.")
@@ -157,8 +165,7 @@ class Runtime:
 
         Raises InvalidSetting where it is refused and NotStored where it could not be committed.
         """
-        live = await self.session(session_id)
-        await live.admission()
+        live = await self.admitted(session_id)
         if live.source_clock is not None and kind in (ChangeKind.START, ChangeKind.RESUME):
             live.source_clock.slacken(time.monotonic())
         await live.change(Change(kind, value), by, timezone.now())
@@ -172,8 +179,7 @@ class Runtime:
 
     async def remark(self, session_id: int, what: Remark, value: float | None, by: User) -> None:
         """Note something of a session; committed when this returns. Raises what ``change`` does."""
-        live = await self.session(session_id)
-        await live.admission()  # so that it keeps its place among changes
+        live = await self.admitted(session_id)
         if live.actor.fold.state in ENDED:
             raise Refused("The session has ended.")
         await live.remark(what, value, by, timezone.now())
