@@ -68,6 +68,7 @@ class Runtime:
         self.children = Children(settings.DATA_DIR / "children.json")
         self.address = sources.local_address(settings.HOST, settings.PORT)  # where children dial in
         self._opening: dict[int, asyncio.Task[None]] = {}
+        self._left: set[int] = set()  # by processes that died: to be paused if they run
         self._unlogged_stops: dict[str, Stop] = {}  # at places whose sessions were all dropped
         # Each is a task of its own: robots stop when nothing is heard, so no heartbeat may wait
         # for the disk, whatever else does.
@@ -88,7 +89,8 @@ class Runtime:
     async def session(self, session_id: int) -> LiveSession:
         """Give a live session, rebuilt from its log where it is not in memory.
 
-        Raises TrainingSession.DoesNotExist and OwnedElsewhere.
+        Raises TrainingSession.DoesNotExist, OwnedElsewhere, and NotStored where a change that it
+        needs could not be committed.
         """
         while (live := self.sessions.get(session_id)) is None:
             if session_id not in self._opening:
@@ -117,12 +119,27 @@ class Runtime:
                 return live
 
     async def _open(self, session_id: int) -> None:
-        actor, recent, stopped = await sync_to_async(_load)(session_id)
+        actor, recent, stopped, left = await sync_to_async(_load)(session_id)
         live = LiveSession(actor, self.writer, recent, self._drop, robot_stopped=stopped)
+        if left:
+            self._left.add(session_id)
+        await self._pause_left(live)
         self._take_over_stops(live)
         self.sessions[session_id] = live
         if live.actor.fold.state in OPEN and not self.draining:
             await sources.run_source(self.children, actor.session, self.address)
+
+    async def _pause_left(self, live: LiveSession) -> None:
+        """Pause a session that the process before left running when it died.
+
+        What could not be stored is tried again when the session is next loaded.
+        """
+        if live.id in self._left:
+            if live.is_running:
+                pause = Change(ChangeKind.PAUSE, PauseReason.RESTART.value)
+                await live.change(pause, None, timezone.now())
+                log.warning("Session %s was left running; it is paused now.", live.id)
+            self._left.discard(live.id)
 
     def _take_over_stops(self, live: LiveSession) -> None:
         """Let a stop hold in a session that has just been loaded, though no log has it yet."""
@@ -201,12 +218,10 @@ class Runtime:
     async def recover(self) -> int:
         """Pause the sessions that a process left running when it died. Give how many."""
         left = await sync_to_async(_left_running)()
+        self._left.update(left)
         for session_id in left:
             try:
-                live = await self.session(session_id)
-                if live.actor.fold.state is State.RUNNING:
-                    pause = Change(ChangeKind.PAUSE, PauseReason.RESTART.value)
-                    await live.change(pause, None, timezone.now())
+                await self._pause_left(await self.session(session_id))
             except Exception:  # one broken session keeps no server from starting
                 log.exception("Session %s could not be recovered", session_id)
         return len(left)
@@ -278,14 +293,17 @@ class Runtime:
         await sync_to_async(_release_all)(held)
 
 
-def _load(session_id: int) -> tuple[SessionActor, list[Step], bool]:
+def _load(session_id: int) -> tuple[SessionActor, list[Step], bool, bool]:
+    """Give a session with its latest steps; say whether its robot is stopped, and whether the
+    process that ran it is dead.
+    """
     session = TrainingSession.everywhere.select_related("patient", "measure", "station").get(
         pk=session_id
     )
-    if State(session.state) in OPEN:
-        owners.claim(session)
+    before = owners.claim(session) if State(session.state) in OPEN else ""
+    left = before not in ("", session.owner)
     steps = Step.everywhere.filter(session=session).order_by("-number")[:RECENT]
-    return SessionActor.load(session), list(reversed(steps)), _is_robot_stopped(session)
+    return SessionActor.load(session), list(reversed(steps)), _is_robot_stopped(session), left
 
 
 def _is_robot_stopped(session: TrainingSession) -> bool:

@@ -375,6 +375,35 @@ async def test_sessions_left_running_come_back_paused_and_complete(place, begun,
     assert await runtimes.current().recover() == 0
 
 
+async def test_a_session_that_was_given_up_in_good_order_goes_on(place, begun):
+    session = await begun(place)
+    await runtimes.current().drain()
+    runtimes._current = None
+    source = await place.source().dial()
+    assert (await source.hello())["state"] == "running"
+    assert not await SessionEvent.everywhere.filter(session=session, kind="pause").aexists()
+
+
+async def test_a_session_of_a_dead_server_is_paused_by_whoever_takes_it_over(
+    place, begun, stall, caplog
+):
+    session = await left_running(place, begun, 3)
+    stall.problem = DatabaseError("disk")
+    source = await place.source().dial()
+    await source.say({"type": "hello", "version": 1, "run": "r1", "last": 3})
+    assert (await source.sent_away())[0] == 4011
+    stall.problem = None
+    assert (await reread(session)).owner == owners.my_name()
+    source = await place.source().dial()
+    welcome = await source.hello()
+    assert (welcome["state"], welcome["next"]) == ("paused", 4)
+    assert f"Session {session.pk} was left running" in caplog.text
+    events = SessionEvent.everywhere.filter(session=session, kind="pause")
+    assert [event.data async for event in events] == [{"value": "restart"}]
+    await change(session, "resume")
+    await source.walk(4.0)
+
+
 async def test_a_session_that_runs_elsewhere_is_left_alone(place, begun, settings):
     session = await left_running(place, begun, 1)
     parent = os.getppid()
