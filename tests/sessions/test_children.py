@@ -6,6 +6,7 @@ import asyncio
 import json
 import os
 import sys
+import threading
 from collections import deque
 
 import pytest
@@ -36,6 +37,7 @@ async def test_a_child_that_fails_comes_back_and_its_last_words_are_kept(childre
     child = children.start("robot", python("print('no port'); raise SystemExit(3)"))
     await until(lambda: child.restarts >= 2)
     assert list(child.last_words)[-1] == "no port"
+    await until((tmp_path / "children.json").exists)
     told = json.loads((tmp_path / "children.json").read_text())
     assert told["children"][0]["name"] == "robot"
 
@@ -132,4 +134,28 @@ async def test_a_report_that_cannot_be_written_harms_no_child(tmp_path, caplog):
     child = children.start("recording", python("pass"))
     await until(lambda: child.state == "done")
     await children.stop("recording")
+    await children.stop_all()
     assert "could not be written" in caplog.text
+
+
+async def test_the_loop_waits_for_no_disk_and_the_last_word_is_told(
+    children, tmp_path, monkeypatch
+):
+    disk, written, replace = threading.Event(), [], Children._replace_report
+
+    def replace_late(self, text):
+        assert disk.wait(5)
+        written.append(text)
+        replace(self, text)
+
+    monkeypatch.setattr(Children, "_replace_report", replace_late)
+    first = children.start("first", python("import time; time.sleep(60)"))
+    await until(lambda: first.pid is not None)
+    second = children.start("second", python("import time; time.sleep(60)"))
+    await until(lambda: second.pid is not None)
+    await children.stop("first")
+    assert not written
+    disk.set()
+    await children.stop_all()
+    assert json.loads((tmp_path / "children.json").read_text())["children"] == []
+    assert len(written) <= 3  # what was out of date before it could be written is not

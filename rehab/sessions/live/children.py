@@ -62,6 +62,8 @@ class Children:
         self.report = report
         self.first_pause_s = first_pause_s
         self.all: dict[str, Child] = {}
+        self._is_told = True
+        self._telling: asyncio.Task[None] | None = None
 
     def start(
         self,
@@ -85,7 +87,9 @@ class Children:
     async def stop(self, name: str) -> None:
         """End a child: politely, then for certain."""
         child = self.all.pop(name, None)
-        if child is not None and child.task is not None:
+        if child is None:
+            return
+        if child.task is not None:
             child.task.cancel()
             await asyncio.wait([child.task])
         self._tell()
@@ -98,6 +102,8 @@ class Children:
         for problem in ended:
             if isinstance(problem, Exception):
                 log.error("A child did not end cleanly", exc_info=problem)
+        if self._telling is not None:
+            await self._telling
 
     async def _keep_up(self, child: Child, environment: Mapping[str, str], once: bool) -> None:
         pause_s = self.first_pause_s
@@ -149,13 +155,25 @@ class Children:
                 await _end(process)
 
     def _tell(self) -> None:
-        children = [child.describe() for child in self.all.values()]
+        """Have the report written; the event loop waits for no disk."""
+        self._is_told = False
+        if self._telling is None or self._telling.done():
+            self._telling = asyncio.get_running_loop().create_task(self._write_report())
+
+    async def _write_report(self) -> None:
+        while not self._is_told:
+            self._is_told = True
+            children = [child.describe() for child in self.all.values()]
+            text = json.dumps({"server": os.getpid(), "children": children})
+            try:
+                await asyncio.to_thread(self._replace_report, text)
+            except OSError as problem:  # they live on; only `doctor` knows less
+                log.warning("%s could not be written: %s", self.report, problem)
+
+    def _replace_report(self, text: str) -> None:
         fresh = self.report.with_suffix(".new")
-        try:
-            fresh.write_text(json.dumps({"server": os.getpid(), "children": children}))
-            fresh.replace(self.report)
-        except OSError as problem:  # they live on; only `doctor` knows less
-            log.warning("%s could not be written: %s", self.report, problem)
+        fresh.write_text(text)
+        fresh.replace(self.report)
 
 
 async def _listen(output: asyncio.StreamReader, words: deque[str]) -> None:

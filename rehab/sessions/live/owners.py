@@ -11,6 +11,7 @@ from pathlib import Path
 from django.conf import settings
 
 from rehab.sessions.models import TrainingSession
+from rehab.training.changes import State
 
 PROCESSES = Path("/proc")
 # What the one before may have written since the session was read.
@@ -86,3 +87,15 @@ def claim(session: TrainingSession) -> str:
 def release(session_id: int, epoch: int) -> None:
     """Give the session up, so that any process may take it."""
     TrainingSession.everywhere.filter(pk=session_id, epoch=epoch).update(owner="")
+
+
+def release_all(held: list[tuple[int, int]]) -> None:
+    """Give up sessions, each with its epoch."""
+    for session_id, epoch in held:
+        release(session_id, epoch)
+
+
+def find_left_running() -> list[int]:
+    """Give the sessions that run and that no process has."""
+    running = TrainingSession.everywhere.filter(state=State.RUNNING.value)
+    return [one.pk for one in running if not one.owner or not is_alive(one.owner)]

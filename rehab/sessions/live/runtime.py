@@ -21,14 +21,13 @@ from django.utils import timezone
 from rehab.people.models import User
 from rehab.sessions.events import Audience, to_text
 from rehab.sessions.live import owners, sources
-from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.live.admission import find_unwelcome, keep_signed_in
 from rehab.sessions.live.children import Children
+from rehab.sessions.live.loading import find_newest_open, load
 from rehab.sessions.live.notes import Notes
-from rehab.sessions.live.session import RECENT, LiveSession, Stop
+from rehab.sessions.live.session import LiveSession, Stop
 from rehab.sessions.live.writer import Writer
-from rehab.sessions.log import Remark, RobotEntry, SessionEvent, Step
-from rehab.sessions.models import TrainingSession
+from rehab.sessions.log import Remark
 from rehab.training.changes import (
     ENDED,
     OPEN,
@@ -119,9 +118,10 @@ class Runtime:
                 return live
 
     async def _open(self, session_id: int) -> None:
-        actor, recent, stopped, left = await sync_to_async(_load)(session_id)
-        live = LiveSession(actor, self.writer, recent, self._drop, robot_stopped=stopped)
-        if left:
+        loaded = await sync_to_async(load)(session_id)
+        actor, stopped = loaded.actor, loaded.robot_stopped
+        live = LiveSession(actor, self.writer, loaded.recent, self._drop, robot_stopped=stopped)
+        if loaded.was_left:
             self._left.add(session_id)
         await self._pause_left(live)
         self._take_over_stops(live)
@@ -190,7 +190,7 @@ class Runtime:
             return
         await self.children.stop(sources.child_name(live.id))
         if live.station_id is not None:
-            waiting = await sync_to_async(_newest_open)(live.station_id)
+            waiting = await sync_to_async(find_newest_open)(live.station_id)
             if waiting is not None:
                 self.announce(waiting, live.station_id)
 
@@ -217,7 +217,7 @@ class Runtime:
 
     async def recover(self) -> int:
         """Pause the sessions that a process left running when it died. Give how many."""
-        left = await sync_to_async(_left_running)()
+        left = await sync_to_async(owners.find_left_running)()
         self._left.update(left)
         for session_id in left:
             try:
@@ -290,35 +290,7 @@ class Runtime:
         await asyncio.sleep(0)  # the writer's last reports
         held = [(live.id, live.actor.session.epoch) for live in self.sessions.values()]
         self.sessions.clear()
-        await sync_to_async(_release_all)(held)
-
-
-def _load(session_id: int) -> tuple[SessionActor, list[Step], bool, bool]:
-    """Give a session with its latest steps; say whether its robot is stopped, and whether the
-    process that ran it is dead.
-    """
-    session = TrainingSession.everywhere.select_related("patient", "measure", "station").get(
-        pk=session_id
-    )
-    before = owners.claim(session) if State(session.state) in OPEN else ""
-    left = before not in ("", session.owner)
-    steps = Step.everywhere.filter(session=session).order_by("-number")[:RECENT]
-    return SessionActor.load(session), list(reversed(steps)), _is_robot_stopped(session), left
-
-
-def _is_robot_stopped(session: TrainingSession) -> bool:
-    """Say whether the last word on the station's robot, in this session or before, was stop."""
-    there = (
-        {"session": session} if session.station is None else {"session__station": session.station}
-    )
-    words = SessionEvent.everywhere.filter(kind__in=(RobotEntry.STOP, RobotEntry.ARM), **there)
-    last = words.order_by("-pk").values_list("kind", flat=True).first()
-    return last == RobotEntry.STOP
-
-
-def _newest_open(station_id: int) -> int | None:
-    there = TrainingSession.everywhere.filter(station=station_id, state__in=[*OPEN])
-    return there.order_by("-created_at", "-pk").values_list("pk", flat=True).first()
+        await sync_to_async(owners.release_all)(held)
 
 
 def _checkpoint() -> None:
@@ -332,18 +304,6 @@ def _checkpoint() -> None:
         log.warning("The database's log could not be moved: %s", problem)
     finally:
         connection.close()
-
-
-def _left_running() -> list[int]:
-    running = TrainingSession.everywhere.filter(state=State.RUNNING.value)
-    return [
-        session.pk for session in running if not session.owner or not owners.is_alive(session.owner)
-    ]
-
-
-def _release_all(held: list[tuple[int, int]]) -> None:
-    for session_id, epoch in held:
-        owners.release(session_id, epoch)
 
 
 _current: Runtime | None = None

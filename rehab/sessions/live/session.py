@@ -92,6 +92,9 @@ class LiveSession:
         session = actor.session
         self.id = session.pk
         self.station_id = session.station_id
+        # Where its robot is: sessions of one station share it.
+        here = f"session {self.id}" if self.station_id is None else f"station {self.station_id}"
+        self.place = here
         self.actor = actor
         self.channel = Channel()
         self.recent: deque[Step | ScoredStep] = deque(recent, maxlen=RECENT)
@@ -118,11 +121,6 @@ class LiveSession:
         self._joining = 0
         self._admits = asyncio.Event()
         self._queue = asyncio.Lock()  # fair: who asks for it first has it first
-
-    @property
-    def place(self) -> str:
-        """Where its robot is: sessions of one station share it."""
-        return f"session {self.id}" if self.station_id is None else f"station {self.station_id}"
 
     @property
     def next_number(self) -> int:
