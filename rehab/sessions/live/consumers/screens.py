@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+from collections.abc import Awaitable
 from typing import ClassVar
 from urllib.parse import parse_qs
 
@@ -30,7 +31,7 @@ from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.past import read_steps
 from rehab.sessions.live.session import LiveSession, NotStored
 from rehab.stations.models import Device
-from rehab.training.changes import ENDED, ChangeKind, PauseReason
+from rehab.training.changes import ChangeKind, PauseReason
 from rehab.training.measures import InvalidSetting
 
 
@@ -139,14 +140,7 @@ class ScreenConsumer(Socket):
         if kind not in (self.changes if by else self.tablet_changes):
             await self._refuse(mark, "refused", "That is changed on the therapist's page.")
             return
-        try:
-            await self.runtime.change(live.id, kind, value, by)
-        except InvalidSetting as problem:
-            await self._refuse(mark, "refused", str(problem))
-        except NotStored as problem:
-            await self._refuse(mark, "not_stored", str(problem))
-        else:
-            await self.say({"type": "done", "id": mark})
+        self.see_through(self._answer(mark, self.runtime.change(live.id, kind, value, by)))
 
     async def _remark(self, message: Message) -> None:
         mark = read_name(message, "id")
@@ -156,15 +150,22 @@ class ScreenConsumer(Socket):
             raise Closing(4004, "not_open", "The session is not open. Connect again.")
         if self.audience is not Audience.MONITOR or not isinstance(by, User):
             await self._refuse(mark, "refused", "That is noted on the therapist's page.")
-        elif live.actor.fold.state in ENDED:
-            await self._refuse(mark, "refused", "The session has ended.")
+            return
+        self.see_through(self._answer(mark, self.runtime.remark(live.id, what, value, by)))
+
+    async def _answer(self, mark: str, work: Awaitable[None]) -> None:
+        """Say what became of something that was asked for, once it is stored or refused.
+
+        Beside the socket, whose next frame may be a stop; and to its end if the page goes.
+        """
+        try:
+            await work
+        except InvalidSetting as problem:
+            await self._refuse(mark, "refused", str(problem))
+        except NotStored as problem:
+            await self._refuse(mark, "not_stored", str(problem))
         else:
-            try:
-                await live.remark(what, value, by, timezone.now())
-            except NotStored as problem:
-                await self._refuse(mark, "not_stored", str(problem))
-            else:
-                await self.say({"type": "done", "id": mark})
+            await self.say({"type": "done", "id": mark})
 
     async def _order_robot(self, message: Message) -> None:
         """Stop the robot, whoever asks; let it move again where a person asks."""
