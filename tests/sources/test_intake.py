@@ -291,3 +291,18 @@ def test_extra_values_travel_as_far_as_they_can():
     assert stride.extra == {"symmetry": 0.03}
     assert (stride.side, stride.value, stride.time_s) == (Side.RIGHT, 3.5, 5.0)
     assert "belt speed, note" in desk.said[0]
+
+
+@pytest.mark.parametrize("begins_anew", [True, False])
+def test_the_clock_that_is_told_follows_a_slow_sensor_and_one_that_begins_anew(begins_anew):
+    desk = Desk()
+    device_s = 0.0
+    for _ in range(2000):  # an hour, by a clock that is 0.5 % slow
+        desk.time.now_s += 1.8
+        device_s += 1.8 * 0.995
+        desk.intake.take([{"time_s": device_s, "value": 4.0}])
+    if begins_anew:
+        desk.time.now_s += 20.0
+        device_s = 1.0
+        desk.intake.take([{"time_s": device_s, "value": 4.0}])
+    assert desk.feed.clock_s == pytest.approx(device_s, abs=0.1)
