@@ -61,7 +61,7 @@ class HeardClock:
         return False
 
     def slacken(self, now_s: float) -> None:
-        """Allow that it stood still for as long as nothing fresh was heard. What comes next tells."""
+        """Allow that it stood still while nothing fresh was heard. What comes next tells."""
         if self._offset is not None:
             self._offset -= (now_s - self._seen_s) * self._speed
             self._seen_s = now_s

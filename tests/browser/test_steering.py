@@ -226,7 +226,12 @@ def test_what_a_therapist_asks_for_without_a_network_is_told_to_be_unsent(server
         expect(why).to_have_text(unsent)
         expect(said).to_have_text(unsent)
         expect(stop).not_to_have_class(re.compile("asked"))
-        for control in ("[data-goal='1']", "[data-main]", "[data-levels] [value='0.5']", "[data-remark]"):
+        for control in (
+            "[data-goal='1']",
+            "[data-main]",
+            "[data-levels] [value='0.5']",
+            "[data-remark]",
+        ):
             monitor.evaluate("document.querySelector('.said').textContent = ''")
             monitor.locator(control).first.click()
             expect(said).to_have_text("There is no connection. Try again in a moment.")
