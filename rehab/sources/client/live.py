@@ -8,10 +8,11 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 
+from rehab.sources.client.outbox import add_ours
 from rehab.sources.client.player import KEPT_MAX
 from rehab.training.clocks import HeardClock
 from rehab.training.phases import make_phase
-from rehab.training.steps import Measurement, Reason, Side, add_reason
+from rehab.training.steps import Measurement, Reason, Side
 
 
 class LiveFeed:
@@ -92,7 +93,7 @@ class LiveFeed:
             self.left_out += 1
             return
         if not self._runs:
-            stride = replace(stride, reasons=add_reason(stride.reasons, Reason.PAUSED))
+            stride = replace(stride, reasons=add_ours(stride.reasons, Reason.PAUSED))
         self._waiting.append(stride)
         self.on_change()
 
