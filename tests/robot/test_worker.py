@@ -125,7 +125,8 @@ OURS = [4000, 4001, 4004, 4008, 4009, 4011, 4012, 4029, 4400, 4409, 4410, 4999]
 @pytest.mark.parametrize("code", [None, *STANDARD, *OURS])
 async def test_however_the_server_hangs_up_it_stands_still_until_somebody_orders(garry, code):
     garry.welcome |= {"watched": True}
-    base, said = RealBase(time.monotonic), []
+    base = RealBase(time.monotonic)
+    said: list[str] = []
     async with working(garry, base, said=said) as worker:
         await garry.until_hello(1)
         await garry.tell(type="arm")

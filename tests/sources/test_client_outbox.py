@@ -82,7 +82,9 @@ def test_as_many_reasons_as_fit_leave_room_for_ours(count, value):
     feed.stand()
     outbox.join(7, 1)
     feed.put(stride(value=value, reasons=own))
-    outbox.give(feed.poll(0))
+    walked = feed.poll(0)
+    assert isinstance(walked, Measurement)
+    outbox.give(walked)
 
     ours = ["paused"] if value == 4.0 else ["paused", "not_finite"]
     assert outbox.next_is_paused
