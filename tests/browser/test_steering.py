@@ -225,6 +225,8 @@ def test_what_a_therapist_asks_for_without_a_network_is_told_to_be_unsent(server
         unsent = "Not sent: no connection. Use the robot’s own switch."
         expect(why).to_have_text(unsent)
         expect(said).to_have_text(unsent)
+        words, button = said.bounding_box(), stop.bounding_box()
+        assert words["x"] >= button["x"] + button["width"]  # what is told hides no Stop
         expect(stop).not_to_have_class(re.compile("asked"))
         for control in (
             "[data-goal='1']",
