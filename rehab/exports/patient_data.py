@@ -99,6 +99,7 @@ def list_consents(user: User, patient: Patient) -> list[dict[str, Any]]:
     return [
         {
             "purpose": row.purpose,
+            "level": row.level or None,
             "given_at": row.given_at,
             "withdrawn_at": row.withdrawn_at,
             "version": row.text and row.text.version,

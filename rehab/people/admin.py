@@ -11,10 +11,12 @@ from django.contrib.auth.forms import AdminUserCreationForm
 from django.contrib.auth.models import Group
 from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import ValidationError
+from django.db import connection
 from django.db.models import Count, Max, QuerySet
 from django.http import HttpRequest, HttpResponseBase
 from django.shortcuts import redirect
 from django.urls import reverse
+from django.utils.html import format_html
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
@@ -188,7 +190,7 @@ class PatientAdmin(ScopedAdmin):
         "body_mass_kg",
         "paretic_side",
         "language",
-        "boards",
+        "boards_agreed",
         "animal_name",
         "blinded",
         "pseudonym",
@@ -196,7 +198,10 @@ class PatientAdmin(ScopedAdmin):
         "ended_at",
         "erased_at",
     )
-    readonly_fields = ("animal_name", "pseudonym", "created_at", "ended_at", "erased_at")
+    readonly_fields = (
+        *("boards_agreed", "animal_name", "pseudonym"),
+        *("created_at", "ended_at", "erased_at"),
+    )
     actions = row_actions = ("draw_aliases",)
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Any]:
@@ -208,11 +213,26 @@ class PatientAdmin(ScopedAdmin):
         )
         return rows
 
+    def get_object(self, request: HttpRequest, object_id: str, from_field: Any = None) -> Any:
+        """Find a patient; one who is about to be changed is held, so that no erasing is undone."""
+        patient = super().get_object(request, object_id, from_field)
+        if patient is not None and request.method == "POST" and connection.in_atomic_block:
+            patient.hold()
+        return patient
+
+    def save_model(self, request: HttpRequest, obj: Any, form: Any, change: bool) -> None:
+        """Store what the form asked for."""
+        if change:
+            obj.keep(*form.changed_data)
+        else:
+            super().save_model(request, obj, form, change)
+
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Lead to where the patient walks, and to what was walked."""
         return [
             (reverse("patient", args=[row.pk]), _("Start a session")),
             (reverse("history", args=[row.pk]), _("Past sessions")),
+            (reverse("consent", args=[row.pk]), _("Consent")),
         ]
 
     @admin.display(description=_("sessions"), ordering="walks")
@@ -227,6 +247,18 @@ class PatientAdmin(ScopedAdmin):
         zone = ZoneInfo(patient.clinic.time_zone)
         return patient.last_visit and patient.last_visit.astimezone(zone).date()
 
+    @admin.display(description=_("leaderboards"))
+    def boards_agreed(self, patient: Patient) -> Any:
+        """Say on which boards the patient agrees to stand, and where that is noted."""
+        if patient.is_new:
+            return _("Noted on the patient's consent page, once the patient is here.")
+        return format_html(
+            '{} · <a href="{}">{}</a>',
+            patient.get_boards_display(),
+            reverse("consent", args=[patient.pk]),
+            _("Change it on the consent page"),
+        )
+
     @admin.display(description=_("animal name"))
     def animal_name(self, patient: Patient) -> str:
         """Say what the patient is called on boards."""
@@ -235,10 +267,9 @@ class PatientAdmin(ScopedAdmin):
     @admin.action(description=_("Draw new animal names for boards"), permissions=["change"])
     def draw_aliases(self, request: HttpRequest, patients: QuerySet[Patient]) -> None:
         """Give the chosen patients other names on boards."""
-        for patient in patients:
+        drawn = list(patients.filter(erased_at=None))
+        for patient in drawn:
             patient.draw_alias()
-            patient.save(update_fields=["alias"])
-        names = ", ".join(
-            f"{patient.nickname}: {self.animal_name(patient)}" for patient in patients
-        )
+            patient.keep("alias")
+        names = ", ".join(f"{patient.nickname}: {self.animal_name(patient)}" for patient in drawn)
         messages.success(request, gettext("New names on boards. %(names)s") % {"names": names})

@@ -123,6 +123,32 @@ def test_the_page_says_where_the_words_have_changed_since(world, pt):
     assert b"words have changed since" in pt.get(url).content
 
 
+def test_a_patient_whom_two_take_in_at_once_is_told_by_the_form(world, pt, monkeypatch):
+    find_good = Patient.full_clean
+
+    def be_slower(patient, *args, **kwargs):
+        find_good(patient, *args, **kwargs)
+        monkeypatch.setattr(Patient, "full_clean", find_good)
+        Patient.everywhere.create(clinic=world.clinic, code="R1", nickname="Rosa")
+
+    monkeypatch.setattr(Patient, "full_clean", be_slower)
+    given = {"nickname": "Rosa", "code": "R1", "paretic_side": "left", "agrees": ["care"]}
+    page = pt.post(reverse("new-patient"), given)
+    assert page.status_code == 200
+    assert "Code R1 already exists: it is Rosa" in page.content.decode()
+    assert Patient.everywhere.filter(code="R1").count() == 1
+
+
+def test_the_demo_patient_is_one_and_takes_nobodys_code(world, pt):
+    for _ in range(2):
+        assert pt.post(reverse("demo")).status_code == 302
+    demo = Patient.everywhere.get(code="demo")
+    Patient.everywhere.filter(pk=demo.pk).update(simulated=False)
+    page = pt.post(reverse("demo"), follow=True)
+    assert "Demo has the code demo. Give that patient another code first." in page.content.decode()
+    assert Patient.everywhere.filter(code="demo").count() == 1
+
+
 def test_the_new_patient_form_notes_what_is_agreed_to(world, pt):
     given = {"nickname": "Rosa", "code": "R1", "paretic_side": "left", "agrees": ["care", "boards"]}
     assert pt.post(reverse("new-patient"), given).status_code == 302
@@ -147,14 +173,31 @@ def test_boards_with_others_need_consent(world):
     patient.full_clean()
 
 
-def test_the_admin_refuses_boards_without_consent(world):
-    withdraw(world.patient, Purpose.BOARDS, None, NOW)
+@pytest.mark.parametrize(("before", "asked"), [("own", "clinic"), ("clinic", "own")])
+def test_the_admin_shows_boards_and_leads_to_where_they_are_agreed_to(before, asked, world, pt):
+    tap(pt, world.patient, "boards", before)
     lead = client_of(world, Role.LEAD)
     url = reverse("admin:rehab_patient_change", args=[world.patient.pk])
-    given = {"code": "c", "nickname": "n", "language": "en", "boards": "clinic"}
-    page = lead.post(url, given)
-    assert b"consent to boards" in page.content
-    assert Patient.everywhere.get(pk=world.patient.pk).boards == Boards.OWN
+    consent = reverse("consent", kwargs={"patient_id": world.patient.pk})
+    assert f'href="{consent}"' in lead.get(url).content.decode()
+    held = list(Consent.everywhere.values_list("pk", "withdrawn_at"))
+    given = {"code": "c", "nickname": "n", "language": "en", "boards": asked}
+    assert lead.post(url, given).status_code == 302
+    stored = Patient.everywhere.get(pk=world.patient.pk)
+    assert (stored.nickname, stored.boards) == ("n", before)
+    assert list(Consent.everywhere.values_list("pk", "withdrawn_at")) == held
+
+
+def test_every_level_of_boards_is_noted_and_who_goes_further_agrees_again(world, pt):
+    Clinic.everywhere.update(boards_across=True)
+    Consent.everywhere.filter(patient=world.patient, purpose="boards").delete()
+    for says in ("total", "across", "across", "clinic"):
+        tap(pt, world.patient, "boards", says)
+    rows = Consent.everywhere.filter(patient=world.patient, purpose="boards").order_by("pk")
+    assert [row.level for row in rows] == ["total", "across", "clinic"]
+    assert [row.withdrawn_at is None for row in rows] == [False, False, True]
+    page = pt.get(reverse("consent", kwargs={"patient_id": world.patient.pk})).content.decode()
+    assert str(Boards.ACROSS.label) in page
 
 
 def test_withdrawing_takes_the_patient_off_all_boards_at_once(world, pt):
@@ -211,3 +254,18 @@ def test_what_exists_when_garry_is_updated_goes_on(world):
     assert [(row.patient, row.text) for row in Consent.everywhere.all()] == [(world.patient, None)]
     world.patient.full_clean()
     assert not holding(quiet)
+
+
+def test_an_update_lets_boards_and_consent_say_the_same(world):
+    board = BoardEntry.everywhere.get(patient=world.patient).board
+    left = Patient.everywhere.create(clinic=world.clinic, code="l", nickname="L", boards="across")
+    kept = Patient.everywhere.create(clinic=world.clinic, code="k", nickname="K")
+    give(kept, Purpose.BOARDS, None, NOW)
+    Consent.everywhere.update(level="")
+    import_module("rehab.migrations.0004_what_was_agreed_to").tell_levels(apps, None)
+    assert holding(world.patient)["boards"].level == "clinic"
+    assert "boards" not in holding(kept)
+    left.refresh_from_db()
+    assert left.boards == Boards.OWN
+    board.refresh_from_db()
+    assert board.built_to == 0  # made anew, without whoever no longer agrees

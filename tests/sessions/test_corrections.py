@@ -21,7 +21,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.takehome import sum_up_for_home
 from rehab.sessions.trend import read_trend
 from tests.walks import strides, walk
-from tests.world import NOW, World, build_world, client_of
+from tests.world import NOW, World, agreeing, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -32,9 +32,10 @@ def world() -> World:
 
 
 def patient_of(world: World, name: str, **fields) -> Patient:
-    return Patient.everywhere.create(
+    patient = Patient.everywhere.create(
         clinic=world.clinic, code=f"K-{ord(name[0])}", nickname=name, paretic_side="left", **fields
     )
+    return agreeing(patient)
 
 
 @pytest.fixture
