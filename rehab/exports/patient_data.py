@@ -9,17 +9,23 @@ from typing import Any
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy as _lazy
 
+from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.exports.archive import write_csv, write_json
 from rehab.exports.tables import TABLES, Selection, codebook
 from rehab.people.consent import Consent
+from rehab.people.history import HistoryEntry
 from rehab.people.models import Patient, User
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.visits import Visit
 from rehab.training.scoring import RULES_VERSION
 
 FILES = {
     "README.txt": _lazy("this page"),
     "patient.json": _lazy("who it is, and how the pages are set"),
     "consent.json": _lazy("what was agreed to, to which words, and when"),
+    "visits.json": _lazy("the days on which a visit is or was planned"),
+    "boards.json": _lazy("the rows on leaderboards, and the groups of boards"),
+    "changes.json": _lazy("when details were changed, each with its value before and after"),
     "sessions.csv": _lazy("a row for each session"),
     "steps.csv": _lazy("a row for each step"),
     "events.csv": _lazy("a row for each thing done or noted during a session"),
@@ -49,6 +55,9 @@ def patient_files(user: User, patient: Patient, now: datetime) -> Iterator[tuple
     yield "README.txt", [write_readme(title, list(FILES), now)]
     yield "patient.json", write_json(describe(patient))
     yield "consent.json", write_json(list_consents(user, patient))
+    yield "visits.json", write_json(list_visits(user, patient))
+    yield "boards.json", write_json(list_boards(user, patient))
+    yield "changes.json", write_json(list_changes(user, patient))
     yield from _tables(Selection(user, sessions, named=True))
 
 
@@ -79,6 +88,7 @@ def describe(patient: Patient) -> dict[str, Any]:
         "body_mass_kg": patient.body_mass_kg,
         "language": patient.language,
         "screen_side": patient.screen_side,
+        "screen_text": patient.screen_text,
         "screen_still": patient.screen_still,
         "screen_sounds": patient.screen_sounds,
         "leaderboards": patient.boards,
@@ -90,6 +100,7 @@ def describe(patient: Patient) -> dict[str, Any]:
         "program_ended_at": patient.ended_at,
         "program_ended_because": patient.ended_because or None,
         "erased_at": patient.erased_at,
+        "erased_because": patient.erased_because or None,
     }
 
 
@@ -106,6 +117,37 @@ def list_consents(user: User, patient: Patient) -> list[dict[str, Any]]:
             "words": row.text and row.text.text,
         }
         for row in rows.order_by("pk")
+    ]
+
+
+def list_visits(user: User, patient: Patient) -> list[dict[str, Any]]:
+    """Give the days that were planned."""
+    visits = Visit.objects.visible_to(user).filter(patient=patient)
+    return [{"day": visit.day, "at": visit.at} for visit in visits]
+
+
+def list_boards(user: User, patient: Patient) -> list[dict[str, Any]]:
+    """Give what stands on boards of others, as it stands there."""
+    rows = BoardEntry.everywhere.filter(patient=patient).select_related("board").order_by("pk")
+    grouped = Leaderboard.objects.visible_to(user).filter(group=patient)
+    return [
+        {
+            "board": row.board.name,
+            "feedback_type": row.valence or None,
+            "figure": row.figure,
+            "could_be_kept": row.stake,
+        }
+        for row in rows
+    ] + [{"in_the_group_of_the_board": board.name} for board in grouped]
+
+
+def list_changes(user: User, patient: Patient) -> list[dict[str, Any]]:
+    """Give the history of the details; an erased value is null. Who works here stays unnamed."""
+    noun = Patient.__name__
+    changes = HistoryEntry.objects.visible_to(user).filter(noun=noun, row=patient.pk)
+    return [
+        {"at": change.at, "kind": change.kind, "before_and_after": change.values}
+        for change in changes.order_by("pk")
     ]
 
 
