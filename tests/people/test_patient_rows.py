@@ -138,6 +138,18 @@ def test_who_no_longer_agrees_stands_on_no_board_whatever_the_row_says(world):
     assert BoardEntry.everywhere.filter(patient=world.patient).exists()
 
 
+def test_a_screen_setting_costs_boards_nothing(world):
+    entry = BoardEntry.everywhere.get(patient=world.patient)
+    entry.delete()  # whoever looks at boards again would bring it back
+    patient = Patient.everywhere.get(pk=world.patient.pk)
+    patient.screen_still = True
+    patient.keep("screen_still")
+    assert not BoardEntry.everywhere.exists()
+    patient.blinded = False
+    patient.keep("blinded")
+    assert BoardEntry.everywhere.exists()
+
+
 # --- at the same time ---------------------------------------------------------------------------
 
 
