@@ -11,7 +11,7 @@ from django.contrib.auth.forms import AdminUserCreationForm
 from django.contrib.auth.models import Group
 from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import ValidationError
-from django.db import connection
+from django.db import connection, transaction
 from django.db.models import Count, Max, QuerySet
 from django.http import HttpRequest, HttpResponseBase
 from django.shortcuts import redirect
@@ -22,8 +22,10 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people import factors, lockout
 from rehab.people.access import person
-from rehab.people.admin_base import ScopedAdmin, ScopedOptions, TokenAdmin, rights
+from rehab.people.admin_base import ScopedAdmin, ScopedOptions, TokenAdmin, ToldChanges, rights
 from rehab.people.aliases import say_alias
+from rehab.people.audit import Act, note_safety
+from rehab.people.lockout import client_address
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.tokens import ApiToken
@@ -78,7 +80,7 @@ class NewAccountForm(AdminUserCreationForm):
 
 
 @admin.register(User)
-class AccountAdmin(ScopedOptions, UserAdmin):
+class AccountAdmin(ScopedOptions, ToldChanges, UserAdmin):
     """Accounts: a lead keeps those of the own clinic, a host all of them."""
 
     list_display = (
@@ -102,7 +104,9 @@ class AccountAdmin(ScopedOptions, UserAdmin):
     def unlock(self, request: HttpRequest, accounts: QuerySet[User]) -> None:
         """Let the chosen accounts try again at once."""
         for account in accounts:
-            lockout.forgive(account)
+            with transaction.atomic():
+                note_safety(Act.UNLOCK, person(request), account, client_address(request))
+                lockout.forgive(account)
         words = gettext("Accounts that may try again: %(count)s.")
         messages.success(request, words % {"count": accounts.count()})
 
@@ -112,7 +116,9 @@ class AccountAdmin(ScopedOptions, UserAdmin):
     def remove_second_factors(self, request: HttpRequest, accounts: QuerySet[User]) -> None:
         """Take the chosen accounts back to their passwords alone."""
         for account in accounts:
-            factors.forget_all(account)
+            with transaction.atomic():
+                note_safety(Act.FACTORS, person(request), account, client_address(request))
+                factors.forget_all(account)
         words = gettext(
             "%(count)s account(s) sign in by password alone now, or set up a new second "
             "factor where the clinic asks for one. If a phone was stolen, give a new password too."
