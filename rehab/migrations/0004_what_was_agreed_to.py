@@ -11,6 +11,8 @@ import django.db.models.manager
 from django.db import migrations, models
 from django.utils import timezone
 
+import rehab.people.networks
+
 
 def tell_levels(apps: Any, schema_editor: Any) -> None:
     Patient, Consent, Leaderboard, BoardCount = (
@@ -40,6 +42,17 @@ class Migration(migrations.Migration):
                 default=False,
                 help_text="No session can be set up for a patient who has not agreed to care.",
                 verbose_name="care needs consent",
+            ),
+        ),
+        migrations.AddField(
+            model_name="clinic",
+            name="networks",
+            field=models.TextField(
+                blank=True,
+                help_text="One a line, such as 192.168.1.0/24. From elsewhere a session is watched only with the patient's consent to remote view; say so in your words. Empty: from anywhere, and nobody is asked.",
+                max_length=1000,
+                validators=[rehab.people.networks.check_networks],
+                verbose_name="the clinic's own networks",
             ),
         ),
         migrations.AddField(

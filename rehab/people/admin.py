@@ -61,7 +61,8 @@ class ClinicAdmin(ScopedAdmin):
     search_fields = ("name",)
     fields = (
         *("name", "language", "time_zone", "boards_across", "second_factor_required"),
-        *("research_needs_consent", "keep_months", "keep_log_months"),
+        *("care_needs_consent", "research_needs_consent", "networks"),
+        *("keep_months", "keep_log_months"),
     )
 
 

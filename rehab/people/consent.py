@@ -13,9 +13,11 @@ from django.utils.translation import gettext_lazy as _
 from django.utils.translation import override
 
 from rehab.people.models import Boards, Clinic, Patient, User
+from rehab.people.networks import is_within
 from rehab.people.roles import Role
 from rehab.people.scope import Scope, ScopedModel
 
+REMOTE_WORDS = _("Remote view: your therapist may watch a session from another place.")
 # What a clinic begins with, in its language. It is its own to change.
 FIRST_WORDS = (
     _(
@@ -32,7 +34,7 @@ FIRST_WORDS = (
         "Boards: your results stand beside those of others, under the name of an animal. You can "
         "leave at any time, also by yourself on the tablet."
     ),
-    _("Remote view: your therapist may watch a session from another place."),
+    REMOTE_WORDS,
     _(
         "You may say no to any of these, and change your mind at any time. Your care does not "
         "depend on research, boards or remote view."
@@ -151,12 +153,16 @@ class PatientScope(Scope):
         )
 
 
+def _is_said(clinic: Clinic, said: Any) -> bool:
+    return said is not REMOTE_WORDS or Purpose.REMOTE in offered(clinic)
+
+
 def current_text(clinic: Clinic) -> ConsentText:
     """Give the words in force; a clinic's first ones are made on first use."""
     text = ConsentText.everywhere.filter(clinic=clinic).first()
     if text is None:
         with override(clinic.language):
-            words = "\n\n".join(map(str, FIRST_WORDS))
+            words = "\n\n".join(str(said) for said in FIRST_WORDS if _is_said(clinic, said))
         text, _made = ConsentText.everywhere.get_or_create(
             clinic=clinic, version=1, defaults={"text": words}
         )
@@ -179,6 +185,19 @@ def holding(patient: Patient) -> dict[str, Consent]:
     """Give what a patient agrees to now, by purpose."""
     rows = Consent.everywhere.filter(patient=patient, withdrawn_at=None).select_related("text")
     return {row.purpose: row for row in rows}
+
+
+def offered(clinic: Clinic) -> list[Purpose]:
+    """Give what patients of a clinic are asked for: remote view where it makes a difference."""
+    return [one for one in Purpose if clinic.networks or one is not Purpose.REMOTE]
+
+
+def may_be_watched(patient: Patient, address: str) -> bool:
+    """Whether a person at this address may watch: from elsewhere with the patient's consent."""
+    networks = patient.clinic.networks
+    if not networks or patient.simulated or is_within(networks, address):
+        return True
+    return Purpose.REMOTE in holding(patient)
 
 
 def may_be_cared_for(patient: Patient) -> bool:

@@ -16,6 +16,7 @@ from django.db.models import Q
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.aliases import draw_alias
+from rehab.people.networks import check_networks
 from rehab.people.roles import Role
 from rehab.people.scope import ClinicRow, Scope, ScopedManager, ScopedModel
 from rehab.training.steps import Side
@@ -72,6 +73,17 @@ class Clinic(ScopedModel):
         _("care needs consent"),
         default=False,
         help_text=_("No session can be set up for a patient who has not agreed to care."),
+    )
+    networks = models.TextField(
+        _("the clinic's own networks"),
+        blank=True,
+        max_length=1000,
+        validators=[check_networks],
+        help_text=_(
+            "One a line, such as 192.168.1.0/24. From elsewhere a session is watched only with "
+            "the patient's consent to remote view; say so in your words. Empty: from anywhere, and "
+            "nobody is asked."
+        ),
     )
     keep_months = models.PositiveSmallIntegerField(
         _("keep patients (months)"),

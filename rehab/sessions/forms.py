@@ -17,7 +17,7 @@ from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
-from rehab.people.consent import Purpose, give, join_boards
+from rehab.people.consent import Purpose, give, join_boards, offered
 from rehab.people.forms import PatientRowForm
 from rehab.people.models import SIDES, Boards, Patient, User
 from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
@@ -62,7 +62,7 @@ class PatientForm(PatientRowForm):
         if self.instance.is_new:
             self.fields["agrees"] = forms.MultipleChoiceField(
                 label=_("What the patient agrees to"),
-                choices=Purpose.choices,
+                choices=[(one.value, one.label) for one in offered(self.instance.clinic)],
                 required=False,
                 widget=forms.CheckboxSelectMultiple,
                 help_text=_(

@@ -20,6 +20,7 @@ from rehab.people.consent import (
     current_text,
     give,
     holding,
+    offered,
     withdraw,
     write_text,
 )
@@ -27,6 +28,9 @@ from rehab.people.models import Boards, Clinic, Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.services import create_session
+from rehab.training.goals import GoalRule
+from rehab.training.measures import InvalidSetting
 from tests.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
@@ -61,11 +65,14 @@ def test_words_that_somebody_agreed_to_never_change(world):
         text.save()
 
 
-def test_a_clinic_begins_with_words_that_name_every_purpose_but_are_its_own_to_change():
-    clinic = Clinic.everywhere.create(name="New")
+@pytest.mark.parametrize("networks", ["", "192.168.1.0/24"])
+def test_a_clinic_begins_with_words_that_name_all_it_asks_for_but_are_its_own_to_change(networks):
+    clinic = Clinic.everywhere.create(name="New", networks=networks)
     first = current_text(clinic)
     assert first.version == 1
-    assert all(f"{purpose.label}:" in first.text for purpose in Purpose)
+    named = [purpose for purpose in Purpose if f"{purpose.label}:" in first.text]
+    assert named == offered(clinic)
+    assert (Purpose.REMOTE in named) == bool(networks)
     assert current_text(clinic) == first
     assert ConsentText.everywhere.filter(clinic=clinic).count() == 1
 
@@ -212,6 +219,88 @@ def test_withdrawing_takes_the_patient_off_all_boards_at_once(world, pt):
 def test_leaving_boards_on_the_tablet_withdraws_the_consent(world, pt):
     pt.post(reverse("leave-boards", kwargs={"session_id": world.session.pk}))
     assert "boards" not in holding(world.patient)
+
+
+# --- care -----------------------------------------------------------------------------------------
+
+
+def set_up(world: World) -> TrainingSession:
+    walked = world.session
+    return create_session(
+        world.patient,
+        valence="positive",
+        goal=GoalRule(value=1.0),
+        protocol=walked.protocol,
+        measure=walked.measure,
+    )
+
+
+def test_a_clinic_may_need_consent_to_care_before_a_session(world, pt):
+    consent = reverse("consent", kwargs={"patient_id": world.patient.pk})
+    assert "no session without it" not in pt.get(consent).content.decode()
+    set_up(world)  # off, unless the clinic says so
+    world.clinic.care_needs_consent = True
+    world.clinic.save()
+    with pytest.raises(InvalidSetting, match="not agreed to care.*Consent and data"):
+        set_up(world)
+    tap(pt, world.patient, "care", "yes")
+    set_up(world)
+    page = pt.post(consent, {"purpose": "care", "says": "no"}, follow=True).content.decode()
+    assert "This clinic sets up no session without it." in page
+    assert f'href="{reverse("records", args=[world.patient.pk])}">End the program' in page
+    with pytest.raises(InvalidSetting):
+        set_up(world)
+    Patient.everywhere.filter(pk=world.patient.pk).update(simulated=True)
+    set_up(world)
+
+
+# --- remote view ----------------------------------------------------------------------------------
+
+HERE, AWAY = "192.168.1.7", "203.0.113.9"
+
+
+@pytest.mark.parametrize("name", ["monitor", "walk"])
+def test_from_elsewhere_a_session_is_watched_with_consent_only(name, world, pt):
+    session = set_up(world)
+    url, consent = reverse(name, args=[session.pk]), reverse("consent", args=[world.patient.pk])
+    assert pt.get(url, REMOTE_ADDR=AWAY).status_code == 200  # no networks: nobody is asked
+    assert 'value="remote"' not in pt.get(consent).content.decode()
+    Clinic.everywhere.update(networks="192.168.1.0/24\n2001:db8::/48")
+    for address, opens in (
+        *((HERE, True), ("2001:db8:0:5::9", True), ("127.0.0.1", True)),
+        *((AWAY, False), ("192.168.2.7", False), ("2001:db9::1", False), ("?", False)),
+    ):
+        answer = pt.get(url, REMOTE_ADDR=address)
+        assert (answer.status_code == 200) == opens, address
+    told = pt.get(url, REMOTE_ADDR=AWAY, follow=True)
+    assert told.redirect_chain == [(consent, 302)]
+    assert "has not agreed to remote view" in told.content.decode()
+    tap(pt, world.patient, "remote", "yes")
+    assert pt.get(url, REMOTE_ADDR=AWAY).status_code == 200
+    tap(pt, world.patient, "remote", "no")
+    assert pt.get(url, REMOTE_ADDR=AWAY).status_code == 302
+
+
+def test_what_is_not_offered_can_be_withdrawn_but_not_given(world, pt):
+    tap(pt, world.patient, "remote", "yes")
+    assert "remote" not in holding(world.patient)
+    give(world.patient, Purpose.REMOTE, None, NOW)  # before the clinic took its networks away
+    tap(pt, world.patient, "remote", "no")
+    assert "remote" not in holding(world.patient)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("192.168.1.7/24", "is no network"),
+        ("our floor", "is no network"),
+        ("2001:db8:1:2:3::/80", "too small"),
+    ],
+)
+def test_what_is_no_network_is_refused(text, words, world):
+    world.clinic.networks = text
+    with pytest.raises(ValidationError, match=words):
+        world.clinic.full_clean()
 
 
 # --- research -------------------------------------------------------------------------------------
