@@ -23,7 +23,7 @@ from rehab.exports.archive import ZipResponse, write_csv, write_zip
 from rehab.exports.tables import PAGE, STEPS, TABLES, Selection, to_cell
 from rehab.people.audit import Act, AuditEntry
 from rehab.people.consent import Purpose, withdraw
-from rehab.people.models import Patient, User
+from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.corrections import Part, correct_session
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
@@ -71,6 +71,14 @@ def test_a_patients_file_holds_everything_that_is_kept(world):
     assert agreed[0]["words"] == world.patient.consents.first().text.text
     assert len(rows_of(files["steps.csv"])) == Step.everywhere.count()
     assert len(rows_of(files["events.csv"])) == SessionEvent.everywhere.count()
+
+
+def test_the_file_says_what_is_in_it_in_the_language_of_whoever_asks(world):
+    Clinic.everywhere.update(language="es")
+    for url in (reverse("patient-data", args=[world.patient.pk]), reverse("export-sessions")):
+        readme = open_archive(body_of(client_of(world, Role.LEAD).get(url)))["README.txt"]
+        assert "una fila por paso" in readme
+        assert "Son datos de salud." in readme
 
 
 # Where the file tells the rows of each model that leads to a patient. Who looked is told from the
