@@ -9,11 +9,12 @@ from datetime import date, datetime
 from itertools import groupby
 from typing import Any
 
-from django.db.models import QuerySet
+from django.db.models import Q, QuerySet
 
 from rehab.boards.models import Leaderboard
 from rehab.boards.periods import Period, period_of
 from rehab.boards.rules import TYPED
+from rehab.people.consent import Purpose, agreed
 from rehab.people.models import Patient
 from rehab.sessions.log import SessionMetric
 from rehab.training.changes import State
@@ -93,6 +94,7 @@ def read_own(board: Leaderboard, patient: Patient, valence: str, now: datetime) 
 def standing_on(board: Leaderboard) -> QuerySet[Patient]:
     """Give the patients who may stand on a board of several."""
     patients = Patient.everywhere.filter(boards__in=board.agreed, blinded=False)
+    patients = patients.filter(Q(simulated=True) | agreed(Purpose.BOARDS))
     if board.among == Leaderboard.Among.ACROSS:
         return patients.filter(clinic__boards_across=True)
     patients = patients.filter(clinic=board.clinic_id)

@@ -17,6 +17,8 @@ from rehab.sessions.log import SessionMetric, figures_stored
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
 
+STANDING = frozenset({"boards", "blinded", "simulated"})  # what of a patient alters boards
+
 
 def watch() -> None:
     """Listen, from the start of the process on."""
@@ -50,9 +52,9 @@ def on_figures(sessions: set[int], **_signal: Any) -> None:
 
 
 @unless_restored
-def on_patient(instance: Patient, created: bool, **_signal: Any) -> None:
+def on_patient(instance: Patient, created: bool, update_fields: Any = None, **_signal: Any) -> None:
     """A patient has agreed to more or less, or has entered or left a blinded study."""
-    if not created:
+    if not created and (update_fields is None or not STANDING.isdisjoint(update_fields)):
         entries.refresh_patients({instance.pk})
 
 

@@ -6,9 +6,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from asgiref.sync import async_to_sync
+from django.db import transaction
 from django.utils.translation import gettext
 
 from rehab.feedback.valences import valences_of
+from rehab.people.consent import may_be_cared_for
 from rehab.people.models import Patient, User
 from rehab.sessions.cues import find_composed, quiet_cue
 from rehab.sessions.live import runtime
@@ -51,11 +53,6 @@ def create_session(
     session. Raises InvalidSetting for a plan that could not be walked and CrossClinic where
     patient, station and the rest are not of one clinic; nothing is stored then.
     """
-    if patient.ended_at is not None:
-        said = gettext(
-            "%(patient)s's program has ended. Reopen it on the page “Consent and data” first."
-        )
-        raise InvalidSetting(said % {"patient": patient.nickname})
     measure = measure or Measure.everywhere.get(clinic=None, slug=A2.slug)
     if phases is None:
         if protocol is None:
@@ -108,11 +105,34 @@ def create_session(
         plan=plan.to_json(),
         goal=goal.value,
     )
-    session.save()
+    with transaction.atomic():
+        patient.hold()  # nobody is erased meanwhile
+        _check_may_walk(patient)
+        session.save()
     live = runtime.peek()
     if live is not None:
         live.loop.call_soon_threadsafe(live.announce, session.pk, session.station_id)
     return session
+
+
+def _check_may_walk(patient: Patient) -> None:
+    """Refuse a patient who has left, or who has not agreed to what the clinic needs.
+
+    Raises InvalidSetting.
+    """
+    names = {"patient": patient.nickname}
+    if patient.ended_at is not None:
+        said = gettext(
+            "%(patient)s's program has ended. Reopen it on the page “Consent and data” first."
+        )
+        raise InvalidSetting(said % names)
+    if may_be_cared_for(patient):
+        return
+    said = gettext(
+        "%(patient)s has not agreed to care, and this clinic needs that. Note it on the page "
+        "“Consent and data” first."
+    )
+    raise InvalidSetting(said % names)
 
 
 def change_session(

@@ -26,7 +26,7 @@ from rehab.stations.models import Device, Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.walks import strides, walk
-from tests.world import NOW
+from tests.world import NOW, agreeing
 
 pytestmark = pytest.mark.django_db
 
@@ -39,7 +39,7 @@ def clinic() -> Clinic:
 
 
 def patient_of(clinic: Clinic, code: str, boards: str = "clinic", **fields) -> Patient:
-    return Patient.everywhere.create(
+    patient = Patient.everywhere.create(
         clinic=clinic,
         code=code,
         nickname=f"Nick {code}",
@@ -47,6 +47,7 @@ def patient_of(clinic: Clinic, code: str, boards: str = "clinic", **fields) -> P
         boards=boards,
         **fields,
     )
+    return agreeing(patient)
 
 
 def people_of(clinic: Clinic, count: int, **fields) -> list[Patient]:

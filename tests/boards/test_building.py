@@ -19,7 +19,7 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from tests.walks import strides, walk
-from tests.world import NOW
+from tests.world import NOW, agreeing
 
 PEOPLE = 9
 
@@ -37,8 +37,14 @@ def woken(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
 def sessions(db: None, woken: list[bool]) -> list[TrainingSession]:
     clinic = Clinic.everywhere.create(name="Elm")
     people = [
-        Patient.everywhere.create(
-            clinic=clinic, code=f"C-{n}", nickname=f"N-{n}", paretic_side="left", boards="clinic"
+        agreeing(
+            Patient.everywhere.create(
+                clinic=clinic,
+                code=f"C-{n}",
+                nickname=f"N-{n}",
+                paretic_side="left",
+                boards="clinic",
+            )
         )
         for n in range(PEOPLE)
     ]
