@@ -104,8 +104,9 @@ def test_a_session_of_two_types_stands_on_no_board_of_points_or_of_one_type(clin
     assert BoardEntry.everywhere.filter(board=board, patient=people[0]).exists() == stands
 
 
-def test_a_session_of_two_types_is_compared_by_its_hits_alone(clinic):
-    person = patient_of(clinic, "A")
+@pytest.mark.parametrize("language", ["en", "es"])
+def test_a_session_of_two_types_is_compared_by_its_hits_alone(clinic, language):
+    person = patient_of(clinic, "A", language=language)
     device = Device(
         clinic=clinic,
         station=Station.everywhere.create(clinic=clinic, name="S"),
