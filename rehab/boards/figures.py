@@ -124,7 +124,7 @@ def _read(board: Leaderboard, rows: QuerySet[SessionMetric], period: Period) -> 
     wanted = {board.metric, board.tie_breaker, "steps", "active_minutes"} - {""}
     facts = ["session_id", "session__patient_id", "session__valence", "session__started_at"]
     facts += ["slug", "value"]
-    if board.metric in TYPED:
+    if {board.metric, board.tie_breaker} & TYPED:
         facts.append("session__plan__valence__miss_points")
     ordered = (
         rows.filter(slug__in=wanted)
@@ -139,7 +139,9 @@ def _read(board: Leaderboard, rows: QuerySet[SessionMetric], period: Period) -> 
         if board.metric in values and counts(board, values):
             cost = -(own[0][6] or 0) if len(facts) > 6 else 0
             day = period.day_of(at)
-            yield Walked(session_id, patient_id, valence, at, day, values, cost)
+            walked = Walked(session_id, patient_id, valence, at, day, values, cost)
+            if not keeps(board.metric, valence) or measure(walked, board.metric)[1] > 0:
+                yield walked
 
 
 def counts(board: Leaderboard, values: dict[str, float]) -> bool:
@@ -150,12 +152,17 @@ def counts(board: Leaderboard, values: dict[str, float]) -> bool:
 
 
 def measure(walked: Walked, slug: str) -> tuple[float, float]:
-    """Give a session's figure in the unit that is shown, and what could be kept of it (or 0)."""
+    """Give a session's figure in the unit that is shown, and what could be kept of it (or 0).
+
+    Of what was lost nothing is told where it is not known what was at stake: imported sessions have
+    points, and may have no steps.
+    """
     value = walked.values.get(slug, 0.0) * (100 if slug in SHARES else 1)
     if not keeps(slug, walked.valence):
         return value, 0.0
     steps = 100 if slug == "points_per_100_steps" else walked.values.get("steps", 0)
-    return walked.cost * steps + value, walked.cost * steps
+    stake = walked.cost * steps
+    return (stake + value if stake else 0.0), stake
 
 
 def keeps(slug: str, valence: str) -> bool:

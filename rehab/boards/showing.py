@@ -10,8 +10,7 @@ from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_noop, ngettext
 
-from rehab.boards import entries
-from rehab.boards.building import builder
+from rehab.boards.building import builder, catch_up
 from rehab.boards.choosing import choose
 from rehab.boards.figures import keeps, read_figures, read_own, standing_on
 from rehab.boards.models import Leaderboard
@@ -104,8 +103,7 @@ class Viewer:
         board, patient = self.board, self.patient
         if board.is_own:
             return self._show_own("")
-        if self.stored and board.is_being_built:
-            builder.wake()  # whoever was at it may have been stopped
+        if self.stored and not self._is_up_to_date():
             return self._show_own(f"{_(BUILT)} {_(OWN)}" if patient else _(BUILT))
         standings = self._standings()
         people = ngettext(
@@ -128,6 +126,12 @@ class Viewer:
         why = _("Outside its first half, own sessions are shown.")
         return self._show_own(_(OWN), f"{people} {why}")
 
+    def _is_up_to_date(self) -> bool:
+        if self.board.is_being_built:
+            builder.wake()  # whoever was at it may have been stopped
+            return False
+        return catch_up(self.board, self.now)
+
     def find_typical(self) -> int | None:
         """Give the patient in the middle of the first half; None for a board of own sessions."""
         if self.board.is_own:
@@ -139,7 +143,6 @@ class Viewer:
     def _standings(self) -> Standings:
         key = self.board.list_of(self.valence)
         if self.stored:
-            entries.refresh_stale(self.board, self.now)
             return Stored(self.board, key)
         figures = read_figures(self.board, self.now)
         return Listed(self.board, (row for row in figures if row.valence == key))

@@ -1,5 +1,6 @@
 """A board that would rank by feedback type, or list a person twice, cannot be built."""
 
+from datetime import date
 from typing import Any
 
 import pytest
@@ -7,6 +8,7 @@ from django.core.exceptions import ValidationError
 from django.urls import reverse, reverse_lazy
 
 from rehab.boards.models import BoardEntry, Leaderboard
+from rehab.boards.rules import FIRST_DAY, LAST_DAY
 from rehab.people.aliases import MANNERS, draw_alias, words
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
@@ -52,6 +54,25 @@ def test_the_defaults_are_safe():
             "never above",
         ),
         ({"metric": "score", "types": "chosen", "valences": ["explicit"]}, "has no points"),
+        ({"tie_breaker": "score", "types": "all"}, "never above 0"),
+        (
+            {
+                "tie_breaker": "points_per_100_steps",
+                "types": "chosen",
+                "valences": ["positive", "negative"],
+            },
+            "never above",
+        ),
+        ({"tie_breaker": "score", "types": "chosen", "valences": ["explicit"]}, "has no points"),
+        (
+            {"period": "dates", "period_from": date(2026, 1, 1), "period_to": date.max},
+            "ends on the last one",
+        ),
+        (
+            {"period": "dates", "period_from": date.min, "period_to": date(2026, 1, 1)},
+            "from Jan. 1, 1970 to Dec. 31, 2199",
+        ),
+        ({"frozen_on": date.min}, "Give a day from"),
         ({"types": "chosen"}, "at least one type"),
         ({"types": "chosen", "valences": ["kind"]}, "positive, negative, binary, explicit"),
         ({"valences": "positive"}, "Give a list"),
@@ -141,6 +162,25 @@ def test_what_is_seen_in_the_preview_is_what_the_tablet_shows(world):
         answer.content.decode().split("<ol>")[1].split("</ol>")[0] for answer in (preview, shown)
     ]
     assert rows[0].split() == rows[1].split()
+
+
+@pytest.mark.parametrize("zone", ["Pacific/Kiritimati", "America/Los_Angeles"])
+def test_the_first_and_the_last_day_can_be_chosen_and_none_beyond(world, zone):
+    Clinic.everywhere.filter(pk=world.clinic.pk).update(time_zone=zone)
+    client = client_of(world)
+    wanted = filled(among="clinic", entry="best", period="dates")
+    for first, last, status in (
+        (FIRST_DAY, LAST_DAY, 302),
+        (date(2026, 1, 1), date.max, 200),
+        (date.min, date(2026, 1, 1), 200),
+    ):
+        days = {"period_from": str(first), "period_to": str(last)}
+        page = client.get(PREVIEW, wanted | days)
+        assert page.status_code == 200
+        assert ("Give a day from" in page.content.decode()) == (status == 200)
+        assert client.post(reverse("admin:rehab_leaderboard_add"), wanted | days).status_code == (
+            status
+        )
 
 
 def test_a_preview_says_what_cannot_be(world):
