@@ -96,7 +96,7 @@ def standing_on(board: Leaderboard) -> QuerySet[Patient]:
     if board.among == Leaderboard.Among.ACROSS:
         return patients.filter(clinic__boards_across=True)
     patients = patients.filter(clinic=board.clinic_id)
-    return patients.filter(pk__in=group_of(board)) if board.among == "group" else patients
+    return patients.filter(pk__in=group_of(board)) if board.has_group else patients
 
 
 def group_of(board: Leaderboard) -> list[int]:

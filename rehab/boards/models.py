@@ -282,6 +282,11 @@ class Leaderboard(ClinicRow):
         return self.among == self.Among.SELF
 
     @property
+    def has_group(self) -> bool:
+        """Whether its group decides who stands on it."""
+        return self.among == self.Among.GROUP
+
+    @property
     def agreed(self) -> list[str]:
         """What a patient must have agreed to, to stand on it: one of these."""
         if self.among == self.Among.ACROSS:

@@ -119,7 +119,7 @@ def on_board(instance: Leaderboard, **_signal: Any) -> None:
 
 def on_group(instance: Leaderboard, action: str, pk_set: set[int] | None, **_signal: Any) -> None:
     """Patients were taken into a board's group or out of it."""
-    if instance.among == Leaderboard.Among.GROUP and action.startswith("post_"):
+    if instance.has_group and action.startswith("post_"):
         building.follow(instance, pk_set)
 
 

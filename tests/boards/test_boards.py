@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from datetime import timedelta
 
 import pytest
@@ -16,6 +17,7 @@ from hypothesis import strategies as st
 from rehab.boards import building, entries
 from rehab.boards.choosing import choose
 from rehab.boards.choosing import place as place_of
+from rehab.boards.figures import read_figures
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.boards.showing import Viewer, show_after, show_waiting
 from rehab.boards.standings import Listed, Stored
@@ -180,6 +182,28 @@ def test_four_participants_see_their_own_sessions_and_why_five_see_the_board(cli
     after = see(sessions[0])
     assert after.shared
     assert len(after.rows) == 3
+
+
+def test_simulated_patients_hide_no_person(clinic):
+    board = board_of(clinic, types="all", include_simulated=True, display="top", names="code")
+    simulated = [patient_of(clinic, f"S{number}", simulated=True) for number in range(5)]
+    sessions = [walk(one, "positive", strides(8, 2), simulated=True) for one in simulated]
+    tried = see(sessions[0])  # alone they are shown: whoever tries GARRY sees a board
+    assert tried.shared
+    assert tried.facts == "5 patients on it now."
+    people = people_of(clinic, 5)
+    walk(people[0], "positive", strides(9, 1))
+    for viewer in (Viewer(board, NOW, simulated[0]), Viewer(board, NOW, people[0])):
+        for made in (None, list(read_figures(board, NOW))):
+            shown = replace(viewer, made=made).show()
+            assert not shown.shared
+            assert "C-0" not in [row.title for row in shown.rows]
+            assert shown.facts.startswith("1 patient on it now. Under 5")
+    walk_down(people[1:])
+    for made in (None, list(read_figures(board, NOW))):
+        shown = Viewer(board, NOW, people[0], made=made).show()
+        assert shown.shared
+        assert shown.facts == "10 patients on it now."
 
 
 def test_nobody_is_shown_in_the_last_half_and_who_is_there_sees_the_own_sessions(clinic):
