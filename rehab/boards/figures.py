@@ -9,7 +9,8 @@ from datetime import date, datetime
 from itertools import groupby
 from typing import Any
 
-from django.db.models import QuerySet
+from django.db.models import CharField, QuerySet
+from django.db.models.functions import Cast
 
 from rehab.boards.models import Leaderboard
 from rehab.boards.periods import Period, period_of
@@ -116,7 +117,8 @@ def _read(board: Leaderboard, rows: QuerySet[SessionMetric], period: Period) -> 
     if board.types != Leaderboard.Types.ALL or {board.metric, board.tie_breaker} & TYPED:
         rows = rows.filter(session__changed_to="")  # one of several types is of none
     if board.slugs:
-        rows = rows.filter(session__valence__in=board.slugs)
+        rows = rows.alias(kind=Cast("session__valence", CharField()))
+        rows = rows.filter(kind__in=board.slugs)
     if period.began is not None:
         rows = rows.filter(session__started_at__gte=period.began)
     if period.ended is not None:
@@ -126,8 +128,11 @@ def _read(board: Leaderboard, rows: QuerySet[SessionMetric], period: Period) -> 
     facts += ["slug", "value"]
     if {board.metric, board.tie_breaker} & TYPED:
         facts.append("session__plan__valence__miss_points")
+    # Types and slugs are cast so that SQLite does not choose their indexes: these lead through
+    # everybody's sessions and figures, where those of some patients are wanted.
     ordered = (
-        rows.filter(slug__in=wanted)
+        rows.alias(what=Cast("slug", CharField()))
+        .filter(what__in=wanted)
         .order_by("session__patient_id", "session__started_at", "session_id")
         .values_list(*facts)
     )

@@ -8,7 +8,9 @@ from datetime import timedelta
 
 import pytest
 from django.core.management import call_command
+from django.db import connection
 from django.test import Client
+from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 from django.utils import timezone
 from hypothesis import given, settings
@@ -773,6 +775,23 @@ def test_rows_are_those_of_the_board_as_it_is_not_as_it_was_read(clinic):
     board.save()
     entries.refresh(read, {person.pk}, NOW)
     assert BoardEntry.everywhere.get().figure == 10
+
+
+def test_a_patients_rows_are_made_of_no_other_patients_figures(clinic):
+    """SQLite knows nothing of how many there are unless somebody tells it."""
+    board_of(clinic, types="chosen", period="week", metric="score", valences=["positive"])
+    person = patient_of(clinic, "A")
+    walk(person, "positive", strides(9, 1))
+    with CaptureQueriesContext(connection) as asked:
+        entries.refresh_patients({person.pk, *range(900, 960)}, NOW)
+    (query,) = [one["sql"] for one in asked.captured_queries if "sessionmetric" in one["sql"]]
+    if connection.vendor == "sqlite":
+        with connection.cursor() as cursor:
+            cursor.execute(f"EXPLAIN QUERY PLAN {query}")
+            plan = "; ".join(row[3] for row in cursor.fetchall())
+        assert "SCAN" not in plan, plan
+        assert "(patient_id=?)" in plan
+        assert "metric_by_value" not in plan
 
 
 def test_everyone_locks_boards_in_one_order_and_each_once(clinic, monkeypatch):
