@@ -40,10 +40,12 @@ class Builder:
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
         self._ends = threading.Event()
+        self._is_wanted = False
 
     def wake(self) -> None:
         """Build what is to be built, soon. Never waits."""
         with self._lock:
+            self._is_wanted = True
             if self._thread is None and not self._ends.is_set():
                 self._thread = threading.Thread(target=self._run, name="garry-boards", daemon=True)
                 self._thread.start()
@@ -68,12 +70,18 @@ class Builder:
             connection.close()
 
     def _next(self) -> Step | None:
-        """Give what is to be done; who asks for more once nothing is starts another thread."""
-        with self._lock:
-            step = None if self._ends.is_set() else find_step()
-            if step is None:
-                self._thread = None
-            return step
+        """Give what is to be done. Looks again where somebody asked meanwhile."""
+        while True:
+            with self._lock:
+                if self._ends.is_set() or not self._is_wanted:
+                    self._thread = None
+                    return None
+                self._is_wanted = False
+            step = find_step()
+            if step is not None:
+                with self._lock:
+                    self._is_wanted = True  # there may be more after it
+                return step
 
     def _go(self, step: Step) -> None:
         most, more = FIRST, True
@@ -132,10 +140,12 @@ def catch_up(board: Leaderboard, now: datetime) -> bool:
     """Bring the rows up to date that time has altered; False where those are many: they are then
     made beside, and the board is not shown meanwhile.
     """
-    if len(entries.find_stale(board, now, FEW + 1)) > FEW:
+    stale = entries.find_stale(board, now, FEW + 1)
+    if len(stale) > FEW:
         builder.wake()
         return False
-    entries.refresh_stale(board, FEW, now)
+    if stale:
+        entries.refresh(board, stale, now, corrected=True)
     return True
 
 

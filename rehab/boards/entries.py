@@ -92,8 +92,8 @@ def thin_out(board: Leaderboard) -> None:
     """Take off a snapshot who may no longer stand on it, and count its rows anew."""
     with transaction.atomic():
         locked = _lock(board.pk)
-        if locked is None:
-            return
+        if locked is None or locked.built_to is not None:
+            return  # building does as much
         rows = BoardEntry.everywhere.filter(board=locked)
         rows.exclude(patient__in=standing_on(locked)).delete()
         BoardCount.everywhere.filter(board=locked).delete()
@@ -133,10 +133,10 @@ def find_unbuilt() -> int | None:
     return unbuilt.values_list("pk", flat=True).first()
 
 
-def find_outdated(now: datetime, few: int) -> Leaderboard | None:
+def find_outdated(now: datetime, few: int) -> int | None:
     """Give a board of which time has altered more than a few rows."""
     boards = Leaderboard.everywhere.filter(active=True).select_related("clinic").order_by("pk")
-    return next((board for board in boards if len(find_stale(board, now, few + 1)) > few), None)
+    return next((board.pk for board in boards if len(find_stale(board, now, few + 1)) > few), None)
 
 
 def measure_progress(board: Leaderboard) -> int | None:
@@ -176,10 +176,11 @@ def find_stale(board: Leaderboard, now: datetime, most: int) -> set[int]:
     return set(stale.values_list("patient_id", flat=True)[:most])
 
 
-def refresh_stale(board: Leaderboard, most: int, now: datetime) -> bool:
+def refresh_stale(board_id: int, most: int, now: datetime) -> bool:
     """Bring so many of those rows up to date; give whether there may be more."""
-    patients = find_stale(board, now, most)
-    if patients:
+    board = Leaderboard.everywhere.filter(pk=board_id).first()
+    patients = find_stale(board, now, most) if board else set()
+    if board and patients:
         refresh(board, patients, now, corrected=True)
     return bool(patients)
 

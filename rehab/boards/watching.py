@@ -83,10 +83,10 @@ def on_patient(instance: Patient, created: bool, **_signal: Any) -> None:
 
 
 @unless_restored
-def on_session(instance: TrainingSession, **_signal: Any) -> None:
-    """A session was corrected or removed."""
+def on_session(instance: TrainingSession, created: bool = False, **_signal: Any) -> None:
+    """A session was corrected or removed, or came from elsewhere."""
     if instance.state == State.FINISHED:
-        entries.refresh_patients({instance.patient_id}, corrected=True)
+        entries.refresh_patients({instance.patient_id}, corrected=not created)
 
 
 @unless_restored
@@ -98,9 +98,9 @@ def on_correction(instance: SessionCorrection, **_signal: Any) -> None:
 
 
 @unless_restored
-def on_figure(instance: SessionMetric, **_signal: Any) -> None:
-    """A figure was corrected or removed."""
-    entries.refresh_patients(patients_of({instance.session_id}), corrected=True)
+def on_figure(instance: SessionMetric, created: bool = False, **_signal: Any) -> None:
+    """A figure was corrected or removed, or came from elsewhere."""
+    entries.refresh_patients(patients_of({instance.session_id}), corrected=not created)
 
 
 @unless_restored

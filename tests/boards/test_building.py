@@ -251,8 +251,8 @@ def test_many_rows_of_another_day_are_made_beside_and_not_shown_meanwhile(sessio
     assert shown.note == "This board is being built. These are your own sessions."
     assert woken
     assert len(entries.find_stale(board, later, 99)) == 6  # of three the best session is new
-    assert entries.find_outdated(later, 4) == board
-    while entries.refresh_stale(board, 2, later):
+    assert entries.find_outdated(later, 4) == board.pk
+    while entries.refresh_stale(board.pk, 2, later):
         pass
     kept = stored()
     assert len(kept[0]) == 6
