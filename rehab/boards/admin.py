@@ -145,7 +145,7 @@ class LeaderboardAdmin(PreviewAdmin):
     def _viewer(self, request: HttpRequest, board: Leaderboard) -> Viewer:
         """Give the eyes to see it with: a patient's after the newest session, or anybody's."""
         now = timezone.now()
-        anybody = Viewer(board, now, made=self._make(board, now))
+        anybody = Viewer(board, now, made=self._make(request, board, now))
         if board.moment == Leaderboard.Moment.WAITING:
             return anybody
         finished = TrainingSession.objects.visible_to(request.user).filter(
@@ -162,9 +162,9 @@ class LeaderboardAdmin(PreviewAdmin):
         session = newest.filter(patient=patient).first()
         return replace(anybody, patient=patient, session=session)
 
-    def _make(self, board: Leaderboard, now: datetime) -> list[Figure] | None:
+    def _make(self, request: HttpRequest, board: Leaderboard, now: datetime) -> list[Figure] | None:
         """Make the rows that a board would have; None where those that are stored are these."""
-        saved = Leaderboard.everywhere.filter(pk=board.pk, built_to=None).first()
+        saved = self.get_queryset(request).filter(pk=board.pk, built_to=None).first()
         if (
             saved is not None
             and saved.makings == board.makings
