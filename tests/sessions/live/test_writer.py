@@ -71,7 +71,7 @@ def bench(live_path, stall, monkeypatch):
 
 @pytest.fixture
 async def actors(place, ready, bench) -> list[SessionActor]:
-    actors = [SessionActor(await ready(place)) for _ in range(3)]
+    actors = [SessionActor(await ready(place, at_station=False)) for _ in range(3)]
     for actor in actors:
         bench.submit(actor, actor.change(Change(ChangeKind.START), None, NOW))
     return actors
