@@ -57,8 +57,9 @@ class NarrowedList(ChangeList):
             found = super().get_filters(request)
         except (ValueError, OverflowError) as problem:  # a year after 9999
             raise IncorrectLookupParameters(problem) from problem
+        pages: Any = self.model_admin
         days = [f"{self.date_hierarchy}__gte", f"{self.date_hierarchy}__lt"]
-        known = {*self.model_admin.linked_by, *(days if self.date_hierarchy else ())}
+        known = {*pages.linked_by, *(days if self.date_hierarchy else ())}
         if strange := found[2].keys() - known:
             raise DisallowedModelAdminLookup(f"Lists are not narrowed by {', '.join(strange)}.")
         return found

@@ -194,7 +194,8 @@ class CorrectionForm(forms.Form):
         stored = TrainingSession.objects.visible_to(self.by).select_related("patient")
         session = stored.get(pk=self.session.pk)
         holds = read_parts(session, self.by) | {Part.PATIENT: str(session.patient_id)}
-        data = self.data.copy()
+        sent: Any = self.data
+        data = sent.copy()
         for part, value in holds.items():
             data[self.add_initial_prefix(part.value)] = value
             if part not in changes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import date, datetime, time, timedelta
-from typing import Any, ClassVar
+from typing import Any
 from zoneinfo import ZoneInfo
 
 from django import forms
@@ -31,22 +31,14 @@ RANGES = {"score": ("metric_score", 1), "hits": ("metric_hit_rate", 100), "goal"
 # No session lies beyond; the days around them are still days in every time zone.
 FIRST_DAY, LAST_DAY = date(1900, 1, 1), date(2999, 12, 31)
 NO_DAY = _("Give a day of the years 1900 to 2999.")
-
-
-class DayField(forms.DateField):
-    """A day on which somebody may have walked."""
-
-    default_validators: ClassVar = [
-        MinValueValidator(FIRST_DAY, NO_DAY),
-        MaxValueValidator(LAST_DAY, NO_DAY),
-    ]
+DAYS = [MinValueValidator(FIRST_DAY, NO_DAY), MaxValueValidator(LAST_DAY, NO_DAY)]
 
 
 class FindForm(forms.Form):
     """What sessions are looked for by. Everything may be left empty."""
 
-    first = DayField(required=False, label=_("From"))
-    last = DayField(required=False, label=_("To"))
+    first = forms.DateField(required=False, validators=DAYS, label=_("From"))
+    last = forms.DateField(required=False, validators=DAYS, label=_("To"))
     place: forms.ModelChoiceField[Station] = forms.ModelChoiceField(
         queryset=None, required=False, label=_("Station")
     )
