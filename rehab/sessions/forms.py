@@ -19,6 +19,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.access import clinic_of
 from rehab.people.consent import Purpose, give, join_boards
 from rehab.people.models import SIDES, Boards, Patient, User
+from rehab.people.refusals import in_words
 from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
@@ -161,7 +162,7 @@ class SessionForm(forms.Form):
         try:
             check_station(station)
         except StationTaken as problem:
-            raise ValidationError(str(problem)) from problem
+            raise ValidationError(in_words(problem)) from problem
         return station
 
     def clean_source(self) -> str:
@@ -220,9 +221,9 @@ class SessionForm(forms.Form):
         try:
             return self.save()
         except StationTaken as problem:  # just now, by somebody else
-            self.add_error("station", str(problem))
+            self.add_error("station", in_words(problem))
         except InvalidSetting as problem:
-            self.add_error(None, str(problem))
+            self.add_error(None, in_words(problem))
         return None
 
 

@@ -7,10 +7,15 @@ import re
 from typing import ClassVar
 from urllib.parse import parse_qs
 
+from channels.db import database_sync_to_async
+from django.conf import settings
 from django.utils import timezone
+from django.utils.translation import override
 
 from rehab.people.audit import Act
+from rehab.people.language import language_of
 from rehab.people.models import User
+from rehab.people.refusals import in_words
 from rehab.people.roles import Role
 from rehab.sessions.events import Audience, history_entry, to_text
 from rehab.sessions.facts import Message
@@ -142,11 +147,19 @@ class ScreenConsumer(Socket):
         try:
             await self.runtime.change(live.id, kind, value, by)
         except InvalidSetting as problem:
-            await self._refuse(mark, "refused", str(problem))
+            await self._refuse(mark, "refused", await self._in_words(live, problem))
         except NotStored as problem:
             await self._refuse(mark, "not_stored", str(problem))
         else:
             await self.say({"type": "done", "id": mark})
+
+    async def _in_words(self, live: LiveSession, problem: InvalidSetting) -> str:
+        """Say a refusal in the language of the page: the patient's, or that of whoever steers."""
+        language = live.actor.fold.plan.language
+        if self.audience is Audience.MONITOR and isinstance(self.actor, User):
+            language = await database_sync_to_async(language_of)(self.actor)
+        with override(language or settings.LANGUAGE_CODE):
+            return in_words(problem)
 
     async def _remark(self, message: Message) -> None:
         mark = read_name(message, "id")
