@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 from robot.composed import read_gesture
-from robot.gestures import TETHER_M, BadGesture, Gesture
+from robot.gestures import TETHER_M, BadGesture, Gesture, Marked
 from robot.motion import DEFAULT_LIMITS, HOME, TICK_S, Limits, Pose, advance
 from robot.player import DONE, Player
 
@@ -66,5 +66,5 @@ def _check_trial(gesture: Gesture, limits: Limits) -> None:
             "steps more time, or make them smaller.",
             took=trial.took_s,
             far=away_m,
-            outcome=trial.outcome,
+            outcome=Marked(trial.outcome),
         )

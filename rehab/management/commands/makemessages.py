@@ -7,7 +7,7 @@ from django.core.management.commands import makemessages
 OPTIONS = makemessages.Command
 DATED = '"POT-Creation-Date:'  # differs each time, and says nothing
 
-# Where pure rooms refuse: the sentence is an argument, and is commented as one that no patient reads.
+# Which argument says what a pure room refuses. The comment tells that no patient reads it.
 REFUSALS = [
     f'--keyword={name}:{place},"refusal"'
     for name, place in (
