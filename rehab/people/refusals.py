@@ -5,21 +5,12 @@ They know no languages: their refusals carry an English sentence with places and
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Protocol
-
 from django.utils.formats import number_format
 from django.utils.translation import gettext
 
 from rehab.training import marking
+from rehab.training.measures import InvalidSetting
 from robot import gestures
-
-
-class Refusal(Protocol):
-    """An exception that can be said in another language."""
-
-    template: str
-    values: Mapping[str, Any]
 
 
 class _Number(float):
@@ -29,7 +20,7 @@ class _Number(float):
         return number_format(super().__format__(spec))
 
 
-def in_words(problem: Refusal) -> str:
+def in_words(problem: InvalidSetting | gestures.BadGesture) -> str:
     """Say a refusal in the language in force; what was said in a language before stays as it is."""
     said = gettext(problem.template)
     if not problem.values:
