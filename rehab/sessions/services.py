@@ -130,7 +130,7 @@ def create_session(
     with transaction.atomic():
         if station is not None and station.clinic_id == patient.clinic_id:
             # Two who set up at once: the second waits here, and then sees the first one's session.
-            Station.everywhere.select_for_update().get(pk=station.pk)
+            Station.everywhere.select_for_update(no_key=True).get(pk=station.pk)
             check_station(station)
         session.save()
     live = runtime.peek()

@@ -1,4 +1,4 @@
-"""Two set up at one station at the same moment: one is told so, and one session is open."""
+"""Two act at the same moment: one session is open at a station, one correction is made."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ from typing import Any
 
 import pytest
 from django.db import connections
+from django.urls import reverse
 
 from rehab.people.models import Patient
 from rehab.people.roles import Role
+from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.defaults import install_defaults
 from rehab.sessions.forms import SessionForm
 from rehab.sessions.models import TrainingSession
@@ -124,3 +126,20 @@ def test_a_station_that_is_taken_is_refused_whoever_asks(world, station, people)
     first.save()
     with pytest.raises(StationTaken, match="Rosa"):
         second.save()
+
+
+def test_of_two_corrections_of_the_same_form_one_is_made(world):
+    session = world.session
+    note = SessionCorrection.everywhere.get(session=session).new
+    seen = {"initial-patient": session.patient_id, "initial-counts": "yes", "initial-note": note}
+    sent = {"patient": session.patient_id, "reason": "It slipped."} | seen
+    url = reverse("correct", args=[session.pk])
+
+    def by(role: Role, **changes: str) -> Callable[[], int]:
+        browser = client_of(world, role)
+        given = {"counts": "yes", "note": note} | sent | changes
+        return lambda: browser.post(url, given).status_code
+
+    acts = by(Role.LEAD, counts="no"), by(Role.PT, note="Another note.")
+    assert sorted(at_once(*acts)) == [200, 302]
+    assert SessionCorrection.everywhere.filter(session=session).count() == 2
