@@ -128,7 +128,7 @@ def in_json(view: Callable[..., HttpResponse]) -> Callable[..., HttpResponse]:
             return find_no_call(request)
         if response.status_code != 405:
             return response
-        allowed = response["Allow"]
+        allowed = ", ".join(sorted(response["Allow"].split(", ")))  # it came from a set
         refused = refuse(request, 405, f"This address takes {allowed}. /api/v1/docs says more.")
         refused["Allow"] = allowed
         return refused

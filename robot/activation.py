@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 MIN_STEPS = 2  # fewer valid steps in a window say nothing
-# Clocks that no source has [s], and performances that no step has: 30 years, a thousandfold goal.
-TIME_MAX_S = 1e9
+# What the server stores at most (seconds since 1970 pass, milliseconds do not), and performances
+# that no step has.
+TIME_MAX_S = 1e10
 PERFORMANCE_MAX = 1000.0
 NAME_MAX = 64
 LEAST_INTENSITY = 0.1
@@ -188,12 +189,14 @@ class Activation:
         """
         if self._first_s is None:
             self._first_s = time_s
+            if self._started_s is not None and self._started_s > time_s:
+                self._started_s = time_s  # set back meanwhile: nobody knows how long ago it was
         window = math.floor((time_s - self._first_s) / self.cue.window_s)
         if window < self._window:
             self.forget()
             self._first_s, window = time_s, 0
             if self._started_s is not None:
-                self._started_s = time_s  # nobody knows how long ago it was
+                self._started_s = time_s
         decision = self._decide(time_s) if window > self._window else None
         if window > self._window:
             self._window, self._steps, self._sum = window, 0, 0.0

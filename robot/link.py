@@ -195,9 +195,9 @@ class Link:
             except ConnectionClosed as closed:
                 self._socket = None
                 if not self._is_closed:
-                    await self._pause(self._explain(closed))
+                    await self.pause(self._explain(closed))
             except (OSError, WebSocketException) as problem:
-                await self._pause(self._explain_failure(problem))
+                await self.pause(self._explain_failure(problem))
         raise StopAsyncIteration
 
     async def send(self, message: Message) -> bool:
@@ -232,6 +232,15 @@ class Link:
         socket, self._socket = self._socket, None
         if socket is not None:
             socket.transport.abort()
+
+    async def pause(self, reason: str) -> None:
+        """Tell of a lost connection, and wait before the next attempt.
+
+        Iterating does, but not where it raises: for whoever dials in again nevertheless.
+        """
+        pause_s = self._back_off.next_s()
+        self._on_lost(reason, pause_s)
+        await self._sleep(pause_s)
 
     async def close(self) -> None:
         """Close the connection and end the iteration."""
@@ -279,11 +288,6 @@ class Link:
             self._was_welcome = self._was_heard = True
             self._error = ""
         return dict(message)
-
-    async def _pause(self, reason: str) -> None:
-        pause_s = self._back_off.next_s()
-        self._on_lost(reason, pause_s)
-        await self._sleep(pause_s)
 
     def _explain(self, closed: ConnectionClosed) -> str:
         """Say why a connection ended. Raises LinkRefused where it need not be tried again."""

@@ -84,10 +84,13 @@ class Worker:
                     self._hear(message)
                 return
             except LinkRefused as refusal:
-                # One broken frame of a server that has welcomed us does not end the work.
+                # What a server that has welcomed us does not understand, or breaks, does not end
+                # the work. Where it hung up over that, the link is lost like any other.
                 if refusal.code != NOT_PROTOCOL or not self.performer.is_linked:
                     raise
                 self.performer.bad(str(refusal))
+                if not self._link.is_open:
+                    await self._link.pause(str(refusal))
 
     def _hear(self, message: Message) -> None:
         was_linked, bad = self.performer.is_linked, self.performer.bad_messages

@@ -18,7 +18,7 @@ from django.db.models import QuerySet
 
 from rehab.people.models import User
 from rehab.sessions.corrections import SessionCorrection
-from rehab.sessions.live.actor import read_log
+from rehab.sessions.live.actor import fold_log
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.training.fold import SessionFold
@@ -252,7 +252,7 @@ def _types_of(session: TrainingSession) -> list[tuple[int, str]]:
     """Give after which step which feedback type was in force, the last one first."""
     if not session.changed_to:
         return [(-1, session.valence)]
-    switches = SessionFold.replay(session.to_plan(), read_log(session)).switches
+    switches = fold_log(SessionFold(session.to_plan()), session).switches
     return [*reversed(switches), (-1, session.valence)]
 
 

@@ -65,7 +65,8 @@ class ContactFinder:
         contact_n: float = CONTACT_N,
         release_n: float = RELEASE_N,
     ) -> None:
-        self.recent: deque[Contact] = deque(maxlen=12)
+        # Those of the samples that are still there, and the last one before them.
+        self.recent: deque[Contact] = deque()
         self.offset_n = 0.0
         self._buffer = buffer
         self._rate_hz = rate_hz
@@ -135,8 +136,14 @@ class ContactFinder:
         if seen and not bounce:
             self._follow_zero(at)
         self._current = Contact(at, time_s, self.offset_n, seen, bounce)
+        self._forget_before(index - self._buffer.samples.keep)
         self.recent.append(self._current)
         self._stuck_index = index + int(STUCK_S * self._rate_hz)
+
+    def _forget_before(self, index: int) -> None:
+        recent = self.recent
+        while len(recent) > 1 and (end := recent[1].end_index) is not None and end < index:
+            recent.popleft()
 
     def _end(self, index: int, ended: list[Contact]) -> None:
         contact = self._current

@@ -81,6 +81,8 @@ class LegDetector:
         )
         self._samples = buffer.samples
         self.piece = int(PIECE_S * rate_hz)
+        # Contacts of so many samples are there, whatever the rest of a piece and the wait brought.
+        self.memory = self._samples.keep - 2 * self.piece
         self._cycle_max = STRIDE_MAX_S * rate_hz
         self._meter = StanceMeter(
             buffer,

@@ -114,7 +114,8 @@ class TwoLegDetector:
         reasons: list[Reason] = []
         flags: list[Flag] = []
         known = _find_contacts(other, draft.index)
-        others = [c for c in known if c.begin_index < _end(this) and _end(c) > this.begin_index]
+        since = max(this.begin_index, draft.index - leg.memory)
+        others = [c for c in known if c.begin_index < _end(this) and _end(c) > since]
         first = others[0] if others else None
         second = others[1] if len(others) == 2 else None
         if is_whole and (first is None or second is None or not _is_walked(first, this, second)):

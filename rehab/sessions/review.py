@@ -12,7 +12,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
 from rehab.sessions.facts import MARKED_CHANGES
-from rehab.sessions.live.actor import read_log
+from rehab.sessions.live.actor import fold_log
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.trend import figures_of
@@ -73,7 +73,7 @@ class Review:
 def review_session(user: User, session: TrainingSession) -> Review:
     """Tell a session. Its figures are folded from the log, its strides are the stored verdicts."""
     plan = session.to_plan()
-    fold = SessionFold.replay(plan, read_log(session))
+    fold = fold_log(SessionFold(plan), session)
     events = list(
         SessionEvent.objects.visible_to(user)
         .filter(session=session)

@@ -20,7 +20,7 @@ let marks = []; // changes and remarks, each after a stride
 let heardAt = 0; // when presence was told
 let last = null;
 
-const robot = new RobotPanel(document.querySelector(".robot"), show, (order) => live.say({ type: "robot", order }));
+const robot = new RobotPanel(document.querySelector(".robot"), show, (order) => live.say({ type: "robot", order }), tell);
 const live = connect(root.dataset.socket, {
   onSnapshot(snapshot) {
     session = snapshot;

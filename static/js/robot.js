@@ -2,8 +2,8 @@
 
 import { _, fill, number } from "garry/language";
 
-
 const KEPT = 240; // positions of the trail
+const ANSWER_MS = 2_000; // after which a link that nobody has closed is not believed
 // Why it does not move, or did not end what it began.
 const REASONS = {
   no_gesture: _("no gesture for that"),
@@ -12,11 +12,6 @@ const REASONS = {
   performing: _("still moving"),
   resting: _("resting"),
   unknown_gesture: _("it does not know the gesture"),
-  other_driver: _("something else drives it too"),
-  nobody_listens: _("nobody follows its orders"),
-  feeler_missing: _("its odometry or its bumpers are missing"),
-  open_loop: _("the gesture is too long for a base that cannot tell where it is"),
-  place_unknown: _("nobody has looked where it stands for long"),
   bad_gesture: _("it cannot perform the gesture; compose it anew"),
   base_cannot_move: _("this base does not move"),
   stopped: _("somebody stopped it"),
@@ -63,9 +58,6 @@ const CURES = {
   stalled: _("Free its wheels."),
   slipped: _("Look at the floor and its wheels."),
   base_silent: _("Look at its switch and its cable."),
-  other_driver: _("Stop what else drives it."),
-  nobody_listens: _("Look at its own computer."),
-  feeler_missing: _("Look at its own computer."),
   charging: _("Take it off the charger."),
   battery_low: _("Charge it."),
   battery_empty: _("Charge it."),
@@ -79,10 +71,12 @@ const HOLDS = new Set(["unwatched", "charging", "battery_low", "away_from_home",
 const STATES = { idle: _("waiting"), performing: _("moving"), stopped: _("stopped"), disarmed: _("not armed") };
 
 export class RobotPanel {
-  constructor(root, show, send) {
+  // `send(order)` gives whether it could be sent; `tell(words)` says so to whoever looks elsewhere.
+  constructor(root, show, send, tell) {
     this.root = root;
     this.show = show;
     this.send = send;
+    this.tell = tell;
     this.way = [];
     this.begin({});
   }
@@ -93,11 +87,17 @@ export class RobotPanel {
     this.brokenOff = ""; // why the gesture after that decision did not end as it should
     this.stopped = stopped ?? false;
     this.there = presence?.robot ?? false;
+    this.unheard = "";
+    this.#settle();
     this.#follow();
   }
 
   take(event) {
-    if (event.kind === "robot_stopped") this.stopped = event.stopped;
+    if (event.kind === "robot_stopped") {
+      this.stopped = event.stopped;
+      this.unheard = "";
+      this.#settle();
+    }
     if (event.kind === "presence") this.there = event.presence.robot;
     if (event.kind !== "robot") return;
     if (event.report.kind === "status") this.status = event.report;
@@ -106,9 +106,37 @@ export class RobotPanel {
     this.#follow();
   }
 
+  // An order looks heard only while it may be: one that cannot be sent, or is not answered, says so.
   order(order) {
-    this.root.querySelector(`[data-robot=${order}]`).classList.add("asked");
-    this.send(order);
+    this.#drop();
+    this.unheard = "";
+    if (this.send(order)) {
+      this.asked = order;
+      this.#button(order).classList.add("asked");
+      this.timer = setTimeout(() => this.#miss(order, _("No answer. If the robot moves, use its own switch."), _("No answer. Try again.")), ANSWER_MS);
+    } else this.#miss(order, _("Not sent: no connection. Use the robot’s own switch."), _("There is no connection. Try again in a moment."));
+    this.draw();
+  }
+
+  #miss(order, stop, other) {
+    this.#drop();
+    this.unheard = order === "stop" ? stop : other;
+    this.tell(this.unheard);
+    this.draw();
+  }
+
+  #settle() {
+    if (this.asked && this.stopped === (this.asked === "stop")) this.#drop();
+  }
+
+  #drop() {
+    clearTimeout(this.timer);
+    if (this.asked) this.#button(this.asked).classList.remove("asked");
+    this.asked = "";
+  }
+
+  #button(order) {
+    return this.root.querySelector(`[data-robot=${order}]`);
   }
 
   #follow() {
@@ -119,19 +147,18 @@ export class RobotPanel {
   }
 
   draw() {
-    const { status, decision, stopped } = this;
+    const { status, decision, stopped, unheard } = this;
     const still = stopped || (this.there && (["stopped", "disarmed"].includes(status?.state) || status?.reason === "place_unknown"));
     this.root.classList.toggle("still", still);
     this.show("robot-state", !this.there ? _("not connected") : !status ? "" : stopped ? _("stopped") : status.gesture ? `${status.gesture}…` : (STATES[status.state] ?? status.state));
     this.show("share", decision?.activated_share == null ? "" : fill(_("%(share)s of windows"), { share: percent(decision.activated_share) }));
-    this.show("robot-why", still ? fill(_("It stands: %(why)s."), { why: say((this.there && status?.reason) || "stopped") }) : this.there && HOLDS.has(status?.reason) ? fill(_("It would not move: %(why)s."), { why: say(status.reason) }) : "");
+    this.show("robot-why", unheard ? unheard : still ? fill(_("It stands: %(why)s."), { why: say((this.there && status?.reason) || "stopped") }) : this.there && HOLDS.has(status?.reason) ? fill(_("It would not move: %(why)s."), { why: say(status.reason) }) : "");
     this.show("robot-cure", still ? `${CURES[status?.reason] ?? ""} ${_("Put it on its mark, nobody near it, then:")}`.trim() : CURES[status?.reason] ?? "");
-    this.show("robot-last", still ? "" : this.#last());
+    this.show("robot-last", still || unheard ? "" : this.#last());
     // A real base waits for a person from the start; a stop stays until a person lifts it.
     const [stop, arm] = this.root.querySelectorAll("[data-robot]");
     stop.hidden = stopped;
     arm.hidden = !still;
-    (stopped ? stop : arm).classList.remove("asked");
     this.#drawWay();
   }
 

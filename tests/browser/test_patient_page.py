@@ -339,6 +339,32 @@ def test_the_robot_can_be_stopped_from_the_page(server, browser):
         expect(page.locator("button.robot")).to_be_hidden()
 
 
+def test_a_stop_that_may_not_have_arrived_is_not_believed(server, browser):
+    (walk,) = make_walks(server, {})
+    header = {"Authorization": f"Bearer {walk.robot}"}
+    url = f"ws://127.0.0.1:{server.port}/ws/robot/"
+    with (
+        Wire(server.port) as wire,
+        signed_in(browser, server, walk, wire.port) as context,
+        connect(url, additional_headers=header) as robot,
+    ):
+        robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
+        page = open_page(context, walk)
+        button = page.locator("button.robot")
+        expect(button).to_have_text("Stop robot")
+        wire.freeze()  # nothing is closed: the tablet's Wi-Fi is just gone
+        page.click("text=Stop robot")
+        expect(button).to_have_text("Stop sent")
+        expect(page.locator(".note")).to_have_text("No answer. Use the robot's own button.")
+        expect(button).to_have_text("Stop robot")
+        wire.go_down()
+        wire.thaw()
+        looks(page, "offline", "No connection.")
+        page.click("text=Stop robot")
+        expect(button).to_have_text("Not sent")
+        expect(page.locator(".note")).to_have_text("No connection. Use the robot's own button.")
+
+
 @pytest.mark.parametrize("motion", ["no-preference", "reduce"])
 def test_confetti_rests_three_seconds_and_heeds_who_wants_no_motion(server, browser, motion):
     (walk,) = make_walks(server, {})

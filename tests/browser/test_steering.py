@@ -4,15 +4,19 @@ monitor, and words edited in the admin.
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
+from websockets.sync.client import connect
 
 from tests.browsers import SIZES
 from tests.servers import Server, serve
 from tests.walk_seed import Walk, feet_of, make_walks
+from tests.wire import Wire
 
 pytestmark = pytest.mark.browser
 
@@ -24,18 +28,21 @@ PHASES = [
 
 
 @contextmanager
-def pages(browser: Browser, server: Server, walk: Walk, path: str) -> Iterator[tuple[Page, Page]]:
-    """Open the tablet's page and one of the PT's."""
+def pages(
+    browser: Browser, server: Server, walk: Walk, path: str, port: int = 0
+) -> Iterator[tuple[Page, Page]]:
+    """Open the tablet's page and one of the PT's, through a port of a wire where there is one."""
+    url = f"http://127.0.0.1:{port or server.port}"
     opened: list[Page] = []
     complaints: list[str] = []
     for address, size in ((walk.path, "tablet-portrait"), (path, "laptop")):
         width, height = SIZES[size]
         context = browser.new_context(
-            base_url=server.url,
+            base_url=url,
             viewport={"width": width, "height": height},
             reduced_motion="reduce",
         )
-        context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
+        context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": url}])
         context.set_default_timeout(PATIENCE_MS)
         page = context.new_page()
         page.on("pageerror", lambda error: complaints.append(str(error)))
@@ -186,3 +193,56 @@ def test_after_a_crash_both_pages_say_why_it_is_paused(tmp_path, browser):
         monitor.locator("[data-main]").click()
         expect(monitor.locator(".notice.why")).to_be_hidden()
         expect(tablet.locator("body")).not_to_have_attribute("data-look", "paused")
+
+
+def test_what_a_therapist_asks_for_without_a_network_is_told_to_be_unsent(server, browser):
+    (walk,) = make_walks(server, {"valence": "positive"})
+    url = f"ws://127.0.0.1:{server.port}/ws/robot/"
+    header = {"Authorization": f"Bearer {walk.robot}"}
+    with (
+        Wire(server.port) as wire,
+        pages(browser, server, walk, f"/sessions/{walk.session}/monitor/", wire.port) as opened,
+        connect(url, additional_headers=header) as robot,
+    ):
+        robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
+        monitor = opened[1]
+        stop = monitor.get_by_role("button", name="Stop robot")
+        why, said = monitor.locator("[data-show=robot-why]"), monitor.locator(".said")
+        expect(monitor.locator("[data-main]")).to_have_attribute("value", "start")
+
+        wire.freeze()  # nothing is closed: the Wi-Fi is just gone
+        stop.click()
+        expect(stop).to_have_class(re.compile("asked"))
+        unanswered = "No answer. If the robot moves, use its own switch."
+        expect(why).to_have_text(unanswered)
+        expect(said).to_have_text(unanswered)
+        expect(stop).not_to_have_class(re.compile("asked"))
+
+        wire.go_down()
+        wire.thaw()
+        expect(monitor.locator(".notice.link")).to_be_visible()
+        stop.click()
+        unsent = "Not sent: no connection. Use the robot’s own switch."
+        expect(why).to_have_text(unsent)
+        expect(said).to_have_text(unsent)
+        words, button = said.bounding_box(), stop.bounding_box()
+        assert words["x"] >= button["x"] + button["width"]  # what is told hides no Stop
+        expect(stop).not_to_have_class(re.compile("asked"))
+        for control in (
+            "[data-goal='1']",
+            "[data-main]",
+            "[data-levels] [value='0.5']",
+            "[data-remark]",
+        ):
+            monitor.evaluate("document.querySelector('.said').textContent = ''")
+            monitor.locator(control).first.click()
+            expect(said).to_have_text("There is no connection. Try again in a moment.")
+
+        wire.come_up()
+        expect(monitor.locator(".notice.link")).to_be_hidden()
+        expect(why).to_have_text("")
+        stop.click()
+        while json.loads(robot.recv(10))["type"] != "stop":
+            pass
+        expect(why).to_have_text("It stands: somebody stopped it.")
+        expect(stop).to_be_hidden()

@@ -319,6 +319,30 @@ def test_chunks_that_do_not_fit():
     assert detector.feed(0.0, 1.0, 2.0, 3.0) == []
 
 
+@pytest.mark.parametrize("plate", ["left", "right"])
+@pytest.mark.parametrize("gain", [50, 1e6])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_plate_that_chatters_is_the_same_in_any_chunks(plate, gain, seed):
+    """Its noise in swing then makes dozens of contacts in a second."""
+    walk, _ = make_walk(rate_hz=1000, strides=14, seed=seed)
+    first = int(np.random.default_rng(seed).integers(1000, 8000))
+    spoiled = (walk.left if plate == "left" else walk.right)[0]
+    spoiled[first : first + 3000] *= gain
+
+    def measure(size):
+        detector, strides = TwoLegDetector(1000, walk.mass_kg, look_ahead_s=0.05), []
+        for begin in range(0, len(walk.t_s), size):
+            part = slice(begin, begin + size)
+            legs = (LegSamples(*walk.left[:, part]), LegSamples(*walk.right[:, part]))
+            strides += detector.feed(walk.t_s[part], *legs)
+        return strides + detector.finish()
+
+    whole = measure(len(walk.t_s))
+    assert len(whole) > 10
+    for size in (20, 333, 1000):
+        assert repr(measure(size)) == repr(whole)
+
+
 ODD = st.sampled_from([0.0, np.nan, np.inf, -np.inf, 1e300, -1e300, 25.0, 700.0, -700.0, 1e-300])
 
 

@@ -10,11 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rehab.training import steps as stored
 from robot.activation import (
     LATE,
     NO_GESTURE,
     PERFORMING,
     RESTING,
+    TIME_MAX_S,
     Activation,
     BadMessage,
     Cue,
@@ -131,6 +133,23 @@ def test_rest_counts_from_the_start_of_the_last_gesture():
     activation.add(3, 1)  # the source's clock was set back
     assert activation.obstacle(replace(first, at_s=7.9), performing=False) == RESTING
     assert activation.obstacle(replace(first, at_s=8.0), performing=False) == ""
+
+
+@pytest.mark.parametrize("back_s", [0, 0.5, 4, 3000, 1.8e9])
+def test_rest_outlasts_a_pause_by_no_more_than_itself_whatever_the_clock(back_s):
+    activation = Activation(CUE)
+    first = Decision(back_s, back_s + 5, back_s + 5.5, 4, 1.0, 0.9, True)
+    activation.started(first)
+    activation.forget()  # paused, or out of reach
+    activation.add(5.6, 1)
+    begun_s = min(5.6, first.at_s)
+    soon, later = (replace(first, from_s=5, until_s=10, at_s=begun_s + s) for s in (4.9, 5))
+    assert activation.obstacle(soon, performing=False) == RESTING
+    assert activation.obstacle(later, performing=False) == ""
+
+
+def test_the_clocks_of_all_steps_that_are_stored_are_heard():
+    assert TIME_MAX_S == stored.TIME_MAX_S
 
 
 def test_nobody_answers_a_window_of_long_ago():

@@ -725,3 +725,13 @@ def test_the_battery_is_told_as_people_read_it(felt, battery_v, share, low):
     assert status["battery_v"] == battery_v
     assert status["battery_share"] == (share if share is None else pytest.approx(share, abs=0.01))
     assert status["battery_low"] is low
+
+
+@pytest.mark.parametrize("first_s", [0.0, 1.8e9, -1e10, 1e10 - 100])  # of a device, Unix, any
+def test_steps_of_any_clock_are_answered(first_s):
+    stage = Stage()
+    stage.source_s = first_s
+    stage.hear(**WELCOME)
+    stage.walk(*[1.2] * 7)
+    assert stage.robot.bad_messages == 0
+    assert [one["gesture"] for one in stage.of("decision")] == ["celebrate"]

@@ -7,9 +7,9 @@ from functools import partial
 
 import pytest
 
-from robot.bases import BASES, BaseLost
+from robot.bases import BASES, Abilities, BaseLost
 from robot.bases.kinematic import KinematicBase
-from robot.link import Link, LinkRefused, Timing
+from robot.link import NOT_PROTOCOL, REFUSALS, Link, LinkRefused, Timing
 from robot.motion import STILL
 from robot.worker import Worker
 from tests.robot.fake_garry import TOKEN, FakeGarry, serve_garry
@@ -17,6 +17,13 @@ from tests.robot.fake_garry import TOKEN, FakeGarry, serve_garry
 pytestmark = pytest.mark.realtime
 
 FAST = Timing(retry_first_s=0.02, retry_longest_s=0.1)
+ENDING = REFUSALS.keys() - {NOT_PROTOCOL}  # of the close codes, those that end the work
+
+
+class RealBase(KinematicBase):
+    """A base that no program may arm."""
+
+    abilities = Abilities(simulated=False, moves=True)
 
 
 @pytest.fixture
@@ -108,6 +115,62 @@ async def test_a_server_that_goes_stops_it_and_is_found_again():
             assert base.read().twist == STILL
             async with serve_garry(garry, port):
                 await garry.until_hello(2)
+
+
+# Every end of a connection: those of the standard, those of docs/protocol.md, and some of nobody.
+STANDARD = [1000, 1001, 1002, 1003, 1007, 1008, 1009, 1010, 1011, 1012, 1013, 1014, 3000]
+OURS = [4000, 4001, 4004, 4008, 4009, 4011, 4012, 4029, 4400, 4409, 4410, 4999]
+
+
+@pytest.mark.parametrize("code", [None, *STANDARD, *OURS])
+async def test_however_the_server_hangs_up_it_stands_still_until_somebody_orders(garry, code):
+    garry.welcome |= {"watched": True}
+    base = RealBase(time.monotonic)
+    said: list[str] = []
+    async with working(garry, base, said=said) as worker:
+        await garry.until_hello(1)
+        await garry.tell(type="arm")
+        await garry.walk(0, 1, 2, 3, 4, 5)
+        async with asyncio.timeout(5):
+            while base.read().twist.is_still:  # noqa: ASYNC110 (a base tells nobody)
+                await asyncio.sleep(0.002)
+        socket = garry.sockets[-1]
+        if code is None:
+            socket.transport.abort()
+        else:
+            await socket.close(code)
+        await until_still(base, 0.1)
+        assert not worker.performer.safety.is_armed or code in ENDING
+        if code not in ENDING:
+            await garry.until_hello(2)
+            assert "dialing in again" in " ".join(said)
+            await garry.until(is_kind("gesture", phase="ended", outcome="no_link"))
+            await garry.walk(6, 7, 8, 9, 10, 11)
+        for _ in range(20):
+            await asyncio.sleep(0.01)
+            assert base.read().twist.is_still
+
+
+async def test_a_server_that_refuses_every_report_is_not_hammered(garry):
+    pauses_s: list[float] = []
+
+    async def sleep(pause_s):
+        pauses_s.append(pause_s)
+        await asyncio.sleep(0)
+
+    dial = partial(Link, garry.url, TOKEN, timing=FAST, jitter=lambda: 0.0, sleep=sleep)
+    worker = Worker(dial, BASES["kinematic"](time.monotonic))
+    task = asyncio.create_task(worker.run())
+    for count in range(1, 5):
+        await garry.until_hello(count)
+        async with asyncio.timeout(5):
+            while not worker.performer.is_linked:  # noqa: ASYNC110
+                await asyncio.sleep(0.002)
+        await garry.sockets[-1].close(4400)
+    await garry.until_hello(5)
+    assert pauses_s == [0.02, 0.04, 0.08, 0.1]
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
 
 
 @pytest.mark.parametrize("junk", ["not json", "[1]", '{"type":', "\x00", '"step"', "7", "NaN"])

@@ -6,10 +6,12 @@ import asyncio
 import json
 import os
 import sys
+import threading
+from collections import deque
 
 import pytest
 
-from rehab.sessions.live.children import Children
+from rehab.sessions.live.children import Children, _listen
 
 
 async def until(condition, seconds: float = 5.0) -> None:
@@ -35,6 +37,7 @@ async def test_a_child_that_fails_comes_back_and_its_last_words_are_kept(childre
     child = children.start("robot", python("print('no port'); raise SystemExit(3)"))
     await until(lambda: child.restarts >= 2)
     assert list(child.last_words)[-1] == "no port"
+    await until((tmp_path / "children.json").exists)
     told = json.loads((tmp_path / "children.json").read_text())
     assert told["children"][0]["name"] == "robot"
 
@@ -66,3 +69,93 @@ async def test_a_name_is_used_once(children):
     children.start("one", python("pass"))
     with pytest.raises(ValueError, match="Stop it first"):
         children.start("one", python("pass"))
+
+
+async def test_a_child_may_print_without_end_and_without_a_line(children):
+    chatty = "print('begins'); print('.' * 300_000, end='', flush=True); raise SystemExit(4)"
+    child = children.start("chatty", python(chatty))
+    await until(lambda: child.restarts >= 2)
+    assert list(child.last_words)[:3] == ["begins", "." * 300, "begins"]
+
+
+async def test_a_child_that_prints_without_end_still_runs_and_is_ended(children, tmp_path):
+    said = tmp_path / "said"  # all of it was taken: more than any pipe holds
+    endless = "import pathlib, time; print('.' * 300_000, end='', flush=True); "
+    then = f"pathlib.Path({str(said)!r}).touch(); time.sleep(60)"
+    child = children.start("endless", python(endless + then))
+    await until(said.exists)
+    pid = child.pid
+    assert (child.state, child.restarts) == ("running", 0)
+    await children.stop("endless")
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+@pytest.mark.parametrize("cut", [1, 2, 5, 1000])
+async def test_lines_are_kept_whole_however_they_come(cut):
+    said = "one\r\n\ntwo – three\n" + "x" * 2000 + "\nlast"
+    output = asyncio.StreamReader()
+    words: deque[str] = deque(maxlen=20)
+    for first in range(0, len(said.encode()), cut):
+        output.feed_data(said.encode()[first : first + cut])
+    output.feed_eof()
+    await _listen(output, words)
+    assert list(words) == ["one", "", "two – three", "x" * 300, "last"]
+
+
+async def test_a_fault_of_ours_leaves_a_child_supervised_and_no_stop_undone(
+    children, monkeypatch, caplog
+):
+    told = []
+
+    async def listen(output, words):
+        told.append(output)
+        if len(told) == 1:
+            raise RuntimeError("a fault")
+        await asyncio.sleep(60)
+
+    monkeypatch.setattr("rehab.sessions.live.children._listen", listen)
+    child = children.start("robot", python("import time; time.sleep(60)"))
+    await until(lambda: len(told) == 2)
+    assert (child.state, child.restarts) == ("running", 1)
+    assert "robot could not be looked after" in caplog.text
+
+    async def stop(name):
+        raise RuntimeError("another fault")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(children, "stop", stop)
+        await children.stop_all()
+    assert "A child did not end cleanly" in caplog.text
+
+
+async def test_a_report_that_cannot_be_written_harms_no_child(tmp_path, caplog):
+    children = Children(tmp_path / "nowhere" / "children.json", first_pause_s=0.02)
+    child = children.start("recording", python("pass"))
+    await until(lambda: child.state == "done")
+    await children.stop("recording")
+    await children.stop_all()
+    assert "could not be written" in caplog.text
+
+
+async def test_the_loop_waits_for_no_disk_and_the_last_word_is_told(
+    children, tmp_path, monkeypatch
+):
+    disk, written, replace = threading.Event(), [], Children._replace_report
+
+    def replace_late(self, text):
+        assert disk.wait(5)
+        written.append(text)
+        replace(self, text)
+
+    monkeypatch.setattr(Children, "_replace_report", replace_late)
+    first = children.start("first", python("import time; time.sleep(60)"))
+    await until(lambda: first.pid is not None)
+    second = children.start("second", python("import time; time.sleep(60)"))
+    await until(lambda: second.pid is not None)
+    await children.stop("first")
+    assert not written
+    disk.set()
+    await children.stop_all()
+    assert json.loads((tmp_path / "children.json").read_text())["children"] == []
+    assert len(written) <= 3  # what was out of date before it could be written is not

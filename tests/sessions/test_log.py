@@ -211,6 +211,43 @@ def test_folding_the_log_rebuilds_the_actor_exactly(patient, actions):
     assert points == (actor.fold.score or 0)
 
 
+def test_what_could_not_have_been_is_passed_over_and_nothing_else_is_lost(patient, caplog):
+    def slip_in(kind: str, value: float | None = None) -> None:
+        after = actor.fold.last_number
+        SessionEvent.everywhere.create(
+            session=actor.session, after_number=after, kind=kind, value=value, at=NOW
+        )
+
+    actor = begin(patient)
+    walk(actor, 4.0)
+    change(actor, ChangeKind.PAUSE)
+    slip_in("pause")  # by another process that believed that the session was its own
+    walk(actor, 4.0)
+    change(actor, ChangeKind.RESUME)
+    slip_in("start")
+    walk(actor, 4.0, 2.0)
+    slip_in("goal", -1.0)
+    change(actor, ChangeKind.GOAL, 3.5)
+    rebuilt = SessionActor.load(reread(actor))
+    assert fold_state(rebuilt) == fold_state(actor)
+    (warning,) = caplog.messages
+    assert "could not have been (3 times)" in warning
+    assert "a session that is paused" in warning.lower()
+    walk(rebuilt, 4.0)
+    assert SessionActor.load(reread(actor)).fold.last_number == 5
+
+
+def test_strides_after_the_end_hide_no_session(patient, caplog):
+    actor = begin(patient)
+    walk(actor, 4.0, 4.0)
+    other = SessionActor.load(reread(actor))
+    change(actor, ChangeKind.FINISH)
+    walk(other, 4.0)
+    loaded = SessionActor.load(reread(actor))
+    assert (loaded.fold.state, loaded.fold.score) == ("finished", 2)
+    assert "could not have been (1 times)" in caplog.text
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [

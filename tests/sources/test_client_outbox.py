@@ -1,12 +1,13 @@
 """The bookkeeping of a source: numbers, window, what is sent again. No sockets."""
 
 import json
+import math
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rehab.sources.client import WINDOW, Outbox, OutOfStep, UnsendableStride, write_step
+from rehab.sources.client import WINDOW, LiveFeed, Outbox, OutOfStep, UnsendableStride, write_step
 from rehab.training.steps import Measurement, Side
 
 
@@ -69,6 +70,25 @@ def test_a_value_that_json_cannot_write_is_null_with_its_reason(value):
 def test_a_stride_that_the_protocol_has_no_room_for_is_refused_with_the_cure(more):
     with pytest.raises(UnsendableStride, match="Rename|Leave columns out"):
         write_step(stride(**more), 1)
+
+
+@pytest.mark.parametrize("value", [4.0, math.inf])
+@pytest.mark.parametrize("count", range(9))
+def test_as_many_reasons_as_fit_leave_room_for_ours(count, value):
+    own = tuple("abcdefgh"[:count])
+    feed, outbox = LiveFeed(), Outbox()
+    feed.begin(Side.LEFT)
+    feed.walk()
+    feed.stand()
+    outbox.join(7, 1)
+    feed.put(stride(value=value, reasons=own))
+    walked = feed.poll(0)
+    assert isinstance(walked, Measurement)
+    outbox.give(walked)
+
+    ours = ["paused"] if value == 4.0 else ["paused", "not_finite"]
+    assert outbox.next_is_paused
+    assert outbox.take()["reasons"] == [*own[: 8 - len(ours)], *ours]
 
 
 def test_a_new_run_goes_on_where_the_server_is():

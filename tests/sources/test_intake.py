@@ -1,7 +1,11 @@
 """Raw signals as labs send them, good and bad: an A2 that is right, or an invalid stride."""
 
+import math
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rehab.gait import LegSamples, measure_both_legs
 from rehab.gait.columns import LAYOUTS, read_column_map
@@ -137,6 +141,59 @@ def test_blank_cells_are_no_samples(made, table):
 
     valid = [m for m in desk.strides() if not m.reasons]
     assert len(valid) >= sum(s.valid for s in measure(made)) - 3
+
+
+def test_a_garbled_cell_costs_its_row_and_no_more(made, table):
+    rows = rows_of(table)
+    for number in range(5, len(rows), 50):
+        rows[number] |= {NAMES[number % 3]: "ERR"}
+    desk = Desk()
+    desk.send(rows)
+    desk.intake.finish()
+
+    assert any("is 'ERR', which is no number." in text for text in desk.said)
+    valid = [m for m in desk.strides() if not m.reasons]
+    assert len(valid) >= sum(s.valid for s in measure(made)) - 3
+
+
+def test_times_that_tell_no_rate_are_told_with_the_cure(made, table):
+    desk = Desk()
+    uneven_s = np.cumsum([0, *[0.01, 0.03] * 49, 0])  # as many steps of one length as of another
+    some = table[:100].copy()
+    some[:, 0] = uneven_s - 50
+    desk.send(rows_of(some), chunk=100)
+    assert desk.said[0].startswith("The times of the samples tell no rate. Give it with --rate.")
+    desk.send(rows_of(table))  # and goes on
+    desk.intake.finish()
+    assert [m for m in desk.strides() if not m.reasons]
+
+
+def one_of(*cells):
+    return st.one_of(st.floats(-50, 900), st.sampled_from([None, math.nan, math.inf, *cells]))
+
+
+odd_rows = st.lists(
+    st.fixed_dictionaries(
+        {},
+        optional={
+            "time_s": one_of("ERR", 1e12),
+            "value": one_of("ERR"),
+            **{name: one_of("ERR") for name in NAMES},
+        },
+    ),
+    max_size=30,
+)
+
+
+@given(st.lists(odd_rows, max_size=5), st.sampled_from([None, 100.0]))
+def test_nothing_that_comes_stops_it(batches, rate_hz):
+    desk = Desk(rate_hz=rate_hz)
+    for number in range(20):  # of samples, so that the rate and the legs are known
+        times = [0.01 * (10 * number + k) for k in range(10)]
+        desk.intake.take([{"time_s": t, **dict.fromkeys(NAMES, 500.0)} for t in times])
+    for batch in batches:
+        desk.intake.take(batch)
+    desk.intake.finish()
 
 
 def spoil(table, rows, columns, change):
@@ -291,3 +348,18 @@ def test_extra_values_travel_as_far_as_they_can():
     assert stride.extra == {"symmetry": 0.03}
     assert (stride.side, stride.value, stride.time_s) == (Side.RIGHT, 3.5, 5.0)
     assert "belt speed, note" in desk.said[0]
+
+
+@pytest.mark.parametrize("begins_anew", [True, False])
+def test_the_clock_that_is_told_follows_a_slow_sensor_and_one_that_begins_anew(begins_anew):
+    desk = Desk()
+    device_s = 0.0
+    for _ in range(2000):  # an hour, by a clock that is 0.5 % slow
+        desk.time.now_s += 1.8
+        device_s += 1.8 * 0.995
+        desk.intake.take([{"time_s": device_s, "value": 4.0}])
+    if begins_anew:
+        desk.time.now_s += 20.0
+        device_s = 1.0
+        desk.intake.take([{"time_s": device_s, "value": 4.0}])
+    assert desk.feed.clock_s == pytest.approx(device_s, abs=0.1)

@@ -103,6 +103,23 @@ async def test_tcp_turns_a_second_sender_away_and_hears_it_later(tmp_path):
     assert [m.value for m in found] == [4.0, 5.0]
 
 
+async def test_a_garbled_cell_does_not_hang_up_on_the_lab(tmp_path):
+    lab = RowsLab(tmp_path)
+    async with reading(lab, "--mass", "75", "--rate", "100") as (_, port, task):
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        leg = {"left_force_n": 500.0, "left_moment_nm": 10.0, "left_angle_rad": 0.1}
+        lines = [json_line(time_s=n / 100, **leg) for n in range(300)]
+        lines[200] = json_line(time_s=2.0, **leg | {"left_moment_nm": "ERR"})
+        writer.write("".join(lines).encode())
+        async with asyncio.timeout(5):
+            while not any("'ERR', which is no number" in text for text in lab.said):  # noqa: ASYNC110
+                await asyncio.sleep(0.005)
+        assert not reader.at_eof()
+        assert not task.done()
+        assert not any("sends no more" in text for text in lab.said)
+        writer.close()
+
+
 async def test_a_lab_that_serves_is_dialed_again(tmp_path):
     lab = RowsLab(tmp_path)
     times = 0

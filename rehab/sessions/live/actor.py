@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from collections.abc import Iterator
 from datetime import datetime
@@ -13,8 +14,11 @@ from rehab.sessions.log import Remark, RobotEntry, SessionEvent, SessionMetric, 
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ENDED, Change, ChangeKind, State, Value
 from rehab.training.fold import SessionFold
+from rehab.training.measures import InvalidSetting
 from rehab.training.metrics import measure_session
-from rehab.training.steps import Measurement, ScoredStep, Side
+from rehab.training.steps import InvalidMeasurement, Measurement, ScoredStep, Side
+
+log = logging.getLogger(__name__)
 
 
 class StepRow(NamedTuple):
@@ -49,11 +53,7 @@ class SessionActor:
     def load(cls, session: TrainingSession) -> SessionActor:
         """Rebuild the actor of a session from its log."""
         actor = cls(session)
-        for entry in read_log(session):
-            if isinstance(entry, Change):
-                actor.fold.change(entry)
-            else:
-                actor.fold.step(entry)
+        fold_log(actor.fold, session)
         marked = SessionEvent.everywhere.filter(session=session, kind__in=MARKED).order_by("-pk")
         for event in reversed(marked[:MARKS]):
             actor.mark(event)
@@ -159,6 +159,31 @@ def _to_columns(old: Value, value: Value) -> dict[str, Any]:
     if value is None or isinstance(value, int | float):
         return {"old": old, "value": value}
     return {"data": {"value": value} if old is None else {"value": value, "old": old}}
+
+
+def fold_log(fold: SessionFold, session: TrainingSession) -> SessionFold:
+    """Fold a session's log; give the fold.
+
+    What could not have been (a second pause, say) is passed over, and logged: it altered nothing
+    then, and a log that is refused for it would shut everyone out of all else that it holds.
+    """
+    passed_over: list[str] = []
+    for entry in read_log(session):
+        try:
+            if isinstance(entry, Change):
+                fold.change(entry)
+            else:
+                fold.step(entry)
+        except (InvalidSetting, InvalidMeasurement) as problem:
+            passed_over.append(f"{entry}: {problem}")
+    if passed_over:
+        log.warning(
+            "The log of session %s holds what could not have been (%d times); the first: %s",
+            session.pk,
+            len(passed_over),
+            passed_over[0],
+        )
+    return fold
 
 
 def read_log(session: TrainingSession) -> Iterator[Measurement | Change]:

@@ -23,6 +23,9 @@ FIRST_PAUSE_S = 0.5
 LONGEST_PAUSE_S = 30.0
 STEADY_S = 60.0  # a child that ran so long failed for a new reason: its pauses begin anew
 STOP_S = 5.0
+CHUNK = 64 * 1024
+LONGEST_LINE = 1200  # bytes of a line that are kept until it ends
+LONGEST_WORDS = 300  # characters of it
 
 
 @dataclass
@@ -59,6 +62,8 @@ class Children:
         self.report = report
         self.first_pause_s = first_pause_s
         self.all: dict[str, Child] = {}
+        self._is_told = True
+        self._telling: asyncio.Task[None] | None = None
 
     def start(
         self,
@@ -82,22 +87,35 @@ class Children:
     async def stop(self, name: str) -> None:
         """End a child: politely, then for certain."""
         child = self.all.pop(name, None)
-        if child is not None and child.task is not None:
+        if child is None:
+            return
+        if child.task is not None:
             child.task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await child.task
+            await asyncio.wait([child.task])
         self._tell()
 
     async def stop_all(self) -> None:
-        """End all children."""
-        await asyncio.gather(*(self.stop(name) for name in list(self.all)))
+        """End all children. Trouble with one keeps no other, nor the server, from ending."""
+        ended = await asyncio.gather(
+            *(self.stop(name) for name in list(self.all)), return_exceptions=True
+        )
+        for problem in ended:
+            if isinstance(problem, Exception):
+                log.error("A child did not end cleanly", exc_info=problem)
+        if self._telling is not None:
+            await self._telling
 
     async def _keep_up(self, child: Child, environment: Mapping[str, str], once: bool) -> None:
         pause_s = self.first_pause_s
         loop = asyncio.get_running_loop()
         while True:
             began = loop.time()
-            status = await self._run(child, environment)
+            status: int | str
+            try:
+                status = await self._run(child, environment)
+            except Exception as problem:  # of ours: it is supervised all the same
+                log.exception("%s could not be looked after", child.name)
+                status = repr(problem)
             if status == 0:
                 child.state = "done"
                 if once:
@@ -129,8 +147,7 @@ class Children:
         self._tell()
         try:
             if process.stdout is not None:
-                async for line in process.stdout:
-                    child.last_words.append(line.decode(errors="replace").rstrip()[:300])
+                await _listen(process.stdout, child.last_words)
             return await process.wait()
         finally:
             child.pid = None
@@ -138,10 +155,40 @@ class Children:
                 await _end(process)
 
     def _tell(self) -> None:
-        children = [child.describe() for child in self.all.values()]
+        """Have the report written; the event loop waits for no disk."""
+        self._is_told = False
+        if self._telling is None or self._telling.done():
+            self._telling = asyncio.get_running_loop().create_task(self._write_report())
+
+    async def _write_report(self) -> None:
+        while not self._is_told:
+            self._is_told = True
+            children = [child.describe() for child in self.all.values()]
+            text = json.dumps({"server": os.getpid(), "children": children})
+            try:
+                await asyncio.to_thread(self._replace_report, text)
+            except OSError as problem:  # they live on; only `doctor` knows less
+                log.warning("%s could not be written: %s", self.report, problem)
+
+    def _replace_report(self, text: str) -> None:
         fresh = self.report.with_suffix(".new")
-        fresh.write_text(json.dumps({"server": os.getpid(), "children": children}))
+        fresh.write_text(text)
         fresh.replace(self.report)
+
+
+async def _listen(output: asyncio.StreamReader, words: deque[str]) -> None:
+    """Keep the last lines of what a child says until it says no more, however long they are."""
+    line = b""
+    while chunk := await output.read(CHUNK):
+        *ended, line = (line + chunk).split(b"\n")
+        words.extend(_decode(one) for one in ended)
+        line = line[:LONGEST_LINE]
+    if line:
+        words.append(_decode(line))
+
+
+def _decode(line: bytes) -> str:
+    return line.decode(errors="replace").rstrip()[:LONGEST_WORDS]
 
 
 async def _end(process: asyncio.subprocess.Process) -> None:

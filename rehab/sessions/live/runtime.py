@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import contextvars
 import gc
 import logging
@@ -11,7 +10,7 @@ import sys
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from asgiref.sync import sync_to_async
@@ -22,20 +21,28 @@ from django.utils import timezone
 from rehab.people.models import User
 from rehab.sessions.events import Audience, to_text
 from rehab.sessions.live import owners, sources
-from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.live.admission import find_unwelcome, keep_signed_in
 from rehab.sessions.live.children import Children
+from rehab.sessions.live.loading import find_newest_open, load
 from rehab.sessions.live.notes import Notes
-from rehab.sessions.live.session import RECENT, LiveSession
+from rehab.sessions.live.session import LiveSession, Stop
 from rehab.sessions.live.writer import Writer
-from rehab.sessions.log import RobotEntry, SessionEvent, Step
-from rehab.sessions.models import TrainingSession
-from rehab.training.changes import ENDED, OPEN, Change, ChangeKind, PauseReason, State, Value
+from rehab.sessions.log import Remark
+from rehab.training.changes import (
+    ENDED,
+    OPEN,
+    Change,
+    ChangeKind,
+    PauseReason,
+    Refused,
+    State,
+    Value,
+)
 
 log = logging.getLogger(__name__)
 
 HEARTBEAT_S = 0.25  # to robots, which stand still after 0.65 s of silence
-SWEEP = 20  # heartbeats; then pages hear one too, and idle sessions are swept
+SWEEP = 20  # heartbeats; then pages hear one too, idle sessions go, sign-ins are looked at
 CHECKPOINT = 8  # heartbeats
 HEARTBEAT = to_text({"type": "heartbeat"})
 # Python's full collections take 200 ms with 2,000 sockets (stack.md, T4): make them rare.
@@ -56,10 +63,24 @@ class Runtime:
         self.waiting: dict[int, set[Callable[[int], None]]] = defaultdict(set)
         self.notes = Notes()
         self.sockets: set[Any] = set()  # whoever must be closed when the server stops
+        self.asked: set[asyncio.Task[None]] = set()  # what pages asked for and is under way
         self.children = Children(settings.DATA_DIR / "children.json")
         self.address = sources.local_address(settings.HOST, settings.PORT)  # where children dial in
-        self._opening: dict[int, asyncio.Task[LiveSession]] = {}
-        self._ticker = self.loop.create_task(self._tick())
+        self._opening: dict[int, asyncio.Task[None]] = {}
+        self._left: set[int] = set()  # by processes that died: to be paused if they run
+        self._unlogged_stops: dict[str, Stop] = {}  # at places whose sessions were all dropped
+        # Each is a task of its own: robots stop when nothing is heard, so no heartbeat may wait
+        # for the disk, whatever else does.
+        self.routines = [
+            self.loop.create_task(self._repeat(beats, work), context=contextvars.Context())
+            for beats, work in (
+                (1, self._beat_for_robots),
+                (SWEEP, self._beat_for_pages),
+                (SWEEP, self._close_idle),
+                (SWEEP, self._look_after_sign_ins),
+                (CHECKPOINT, self._move_log),
+            )
+        ]
 
     def _call(self, function: Callable[[], None]) -> None:
         self.loop.call_soon_threadsafe(function)
@@ -67,38 +88,86 @@ class Runtime:
     async def session(self, session_id: int) -> LiveSession:
         """Give a live session, rebuilt from its log where it is not in memory.
 
-        Raises TrainingSession.DoesNotExist and OwnedElsewhere.
+        Raises TrainingSession.DoesNotExist, OwnedElsewhere, and NotStored where a change that it
+        needs could not be committed.
         """
-        live = self.sessions.get(session_id)
-        if live is not None:
-            live.asked_for = True
-            return live
-        if session_id not in self._opening:
-            # A context of its own: a request's ends with the request, others wait for this too.
-            self._opening[session_id] = self.loop.create_task(
-                self._open(session_id), context=contextvars.Context()
-            )
-        try:
-            return await asyncio.shield(self._opening[session_id])
-        finally:
-            task = self._opening.get(session_id)
-            if task is not None and task.done():
-                del self._opening[session_id]
+        while (live := self.sessions.get(session_id)) is None:
+            if session_id not in self._opening:
+                # A context of its own: a request's ends with the request, others wait for this too.
+                self._opening[session_id] = self.loop.create_task(
+                    self._open(session_id), context=contextvars.Context()
+                )
+            try:
+                await asyncio.shield(self._opening[session_id])
+            finally:
+                task = self._opening.get(session_id)
+                if task is not None and task.done():
+                    del self._opening[session_id]
+        live.asked_for = True
+        return live
 
-    async def _open(self, session_id: int) -> LiveSession:
-        actor, recent, stopped = await sync_to_async(_load)(session_id)
-        live = LiveSession(actor, self.writer, recent, self._drop, robot_stopped=stopped)
+    async def admitted(self, session_id: int) -> LiveSession:
+        """Give a live session at a moment when no viewer joins it. Raises what ``session`` does.
+
+        Until the next ``await`` it is the one in memory: what is attached to it is told of its end.
+        """
+        while True:
+            live = await self.session(session_id)
+            await live.admission()
+            if self.sessions.get(session_id) is live:
+                return live
+
+    async def _open(self, session_id: int) -> None:
+        loaded = await sync_to_async(load)(session_id)
+        actor, stopped = loaded.actor, loaded.robot_stopped
+        live = LiveSession(actor, self.writer, loaded.recent, self._drop, robot_stopped=stopped)
+        if loaded.was_left:
+            self._left.add(session_id)
+        await self._pause_left(live)
+        self._take_over_stops(live)
         self.sessions[session_id] = live
         if live.actor.fold.state in OPEN and not self.draining:
             await sources.run_source(self.children, actor.session, self.address)
-        return live
+
+    async def _pause_left(self, live: LiveSession) -> None:
+        """Pause a session that the process before left running when it died.
+
+        What could not be stored is tried again when the session is next loaded.
+        """
+        if live.id in self._left:
+            if live.is_running:
+                pause = Change(ChangeKind.PAUSE, PauseReason.RESTART.value)
+                await live.change(pause, None, timezone.now())
+                log.warning("Session %s was left running; it is paused now.", live.id)
+            self._left.discard(live.id)
+
+    def _take_over_stops(self, live: LiveSession) -> None:
+        """Let a stop hold in a session that has just been loaded, though no log has it yet."""
+        kept = self._unlogged_stops.pop(live.place, None)
+        if kept is not None:
+            live.stop_robot(*kept)
+        for other in self._others_at_place_of(live):
+            if other.robot_stopped and other.unlogged_stop is not None:
+                live.stop_robot(*other.unlogged_stop)
+            elif other.robot_stopped:  # committed since the log was read
+                live.robot_stopped = True
 
     def _drop(self, live: LiveSession, problem: Exception) -> None:
-        """Forget a session that could not be written: its log is right, its fold is not."""
-        if self.sessions.get(live.id) is not live:
-            return
-        log.error("Session %s is rebuilt from its log: %s", live.id, problem)
-        del self.sessions[live.id]
+        """Forget a session that could not be written: its log is right, its fold is not.
+
+        But for a stop of the robot, which holds all the same: another session of the place keeps
+        it, or the next one that is loaded.
+        """
+        stop, live.unlogged_stop = live.unlogged_stop, None
+        if stop is not None:
+            heirs = self._others_at_place_of(live)
+            for heir in heirs:
+                heir.stop_robot(*stop)
+            if not heirs:
+                self._unlogged_stops[live.place] = stop
+        if self.sessions.get(live.id) is live:
+            log.error("Session %s is rebuilt from its log: %s", live.id, problem)
+            del self.sessions[live.id]
         for peer in (live.source, live.robot):
             if peer is not None:
                 peer.send_away(4011, "not_stored", "A step could not be stored. Connect again.")
@@ -113,8 +182,7 @@ class Runtime:
 
         Raises InvalidSetting where it is refused and NotStored where it could not be committed.
         """
-        live = await self.session(session_id)
-        await live.admission()
+        live = await self.admitted(session_id)
         if live.source_clock is not None and kind in (ChangeKind.START, ChangeKind.RESUME):
             live.source_clock.slacken(time.monotonic())
         await live.change(Change(kind, value), by, timezone.now())
@@ -122,15 +190,24 @@ class Runtime:
             return
         await self.children.stop(sources.child_name(live.id))
         if live.station_id is not None:
-            waiting = await sync_to_async(_newest_open)(live.station_id)
+            waiting = await sync_to_async(find_newest_open)(live.station_id)
             if waiting is not None:
                 self.announce(waiting, live.station_id)
 
+    async def remark(self, session_id: int, what: Remark, value: float | None, by: User) -> None:
+        """Note something of a session; committed when this returns. Raises what ``change`` does."""
+        live = await self.admitted(session_id)
+        if live.actor.fold.state in ENDED:
+            raise Refused("The session has ended.")
+        await live.remark(what, value, by, timezone.now())
+
     def at_station_of(self, live: LiveSession) -> list[LiveSession]:
         """Give a session and the other live ones of its station: the robot may be with them."""
-        there = self.sessions.values() if live.station_id is not None else ()
-        others = [one for one in there if one.station_id == live.station_id and one is not live]
-        return [live, *others]
+        return [live, *self._others_at_place_of(live)]
+
+    def _others_at_place_of(self, live: LiveSession) -> list[LiveSession]:
+        there = self.sessions.values()
+        return [one for one in there if one.place == live.place and one is not live]
 
     def announce(self, session_id: int, station_id: int | None) -> None:
         """Tell the devices of a station that a session is there for them."""
@@ -140,38 +217,44 @@ class Runtime:
 
     async def recover(self) -> int:
         """Pause the sessions that a process left running when it died. Give how many."""
-        left = await sync_to_async(_left_running)()
+        left = await sync_to_async(owners.find_left_running)()
+        self._left.update(left)
         for session_id in left:
             try:
-                live = await self.session(session_id)
-                if live.actor.fold.state is State.RUNNING:
-                    pause = Change(ChangeKind.PAUSE, PauseReason.RESTART.value)
-                    await live.change(pause, None, timezone.now())
+                await self._pause_left(await self.session(session_id))
             except Exception:  # one broken session keeps no server from starting
                 log.exception("Session %s could not be recovered", session_id)
         return len(left)
 
-    async def _tick(self) -> None:
-        ticks = 0
+    async def _repeat(self, beats: int, work: Callable[[], Awaitable[None]]) -> None:
+        """Do something again and again. Where it fails that is logged, and it is tried again."""
         while True:
-            await asyncio.sleep(HEARTBEAT_S)
-            ticks += 1
-            for live in list(self.sessions.values()):
-                if live.robot is not None:
-                    live.robot.tell({"type": "heartbeat", "watched": live.is_watched})
-                if ticks % SWEEP == 0:
-                    presence = live.presence(timezone.now())
-                    quality = to_text({"type": "heartbeat", "presence": presence})
-                    for viewer in live.channel.viewers:
-                        monitors = viewer.audience is Audience.MONITOR
-                        viewer.beat(quality if monitors else HEARTBEAT)
-                    if live.is_idle and not live.asked_for:
-                        await self._close(live)
-                    live.asked_for = False  # whoever gets it now has until the next sweep to join
-            if ticks % SWEEP == 0:
-                await self._look_after_sign_ins()
-            if ticks % CHECKPOINT == 0:
-                await self.loop.run_in_executor(None, _checkpoint)
+            await asyncio.sleep(beats * HEARTBEAT_S)
+            try:
+                await work()
+            except Exception:
+                log.exception("What is done every %.2f s failed", beats * HEARTBEAT_S)
+
+    async def _beat_for_robots(self) -> None:
+        for live in self.sessions.values():
+            if live.robot is not None:
+                live.robot.tell({"type": "heartbeat", "watched": live.is_watched})
+
+    async def _beat_for_pages(self) -> None:
+        for live in self.sessions.values():
+            presence = live.presence(timezone.now())
+            quality = to_text({"type": "heartbeat", "presence": presence})
+            for viewer in live.channel.viewers:
+                viewer.beat(quality if viewer.audience is Audience.MONITOR else HEARTBEAT)
+
+    async def _close_idle(self) -> None:
+        for live in list(self.sessions.values()):
+            if self.sessions.get(live.id) is live and live.is_idle and not live.asked_for:
+                await self._close(live)
+            live.asked_for = False  # whoever gets it now has until the next sweep to join
+
+    async def _move_log(self) -> None:
+        await self.loop.run_in_executor(None, _checkpoint)
 
     async def _look_after_sign_ins(self) -> None:
         """Keep people signed in while their page shows a training that runs; end the sockets of
@@ -179,12 +262,9 @@ class Runtime:
         """
         sockets = [socket for socket in self.sockets if socket.actor is not None]
         running = [one.scope for one in sockets if one.live is not None and one.live.is_running]
-        try:
-            await keep_signed_in(running)
-            for index in await find_unwelcome([(one.actor, one.scope) for one in sockets]):
-                sockets[index].send_off()
-        except DatabaseError:
-            log.exception("Tokens could not be looked at")  # the next sweep will
+        await keep_signed_in(running)
+        for index in await find_unwelcome([(one.actor, one.scope) for one in sockets]):
+            sockets[index].send_off()
 
     async def _close(self, live: LiveSession) -> None:
         """Take a session that nobody needs out of memory; its log brings it back."""
@@ -194,47 +274,23 @@ class Runtime:
         try:
             await sync_to_async(owners.release)(live.id, live.actor.session.epoch)
         except DatabaseError:
-            log.exception("Session %s could not be given up", live.id)  # the heartbeat goes on
+            log.exception("Session %s could not be given up", live.id)  # others can
 
     async def drain(self) -> None:
         """Close every socket so that clients come back, commit everything, stop."""
         self.draining = True
         await self.children.stop_all()
-        self._ticker.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await self._ticker
+        for routine in self.routines:
+            routine.cancel()
+        await asyncio.gather(*self.routines, return_exceptions=True)
         closing = [socket.shut(4012) for socket in list(self.sockets)]
         await asyncio.gather(*closing, self.notes.settled(), return_exceptions=True)
+        await asyncio.gather(*self.asked, return_exceptions=True)
         await self.loop.run_in_executor(None, self.writer.close)
         await asyncio.sleep(0)  # the writer's last reports
         held = [(live.id, live.actor.session.epoch) for live in self.sessions.values()]
         self.sessions.clear()
-        await sync_to_async(_release_all)(held)
-
-
-def _load(session_id: int) -> tuple[SessionActor, list[Step], bool]:
-    session = TrainingSession.everywhere.select_related("patient", "measure", "station").get(
-        pk=session_id
-    )
-    if State(session.state) in OPEN:
-        owners.claim(session)
-    steps = Step.everywhere.filter(session=session).order_by("-number")[:RECENT]
-    return SessionActor.load(session), list(reversed(steps)), _is_robot_stopped(session)
-
-
-def _is_robot_stopped(session: TrainingSession) -> bool:
-    """Say whether the last word on the station's robot, in this session or before, was stop."""
-    there = (
-        {"session": session} if session.station is None else {"session__station": session.station}
-    )
-    words = SessionEvent.everywhere.filter(kind__in=(RobotEntry.STOP, RobotEntry.ARM), **there)
-    last = words.order_by("-pk").values_list("kind", flat=True).first()
-    return last == RobotEntry.STOP
-
-
-def _newest_open(station_id: int) -> int | None:
-    there = TrainingSession.everywhere.filter(station=station_id, state__in=[*OPEN])
-    return there.order_by("-created_at", "-pk").values_list("pk", flat=True).first()
+        await sync_to_async(owners.release_all)(held)
 
 
 def _checkpoint() -> None:
@@ -248,18 +304,6 @@ def _checkpoint() -> None:
         log.warning("The database's log could not be moved: %s", problem)
     finally:
         connection.close()
-
-
-def _left_running() -> list[int]:
-    running = TrainingSession.everywhere.filter(state=State.RUNNING.value)
-    return [
-        session.pk for session in running if not session.owner or not owners.is_alive(session.owner)
-    ]
-
-
-def _release_all(held: list[tuple[int, int]]) -> None:
-    for session_id, epoch in held:
-        owners.release(session_id, epoch)
 
 
 _current: Runtime | None = None

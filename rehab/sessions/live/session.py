@@ -6,7 +6,7 @@ import asyncio
 from collections import deque
 from collections.abc import Awaitable, Callable
 from datetime import datetime
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from rehab.people.models import User
 from rehab.sessions.events import (
@@ -66,6 +66,14 @@ class Peer(Protocol):
         """Send it away."""
 
 
+class Stop(NamedTuple):
+    """A stop of the robot: by whom, when, and which device did it where that was no person."""
+
+    by: User | None
+    at: datetime
+    data: Message
+
+
 class LiveSession:
     """Takes steps and changes in order; what is committed goes to everyone who listens.
 
@@ -84,6 +92,9 @@ class LiveSession:
         session = actor.session
         self.id = session.pk
         self.station_id = session.station_id
+        # Where its robot is: sessions of one station share it.
+        here = f"session {self.id}" if self.station_id is None else f"station {self.station_id}"
+        self.place = here
         self.actor = actor
         self.channel = Channel()
         self.recent: deque[Step | ScoredStep] = deque(recent, maxlen=RECENT)
@@ -91,6 +102,7 @@ class LiveSession:
         self.source_clock: Lateness | None = None  # of its latest run
         self.robot: Peer | None = None
         self.robot_stopped = robot_stopped  # until a person arms it again
+        self.unlogged_stop: Stop | None = None  # holds, though it is not committed yet
         self.robot_reports: Message = {"status": None, "decision": None}  # the latest
         self.tablets = 0
         self.tablet_heard_at: datetime | None = None
@@ -108,6 +120,7 @@ class LiveSession:
         self._on_failure = on_failure
         self._joining = 0
         self._admits = asyncio.Event()
+        self._queue = asyncio.Lock()  # fair: who asks for it first has it first
 
     @property
     def next_number(self) -> int:
@@ -189,9 +202,10 @@ class LiveSession:
             self.robot.tell({"type": "stop"})
         if not self.robot_stopped:
             self.robot_stopped = True
+            self.unlogged_stop = stop = Stop(by, at, data)
             row = self.actor.note(RobotEntry.STOP, by, at, data)
             event = robot_stopped_event(self.actor.fold, True)
-            self._submit([row], [event], [], summarize=False)
+            self._submit([row], [event], [], summarize=False, stop=stop)
 
     def arm_robot(self, by: User, at: datetime) -> asyncio.Future[None]:
         """Let the robot move again once that is in the log; done when the future is."""
@@ -231,6 +245,7 @@ class LiveSession:
         summarize: bool,
         step: ScoredStep | None = None,
         stored: asyncio.Future[None] | None = None,
+        stop: Stop | None = None,
     ) -> None:
         def done(problem: Exception | None) -> None:
             self.unwritten -= 1
@@ -239,6 +254,8 @@ class LiveSession:
                     stored.set_exception(NotStored("It could not be stored. Try again."))
                 self._on_failure(self, problem)
                 return
+            if stop is not None and self.unlogged_stop is stop:
+                self.unlogged_stop = None
             if self.source is not None:
                 for message in told:  # before the ack: a simulated patient waits for that
                     self.source.tell(message)
@@ -327,9 +344,13 @@ class LiveSession:
         return sorted([*self.actor.marks, *switches], key=lambda mark: mark["after"])
 
     async def admission(self) -> None:
-        """Wait while a viewer joins. Whoever takes steps or changes asks first."""
-        while self._joining:
-            await self._admits.wait()
+        """Wait while a viewer joins. Whoever takes steps or changes asks first.
+
+        Those who wait go on in the order in which they came.
+        """
+        async with self._queue:
+            while self._joining:
+                await self._admits.wait()
 
     async def settled(self) -> None:
         """Wait until everything taken so far is committed. Raises NotStored."""

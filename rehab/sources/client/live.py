@@ -8,9 +8,11 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 
+from rehab.sources.client.outbox import add_ours
 from rehab.sources.client.player import KEPT_MAX
+from rehab.training.clocks import HeardClock
 from rehab.training.phases import make_phase
-from rehab.training.steps import Measurement, Reason, Side, add_reason
+from rehab.training.steps import Measurement, Reason, Side
 
 
 class LiveFeed:
@@ -45,8 +47,7 @@ class LiveFeed:
         self._has_walked = False  # it has begun
         self._runs = False
         self._is_finished = False
-        self._last_s: float | None = None
-        self._ahead_s: float | None = None  # the source's clock, less ours
+        self._clock = HeardClock()
 
     @property
     def clock_s(self) -> float | None:
@@ -54,7 +55,7 @@ class LiveFeed:
 
         From the stride that came quickest, so that one that is held up is known to be late.
         """
-        return None if self._ahead_s is None else self._monotonic() + self._ahead_s
+        return self._clock.read_s(self._monotonic())
 
     @property
     def is_running(self) -> bool:
@@ -87,16 +88,12 @@ class LiveFeed:
 
     def put(self, stride: Measurement) -> None:
         """Take a stride that was measured just now."""
-        ahead_s = stride.time_s - self._monotonic()
-        went_back = self._last_s is not None and stride.time_s < self._last_s
-        if self._ahead_s is None or went_back or ahead_s > self._ahead_s:
-            self._ahead_s = ahead_s
-        self._last_s = stride.time_s
+        self._clock.is_late(stride.time_s, self._monotonic())
         if not (self._is_open and self._has_walked) or len(self._waiting) >= KEPT_MAX:
             self.left_out += 1
             return
         if not self._runs:
-            stride = replace(stride, reasons=add_reason(stride.reasons, Reason.PAUSED))
+            stride = replace(stride, reasons=add_ours(stride.reasons, Reason.PAUSED))
         self._waiting.append(stride)
         self.on_change()
 

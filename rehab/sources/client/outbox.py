@@ -8,7 +8,7 @@ import re
 from collections import deque
 from typing import Any, NamedTuple
 
-from rehab.training.steps import Measurement, Reason, add_reason
+from rehab.training.steps import Measurement, Reason
 
 Message = dict[str, Any]
 
@@ -19,6 +19,7 @@ FRAME_BYTES = 60 * 1024
 
 MAX_REASONS = 8
 MAX_EXTRA = 32
+OURS = (Reason.PAUSED, Reason.NOT_FINITE)  # reasons that are added here
 _NAME = re.compile(r"[A-Za-z0-9_.:-]{1,64}")
 
 
@@ -36,6 +37,13 @@ class _Kept(NamedTuple):
     size: int  # [bytes]
 
 
+def add_ours(reasons: tuple[str, ...], reason: str) -> tuple[str, ...]:
+    """Give a source's reasons with one of ours; its last ones make room for it."""
+    ours = [one for one in OURS if one in reasons or one == reason]
+    others = [one for one in reasons if one not in OURS]
+    return (*others[: MAX_REASONS - len(ours)], *ours)
+
+
 def write_step(measurement: Measurement, number: int) -> Message:
     """Give a stride as the protocol writes it. Raises UnsendableStride.
 
@@ -43,7 +51,7 @@ def write_step(measurement: Measurement, number: int) -> Message:
     """
     value, reasons = measurement.value, measurement.reasons
     if value is not None and not math.isfinite(value):
-        value, reasons = None, add_reason(reasons, Reason.NOT_FINITE)
+        value, reasons = None, add_ours(reasons, Reason.NOT_FINITE)
     step: Message = {
         "number": number,
         "time_s": measurement.time_s,

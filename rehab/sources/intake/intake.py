@@ -185,10 +185,13 @@ class Intake:
                         f"Samples come without {time.name}. Send the device's own time in seconds: "
                         "when they arrive says too little."
                     )
-                times.append(read_time(row, time.name) * time.factor)
-                cells.append([read_number(row, name) for name in names])
+                time_s = read_time(row, time.name) * time.factor
+                numbers = [read_number(row, name) for name in names]
             except BadRow as problem:
                 self.complain(str(problem))
+                continue
+            times.append(time_s)
+            cells.append(numbers)
         if cells:
             there = np.array([[cell is not None for cell in row] for row in cells])
             table = np.array(cells, dtype=np.float64)

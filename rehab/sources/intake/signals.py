@@ -140,9 +140,12 @@ def find_rate(t_s: Floats) -> float:
     steps = steps[steps > 0]
     if not len(steps):
         raise GaitInputError("The times of the samples do not go on.")
-    usual_s = float(np.median(steps))
+    usual_s = float(np.sort(steps)[len(steps) // 2])  # one of them, not between two
+    usual = steps[np.abs(steps - usual_s) < 0.5 * usual_s]
+    if len(usual) <= len(steps) / 2:
+        raise GaitInputError("The times of the samples tell no rate. Give it with --rate.")
     # Their mean: jitter adds up to nothing, and A2 is as wrong as the rate.
-    rate_hz = float(1 / steps[np.abs(steps - usual_s) < 0.5 * usual_s].mean())
+    rate_hz = float(1 / usual.mean())
     if rate_hz < RATE_MIN_HZ / 100:
         raise GaitInputError(
             f"Samples lie {1 / rate_hz:g} s apart by their own times: milliseconds? Send seconds, "

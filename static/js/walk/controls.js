@@ -5,6 +5,7 @@ import { _ } from "garry/language";
 
 const GUARD_MS = 700; // a question that just appeared takes no answer: a second tap is no yes
 const NOTE_MS = 6_000;
+const ANSWER_MS = 2_000; // after which a link that nobody has closed is not believed
 
 export function createControls(body, live, ask) {
   const note = body.querySelector(".note");
@@ -44,7 +45,12 @@ export function createControls(body, live, ask) {
     if (!sent) tell(_("No connection. Use the robot's own button."));
     answer(sent ? _("Stop sent") : _("Not sent"));
     clearTimeout(resetting);
-    resetting = setTimeout(() => answer(""), NOTE_MS);
+    resetting = setTimeout(sent ? doubt : () => answer(""), sent ? ANSWER_MS : NOTE_MS);
+  }
+
+  function doubt() {
+    if (!stopped) tell(_("No answer. Use the robot's own button."));
+    answer("");
   }
 
   function answer(words) {

@@ -22,6 +22,8 @@ from tests.sessions.live.callers import Caller, Place, build_place, change, open
 class Stall:
     """Holds the writer's commits up, so that a test can look at what is not committed."""
 
+    problem: Exception | None = None  # what they fail with, once they may happen
+
     def __init__(self) -> None:
         self._open = threading.Event()
         self._open.set()
@@ -37,6 +39,8 @@ class Stall:
     def wait(self) -> None:
         """Wait until commits may happen (in the writer's thread)."""
         assert self._open.wait(10)
+        if self.problem is not None:
+            raise self.problem
 
 
 @pytest.fixture

@@ -5,6 +5,9 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
+from django.db import OperationalError
+
+from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers import base
 from rehab.sessions.live.messages import MAX_FRAME
 from rehab.sessions.log import Step
@@ -21,6 +24,7 @@ from tests.sessions.live.callers import (
     change,
     numbers,
     sign_in,
+    turns,
 )
 
 # --- frames that are not the protocol -------------------------------------------------------------
@@ -398,3 +402,43 @@ async def test_pages_whose_session_fails_are_told_to_come_back(place: Place, beg
     assert (await again.hello())["next"] == 3
     await again.walk(4.0)
     assert await numbers(session) == [1, 2, 3]
+
+
+async def test_a_source_is_let_into_no_session_that_was_dropped_meanwhile(place, begun, stall):
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    await source.walk(4.0)
+    live = await runtimes.current().session(session.pk)
+    stall.begin()
+    await source.say(a_step(2))
+    await turns()
+    await place.tablet(session).dial()
+    while not live._joining:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    again = await place.source().dial()  # it gives up waiting, and waits for the page to join
+    await again.say({"type": "hello", "version": 1, "run": "r1", "last": 2})
+    while not live._queue.locked():  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    stall.problem = OperationalError("database is locked")
+    stall.end()
+    assert (await again.hear("welcome"))["next"] == 2
+    stall.problem = None
+    again.number = 1
+    await again.walk(4.0, 4.0)
+    assert await numbers(session) == [1, 2, 3]
+
+
+async def test_whoever_is_in_a_dropped_session_hears_of_its_end(place, begun, stall):
+    session = await begun(place)
+    source, tablet = await place.source().dial(), place.tablet(session)
+    await source.hello()
+    await tablet.watch()
+    await source.walk(4.0)
+    del runtimes.current().sessions[session.pk]
+    stall.problem = OperationalError("database is locked")
+    await source.say(a_step(2))
+    assert (await source.sent_away())[0] == 4011
+    assert (await tablet.sent_away())[0] == 4012
+    stall.problem = None
+    assert (await (await place.source().dial()).hello())["next"] == 2

@@ -7,20 +7,23 @@ from types import SimpleNamespace
 import pytest
 
 from rehab.sessions.live.consumers import source as source_module
-from rehab.sessions.live.lateness import LATE_S, Lateness
+from rehab.sessions.live.lateness import Lateness
 from rehab.sessions.log import Step
+from rehab.training.clocks import LATE_S, LEAK
 from tests.sessions.live.callers import a_step
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 2.0, 10.0])
 def test_lateness_is_told_by_the_clock_in_hello(speed):
-    lateness = Lateness("r", 100.0, clock_s=50.0, speed=speed)
+    def is_late(time_s, now_s):
+        return Lateness("r", 100.0, clock_s=50.0, speed=speed).is_late(time_s, now_s)
+
     slack = LATE_S * max(1.0, speed)
-    assert not lateness.is_late(50.0, 100.0)
-    assert not lateness.is_late(50.0 + 10 * speed, 110.0)
-    assert not lateness.is_late(50.0 - slack, 100.0)
-    assert lateness.is_late(50.0 - slack - 0.01, 100.0)
-    assert lateness.is_late(50.0, 100.0 + slack / speed + 0.1)
+    assert not is_late(50.0, 100.0)
+    assert not is_late(50.0 + 10 * speed, 110.0)
+    assert not is_late(50.0 - slack, 100.0)
+    assert is_late(50.0 - slack - 0.01, 100.0)
+    assert is_late(50.0, 100.0 + (1 + 2 * LEAK) * slack / speed)
 
 
 def test_nothing_is_late_at_full_speed():
@@ -101,3 +104,19 @@ async def test_steps_resent_after_a_minute_offline(place, begun, monkeypatch, te
     await robot.overhear()
     assert [m["number"] for m in robot.heard if m["type"] == "step"] == fresh
     assert await Step.everywhere.filter(session=session, hit=True).acount() == 64
+
+
+async def test_a_device_that_begins_anew_is_live_again_at_once(place, begun):
+    session = await begun(place)
+    tablet, robot = place.tablet(session), place.robot()
+    await tablet.watch()
+    await (await robot.dial()).hello()
+    source = await place.source().dial()
+    await source.hello(clock_s=1000.0)
+    for time_s in (1000.1, 1000.2, 1000.3, 0.1, 0.2, 0.3):
+        await source.walk(4.0, time_s=time_s)
+    await tablet.until_step(6)
+    steps = [event for event in tablet.events if event["kind"] in ("step", "missing")]
+    assert [event["live"] for event in steps] == [True] * 6
+    await robot.overhear()  # the fourth does not count: its time runs backwards
+    assert [m["number"] for m in robot.heard if m["type"] == "step"] == [1, 2, 3, 5, 6]

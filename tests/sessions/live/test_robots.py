@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import asyncio
 import copy
 from typing import Any
 
 import pytest
 from asgiref.sync import sync_to_async
+from django.db import OperationalError
 
 from rehab.gestures.models import Gesture
 from rehab.people.models import Clinic
 from rehab.sessions.live import hub
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live import writer as writers
 from rehab.sessions.live.actor import SessionActor
+from rehab.sessions.live.session import NotStored
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.valences import Cue
 from robot.trial import admit_gesture
 from tests.sessions.live.callers import Message, change, turns
+from tests.world import NOW
 
 STATUS = {
     "kind": "status",
@@ -186,6 +191,140 @@ async def test_a_stop_waits_for_no_disk_and_overtakes_an_arming(place, begun, st
     assert "arm" not in [message["type"] for message in robot.heard]
     kinds = [row["kind"] for row in await log_of(session)]
     assert kinds == ["robot_stop", "robot_arm", "robot_stop"]
+
+
+def break_disk(patch: pytest.MonkeyPatch, session_id: int | None = None) -> None:
+    """Let nothing, or nothing of a session, be committed until ``patch`` takes it back."""
+    sound = writers.commit
+
+    def commit(jobs: Any) -> None:
+        if any(session_id in (None, job.session_id) for job in jobs):
+            raise OperationalError("database or disk is full")
+        sound(jobs)
+
+    patch.setattr(writers, "commit", commit)
+
+
+async def test_a_stop_that_could_not_be_stored_holds_and_is_stored_later(place, begun, monkeypatch):
+    session = await begun(place)
+    robot, tablet = await place.robot().dial(), place.tablet(session)
+    await robot.hello()
+    await tablet.watch()
+    with monkeypatch.context() as patch:
+        break_disk(patch)
+        await tablet.say(STOP)
+        await robot.hear("stop")
+        assert (await tablet.sent_away())[0] == 4012
+        assert (await robot.sent_away())[0] == 4011
+        again = await place.tablet(session).dial()  # too early
+        assert (await again.sent_away())[0] in (4011, 4012)
+    assert (await place.tablet(session).watch())["robot_stopped"] is True
+    assert (await (await place.robot().dial()).hello())["stopped"] is True
+    device = {"device": place.devices["tablet"].pk}
+    assert await log_of(session) == [
+        {"kind": "robot_stop", "by": None, "data": device, "after_number": 0}
+    ]
+    await restart()
+    assert (await place.tablet(session).watch())["robot_stopped"] is True
+
+
+async def test_a_stop_holds_where_it_and_the_arming_after_it_are_lost(place, begun, monkeypatch):
+    session = await begun(place)
+    robot, monitor = await place.robot().dial(), place.monitor(session)
+    await robot.hello()
+    await monitor.watch()
+    with monkeypatch.context() as patch:
+        break_disk(patch)
+        await monitor.say(STOP)
+        await monitor.say(ARM)
+        await robot.sent_away()
+    assert "arm" not in [message["type"] for message in robot.heard]
+    assert (await (await place.robot().dial()).hello())["stopped"] is True
+    again = place.monitor(session)
+    assert (await again.watch())["robot_stopped"] is True
+    await again.say(ARM)
+    await again.until(is_stopped(False))
+    assert [row["kind"] for row in await log_of(session)] == ["robot_stop", "robot_arm"]
+
+
+async def test_a_stop_holds_in_a_session_that_is_loaded_before_it_is_stored(
+    place, begun, ready, stall
+):
+    first, second = await begun(place), await ready(place, beside=True)
+    tablet = place.tablet(first)
+    await tablet.watch()
+    stall.begin()
+    await tablet.say(STOP)
+    await turns()
+    live = await runtimes.current().session(second.pk)
+    assert live.robot_stopped
+    stall.end()
+    await live.settled()
+    assert [row["kind"] for row in await log_of(second)] == ["robot_stop"]
+
+
+@pytest.mark.parametrize("opened", ["before", "after"])
+async def test_a_stop_lost_in_one_session_holds_in_the_other_of_its_station(
+    place, begun, ready, monkeypatch, opened
+):
+    first, second = await begun(place), await ready(place, beside=True)
+    here = runtimes.current()
+    live = await here.session(first.pk)
+    if opened == "before":
+        await here.session(second.pk)
+    with monkeypatch.context() as patch:
+        break_disk(patch, first.pk)
+        live.stop_robot(None, NOW, {})  # as a page that has not heard yet that it is dropped
+        with pytest.raises(NotStored):
+            await live.settled()
+    other = await here.session(second.pk)
+    assert other.robot_stopped
+    await other.settled()
+    assert [row["kind"] for row in await log_of(second)] == ["robot_stop"]
+    assert (await here.session(first.pk)).robot_stopped
+
+
+ASKED = [
+    {"type": "change", "kind": "goal", "value": 3.5, "id": "x"},
+    {"type": "change", "kind": "pause", "id": "x"},
+    {"type": "remark", "what": "pain", "id": "x"},
+]
+
+
+@pytest.mark.parametrize("asked", ASKED, ids=["goal", "pause", "remark"])
+async def test_a_stop_waits_for_nothing_that_its_page_asked_for_before(place, begun, stall, asked):
+    session = await begun(place)
+    robot, monitor = await place.robot().dial(), place.monitor(session)
+    await robot.hello()
+    await monitor.watch()
+    stall.begin()
+    await monitor.say(asked)
+    await turns()
+    await monitor.say(STOP)
+    await robot.hear("stop")
+    assert "done" not in [message["type"] for message in await monitor.overhear()]
+    stall.end()
+    await monitor.hear("done")
+    await monitor.until(is_stopped(True))
+
+
+async def test_a_stop_waits_for_no_source_that_ends_with_its_session(place, begun, monkeypatch):
+    session = await begun(place)
+    ended = asyncio.Event()
+
+    async def end_slowly(name: str) -> None:
+        await ended.wait()
+
+    monkeypatch.setattr(runtimes.current().children, "stop", end_slowly)
+    robot, monitor = await place.robot().dial(), place.monitor(session)
+    await robot.hello()
+    await monitor.watch()
+    await monitor.say({"type": "change", "kind": "finish", "id": "x"})
+    await robot.hear("state")
+    await monitor.say(STOP)
+    await robot.hear("stop")
+    ended.set()
+    await monitor.hear("done")
 
 
 async def test_reports_are_shown_and_decisions_and_gestures_kept(place, begun):

@@ -16,6 +16,8 @@ from rehab.sessions.models import TrainingSession
 from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
+from robot.bases.kinematic import KinematicBase
+from robot.performer import Performer
 from tests.sessions.live.callers import SourceCaller, a_step, change, turns
 from tests.world import NOW
 
@@ -294,6 +296,47 @@ async def test_plain_text_is_numbered_and_timed_by_the_server(place, begun, monk
         (3, 1000.5, "left", None, ["missing"], None),
         (4, 1000.5, "left", 2.5, [], False),
     ]
+
+
+@pytest.mark.parametrize("set_s", [0.0, -3600.0, 86_400.0])
+async def test_the_time_of_plain_text_never_runs_backwards(place, begun, monkeypatch, set_s):
+    wall, ours = [1_800_000_000.0], [50.0]
+    clock = SimpleNamespace(monotonic=lambda: ours[0], time=lambda: wall[0])
+    monkeypatch.setattr(source_module, "time", clock)
+    session = await begun(place)
+    source = await place.source().dial()
+    for number in (1, 2):
+        ours[0] += 1.0
+        await source.say("4, 3")
+        await source.acked(number)
+        wall[0] += 1.0 + set_s  # somebody sets the server's clock; a step does not hear of it
+    await source.hang_up()
+    ours[0], wall[0] = 5.0, 1_800_000_003.0 + set_s  # another process, after a restart
+    source = await place.source().dial()
+    for number in (3, 4):
+        await source.say("4, 3")
+        await source.acked(number)
+        ours[0] += 1.0
+    first_s = max(wall[0], 1_800_000_001.0)
+    assert await rows(session, "time_s", "reasons") == [
+        (1_800_000_000.0, []),
+        (1_800_000_001.0, []),
+        (first_s, []),
+        (first_s + 1.0, []),
+    ]
+
+
+async def test_a_robot_answers_plain_text(place, begun):
+    await begun(place)
+    robot = await place.robot().dial()
+    await robot.hello()
+    source = await place.source().dial()
+    await source.say("4.02, 3.0")
+    step = await robot.hear("step")
+    performer = Performer(KinematicBase(lambda: 0.0))
+    performer.hear(robot.heard[0], 0.0)
+    performer.hear(step, 0.0)
+    assert (performer.is_linked, performer.bad_messages) == (True, 0)
 
 
 async def test_the_pts_goal_wins_and_another_one_is_shown_to_the_pt(place, begun):

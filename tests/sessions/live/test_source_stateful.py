@@ -314,7 +314,8 @@ class Sources(RuleBasedStateMachine):
 
     async def _end(self, runtime: runtimes.Runtime) -> None:
         await runtime.loop.run_in_executor(None, runtime.writer.close)
-        runtime._ticker.cancel()
+        for routine in runtime.routines:
+            routine.cancel()
         for caller in list(Caller.open_ones):
             await caller.hang_up()
         self.source = None

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 from asgiref.sync import sync_to_async
 
 from rehab.people.models import Clinic, User
+from rehab.sessions.events import Audience, snapshot
 from rehab.sessions.live import runtime
+from rehab.sessions.live import session as sessions
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.phases import make_phase
 from rehab.training.valences import Cue
+from tests.sessions.live.callers import turns
 from tests.sessions.live.test_robots import restart
+from tests.world import NOW
 
 TWO = (make_phase("training", "First", strides=2), make_phase("training", "Last"))
 
@@ -216,3 +222,70 @@ async def test_a_plan_from_before_today_runs_on(place, begun):
     monitor = place.monitor(session)
     assert [one["slug"] for one in (await monitor.watch())["types"]] == ["positive"]
     assert (await monitor.change("valence", "negative"))["code"] == "refused"
+
+
+# --- beside the socket ----------------------------------------------------------------------------
+
+
+async def test_what_a_page_asks_for_takes_effect_in_its_order(place, begun, stall):
+    session = await begun(place)
+    monitor = place.monitor(session)
+    await monitor.watch()
+    stall.begin()
+    await monitor.say({"type": "change", "kind": "goal", "value": 2.0, "id": "first"})
+    await turns()
+    other = await place.monitor(session).dial()  # joins: what comes now waits for it
+    await turns()
+    kinds = ["pause", "resume", "pause", "resume", "pause"]
+    for index, kind in enumerate(kinds):
+        await monitor.say({"type": "change", "kind": kind, "id": f"c{index}"})
+        await monitor.say({"type": "remark", "what": "borg", "value": index, "id": f"r{index}"})
+    stall.end()
+    await other.hear("snapshot")
+    answers = [await monitor.hear("done") for _ in range(11)]
+    asked = [f"{what}{index}" for index in range(5) for what in "cr"]
+    assert [answer["id"] for answer in answers] == ["first", *asked]
+    rows = SessionEvent.everywhere.filter(session=session).order_by("pk")
+    kept = [row.value if row.kind == "borg" else row.kind async for row in rows]
+    assert kept == ["start", "goal", *[one for pair in enumerate(kinds) for one in pair[::-1]]]
+
+
+async def test_whoever_waits_for_a_viewer_is_not_overtaken(place, begun, monkeypatch):
+    live = await runtime.current().session((await begun(place)).pk)
+    order, tasks = [], []
+
+    async def ask(name):
+        await live.admission()
+        order.append(name)
+
+    def snapshot_meanwhile(*args, **facts):
+        tasks.append(asyncio.create_task(ask("later")))  # not yet begun when the viewer is in
+        return snapshot(*args, **facts)
+
+    monkeypatch.setattr(sessions, "snapshot", snapshot_meanwhile)
+    settled = asyncio.Event()
+    monkeypatch.setattr(live, "settled", settled.wait)
+    monkeypatch.setattr(live, "unwritten", 1)
+    joining = asyncio.create_task(live.join(Audience.PATIENT, take_frame, NOW))
+    await turns()
+    tasks.append(asyncio.create_task(ask("earlier")))
+    await turns()
+    monkeypatch.setattr(live, "unwritten", 0)
+    settled.set()
+    await joining
+    await asyncio.gather(*tasks)
+    assert order == ["earlier", "later"]
+
+
+async def take_frame(text):
+    """Take a frame, and let it be."""
+
+
+async def test_what_was_asked_is_done_though_the_page_goes_at_once(place, begun):
+    session = await begun(place)
+    monitor = place.monitor(session)
+    await monitor.watch()
+    await monitor.say({"type": "change", "kind": "pause", "id": "x"})
+    await monitor.hang_up()
+    await runtime.current().drain()
+    assert len(await events_of(session, "pause")) == 1

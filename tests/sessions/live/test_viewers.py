@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import random
+import threading
+from collections import Counter
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -13,10 +16,11 @@ from django.utils import timezone
 
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.sessions.live import hub
+from rehab.sessions.live import hub, owners
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.live.past import PAGE
+from rehab.sessions.live.session import LiveSession
 from rehab.sessions.log import Remark, SessionEvent
 from rehab.sessions.services import change_session, create_session
 from rehab.training.changes import ChangeKind
@@ -408,6 +412,73 @@ async def test_pages_hear_a_heartbeat(place, begun, monkeypatch):
     tablet = place.tablet(session)
     await tablet.watch()
     await tablet.hear("heartbeat")
+
+
+async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch):
+    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+    disk, database = threading.Event(), asyncio.Event()
+    waiting: set[str] = set()
+
+    def move_log() -> None:
+        waiting.add("checkpoint")
+        assert disk.wait(10)
+
+    def release(*_: Any) -> None:
+        waiting.add("release")
+        assert disk.wait(10)
+
+    async def keep_signed_in(*_: Any) -> None:
+        waiting.add("sign-ins")
+        await database.wait()
+
+    session = await begun(place)
+    robot, tablet = await place.robot().dial(), place.tablet(session)
+    await robot.hello()
+    await tablet.watch()
+    monkeypatch.setattr(runtimes, "_checkpoint", move_log)
+    monkeypatch.setattr(runtimes, "keep_signed_in", keep_signed_in)
+    monkeypatch.setattr(owners, "release", release)
+    await runtimes.current().session((await ready(place, at_station=False)).pk)  # soon idle
+    while len(waiting) < 3:
+        await robot.hear("heartbeat")
+    await robot.overhear()
+    for _ in range(50):
+        await robot.hear("heartbeat")
+    await tablet.overhear()
+    for _ in range(3):
+        await tablet.hear("heartbeat")
+    assert not disk.is_set()
+    disk.set()
+    database.set()
+
+
+async def test_heartbeats_and_housekeeping_go_on_whatever_fails(place, begun, monkeypatch, caplog):
+    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+    failed: Counter[str] = Counter()
+
+    def fail(what: str) -> Callable[..., None]:
+        def failing(*_: Any) -> None:
+            failed[what] += 1
+            raise RuntimeError(what)
+
+        return failing
+
+    session = await begun(place)
+    robot = await place.robot().dial()
+    await robot.hello()
+    for name in ("_checkpoint", "keep_signed_in"):
+        monkeypatch.setattr(runtimes, name, fail(name))
+    with monkeypatch.context() as patch:
+        patch.setattr(LiveSession, "is_watched", property(fail("robots")))
+        patch.setattr(LiveSession, "presence", fail("pages"))
+        patch.setattr(LiveSession, "is_idle", property(fail("idle")))
+        while len(failed) < 5 or min(failed.values()) < 2:  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
+    await robot.overhear()
+    await robot.hear("heartbeat")
+    await place.tablet(session).watch()
+    told = {str(record.exc_info[1]) for record in caplog.records if record.exc_info}
+    assert told == set(failed)
 
 
 # --- pages steer, also from a request's thread ----------------------------------------------------

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import os
+import re
+import shutil
 import socket
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
 from asgiref.sync import sync_to_async
-from django.db import DatabaseError
+from django.db import DatabaseError, connection
 
 from rehab.sessions.live import owners
 from rehab.sessions.live import runtime as runtimes
@@ -218,6 +222,107 @@ def test_a_process_that_has_ended_is_dead_and_this_one_lives():
     assert owners.is_alive(f"{HOST}|{parent}|{owners._started(parent)}")
 
 
+def call_processes(monkeypatch: pytest.MonkeyPatch) -> threading.local:
+    """Let threads stand for processes that all live; each says its name in what this gives."""
+    process = threading.local()
+    monkeypatch.setattr(owners, "my_name", lambda: process.name)
+    monkeypatch.setattr(owners, "is_alive", lambda owner: owner.startswith("process"))
+    return process
+
+
+async def test_of_two_that_claim_a_session_at_once_one_has_it(place, ready, monkeypatch):
+    session = await ready(place)
+    process = call_processes(monkeypatch)
+    one, two = [await reread(session) for _ in range(2)]
+    refresh, refused = TrainingSession.refresh_from_db, list[Any]()
+
+    def refresh_late(read: TrainingSession, *args: Any, **options: Any) -> None:
+        if read is one and not refused:  # the other one comes as the first one reads back
+            process.name = "process|2|0"
+            with pytest.raises(owners.OwnedElsewhere) as problem:
+                owners.claim(two)
+            refused.append(problem)
+            process.name = "process|1|0"
+        refresh(read, *args, **options)
+
+    def claim() -> None:
+        process.name = "process|1|0"
+        owners.claim(one)
+
+    monkeypatch.setattr(TrainingSession, "refresh_from_db", refresh_late)
+    await sync_to_async(claim)()
+    stored = await reread(session)
+    assert (stored.owner, stored.epoch) == ("process|1|0", session.epoch + 1)
+    assert (one.owner, one.epoch) == (stored.owner, stored.epoch)
+    assert refused
+
+
+async def test_of_many_that_claim_a_session_at_once_one_has_it(place, ready, monkeypatch):
+    process, count = call_processes(monkeypatch), 4
+    for _ in range(5):
+        session = await ready(place, at_station=False)
+        together = threading.Barrier(count)
+
+        def claim(
+            number: int, pk: int = session.pk, together: threading.Barrier = together
+        ) -> int | None:
+            process.name = f"process|{number}|0"
+            mine = TrainingSession.everywhere.get(pk=pk)
+            together.wait(10)
+            try:
+                owners.claim(mine)
+            except owners.OwnedElsewhere:
+                return None
+            else:
+                return mine.epoch
+            finally:
+                connection.close()
+
+        with ThreadPoolExecutor(count) as threads:
+            epochs = await asyncio.gather(
+                *(
+                    asyncio.get_running_loop().run_in_executor(threads, claim, n)
+                    for n in range(count)
+                )
+            )
+        assert [epoch for epoch in epochs if epoch is not None] == [session.epoch + 1]
+        await own(session, "")
+
+
+FAKE_PS = """#!/bin/sh
+test "$*" = "-o lstart= -p {pid}" || exit 1
+echo "$LC_ALL $TZ  {when}  "
+"""
+
+
+def test_where_no_folder_tells_of_processes_ps_tells_when_they_started(tmp_path, monkeypatch):
+    monkeypatch.setattr(owners, "PROCESSES", tmp_path / "none")
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    pid = os.getppid()
+    ps = tmp_path / "ps"
+    ps.write_text(FAKE_PS.format(pid=pid, when="Sat Nov  7 09:05:01 2026"))
+    ps.chmod(0o755)
+    started = owners._started(pid)
+    assert started == "C UTC Sat Nov 7 09:05:01 2026"
+    owner = f"{HOST}|{pid}|{started}"
+    assert owners.is_alive(owner)
+    # After a crash and a restart of the computer the number is another process's.
+    ps.write_text(FAKE_PS.format(pid=pid, when="Sun Nov  8 08:00:00 2026"))
+    assert not owners.is_alive(owner)
+    assert owners._started(1) == ""
+    ps.unlink()
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert owners._started(pid) == ""
+
+
+@pytest.mark.skipif(shutil.which("ps") is None, reason="this machine has no ps")
+def test_what_the_real_ps_tells(tmp_path, monkeypatch):
+    monkeypatch.setattr(owners, "PROCESSES", tmp_path / "none")
+    started = owners._started(os.getpid())
+    assert re.fullmatch(r"\w{3} \w{3} \d{1,2} [\d:]{8} \d{4}", started)
+    assert owners._started(dead_pid()) == ""
+
+
 async def own(session: TrainingSession, owner: str) -> None:
     await TrainingSession.everywhere.filter(pk=session.pk).aupdate(owner=owner)
 
@@ -268,6 +373,35 @@ async def test_sessions_left_running_come_back_paused_and_complete(place, begun,
     tablet = place.tablet(session)
     assert (await tablet.watch())["score"] == 6
     assert await runtimes.current().recover() == 0
+
+
+async def test_a_session_that_was_given_up_in_good_order_goes_on(place, begun):
+    session = await begun(place)
+    await runtimes.current().drain()
+    runtimes._current = None
+    source = await place.source().dial()
+    assert (await source.hello())["state"] == "running"
+    assert not await SessionEvent.everywhere.filter(session=session, kind="pause").aexists()
+
+
+async def test_a_session_of_a_dead_server_is_paused_by_whoever_takes_it_over(
+    place, begun, stall, caplog
+):
+    session = await left_running(place, begun, 3)
+    stall.problem = DatabaseError("disk")
+    source = await place.source().dial()
+    await source.say({"type": "hello", "version": 1, "run": "r1", "last": 3})
+    assert (await source.sent_away())[0] == 4011
+    stall.problem = None
+    assert (await reread(session)).owner == owners.my_name()
+    source = await place.source().dial()
+    welcome = await source.hello()
+    assert (welcome["state"], welcome["next"]) == ("paused", 4)
+    assert f"Session {session.pk} was left running" in caplog.text
+    events = SessionEvent.everywhere.filter(session=session, kind="pause")
+    assert [event.data async for event in events] == [{"value": "restart"}]
+    await change(session, "resume")
+    await source.walk(4.0)
 
 
 async def test_a_session_that_runs_elsewhere_is_left_alone(place, begun, settings):

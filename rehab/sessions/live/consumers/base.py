@@ -146,10 +146,19 @@ class Socket(AsyncWebsocketConsumer):
 
     def start(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run a task that lives as long as the socket."""
+        return self._run(work, self._tasks)
+
+    def see_through(self, work: Coroutine[Any, Any, None]) -> None:
+        """Run a task to its end, even if the socket closes meanwhile."""
+        self._run(work, self.runtime.asked)
+
+    def _run(
+        self, work: Coroutine[Any, Any, None], among: set[asyncio.Task[None]]
+    ) -> asyncio.Task[None]:
         # The socket's own context: asgiref's marks of a page that caused this have no place here.
         task = self.runtime.loop.create_task(self._guard(work), context=self._context)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        among.add(task)
+        task.add_done_callback(among.discard)
         task.add_done_callback(lambda _: work.close())  # for one cancelled before it began
         return task
 

@@ -103,11 +103,10 @@ class DeviceSocket(Socket):
 
     async def _attach(self, session_id: int) -> None:
         try:
-            live = await self.runtime.session(session_id)
+            # Admitted, too: from its place on until its welcome nothing may come between.
+            live = await self.runtime.admitted(session_id)
         except OwnedElsewhere as problem:
             raise Closing(4409, "busy", str(problem)) from None
-        # Here, not later: from its place on until its welcome nothing may come between.
-        await live.admission()
         other: Peer | None = getattr(live, self.slot)
         if other is not None and other is not self:
             if other.device_id != self.device_id:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+from collections.abc import Awaitable
 from typing import ClassVar
 from urllib.parse import parse_qs
 
@@ -35,7 +36,7 @@ from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.past import read_steps
 from rehab.sessions.live.session import LiveSession, NotStored
 from rehab.stations.models import Device
-from rehab.training.changes import ENDED, ChangeKind, PauseReason
+from rehab.training.changes import ChangeKind, PauseReason
 from rehab.training.measures import InvalidSetting
 
 
@@ -51,6 +52,7 @@ class ScreenConsumer(Socket):
     robot_orders: ClassVar[tuple[str, ...]] = ("stop",)
     tablet_changes: ClassVar[frozenset[ChangeKind]] = frozenset()
     viewer: Viewer | None = None
+    language = settings.LANGUAGE_CODE
 
     async def opened(self) -> None:
         """Let the right people in and begin to send."""
@@ -67,6 +69,10 @@ class ScreenConsumer(Socket):
         if isinstance(self.actor, Device):
             live.tablets += 1
             live.tablet_heard_at = timezone.now()
+        self.language = live.actor.fold.plan.language  # what the patient reads
+        if self.audience is Audience.MONITOR and isinstance(self.actor, User):
+            theirs = await database_sync_to_async(language_of)(self.actor)
+            self.language = theirs or settings.LANGUAGE_CODE
         self.start(self._pump(live, _after(self.scope["query_string"])))
         self.runtime.notes.add(Act.VIEW, self.actor, session_id, self.scope)
 
@@ -144,22 +150,7 @@ class ScreenConsumer(Socket):
         if kind not in (self.changes if by else self.tablet_changes):
             await self._refuse(mark, "refused", "That is changed on the therapist's page.")
             return
-        try:
-            await self.runtime.change(live.id, kind, value, by)
-        except InvalidSetting as problem:
-            await self._refuse(mark, "refused", await self._in_words(live, problem))
-        except NotStored as problem:
-            await self._refuse(mark, "not_stored", str(problem))
-        else:
-            await self.say({"type": "done", "id": mark})
-
-    async def _in_words(self, live: LiveSession, problem: InvalidSetting) -> str:
-        """Say a refusal in the language of the page: the patient's, or that of whoever steers."""
-        language = live.actor.fold.plan.language
-        if self.audience is Audience.MONITOR and isinstance(self.actor, User):
-            language = await database_sync_to_async(language_of)(self.actor)
-        with override(language or settings.LANGUAGE_CODE):
-            return in_words(problem)
+        self.see_through(self._answer(mark, self.runtime.change(live.id, kind, value, by)))
 
     async def _remark(self, message: Message) -> None:
         mark = read_name(message, "id")
@@ -169,15 +160,27 @@ class ScreenConsumer(Socket):
             raise Closing(4004, "not_open", "The session is not open. Connect again.")
         if self.audience is not Audience.MONITOR or not isinstance(by, User):
             await self._refuse(mark, "refused", "That is noted on the therapist's page.")
-        elif live.actor.fold.state in ENDED:
-            await self._refuse(mark, "refused", "The session has ended.")
+            return
+        self.see_through(self._answer(mark, self.runtime.remark(live.id, what, value, by)))
+
+    async def _answer(self, mark: str, work: Awaitable[None]) -> None:
+        """Say what became of something that was asked for, once it is stored or refused.
+
+        Beside the socket, whose next frame may be a stop; and to its end if the page goes.
+        """
+        try:
+            await work
+        except InvalidSetting as problem:
+            await self._refuse(mark, "refused", self._in_words(problem))
+        except NotStored as problem:
+            await self._refuse(mark, "not_stored", str(problem))
         else:
-            try:
-                await live.remark(what, value, by, timezone.now())
-            except NotStored as problem:
-                await self._refuse(mark, "not_stored", str(problem))
-            else:
-                await self.say({"type": "done", "id": mark})
+            await self.say({"type": "done", "id": mark})
+
+    def _in_words(self, problem: InvalidSetting) -> str:
+        """Say a refusal in the page's language."""
+        with override(self.language):
+            return in_words(problem)
 
     async def _order_robot(self, message: Message) -> None:
         """Stop the robot, whoever asks; let it move again where a person asks."""

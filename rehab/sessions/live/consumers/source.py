@@ -34,6 +34,7 @@ class SourceConsumer(DeviceSocket):
     kind = Device.Kind.SOURCE
     slot = "source"
     lateness: Lateness
+    plain_s: float | None = None  # what plain text is timed by, when our clock shows 0
 
     async def heard(self, text: str | None) -> None:
         """Deal with a frame of the protocol, or with the original's plain text."""
@@ -136,7 +137,21 @@ class SourceConsumer(DeviceSocket):
         if goal is not None and goal != fold.goal:
             live.channel.publish(source_goal_event(fold, goal))
         side = Side(fold.plan.trained_side)
-        live.take(Measurement(live.next_number, time.time(), side, value), timezone.now())
+        time_s = self._time_plain(fold.last_time_s)
+        live.take(Measurement(live.next_number, time_s, side, value), timezone.now())
+
+    def _time_plain(self, last_s: float | None) -> float:
+        """Time a text: in Unix time as it was with the first one, by a clock that nobody sets.
+
+        Never before the last step of the log, which another run of this server or another source
+        may have timed: phases, windows and rest go on from there.
+        """
+        now_s = time.monotonic()
+        if self.plain_s is None:
+            self.plain_s = time.time() - now_s
+        if last_s is not None:
+            self.plain_s = max(self.plain_s, last_s - now_s)
+        return self.plain_s + now_s
 
     async def _complain(self, code: str, message: str) -> None:
         await self.say({"type": "error", "code": code, "message": message})
