@@ -260,6 +260,9 @@ STORAGES = {
     },
 }
 DATA_UPLOAD_MAX_MEMORY_SIZE = 2 * 1024 * 1024  # the server hangs up on anything longer
+DATA_UPLOAD_MAX_NUMBER_FIELDS = (
+    5000  # a leaderboard's form says itself how many patients are too many
+)
 DATA_UPLOAD_MAX_NUMBER_FILES = 0  # no page takes any
 
 # --- browsers -----------------------------------------------------------------------------------

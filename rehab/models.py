@@ -5,6 +5,7 @@ from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.people.audit import AuditEntry
 from rehab.people.consent import Consent, ConsentText
+from rehab.people.erased import ErasedOriginal
 from rehab.people.factors import Authenticator, RecoveryCode
 from rehab.people.history import HistoryEntry
 from rehab.people.models import Clinic, Patient, User
@@ -47,6 +48,7 @@ __all__ = [
     "Consent",
     "ConsentText",
     "Device",
+    "ErasedOriginal",
     "FeedbackBand",
     "FeedbackType",
     "Gesture",

@@ -16,9 +16,10 @@ from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.people.audit import AuditEntry
 from rehab.people.consent import Consent, ConsentText, Purpose, give
+from rehab.people.erased import ErasedOriginal
 from rehab.people.factors import Authenticator, RecoveryCode
 from rehab.people.history import HistoryEntry
-from rehab.people.models import Clinic, Patient, User
+from rehab.people.models import Boards, Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.tokens import ApiToken
 from rehab.sessions.corrections import SessionCorrection
@@ -70,6 +71,13 @@ class World:
 def scoped_models() -> list[type[Any]]:
     """Give every model of the app, found by itself."""
     return list(apps.get_app_config("rehab").get_models())
+
+
+def agreeing(patient: Patient) -> Patient:
+    """Give a patient who agrees to stand on the boards that are set."""
+    if patient.boards != Boards.OWN:
+        give(patient, Purpose.BOARDS, None, NOW, patient.boards)
+    return patient
 
 
 def store(actor: SessionActor, rows: list[Row]) -> None:
@@ -135,7 +143,8 @@ def build_world(name: str) -> World:
     )
     text = ConsentText.everywhere.create(clinic=clinic, version=1, text=mark(name, ConsentText))
     for purpose in (Purpose.BOARDS, Purpose.RESEARCH):
-        give(patient, purpose, people[Role.PT], NOW)
+        level = patient.boards if purpose == Purpose.BOARDS else ""
+        give(patient, purpose, people[Role.PT], NOW, level)
     session = create_session(
         patient,
         valence="positive",
@@ -216,6 +225,7 @@ def build_world(name: str) -> World:
         ),
         RecoveryCode.everywhere.create(user=people[Role.PT], digest=mark(name, RecoveryCode)),
         LeaveTries.everywhere.create(station=station, who=f"tablet {device.pk}", open_at=NOW),
+        ErasedOriginal.everywhere.create(clinic=clinic, mark=mark(name, ErasedOriginal)),
         Visit.everywhere.create(clinic=clinic, patient=patient, day=NOW.date()),
         Pairing.everywhere.create(
             code=f"P{clinic.pk}",
@@ -234,12 +244,14 @@ def fill_board(world: World) -> None:
     session.refresh_from_db()
     columns = [f.attname for f in TrainingSession._meta.concrete_fields if f.attname not in shared]
     for number in range(2, 6):
-        patient = Patient.everywhere.create(
-            clinic=world.clinic,
-            code=f"{mark(world.name, Patient)}{number}",
-            nickname=mark(world.name, Patient),
-            paretic_side="left",
-            boards="clinic",
+        patient = agreeing(
+            Patient.everywhere.create(
+                clinic=world.clinic,
+                code=f"{mark(world.name, Patient)}{number}",
+                nickname=mark(world.name, Patient),
+                paretic_side="left",
+                boards="clinic",
+            )
         )
         walked = TrainingSession.everywhere.create(
             clinic=world.clinic,

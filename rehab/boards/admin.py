@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import datetime
 from typing import Any
 
 from django import forms
@@ -15,6 +16,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.boards import entries
+from rehab.boards.figures import Figure, group_of, read_figures
 from rehab.boards.forms import LeaderboardForm
 from rehab.boards.models import Leaderboard
 from rehab.boards.showing import Viewer
@@ -103,9 +105,11 @@ class LeaderboardAdmin(PreviewAdmin):
         return super().formfield_for_choice_field(db_field, request, **kwargs)
 
     def formfield_for_manytomany(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
-        """Let a group be ticked."""
+        """Let a group be ticked, of those who are not erased."""
         kwargs["widget"] = forms.CheckboxSelectMultiple()
-        return super().formfield_for_manytomany(db_field, request, **kwargs)
+        field: Any = super().formfield_for_manytomany(db_field, request, **kwargs)
+        field.queryset = field.queryset.filter(erased_at=None)
+        return field
 
     def get_changeform_initial_data(self, request: HttpRequest) -> dict[str, Any]:
         """Begin with a board that can be saved."""
@@ -140,7 +144,8 @@ class LeaderboardAdmin(PreviewAdmin):
 
     def _viewer(self, request: HttpRequest, board: Leaderboard) -> Viewer:
         """Give the eyes to see it with: a patient's after the newest session, or anybody's."""
-        anybody = Viewer(board, timezone.now(), stored=False)
+        now = timezone.now()
+        anybody = Viewer(board, now, made=self._make(board, now))
         if board.moment == Leaderboard.Moment.WAITING:
             return anybody
         finished = TrainingSession.objects.visible_to(request.user).filter(
@@ -156,6 +161,17 @@ class LeaderboardAdmin(PreviewAdmin):
             patient = walkers.filter(pk=typical or 0).first() or walkers.first()
         session = newest.filter(patient=patient).first()
         return replace(anybody, patient=patient, session=session)
+
+    def _make(self, board: Leaderboard, now: datetime) -> list[Figure] | None:
+        """Make the rows that a board would have; None where those that are stored are these."""
+        saved = Leaderboard.everywhere.filter(pk=board.pk, built_to=None).first()
+        if (
+            saved is not None
+            and saved.makings == board.makings
+            and (not board.has_group or set(group_of(saved)) == set(group_of(board)))
+        ):
+            return None
+        return [] if board.is_own else list(read_figures(board, now))
 
     def _walkers(self, request: HttpRequest) -> QuerySet[Patient]:
         """Give the patients who have walked, those who agreed to boards first."""

@@ -3,7 +3,7 @@
 SQLite lets one writer in at a time, and what patients walk must be stored meanwhile: a step's
 commit waits for one batch at most. How far it has come is stored with each batch (`entries.py`), so
 that a server that was stopped goes on where it was; several may build at once. A board is not shown
-before it is built.
+before it is built, nor while many of its rows are those of another day.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ import atexit
 import logging
 import threading
 import time
+from collections.abc import Callable
+from datetime import datetime
 
 from django.db import connection, transaction
 from django.utils import timezone
@@ -26,6 +28,9 @@ HOLD_S = 0.015  # what a batch should take; its size follows from what the last 
 # Between two batches [s]. Who waits for SQLite looks every 5 to 25 ms.
 PAUSE_S = 0.025
 FIRST, FEWEST, MOST = 20, 10, 1_000  # patients a batch
+
+
+Step = Callable[[int], bool]  # works off so many patients at most; gives whether there are more
 
 
 class Builder:
@@ -55,10 +60,8 @@ class Builder:
 
     def _run(self) -> None:
         try:
-            while self._is_to_go_on():
-                board_id = entries.find_unbuilt()
-                if board_id is not None:
-                    self._build(board_id)
+            while (step := self._next()) is not None:
+                self._go(step)
         except Exception:  # a look at the board, or the next start, tries again
             log.exception("A board could not be built")
             with self._lock:
@@ -66,24 +69,41 @@ class Builder:
         finally:
             connection.close()
 
-    def _is_to_go_on(self) -> bool:
-        with self._lock:
-            if self._ends.is_set() or not (self._is_wanted or entries.find_unbuilt()):
-                self._thread = None
-                return False
-            self._is_wanted = False
-            return True
+    def _next(self) -> Step | None:
+        """Give what is to be done. Looks again where somebody asked meanwhile."""
+        while True:
+            with self._lock:
+                if self._ends.is_set() or not self._is_wanted:
+                    self._thread = None
+                    return None
+                self._is_wanted = False
+            step = find_step()
+            if step is not None:
+                with self._lock:
+                    self._is_wanted = True  # there may be more after it
+                return step
 
-    def _build(self, board_id: int) -> None:
+    def _go(self, step: Step) -> None:
         most, more = FIRST, True
         while more and not self._ends.is_set():
             began = time.perf_counter()
-            more = entries.advance(board_id, most, timezone.now())
+            more = step(most)
             held_s = time.perf_counter() - began
             most = max(FEWEST, min(MOST, round(most * min(2.0, HOLD_S / held_s))))
             self._ends.wait(max(held_s, PAUSE_S))
         if not more:
             entries.tidy()
+
+
+def find_step() -> Step | None:
+    """Give what works off so many patients of a board that is to be built, or caught up with."""
+    board_id = entries.find_unbuilt()
+    if board_id is not None:
+        return lambda most: entries.advance(board_id, most, timezone.now())
+    outdated = entries.find_outdated(timezone.now(), FEW)
+    if outdated is not None:
+        return lambda most: entries.refresh_stale(outdated, most, timezone.now())
+    return None
 
 
 builder = Builder()
@@ -95,5 +115,40 @@ def rebuild(board: Leaderboard) -> None:
     if len(entries.next_patients(board, 0, FEW + 1)) <= FEW:
         entries.refresh(board)
     else:
-        entries.begin(board)
-        transaction.on_commit(lambda: builder.wake())  # noqa: PLW0108 (looked up when it is time)
+        _begin(board)
+
+
+def follow(board: Leaderboard, patients: set[int] | None = None) -> None:
+    """Let a board follow what decides who may stand on it: for some patients, or (None) all."""
+    if patients is not None and len(patients) <= FEW:
+        entries.refresh(board, patients)
+    elif entries.is_snapshot(board, timezone.now()):
+        entries.thin_out(board)
+    else:
+        rebuild(board)
+
+
+def heal(patients: set[int]) -> None:
+    """Have the boards built that did not follow what some patients walked."""
+    now = timezone.now()
+    for board in entries.boards_of(entries.clinics_of(patients)):
+        if not entries.is_snapshot(board, now):
+            _begin(board)
+
+
+def catch_up(board: Leaderboard, now: datetime) -> bool:
+    """Bring the rows up to date that time has altered; False where those are many: they are then
+    made beside, and the board is not shown meanwhile.
+    """
+    stale = entries.find_stale(board, now, FEW + 1)
+    if len(stale) > FEW:
+        builder.wake()
+        return False
+    if stale:
+        entries.refresh(board, stale, now, corrected=True)
+    return True
+
+
+def _begin(board: Leaderboard) -> None:
+    entries.begin(board)
+    transaction.on_commit(lambda: builder.wake())  # noqa: PLW0108 (looked up when it is time)

@@ -4,6 +4,9 @@ Rows are written here only, each together with the count of its figure. What alt
 that ends or is taken away, a patient who agrees or no longer does, a board that is built, and the
 calendar. The same rows come out whether they were kept up or are made anew; a test compares.
 
+Once its last day is over, a frozen board is a snapshot: nobody enters it, and rows only leave, or
+follow a correction of what they are made of.
+
 A board of many is built by `building.py`, some patients at a time; what happens to a patient
 meanwhile is kept up as ever.
 """
@@ -15,37 +18,50 @@ from collections.abc import Collection, Iterable
 from datetime import datetime
 
 from django.db import connection, transaction
-from django.db.models import Q, QuerySet
+from django.db.models import Count, Q, QuerySet
 from django.utils import timezone
 
 from rehab.boards.figures import Figure, read_figures, standing_on
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
-from rehab.boards.periods import period_of
+from rehab.boards.periods import is_over, last_day_of
 from rehab.people.models import Patient
 
 AT_ONCE = 2_000  # patients a transaction, where nobody waits beside it
 
 
-def boards_of(clinic_id: int | None) -> QuerySet[Leaderboard]:
-    """Give the boards that patients of a clinic can have rows on."""
-    boards = Leaderboard.everywhere.filter(Q(clinic=clinic_id) | Q(clinic=None), active=True)
-    return boards.exclude(among=Leaderboard.Among.SELF).select_related("clinic")
+def boards_of(clinics: Iterable[int]) -> QuerySet[Leaderboard]:
+    """Give the boards that patients of some clinics can have rows on, each once.
+
+    In one order for everyone: who writes rows locks boards in it, so that no two wait crosswise.
+    """
+    boards = Leaderboard.everywhere.filter(Q(clinic__in=clinics) | Q(clinic=None), active=True)
+    return boards.exclude(among=Leaderboard.Among.SELF).order_by("pk")
 
 
-def refresh_patients(patients: Collection[int], now: datetime | None = None) -> None:
+def clinics_of(patients: Collection[int]) -> set[int]:
+    """Give the clinics of some patients."""
+    return set(Patient.everywhere.filter(pk__in=patients).values_list("clinic_id", flat=True))
+
+
+def refresh_patients(
+    patients: Collection[int], now: datetime | None = None, *, corrected: bool = False
+) -> None:
     """Bring the rows of some patients up to date, on every board that they can be on."""
-    clinics = set(Patient.everywhere.filter(pk__in=patients).values_list("clinic_id", flat=True))
-    for clinic_id in clinics:
-        for board in boards_of(clinic_id):
-            refresh(board, patients, now)
+    for board in boards_of(clinics_of(patients)):
+        refresh(board, patients, now, corrected=corrected)
 
 
 def refresh(
-    board: Leaderboard, patients: Collection[int] | None = None, now: datetime | None = None
+    board: Leaderboard,
+    patients: Collection[int] | None = None,
+    now: datetime | None = None,
+    *,
+    corrected: bool = False,
 ) -> None:
     """Bring a board's rows up to date: those of some patients, or (None) all.
 
-    One at a time for each board, so that no two writers count the same row.
+    One at a time for each board, so that no two writers count the same row. ``corrected``: what
+    the rows are made of was wrong, so that those of a snapshot follow.
     """
     now = now or timezone.now()
     if patients is None:
@@ -58,13 +74,31 @@ def refresh(
         locked = _lock(board.pk)
         if locked is None:
             return
-        before, after = _replace(board, patients, now)
+        before, after = _replace(locked, patients, now, corrected=corrected)
         if locked.built_to is not None:  # those beyond are counted when building comes there
             before = [row for row in before if row.patient_id <= locked.built_to]
             after = [row for row in after if row.patient_id <= locked.built_to]
         changed = _tally(after)
         changed.subtract(_tally(before))
-        _count(board, changed)
+        _count(locked, changed)
+
+
+def is_snapshot(board: Leaderboard, now: datetime) -> bool:
+    """Whether a board's rows are what they were when it was frozen, and stay so."""
+    return board.built_to is None and board.active and not board.is_own and is_over(board, now)
+
+
+def thin_out(board: Leaderboard) -> None:
+    """Take off a snapshot who may no longer stand on it, and count its rows anew."""
+    with transaction.atomic():
+        locked = _lock(board.pk)
+        if locked is None or locked.built_to is not None:
+            return  # building does as much
+        rows = BoardEntry.everywhere.filter(board=locked)
+        rows.exclude(patient__in=standing_on(locked)).delete()
+        BoardCount.everywhere.filter(board=locked).delete()
+        alike = rows.order_by().values_list("valence", "figure").annotate(rows=Count("pk"))
+        _count(locked, Counter({(valence, figure): number for valence, figure, number in alike}))
 
 
 def begin(board: Leaderboard) -> None:
@@ -99,6 +133,12 @@ def find_unbuilt() -> int | None:
     return unbuilt.values_list("pk", flat=True).first()
 
 
+def find_outdated(now: datetime, few: int) -> int | None:
+    """Give a board of which time has altered more than a few rows."""
+    boards = Leaderboard.everywhere.filter(active=True).select_related("clinic").order_by("pk")
+    return next((board.pk for board in boards if len(find_stale(board, now, few + 1)) > few), None)
+
+
 def measure_progress(board: Leaderboard) -> int | None:
     """Give how much of a board is built, in percent; None where all is."""
     if board.built_to is None:
@@ -108,7 +148,10 @@ def measure_progress(board: Leaderboard) -> int | None:
 
 
 def _lock(board_id: int) -> Leaderboard | None:
-    """Give a board, if it is still there, and let nobody else write its rows until the commit."""
+    """Give a board as it is now, if it is still there; nobody else writes its rows meanwhile.
+
+    Its clinic is read afterwards: both are what they were when the lock was had, not before.
+    """
     return Leaderboard.everywhere.select_for_update().filter(pk=board_id).first()
 
 
@@ -126,22 +169,39 @@ def _has_rows(board: Leaderboard) -> bool:
     return board.active and not board.is_own
 
 
-def refresh_stale(board: Leaderboard, now: datetime) -> None:
-    """Bring the rows up to date that time has altered: a session has left the period."""
-    today = period_of(board, now).day_of(now)
+def find_stale(board: Leaderboard, now: datetime, most: int) -> set[int]:
+    """Give patients whose rows time has altered: a session has left the period. So many rows."""
+    today = last_day_of(board, now)
     stale = BoardEntry.everywhere.filter(board=board, stale_on__lte=today)
-    while patients := set(stale.values_list("patient_id", flat=True)[:AT_ONCE]):
-        refresh(board, patients, now)
+    return set(stale.values_list("patient_id", flat=True)[:most])
+
+
+def refresh_stale(board_id: int, most: int, now: datetime) -> bool:
+    """Bring so many of those rows up to date; give whether there may be more."""
+    board = Leaderboard.everywhere.filter(pk=board_id).first()
+    patients = find_stale(board, now, most) if board else set()
+    if board and patients:
+        refresh(board, patients, now, corrected=True)
+    return bool(patients)
 
 
 def _replace(
-    board: Leaderboard, patients: Collection[int], now: datetime
+    board: Leaderboard, patients: Collection[int], now: datetime, *, corrected: bool = False
 ) -> tuple[list[BoardEntry], list[BoardEntry]]:
     """Make the rows of some patients anew; give those that were there and those that are."""
     rows = BoardEntry.everywhere.filter(board=board, patient__in=patients)
     before = {(row.patient_id, row.valence): row for row in rows}
-    figures = read_figures(board, now, patients) if _has_rows(board) else ()
-    after = {(row.patient_id, row.valence): make_entry(board, row) for row in figures}
+    snapshot = is_snapshot(board, now)
+    after: dict[tuple[int, str], BoardEntry] = {}
+    if snapshot and not corrected:
+        known = {patient for patient, _valence in before}
+        stay = set(standing_on(board).filter(pk__in=known).values_list("pk", flat=True))
+        after = {key: row for key, row in before.items() if key[0] in stay}
+    elif _has_rows(board):
+        figures = read_figures(board, now, patients)
+        after = {(row.patient_id, row.valence): make_entry(board, row) for row in figures}
+        if snapshot:
+            after = {key: row for key, row in after.items() if key in before}
     gone = [row.pk for key, row in before.items() if _alters(row, after.get(key))]
     new = [row for key, row in after.items() if _alters(row, before.get(key))]
     if gone:

@@ -9,11 +9,13 @@ from datetime import date, datetime
 from itertools import groupby
 from typing import Any
 
-from django.db.models import QuerySet
+from django.db.models import CharField, Q, QuerySet
+from django.db.models.functions import Cast
 
 from rehab.boards.models import Leaderboard
 from rehab.boards.periods import Period, period_of
 from rehab.boards.rules import TYPED
+from rehab.people.consent import Purpose, agreed
 from rehab.people.models import Patient
 from rehab.sessions.log import SessionMetric
 from rehab.training.changes import State
@@ -93,10 +95,11 @@ def read_own(board: Leaderboard, patient: Patient, valence: str, now: datetime) 
 def standing_on(board: Leaderboard) -> QuerySet[Patient]:
     """Give the patients who may stand on a board of several."""
     patients = Patient.everywhere.filter(boards__in=board.agreed, blinded=False)
+    patients = patients.filter(Q(simulated=True) | agreed(Purpose.BOARDS))
     if board.among == Leaderboard.Among.ACROSS:
         return patients.filter(clinic__boards_across=True)
     patients = patients.filter(clinic=board.clinic_id)
-    return patients.filter(pk__in=group_of(board)) if board.among == "group" else patients
+    return patients.filter(pk__in=group_of(board)) if board.has_group else patients
 
 
 def group_of(board: Leaderboard) -> list[int]:
@@ -116,7 +119,8 @@ def _read(board: Leaderboard, rows: QuerySet[SessionMetric], period: Period) -> 
     if board.types != Leaderboard.Types.ALL or {board.metric, board.tie_breaker} & TYPED:
         rows = rows.filter(session__changed_to="")  # one of several types is of none
     if board.slugs:
-        rows = rows.filter(session__valence__in=board.slugs)
+        rows = rows.alias(kind=Cast("session__valence", CharField()))
+        rows = rows.filter(kind__in=board.slugs)
     if period.began is not None:
         rows = rows.filter(session__started_at__gte=period.began)
     if period.ended is not None:
@@ -124,10 +128,13 @@ def _read(board: Leaderboard, rows: QuerySet[SessionMetric], period: Period) -> 
     wanted = {board.metric, board.tie_breaker, "steps", "active_minutes"} - {""}
     facts = ["session_id", "session__patient_id", "session__valence", "session__started_at"]
     facts += ["slug", "value"]
-    if board.metric in TYPED:
+    if {board.metric, board.tie_breaker} & TYPED:
         facts.append("session__plan__valence__miss_points")
+    # Types and slugs are cast so that SQLite does not choose their indexes: these lead through
+    # everybody's sessions and figures, where those of some patients are wanted.
     ordered = (
-        rows.filter(slug__in=wanted)
+        rows.alias(what=Cast("slug", CharField()))
+        .filter(what__in=wanted)
         .order_by("session__patient_id", "session__started_at", "session_id")
         .values_list(*facts)
     )
@@ -139,7 +146,9 @@ def _read(board: Leaderboard, rows: QuerySet[SessionMetric], period: Period) -> 
         if board.metric in values and counts(board, values):
             cost = -(own[0][6] or 0) if len(facts) > 6 else 0
             day = period.day_of(at)
-            yield Walked(session_id, patient_id, valence, at, day, values, cost)
+            walked = Walked(session_id, patient_id, valence, at, day, values, cost)
+            if not keeps(board.metric, valence) or measure(walked, board.metric)[1] > 0:
+                yield walked
 
 
 def counts(board: Leaderboard, values: dict[str, float]) -> bool:
@@ -150,12 +159,17 @@ def counts(board: Leaderboard, values: dict[str, float]) -> bool:
 
 
 def measure(walked: Walked, slug: str) -> tuple[float, float]:
-    """Give a session's figure in the unit that is shown, and what could be kept of it (or 0)."""
+    """Give a session's figure in the unit that is shown, and what could be kept of it (or 0).
+
+    Of what was lost nothing is told where it is not known what was at stake: imported sessions have
+    points, and may have no steps.
+    """
     value = walked.values.get(slug, 0.0) * (100 if slug in SHARES else 1)
     if not keeps(slug, walked.valence):
         return value, 0.0
     steps = 100 if slug == "points_per_100_steps" else walked.values.get("steps", 0)
-    return walked.cost * steps + value, walked.cost * steps
+    stake = walked.cost * steps
+    return (stake + value if stake else 0.0), stake
 
 
 def keeps(slug: str, valence: str) -> bool:

@@ -11,6 +11,8 @@ from rehab.boards.models import Leaderboard
 from rehab.people.admin_base import ClinicForm
 from rehab.training.valences import VALENCES
 
+MOST_IN_GROUP = 1_000  # the preview's address names each, and servers refuse those beyond 16 kB
+
 
 class LeaderboardForm(ClinicForm):
     """All of a board on one page; what is left as it is makes a safe one."""
@@ -23,7 +25,7 @@ class LeaderboardForm(ClinicForm):
     )
 
     def clean(self) -> dict[str, Any]:
-        """Refuse a group that is too small ever to be shown."""
+        """Refuse a group that is too small ever to be shown, or too large to be sent."""
         cleaned: dict[str, Any] = super().clean() or self.cleaned_data
         group = cleaned.get("group")
         if group is not None:
@@ -32,4 +34,7 @@ class LeaderboardForm(ClinicForm):
         if cleaned.get("among") == Leaderboard.Among.GROUP and len(group or []) < fewest:
             few = _("Choose at least %(fewest)d patients.") % {"fewest": fewest}
             self.add_error("group", few)
+        elif len(group or []) > MOST_IN_GROUP:
+            many = _("Choose at most %(most)d patients, or all of the clinic.")
+            self.add_error("group", many % {"most": MOST_IN_GROUP})
         return cleaned

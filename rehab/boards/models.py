@@ -17,6 +17,22 @@ from rehab.people.scope import ClinicRow, Scope, ScopedModel
 from rehab.training.metrics import METRICS
 from rehab.training.valences import VALENCES
 
+# How rows are shown, and when. All else of a board decides what its rows are.
+SHOWN_BY = frozenset(
+    {
+        "name",
+        "display",  # but whose agreement it takes: `agreed`
+        "top_n",
+        "total_goal",
+        "show_ranks",
+        "ties",
+        "names",
+        "min_participants",
+        "moment",
+        "built_to",
+    }
+)
+
 METRIC_LABELS = {
     "hit_rate": _("Steps at the goal (%)"),
     "mean_performance": _("Mean step, in % of the own goal"),
@@ -164,7 +180,10 @@ class Leaderboard(ClinicRow):
         _("frozen on"),
         null=True,
         blank=True,
-        help_text=_("The board stays as it was at the end of this day: for a report."),
+        help_text=_(
+            "For a report: the board stays as it was at the end of this day. Nobody enters it "
+            "afterwards, and who leaves the boards leaves it."
+        ),
     )
     display = models.CharField(
         _("rows"), max_length=16, choices=Display.choices, default=Display.NEIGHBORS
@@ -239,6 +258,13 @@ class Leaderboard(ClinicRow):
     def __str__(self) -> str:
         return self.name
 
+    def save(self, *args: Any, **kwargs: Any) -> None:
+        """Save the board, but not how far its rows are built: that may go on meanwhile."""
+        if not self._state.adding and kwargs.get("update_fields") is None:
+            names = {field.name for field in self._meta.concrete_fields if not field.primary_key}
+            kwargs["update_fields"] = names - {"built_to"}
+        super().save(*args, **kwargs)
+
     def clean(self) -> None:
         """Refuse boards that would mislead or expose somebody, with the cure at the field."""
         faults = dict(find_faults(self))
@@ -256,12 +282,23 @@ class Leaderboard(ClinicRow):
         return self.among == self.Among.SELF
 
     @property
+    def has_group(self) -> bool:
+        """Whether its group decides who stands on it."""
+        return self.among == self.Among.GROUP
+
+    @property
     def agreed(self) -> list[str]:
         """What a patient must have agreed to, to stand on it: one of these."""
         if self.among == self.Among.ACROSS:
             return [Boards.ACROSS]
         total = [Boards.TOTAL] if self.display == self.Display.TOTAL else []
         return [*total, Boards.CLINIC, Boards.ACROSS]
+
+    @property
+    def makings(self) -> list[Any]:
+        """What its rows follow from, besides sessions and patients."""
+        fields = [field for field in self._meta.concrete_fields if field.name not in SHOWN_BY]
+        return [self.agreed, *(getattr(self, field.attname) for field in fields)]
 
     @property
     def slugs(self) -> list[str]:

@@ -44,15 +44,31 @@ class Period:
 
 def period_of(board: Leaderboard, now: datetime) -> Period:
     """Give the days that count now; on a frozen board, those that counted on its last day."""
-    zone = UTC if board.clinic is None else ZoneInfo(board.clinic.time_zone)
-    today = now.astimezone(zone).date()
-    frozen = board.frozen_on if board.frozen_on and board.frozen_on < today else None
-    as_of = frozen or today
+    zone, as_of = zone_of(board), last_day_of(board, now)
     period = _reach(board, as_of, zone)
-    if frozen is None:
+    if not is_over(board, now):
         return period
-    last = frozen if period.last is None else min(period.last, frozen)
+    last = as_of if period.last is None else min(period.last, as_of)
     return Period(period.first, last, zone)
+
+
+def zone_of(board: Leaderboard) -> tzinfo:
+    """Give the clock that a board goes by."""
+    return UTC if board.clinic is None else ZoneInfo(board.clinic.time_zone)
+
+
+def last_day_of(board: Leaderboard, now: datetime) -> date:
+    """Give the day as of which a board is: today, or the one on which it was frozen."""
+    today = now.astimezone(zone_of(board)).date()
+    return today if board.frozen_on is None else min(board.frozen_on, today)
+
+
+def is_over(board: Leaderboard, now: datetime) -> bool:
+    """Whether a frozen board's last day has passed."""
+    return (
+        board.frozen_on is not None
+        and last_day_of(board, now) < now.astimezone(zone_of(board)).date()
+    )
 
 
 def _reach(board: Leaderboard, today: date, zone: tzinfo) -> Period:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from datetime import date
 from typing import TYPE_CHECKING
 
+from django.utils.formats import date_format
 from django.utils.translation import gettext as _
 
 from rehab.training.valences import VALENCES
@@ -18,11 +20,14 @@ TYPED = frozenset({"score", "points_per_100_steps"})
 SUMMABLE = frozenset({"score", "steps", "active_minutes", "attended", "target_met"})
 # What says nothing of a single session.
 COUNTED = frozenset({"attended", "target_met"})
+# Days that every time zone and both databases can reckon with.
+FIRST_DAY, LAST_DAY = date(1970, 1, 1), date(2199, 12, 31)
 
 
 def find_faults(board: Leaderboard) -> Iterator[tuple[str, str]]:
     """Give what is wrong with a board: the field, and what to do."""
     yield from _faults_of_types(board)
+    yield from _faults_of_days(board)
     yield from _faults_of_rows(board)
     yield from _faults_of_places(board)
 
@@ -37,18 +42,36 @@ def _faults_of_types(board: Leaderboard) -> Iterator[tuple[str, str]]:
         return
     if board.types == board.Types.CHOSEN and not chosen:
         yield "valences", _("Choose at least one type.")
-    if board.metric not in TYPED or board.types == board.Types.SAME:
+    if board.types == board.Types.SAME:
         return
-    if board.types == board.Types.ALL or len(set(chosen)) > 1:
-        yield (
-            "metric",
-            _(
-                "Points of different feedback types cannot be compared: negative ones are never "
-                "above 0. Choose the steps at the goal, or a single type."
-            ),
-        )
-    elif chosen == ["explicit"]:
-        yield "metric", _("Explicit feedback has no points. Choose the steps at the goal.")
+    mixed = board.types == board.Types.ALL or len(set(chosen)) > 1
+    for field in ("metric", "tie_breaker"):
+        if getattr(board, field) not in TYPED:
+            continue
+        if mixed:
+            yield (
+                field,
+                _(
+                    "Points of different feedback types cannot be compared: negative ones are "
+                    "never above 0. Choose the steps at the goal, or a single type."
+                ),
+            )
+        elif chosen == ["explicit"]:
+            yield field, _("Explicit feedback has no points. Choose the steps at the goal.")
+
+
+def _faults_of_days(board: Leaderboard) -> Iterator[tuple[str, str]]:
+    for field in ("period_from", "period_to", "frozen_on"):
+        day = getattr(board, field)
+        if isinstance(day, date) and not FIRST_DAY <= day <= LAST_DAY:
+            yield (
+                field,
+                _(
+                    "Give a day from %(first)s to %(last)s. A board without an end ends on the "
+                    "last one."
+                )
+                % {"first": date_format(FIRST_DAY), "last": date_format(LAST_DAY)},
+            )
 
 
 def _faults_of_rows(board: Leaderboard) -> Iterator[tuple[str, str]]:

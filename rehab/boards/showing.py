@@ -10,10 +10,9 @@ from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_noop, ngettext
 
-from rehab.boards import entries
-from rehab.boards.building import builder
+from rehab.boards.building import builder, catch_up
 from rehab.boards.choosing import choose
-from rehab.boards.figures import keeps, read_figures, read_own, standing_on
+from rehab.boards.figures import Figure, keeps, read_own, standing_on
 from rehab.boards.models import Leaderboard
 from rehab.boards.rows import Row, date_rows, name_rows, say_figure, share, write
 from rehab.boards.standings import Listed, Placed, Standings, Stored
@@ -81,18 +80,28 @@ def show_waiting(clinic: Clinic, now: datetime | None = None) -> list[Shown]:
     return [board for board in shown if board.shared]
 
 
+def count_hidden(standings: Standings, fewest: int) -> int:
+    """Count those on a board among whom each is hidden, as soon as there are as few as that.
+
+    Simulated patients hide nobody: they count only where they are alone, as in a clinic that tries
+    GARRY.
+    """
+    people = standings.count_people(fewest)
+    return people if 0 < people < fewest else standings.count
+
+
 @dataclass(frozen=True)
 class Viewer:
     """A board in somebody's eyes: a patient's, with or without a session at hand, or anybody's.
 
-    ``stored`` is False for a board that is not saved: its rows are then made of the sessions.
+    ``made`` are the rows of a board that is not saved as it is here, made of the sessions.
     """
 
     board: Leaderboard
     now: datetime
     patient: Patient | None = None
     session: TrainingSession | None = None
-    stored: bool = True
+    made: Sequence[Figure] | None = None
 
     @property
     def valence(self) -> str:
@@ -104,14 +113,13 @@ class Viewer:
         board, patient = self.board, self.patient
         if board.is_own:
             return self._show_own("")
-        if self.stored and board.is_being_built:
-            builder.wake()  # whoever was at it may have been stopped
+        if self.made is None and not self._is_up_to_date():
             return self._show_own(f"{_(BUILT)} {_(OWN)}" if patient else _(BUILT))
         standings = self._standings()
-        people = ngettext(
-            "%(count)d patient on it now.", "%(count)d patients on it now.", standings.count
-        ) % {"count": standings.count}
-        if standings.count < board.min_participants:
+        count = count_hidden(standings, board.min_participants)
+        people = ngettext("%(count)d patient on it now.", "%(count)d patients on it now.", count)
+        people %= {"count": count}
+        if count < board.min_participants:
             fewest = {"fewest": board.min_participants}
             why = _("Under %(fewest)d, all see their own sessions.") % fewest
             few = _("Fewer than %(fewest)d people so far.") % fewest
@@ -128,6 +136,12 @@ class Viewer:
         why = _("Outside its first half, own sessions are shown.")
         return self._show_own(_(OWN), f"{people} {why}")
 
+    def _is_up_to_date(self) -> bool:
+        if self.board.is_being_built:
+            builder.wake()  # whoever was at it may have been stopped
+            return False
+        return catch_up(self.board, self.now)
+
     def find_typical(self) -> int | None:
         """Give the patient in the middle of the first half; None for a board of own sessions."""
         if self.board.is_own:
@@ -138,11 +152,9 @@ class Viewer:
 
     def _standings(self) -> Standings:
         key = self.board.list_of(self.valence)
-        if self.stored:
-            entries.refresh_stale(self.board, self.now)
+        if self.made is None:
             return Stored(self.board, key)
-        figures = read_figures(self.board, self.now)
-        return Listed(self.board, (row for row in figures if row.valence == key))
+        return Listed(self.board, (row for row in self.made if row.valence == key))
 
     def _total(self, standings: Standings, me: Placed | None) -> Total:
         metric, goal = self.board.metric, self.board.total_goal

@@ -15,6 +15,7 @@ from django.db.models.functions import Concat, Left
 
 from rehab.boards.figures import Figure
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.people.models import Patient
 
 Ties = Leaderboard.Ties
 Columns = tuple[int, int, int | None, str]
@@ -40,6 +41,9 @@ class Standings(Protocol):
 
     count: int
     total: int
+
+    def count_people(self, most: int) -> int:
+        """Count the rows that are no simulated patient's, up to so many."""
 
     def find(self, patient_id: int) -> Placed | None:
         """Give a patient's row."""
@@ -68,6 +72,7 @@ class Listed:
     """Standings of rows at hand: of own sessions, or of a board that is not saved yet."""
 
     def __init__(self, board: Leaderboard, figures: Iterable[Figure]) -> None:
+        self._board = board
         rows = sorted(figures, key=lambda row: row.key, reverse=True)
         self.count = len(rows)
         self.total = sum(row.value for row in rows)
@@ -76,6 +81,12 @@ class Listed:
             Placed(row.patient_id, row.session_id, row.value, row.stake, row.key, shared, rank)
             for row, (shared, rank) in zip(rows, places, strict=True)
         ]
+
+    def count_people(self, most: int) -> int:
+        """Count the rows that are no simulated patient's, up to so many."""
+        simulated = Patient.everywhere.filter(simulated=True, clinic=self._board.clinic_id)
+        others = set(simulated.values_list("pk", flat=True))
+        return min(most, sum(row.patient_id not in others for row in self._rows))
 
     def find(self, patient_id: int) -> Placed | None:
         """Give a patient's row."""
@@ -108,6 +119,10 @@ class Stored:
     def find_rows(self) -> QuerySet[BoardEntry]:
         """Give the rows of this list."""
         return BoardEntry.everywhere.filter(board=self._board, valence=self._valence)
+
+    def count_people(self, most: int) -> int:
+        """Count the rows that are no simulated patient's, up to so many."""
+        return self.find_rows().filter(patient__simulated=False)[:most].count()
 
     def find(self, patient_id: int) -> Placed | None:
         """Give a patient's row. Its place: all whose figures are better, and one."""

@@ -92,14 +92,13 @@ def own_boards(request: HttpRequest, session: TrainingSession) -> list[Shown]:
     actor = actor_of(request)
     valence = session.to_plan().valence
     figures = read_figures(actor, session)
-    same = [own for own in figures if own.valence == session.valence and not own.mixed]
-    by = ranking_of(valence)
-    places = {
-        ("same", pgettext("board", "This type"), by): rank(same, by, -(valence.miss_points or 0)),
-        ("all", pgettext("board", "All types"), By.RATE): rank(figures, By.RATE),
-    }
-    if session.changed_to:
-        del places["same", "This type", by]
+    places: dict[tuple[str, str, By], list[Entry]] = {}
+    if not session.changed_to:
+        same = [own for own in figures if own.valence == session.valence and not own.mixed]
+        by = ranking_of(valence)
+        ranked = rank(same, by, -(valence.miss_points or 0))
+        places["same", pgettext("board", "This type"), by] = ranked
+    places["all", pgettext("board", "All types"), By.RATE] = rank(figures, By.RATE)
     shown = {key: cut(entries, session.pk) for key, entries in places.items()}
     wanted = {entry.session_id for entries in shown.values() for entry in entries}
     facts = {

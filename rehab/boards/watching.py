@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
-from functools import wraps
+from functools import partial, wraps
 from typing import Any
 
+from django.db import transaction
 from django.db.models import Model
-from django.db.models.signals import m2m_changed, post_delete, post_save
+from django.db.models.signals import m2m_changed, post_delete, post_save, pre_save
 
 from rehab.boards import building, entries
 from rehab.boards.models import Leaderboard
@@ -16,6 +18,12 @@ from rehab.sessions.corrections import Part, SessionCorrection
 from rehab.sessions.log import SessionMetric, figures_stored
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
+
+STANDING = frozenset({"boards", "blinded", "simulated"})  # what of a patient alters boards
+
+log = logging.getLogger(__name__)
+
+BEFORE = "row that boards knew before the save"
 
 
 def watch() -> None:
@@ -27,8 +35,10 @@ def watch() -> None:
     post_save.connect(on_correction, sender=SessionCorrection)
     post_save.connect(on_figure, sender=SessionMetric)
     post_delete.connect(on_figure, sender=SessionMetric)
+    pre_save.connect(look, sender=Leaderboard)
     post_save.connect(on_board, sender=Leaderboard)
     m2m_changed.connect(on_group, sender=Leaderboard.group.through)
+    pre_save.connect(look, sender=Clinic)
     post_save.connect(on_clinic, sender=Clinic)
 
 
@@ -44,23 +54,41 @@ def unless_restored(heed: Callable[..., None]) -> Callable[..., None]:
 
 
 def on_figures(sessions: set[int], **_signal: Any) -> None:
-    """Sessions have ended: part of the transaction that stores their figures."""
-    ended = TrainingSession.everywhere.filter(pk__in=sessions)
-    entries.refresh_patients(set(ended.values_list("patient_id", flat=True)))
+    """Sessions have ended: part of the transaction that stores their figures.
+
+    Where that fails, figures are kept all the same, and the boards are built anew.
+    """
+    patients = patients_of(sessions)
+    try:
+        with transaction.atomic():
+            entries.refresh_patients(patients)
+    except Exception:
+        log.exception(
+            "Boards did not follow sessions %s. They are built anew; if they stay away, run "
+            "manage.py rebuildboards",
+            sessions,
+        )
+        transaction.on_commit(partial(building.heal, patients), robust=True)
+
+
+def patients_of(sessions: set[int]) -> set[int]:
+    """Give who walked some sessions."""
+    rows = TrainingSession.everywhere.filter(pk__in=sessions)
+    return set(rows.values_list("patient_id", flat=True))
 
 
 @unless_restored
-def on_patient(instance: Patient, created: bool, **_signal: Any) -> None:
+def on_patient(instance: Patient, created: bool, update_fields: Any = None, **_signal: Any) -> None:
     """A patient has agreed to more or less, or has entered or left a blinded study."""
-    if not created:
+    if not created and (update_fields is None or not STANDING.isdisjoint(update_fields)):
         entries.refresh_patients({instance.pk})
 
 
 @unless_restored
-def on_session(instance: TrainingSession, **_signal: Any) -> None:
-    """A session was corrected or removed."""
+def on_session(instance: TrainingSession, created: bool = False, **_signal: Any) -> None:
+    """A session was corrected or removed, or came from elsewhere."""
     if instance.state == State.FINISHED:
-        entries.refresh_patients({instance.patient_id})
+        entries.refresh_patients({instance.patient_id}, corrected=not created)
 
 
 @unless_restored
@@ -68,30 +96,43 @@ def on_correction(instance: SessionCorrection, **_signal: Any) -> None:
     """A session was given to whoever walked it: the one whom it was put down to has one less."""
     if instance.part == Part.PATIENT:
         before = Patient.everywhere.filter(pseudonym=instance.old)
-        entries.refresh_patients(set(before.values_list("pk", flat=True)))
+        entries.refresh_patients(set(before.values_list("pk", flat=True)), corrected=True)
 
 
 @unless_restored
-def on_figure(instance: SessionMetric, **_signal: Any) -> None:
-    """A figure was corrected or removed."""
-    on_figures({instance.session_id})
+def on_figure(instance: SessionMetric, created: bool = False, **_signal: Any) -> None:
+    """A figure was corrected or removed, or came from elsewhere."""
+    entries.refresh_patients(patients_of({instance.session_id}), corrected=not created)
+
+
+@unless_restored
+def look(instance: Any, **_signal: Any) -> None:
+    """Read, before a save, what is there."""
+    vars(instance)[BEFORE] = type(instance).everywhere.filter(pk=instance.pk).first()
 
 
 @unless_restored
 def on_board(instance: Leaderboard, **_signal: Any) -> None:
-    """A board was made or changed."""
-    building.rebuild(instance)
-
-
-def on_group(instance: Leaderboard, action: str, **_signal: Any) -> None:
-    """A board's group was chosen."""
-    if action.startswith("post_"):
+    """A board was made, or its rows are others now: how they are shown alters none."""
+    before: Leaderboard | None = vars(instance).pop(BEFORE, None)
+    if before is None or before.makings != instance.makings:
         building.rebuild(instance)
 
 
+def on_group(instance: Leaderboard, action: str, pk_set: set[int] | None, **_signal: Any) -> None:
+    """Patients were taken into a board's group or out of it."""
+    if instance.has_group and action.startswith("post_"):
+        building.follow(instance, pk_set)
+
+
 @unless_restored
-def on_clinic(instance: Clinic, created: bool, **_signal: Any) -> None:
-    """A clinic takes part in boards across clinics, or no longer."""
-    if not created:
-        for board in entries.boards_of(None):
-            building.rebuild(board)
+def on_clinic(instance: Clinic, **_signal: Any) -> None:
+    """A clinic's days begin at another hour, or it joins boards across clinics or leaves them."""
+    before: Clinic | None = vars(instance).pop(BEFORE, None)
+    if before is None:
+        return
+    joins = before.boards_across != instance.boards_across
+    moves = before.time_zone != instance.time_zone
+    for board in entries.boards_of([instance.pk]) if joins or moves else ():
+        if joins if board.clinic_id is None else moves:
+            building.follow(board)

@@ -4,29 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import datetime
+from itertools import chain
 from typing import Any
 
-from django.utils.translation import gettext as _
-from django.utils.translation import gettext_lazy as _lazy
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
 
+from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.exports.archive import write_csv, write_json
 from rehab.exports.tables import TABLES, Selection, codebook
 from rehab.people.consent import Consent
+from rehab.people.history import HistoryEntry
 from rehab.people.models import Patient, User
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.visits import Visit
 from rehab.training.scoring import RULES_VERSION
 
 FILES = {
-    "README.txt": _lazy("this page"),
-    "patient.json": _lazy("who it is, and how the pages are set"),
-    "consent.json": _lazy("what was agreed to, to which words, and when"),
-    "sessions.csv": _lazy("a row for each session"),
-    "steps.csv": _lazy("a row for each step"),
-    "events.csv": _lazy("a row for each thing done or noted during a session"),
-    "corrections.csv": _lazy("a row for each correction of a session after its end"),
-    "codebook.csv": _lazy("what every column means, with its unit"),
+    "README.txt": _("this page"),
+    "patient.json": _("who it is, and how the pages are set"),
+    "consent.json": _("what was agreed to, to which words, and when"),
+    "visits.json": _("the days on which a visit is or was planned"),
+    "boards.json": _("the rows on leaderboards, and the groups of boards"),
+    "changes.json": _("when details were changed, each with its value before and after"),
+    "sessions.csv": _("a row for each session"),
+    "steps.csv": _("a row for each step"),
+    "events.csv": _("a row for each thing done or noted during a session"),
+    "corrections.csv": _("a row for each correction of a session after its end"),
+    "codebook.csv": _("what every column means, with its unit"),
 }
-ABOUT = _lazy("""\
+ABOUT = _("""\
 The tables open in any spreadsheet, R or Python: text in UTF-8, commas between cells, the names of
 the columns in the first line, an empty cell where there is nothing. Times are in UTC. Numbers have
 a decimal point and all their digits: read back, they are what GARRY computes with.
@@ -44,11 +51,19 @@ does.
 
 def patient_files(user: User, patient: Patient, now: datetime) -> Iterator[tuple[str, Any]]:
     """Give all that is kept of one patient, with the name: for the patient and the therapists."""
+    title = gettext("Everything that GARRY keeps of %(patient)s") % {"patient": patient}
+    # In the language of now: the rest is made on the way, when nobody's language holds any more.
+    readme = write_readme(title, list(FILES), now)
+    return chain([("README.txt", [readme])], _details(user, patient))
+
+
+def _details(user: User, patient: Patient) -> Iterator[tuple[str, Any]]:
     sessions = TrainingSession.objects.visible_to(user).filter(patient=patient)
-    title = _("Everything that GARRY keeps of %(patient)s") % {"patient": patient}
-    yield "README.txt", [write_readme(title, list(FILES), now)]
     yield "patient.json", write_json(describe(patient))
     yield "consent.json", write_json(list_consents(user, patient))
+    yield "visits.json", write_json(list_visits(user, patient))
+    yield "boards.json", write_json(list_boards(user, patient))
+    yield "changes.json", write_json(list_changes(user, patient))
     yield from _tables(Selection(user, sessions, named=True))
 
 
@@ -56,9 +71,9 @@ def session_files(user: User, now: datetime) -> Iterator[tuple[str, Any]]:
     """Give all sessions that somebody may see, by pseudonyms, trial by trial."""
     sessions = TrainingSession.objects.visible_to(user)
     names = [name for name in FILES if not name.endswith(".json")]
-    title = _("All sessions of %(clinic)s, by pseudonyms") % {"clinic": user.clinic}
-    yield "README.txt", [write_readme(title, names, now)]
-    yield from _tables(Selection(user, sessions, named=False))
+    title = gettext("All sessions of %(clinic)s, by pseudonyms") % {"clinic": user.clinic}
+    readme = write_readme(title, names, now)
+    return chain([("README.txt", [readme])], _tables(Selection(user, sessions, named=False)))
 
 
 def _tables(selection: Selection) -> Iterator[tuple[str, Any]]:
@@ -79,6 +94,7 @@ def describe(patient: Patient) -> dict[str, Any]:
         "body_mass_kg": patient.body_mass_kg,
         "language": patient.language,
         "screen_side": patient.screen_side,
+        "screen_text": patient.screen_text,
         "screen_still": patient.screen_still,
         "screen_sounds": patient.screen_sounds,
         "leaderboards": patient.boards,
@@ -90,6 +106,7 @@ def describe(patient: Patient) -> dict[str, Any]:
         "program_ended_at": patient.ended_at,
         "program_ended_because": patient.ended_because or None,
         "erased_at": patient.erased_at,
+        "erased_because": patient.erased_because or None,
     }
 
 
@@ -99,6 +116,7 @@ def list_consents(user: User, patient: Patient) -> list[dict[str, Any]]:
     return [
         {
             "purpose": row.purpose,
+            "level": row.level or None,
             "given_at": row.given_at,
             "withdrawn_at": row.withdrawn_at,
             "version": row.text and row.text.version,
@@ -108,8 +126,39 @@ def list_consents(user: User, patient: Patient) -> list[dict[str, Any]]:
     ]
 
 
+def list_visits(user: User, patient: Patient) -> list[dict[str, Any]]:
+    """Give the days that were planned."""
+    visits = Visit.objects.visible_to(user).filter(patient=patient)
+    return [{"day": visit.day, "at": visit.at} for visit in visits]
+
+
+def list_boards(user: User, patient: Patient) -> list[dict[str, Any]]:
+    """Give what stands on boards of others, as it stands there."""
+    rows = BoardEntry.everywhere.filter(patient=patient).select_related("board").order_by("pk")
+    grouped = Leaderboard.objects.visible_to(user).filter(group=patient)
+    return [
+        {
+            "board": row.board.name,
+            "feedback_type": row.valence or None,
+            "figure": row.figure,
+            "could_be_kept": row.stake,
+        }
+        for row in rows
+    ] + [{"in_the_group_of_the_board": board.name} for board in grouped]
+
+
+def list_changes(user: User, patient: Patient) -> list[dict[str, Any]]:
+    """Give the history of the details; an erased value is null. Who works here stays unnamed."""
+    noun = Patient.__name__
+    changes = HistoryEntry.objects.visible_to(user).filter(noun=noun, row=patient.pk)
+    return [
+        {"at": change.at, "kind": change.kind, "before_and_after": change.values}
+        for change in changes.order_by("pk")
+    ]
+
+
 def write_readme(title: str, names: list[str], now: datetime) -> str:
     """Say in plain words what is in the archive."""
     listed = "\n".join(f"  {name:14} {FILES[name]}" for name in names)
-    made = _("Made on %(moment)s UTC.") % {"moment": f"{now:%Y-%m-%d %H:%M}"}
+    made = gettext("Made on %(moment)s UTC.") % {"moment": f"{now:%Y-%m-%d %H:%M}"}
     return f"{title}\n{made}\n\n{listed}\n\n{ABOUT % {'version': RULES_VERSION}}"

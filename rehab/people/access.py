@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import PermissionDenied
 from django.http import HttpRequest, HttpResponseBase
+from django.utils.cache import patch_cache_control
 
 from rehab.people import entry, history, sightings
 from rehab.people.models import Clinic, User
@@ -75,6 +76,19 @@ def clinic_of(user: User) -> Clinic:
     return user.clinic
 
 
+def _is_guarded(request: HttpRequest) -> bool:
+    """Whether not everyone may open what was asked for: a page, or a call of the API."""
+    match = request.resolver_match
+    opened = getattr(request, "call", match and match.func)
+    return getattr(opened, "access", PUBLIC) != PUBLIC
+
+
+def _forbid_keeping(response: HttpResponseBase) -> None:
+    """Let nobody but the server keep it: going back after the sign-out shows nothing."""
+    if not response.has_header("Cache-Control"):
+        patch_cache_control(response, private=True, no_store=True)
+
+
 class AccessMiddleware:
     """Holds every view to what it declared, and notes who saw what. Sync; it keeps no state."""
 
@@ -86,6 +100,8 @@ class AccessMiddleware:
         with history.acting(request):
             response = self.get_response(request)
         sightings.note_request(request, response)
+        if _is_guarded(request):
+            _forbid_keeping(response)
         return response
 
     def process_view(

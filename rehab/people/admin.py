@@ -11,17 +11,21 @@ from django.contrib.auth.forms import AdminUserCreationForm
 from django.contrib.auth.models import Group
 from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import ValidationError
+from django.db import connection, transaction
 from django.db.models import Count, Max, QuerySet
 from django.http import HttpRequest, HttpResponseBase
 from django.shortcuts import redirect
 from django.urls import reverse
+from django.utils.html import format_html
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people import factors, lockout
 from rehab.people.access import person
-from rehab.people.admin_base import ScopedAdmin, ScopedOptions, TokenAdmin, rights
+from rehab.people.admin_base import ScopedAdmin, ScopedOptions, TokenAdmin, ToldChanges, rights
 from rehab.people.aliases import say_alias
+from rehab.people.audit import Act, note_safety
+from rehab.people.lockout import client_address
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.tokens import ApiToken
@@ -57,7 +61,8 @@ class ClinicAdmin(ScopedAdmin):
     search_fields = ("name",)
     fields = (
         *("name", "language", "time_zone", "boards_across", "second_factor_required"),
-        *("research_needs_consent", "keep_months", "keep_log_months"),
+        *("care_needs_consent", "research_needs_consent", "networks"),
+        *("keep_months", "keep_log_months"),
     )
 
 
@@ -76,7 +81,7 @@ class NewAccountForm(AdminUserCreationForm):
 
 
 @admin.register(User)
-class AccountAdmin(ScopedOptions, UserAdmin):
+class AccountAdmin(ScopedOptions, ToldChanges, UserAdmin):
     """Accounts: a lead keeps those of the own clinic, a host all of them."""
 
     list_display = (
@@ -100,7 +105,9 @@ class AccountAdmin(ScopedOptions, UserAdmin):
     def unlock(self, request: HttpRequest, accounts: QuerySet[User]) -> None:
         """Let the chosen accounts try again at once."""
         for account in accounts:
-            lockout.forgive(account)
+            with transaction.atomic():
+                note_safety(Act.UNLOCK, person(request), account, client_address(request))
+                lockout.forgive(account)
         words = gettext("Accounts that may try again: %(count)s.")
         messages.success(request, words % {"count": accounts.count()})
 
@@ -110,7 +117,9 @@ class AccountAdmin(ScopedOptions, UserAdmin):
     def remove_second_factors(self, request: HttpRequest, accounts: QuerySet[User]) -> None:
         """Take the chosen accounts back to their passwords alone."""
         for account in accounts:
-            factors.forget_all(account)
+            with transaction.atomic():
+                note_safety(Act.FACTORS, person(request), account, client_address(request))
+                factors.forget_all(account)
         words = gettext(
             "%(count)s account(s) sign in by password alone now, or set up a new second "
             "factor where the clinic asks for one. If a phone was stolen, give a new password too."
@@ -188,7 +197,7 @@ class PatientAdmin(ScopedAdmin):
         "body_mass_kg",
         "paretic_side",
         "language",
-        "boards",
+        "boards_agreed",
         "animal_name",
         "blinded",
         "pseudonym",
@@ -196,7 +205,10 @@ class PatientAdmin(ScopedAdmin):
         "ended_at",
         "erased_at",
     )
-    readonly_fields = ("animal_name", "pseudonym", "created_at", "ended_at", "erased_at")
+    readonly_fields = (
+        *("boards_agreed", "animal_name", "pseudonym"),
+        *("created_at", "ended_at", "erased_at"),
+    )
     actions = row_actions = ("draw_aliases",)
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Any]:
@@ -208,11 +220,26 @@ class PatientAdmin(ScopedAdmin):
         )
         return rows
 
+    def get_object(self, request: HttpRequest, object_id: str, from_field: Any = None) -> Any:
+        """Find a patient; one who is about to be changed is held, so that no erasing is undone."""
+        patient = super().get_object(request, object_id, from_field)
+        if patient is not None and request.method == "POST" and connection.in_atomic_block:
+            patient.hold()
+        return patient
+
+    def save_model(self, request: HttpRequest, obj: Any, form: Any, change: bool) -> None:
+        """Store what the form asked for."""
+        if change:
+            obj.keep(*form.changed_data)
+        else:
+            super().save_model(request, obj, form, change)
+
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Lead to where the patient walks, and to what was walked."""
         return [
             (reverse("patient", args=[row.pk]), _("Start a session")),
             (reverse("history", args=[row.pk]), _("Past sessions")),
+            (reverse("consent", args=[row.pk]), _("Consent")),
         ]
 
     @admin.display(description=_("sessions"), ordering="walks")
@@ -227,6 +254,18 @@ class PatientAdmin(ScopedAdmin):
         zone = ZoneInfo(patient.clinic.time_zone)
         return patient.last_visit and patient.last_visit.astimezone(zone).date()
 
+    @admin.display(description=_("leaderboards"))
+    def boards_agreed(self, patient: Patient) -> Any:
+        """Say on which boards the patient agrees to stand, and where that is noted."""
+        if patient.is_new:
+            return _("Noted on the patient's consent page, once the patient is here.")
+        return format_html(
+            '{} · <a href="{}">{}</a>',
+            patient.get_boards_display(),
+            reverse("consent", args=[patient.pk]),
+            _("Change it on the consent page"),
+        )
+
     @admin.display(description=_("animal name"))
     def animal_name(self, patient: Patient) -> str:
         """Say what the patient is called on boards."""
@@ -235,10 +274,9 @@ class PatientAdmin(ScopedAdmin):
     @admin.action(description=_("Draw new animal names for boards"), permissions=["change"])
     def draw_aliases(self, request: HttpRequest, patients: QuerySet[Patient]) -> None:
         """Give the chosen patients other names on boards."""
-        for patient in patients:
+        drawn = list(patients.filter(erased_at=None))
+        for patient in drawn:
             patient.draw_alias()
-            patient.save(update_fields=["alias"])
-        names = ", ".join(
-            f"{patient.nickname}: {self.animal_name(patient)}" for patient in patients
-        )
+            patient.keep("alias")
+        names = ", ".join(f"{patient.nickname}: {self.animal_name(patient)}" for patient in drawn)
         messages.success(request, gettext("New names on boards. %(names)s") % {"names": names})

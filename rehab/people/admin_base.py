@@ -9,7 +9,7 @@ from django.contrib import admin, messages
 from django.contrib.admin.exceptions import DisallowedModelAdminLookup
 from django.contrib.admin.options import IncorrectLookupParameters
 from django.contrib.admin.views.main import ChangeList
-from django.db import models
+from django.db import models, transaction
 from django.db.models import QuerySet
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import redirect
@@ -20,7 +20,9 @@ from django.utils.translation import gettext, ngettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import person
+from rehab.people.audit import Act, note_safety
 from rehab.people.changes import changes_of
+from rehab.people.lockout import client_address
 from rehab.people.roles import Right, Role, rights_of
 from rehab.people.scope import ScopedModel, visible
 from rehab.people.tokens import TokenRow
@@ -136,7 +138,29 @@ class ClinicForm(forms.ModelForm):
         return super()._get_validation_exclusions() - {"clinic"}  # type: ignore[misc, no-any-return]
 
 
-class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
+class ToldChanges(admin.ModelAdmin):
+    """Pages whose history is ours: each value before and after."""
+
+    def history_view(
+        self, request: HttpRequest, object_id: str, extra_context: Any = None
+    ) -> HttpResponse:
+        """Tell who changed what of a row, to those who may see the row."""
+        row = self.get_object(request, object_id)
+        if row is None or not self.has_view_permission(request, row):
+            raise Http404
+        parts = [inline.model for inline in self.get_inline_instances(request, row)]
+        context = {
+            **self.admin_site.each_context(request),
+            "title": gettext("Changes: %(row)s") % {"row": row},
+            "object": row,
+            "opts": self.opts,
+            "module_name": capfirst(self.opts.verbose_name_plural),
+            "changes": changes_of(request.user, row, parts),
+        }
+        return TemplateResponse(request, "people/changes.html", context)
+
+
+class ScopedAdmin(ScopedOptions, ToldChanges):
     """A model's pages. New rows belong to the clinic of whoever adds them."""
 
     form = ClinicForm
@@ -221,24 +245,6 @@ class ScopedAdmin(ScopedOptions, admin.ModelAdmin):
                 gone.append(words % named)
         return (gone, *others)
 
-    def history_view(
-        self, request: HttpRequest, object_id: str, extra_context: Any = None
-    ) -> HttpResponse:
-        """Tell who changed what of a row, to those who may see the row."""
-        row = self.get_object(request, object_id)
-        if row is None or not self.has_view_permission(request, row):
-            raise Http404
-        parts = [inline.model for inline in self.get_inline_instances(request, row)]
-        context = {
-            **self.admin_site.each_context(request),
-            "title": gettext("Changes: %(row)s") % {"row": row},
-            "object": row,
-            "opts": self.opts,
-            "module_name": capfirst(self.opts.verbose_name_plural),
-            "changes": changes_of(request.user, row, parts),
-        }
-        return TemplateResponse(request, "people/changes.html", context)
-
 
 class TokenAdmin(ScopedAdmin):
     """Pages of rows that are known by a token. It is shown once, when it is made."""
@@ -257,9 +263,11 @@ class TokenAdmin(ScopedAdmin):
     def renew_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:
         """Replace the tokens of the chosen rows."""
         for holder in holders:
-            token = holder.new_token()
-            holder.revoked_at = None
-            holder.save()
+            with transaction.atomic():
+                note_safety(Act.TOKEN, person(request), holder, client_address(request))
+                token = holder.new_token()
+                holder.revoked_at = None
+                holder.save()
             self._show(request, holder, token)
 
     @admin.action(description=_("Revoke tokens"), permissions=["change"])

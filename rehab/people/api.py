@@ -132,16 +132,21 @@ def patients_of(user: User) -> QuerySet[Patient]:
 
 
 def store(patient: Patient, values: dict[str, Any]) -> Patient:
-    """Fill a patient in and save. Raises Rejected for what the model refuses."""
+    """Fill a patient in and save; of one who is here these values alone.
+
+    Raises Rejected for what the model refuses.
+    """
     for name, value in values.items():
         setattr(patient, name, value)
     try:
         patient.full_clean()
+        with transaction.atomic():
+            if patient.is_new:
+                patient.save()
+            else:
+                patient.keep(*values)
     except ValidationError as problem:
         raise Rejected(say_errors(problem.message_dict)) from problem
-    try:
-        with transaction.atomic():
-            patient.save()
     except IntegrityError as problem:  # somebody else was quicker
         raise Rejected({"code": "This code has just been taken."}) from problem
     return patient

@@ -20,6 +20,7 @@ from django.db.models import QuerySet
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.history import clinic_id_of
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.scope import Scope, ScopedManager, ScopedModel
 
@@ -69,6 +70,9 @@ class Act(models.TextChoices):
     EXPORT = "export", _("Took data out")
     BACKUP = "backup", _("Backed up")
     ERASE = "erase", _("Erased")
+    UNLOCK = "unlock", _("Unlocked an account")
+    FACTORS = "factors", _("Removed second factors")
+    TOKEN = "token", _("Gave a new token")
     ROBOT_STOP = "robot_stop", _("Stopped the robot")
     ROBOT_ARM = "robot_arm", _("Armed the robot")
     ROBOT_TRIAL = "robot_trial", _("Tried a gesture on the robot")
@@ -178,6 +182,16 @@ def compose(
 def note(act: Act, actor: Any, **facts: Any) -> None:
     """Add an entry. Raises DatabaseError where it cannot be kept: nothing may then be given out."""
     compose(act, actor, **facts).save()
+
+
+def note_safety(act: Act, actor: User, row: Any, address: str) -> None:
+    """Add an entry of what alters who gets in: an account's, a device's or a program's row."""
+    clinic = clinic_id_of(row) or actor.clinic_id
+    about = f"{row._meta.verbose_name}: {row}"
+    if clinic is None:  # a host's own account: no clinic has a log of it
+        log.warning("%s, %s, by %s from %s", act.label, about, actor, shorten(address))
+        return
+    note(act, actor, clinic=clinic, about=about, address=address)
 
 
 def try_to_keep(entries: list[AuditEntry]) -> None:

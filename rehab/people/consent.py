@@ -13,9 +13,11 @@ from django.utils.translation import gettext_lazy as _
 from django.utils.translation import override
 
 from rehab.people.models import Boards, Clinic, Patient, User
+from rehab.people.networks import is_within
 from rehab.people.roles import Role
 from rehab.people.scope import Scope, ScopedModel
 
+REMOTE_WORDS = _("Remote view: your therapist may watch a session from another place.")
 # What a clinic begins with, in its language. It is its own to change.
 FIRST_WORDS = (
     _(
@@ -32,7 +34,7 @@ FIRST_WORDS = (
         "Boards: your results stand beside those of others, under the name of an animal. You can "
         "leave at any time, also by yourself on the tablet."
     ),
-    _("Remote view: your therapist may watch a session from another place."),
+    REMOTE_WORDS,
     _(
         "You may say no to any of these, and change your mind at any time. Your care does not "
         "depend on research, boards or remote view."
@@ -95,6 +97,8 @@ class Consent(ScopedModel):
         Patient, on_delete=models.CASCADE, related_name="consents", verbose_name=_("patient")
     )
     purpose = models.CharField(_("to what"), max_length=8, choices=Purpose.choices)
+    # Of boards: on which.
+    level = models.CharField(_("how far"), max_length=8, choices=Boards.choices, blank=True)
     # None: agreed before GARRY kept the words.
     text = models.ForeignKey(
         ConsentText, on_delete=models.PROTECT, related_name="+", null=True, verbose_name=_("text")
@@ -122,6 +126,12 @@ class Consent(ScopedModel):
         return str(self.get_purpose_display())
 
 
+def agreed(purpose: Purpose, patient: str = "pk") -> Exists:
+    """Give the condition that a patient agrees to something now; ``patient`` leads to the key."""
+    rows = Consent.everywhere.filter(purpose=purpose, withdrawn_at__isnull=True)
+    return Exists(rows.filter(patient=OuterRef(patient)))
+
+
 @dataclass(frozen=True)
 class PatientScope(Scope):
     """Rows of patients' sessions: researchers see those of patients who agreed to research.
@@ -136,16 +146,15 @@ class PatientScope(Scope):
         """Give what must hold besides the clinic."""
         if role != Role.RESEARCHER:
             return Q()
-        agreed = Consent.everywhere.filter(
-            patient=OuterRef(f"{self.patient}_id"),
-            purpose=Purpose.RESEARCH,
-            withdrawn_at__isnull=True,
-        )
         return (
-            Q(Exists(agreed))
+            Q(agreed(Purpose.RESEARCH, f"{self.patient}_id"))
             | Q(**{f"{self.patient}__simulated": True})
             | Q(**{f"{self.patient}__clinic__research_needs_consent": False})
         )
+
+
+def _is_said(clinic: Clinic, said: Any) -> bool:
+    return said is not REMOTE_WORDS or Purpose.REMOTE in offered(clinic)
 
 
 def current_text(clinic: Clinic) -> ConsentText:
@@ -153,7 +162,7 @@ def current_text(clinic: Clinic) -> ConsentText:
     text = ConsentText.everywhere.filter(clinic=clinic).first()
     if text is None:
         with override(clinic.language):
-            words = "\n\n".join(map(str, FIRST_WORDS))
+            words = "\n\n".join(str(said) for said in FIRST_WORDS if _is_said(clinic, said))
         text, _made = ConsentText.everywhere.get_or_create(
             clinic=clinic, version=1, defaults={"text": words}
         )
@@ -178,24 +187,54 @@ def holding(patient: Patient) -> dict[str, Consent]:
     return {row.purpose: row for row in rows}
 
 
-def give(patient: Patient, purpose: Purpose, by: User | None, now: datetime) -> None:
-    """Note that a patient agrees to the words in force; again, if it was to older ones."""
+def offered(clinic: Clinic) -> list[Purpose]:
+    """Give what patients of a clinic are asked for: remote view where it makes a difference."""
+    return [one for one in Purpose if clinic.networks or one is not Purpose.REMOTE]
+
+
+def may_be_watched(patient: Patient, address: str) -> bool:
+    """Whether a person at this address may watch: from elsewhere with the patient's consent."""
+    networks = patient.clinic.networks
+    if not networks or patient.simulated or is_within(networks, address):
+        return True
+    return Purpose.REMOTE in holding(patient)
+
+
+def may_be_cared_for(patient: Patient) -> bool:
+    """Whether sessions may be set up: with the patient's consent, where the clinic needs that."""
+    needed = patient.clinic.care_needs_consent and not patient.simulated
+    return not needed or Purpose.CARE in holding(patient)
+
+
+def give(
+    patient: Patient, purpose: Purpose, by: User | None, now: datetime, level: str = ""
+) -> None:
+    """Note that a patient agrees to the words in force; again, if it was to older ones or to
+    another ``level`` of boards. Nobody agrees for a person who is erased.
+    """
     with transaction.atomic():
+        patient.hold()
+        if patient.erased_at is not None:
+            return
         text = current_text(patient.clinic)
-        held = Consent.everywhere.select_for_update().filter(
-            patient=patient, purpose=purpose, withdrawn_at=None
-        )
-        if held.filter(text=text).exists():
+        held = Consent.everywhere.filter(patient=patient, purpose=purpose, withdrawn_at=None)
+        if held.filter(text=text, level=level).exists():
             return
         held.update(withdrawn_at=now, withdrawn_by=by)  # replaced by what follows
         Consent.everywhere.create(
-            patient=patient, purpose=purpose, text=text, given_at=now, recorded_by=by
+            patient=patient,
+            purpose=purpose,
+            level=level,
+            text=text,
+            given_at=now,
+            recorded_by=by,
         )
 
 
 def withdraw(patient: Patient, purpose: Purpose, by: User | None, now: datetime) -> None:
     """Note that a patient no longer agrees. It takes effect at once: boards lose the rows."""
     with transaction.atomic():
+        patient.hold()
         Consent.everywhere.filter(patient=patient, purpose=purpose, withdrawn_at=None).update(
             withdrawn_at=now, withdrawn_by=by
         )
@@ -210,6 +249,7 @@ def join_boards(patient: Patient, boards: Boards, by: User | None, now: datetime
         withdraw(patient, Purpose.BOARDS, by, now)
         return
     with transaction.atomic():
-        give(patient, Purpose.BOARDS, by, now)
-        patient.boards = boards
-        patient.save(update_fields=["boards"])
+        give(patient, Purpose.BOARDS, by, now, boards.value)
+        if patient.erased_at is None:
+            patient.boards = boards
+            patient.save(update_fields=["boards"])

@@ -8,11 +8,12 @@ from django import forms
 from django.contrib.auth import authenticate
 from django.contrib.auth.forms import AuthenticationForm, PasswordChangeForm
 from django.core.exceptions import ValidationError
+from django.db import IntegrityError, transaction
 from django.http import HttpRequest
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people import lockout
-from rehab.people.models import User
+from rehab.people.models import Patient, User
 
 WRONG = _("Name and password do not fit. Look at capitals, and try again.")
 WRONG_PASSWORD = _("That is not your password.")
@@ -107,6 +108,35 @@ def check_own_password(request: HttpRequest, user: User, password: str) -> str:
         wait = lockout.wait_of(request, username=user.username)
         raise ValidationError(wait or WRONG_PASSWORD)
     return password
+
+
+class PatientRowForm(forms.ModelForm):
+    """What is written of a patient. Of one who is here it stores its own fields, nothing else."""
+
+    instance: Patient
+
+    def save(self, commit: bool = True) -> Patient:
+        """Store the patient. Raises PersonErased, and IntegrityError where a code is taken."""
+        if self.instance.is_new:
+            patient: Patient = super().save(commit)
+            return patient
+        self.instance.keep(*self.fields)
+        return self.instance
+
+    def keep(self) -> bool:
+        """Store the patient, or say in ``errors`` what hinders; whatever others do meanwhile."""
+        if not self.is_valid():
+            return False
+        try:
+            with transaction.atomic():
+                self.save()
+        except ValidationError as problem:
+            self.add_error(None, problem)
+        except IntegrityError:
+            self.full_clean()  # somebody was quicker, and is found now
+            if self.is_valid():
+                raise
+        return self.is_valid()
 
 
 class ConsentTextForm(forms.Form):

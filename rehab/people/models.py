@@ -9,13 +9,14 @@ from zoneinfo import available_timezones
 from django.conf import settings
 from django.contrib.auth.base_user import BaseUserManager
 from django.contrib.auth.models import AbstractUser, UserManager
-from django.core.exceptions import ValidationError
+from django.core.exceptions import NON_FIELD_ERRORS, ValidationError
 from django.core.validators import MaxValueValidator, MinValueValidator
-from django.db import models
+from django.db import models, transaction
 from django.db.models import Q
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.aliases import draw_alias
+from rehab.people.networks import check_networks
 from rehab.people.roles import Role
 from rehab.people.scope import ClinicRow, Scope, ScopedManager, ScopedModel
 from rehab.training.steps import Side
@@ -66,6 +67,22 @@ class Clinic(ScopedModel):
         default=True,
         help_text=_(
             "Researchers see the sessions of those patients only who have agreed to research."
+        ),
+    )
+    care_needs_consent = models.BooleanField(
+        _("care needs consent"),
+        default=False,
+        help_text=_("No session can be set up for a patient who has not agreed to care."),
+    )
+    networks = models.TextField(
+        _("the clinic's own networks"),
+        blank=True,
+        max_length=1000,
+        validators=[check_networks],
+        help_text=_(
+            "One a line, such as 192.168.1.0/24. From elsewhere a session is watched only with "
+            "the patient's consent to remote view; say so in your words. Empty: from anywhere, and "
+            "nobody is asked."
         ),
     )
     keep_months = models.PositiveSmallIntegerField(
@@ -217,6 +234,13 @@ class Erasing(models.TextChoices):
     RETENTION = "retention", _("Kept long enough")
 
 
+class PersonErased(ValidationError):
+    """Words about a person whom nobody brings back."""
+
+    def __init__(self) -> None:
+        super().__init__({NON_FIELD_ERRORS: _("This person is erased. Take a new patient in.")})
+
+
 class Patient(ClinicRow):
     """Someone who walks. The clinic's code and a nickname, never a full name."""
 
@@ -315,10 +339,29 @@ class Patient(ClinicRow):
                 kwargs["update_fields"] = {*kwargs["update_fields"], "alias"}
         super().save(*args, **kwargs)
 
+    @property
+    def is_new(self) -> bool:
+        """Whether the patient is not stored yet."""
+        return self._state.adding
+
+    def hold(self) -> None:
+        """Read the row anew, and let nobody else alter it until the transaction ends."""
+        self.refresh_from_db(from_queryset=_held())
+
+    def keep(self, *fields: str) -> None:
+        """Store what somebody wrote in these fields, and nothing else that was read before.
+
+        Raises PersonErased where the person has been erased meanwhile.
+        """
+        with transaction.atomic():
+            if _held().get(pk=self.pk).erased_at is not None:
+                raise PersonErased
+            self.save(update_fields=fields)
+
     def clean(self) -> None:
         """Refuse boards with others before the patient agreed to them, and to bring anyone back."""
         if self.erased_at is not None:
-            raise ValidationError(_("This person is erased. Take a new patient in."))
+            raise PersonErased
         if self.boards == Boards.OWN or self.simulated:
             return
         agreed = self.pk and self.consents.filter(purpose="boards", withdrawn_at=None).exists()
@@ -335,3 +378,8 @@ class Patient(ClinicRow):
     def draw_alias(self) -> None:
         """Give the patient another animal name, one that nobody on this server has."""
         self.alias = draw_alias(lambda name: Patient.everywhere.filter(alias=name).exists())
+
+
+def _held() -> models.QuerySet[Patient]:
+    """Give patients to hold: rows of other tables may still point to them meanwhile."""
+    return Patient.everywhere.select_for_update(no_key=True)

@@ -41,6 +41,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Patient": {Role.LEAD: Right.EDIT, Role.PT: Right.EDIT},
     "Consent": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
     "ConsentText": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
+    "ErasedOriginal": {},
     "AuditEntry": {Role.LEAD: Right.VIEW},
     "HistoryEntry": dict.fromkeys(Role, Right.VIEW),
     "Station": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},

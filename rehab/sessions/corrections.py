@@ -120,7 +120,9 @@ class CorrectionForm(forms.Form):
         )
         super().__init__(*args, **options)
         fields: dict[str, Any] = self.fields
-        fields["patient"].queryset = Patient.objects.visible_to(by).filter(clinic=session.clinic_id)
+        patients = Patient.objects.visible_to(by).filter(clinic=session.clinic_id)
+        here = models.Q(erased_at=None) | models.Q(pk=session.patient_id)
+        fields["patient"].queryset = patients.filter(here)
 
     def clean_note(self) -> str:
         """Refuse the patient's name in the note."""
@@ -260,7 +262,8 @@ def correct_session(
     if seen is not None and seen != before:
         raise ValidationError(_tell_meanwhile(stored, before, seen, by))
     if Part.PATIENT in changes:
-        walker = Patient.objects.visible_to(by).filter(pseudonym=changes[Part.PATIENT]).first()
+        patients = Patient.objects.visible_to(by).filter(erased_at=None)
+        walker = patients.filter(pseudonym=changes[Part.PATIENT]).first()
         if walker is None:
             raise ValidationError(gettext("There is no such patient. Choose one of your clinic."))
         stored.patient = walker

@@ -12,19 +12,21 @@ from datetime import datetime
 from django.contrib.admin.models import LogEntry
 from django.contrib.contenttypes.models import ContentType
 from django.db import transaction
-from django.db.models import F, Max, QuerySet
-from django.db.models.functions import Coalesce
+from django.db.models import Exists, F, Max, OuterRef, QuerySet
+from django.db.models.functions import Coalesce, Greatest
 from django.utils.translation import gettext as _
 
 from rehab.people import audit
 from rehab.people.audit import Act
 from rehab.people.consent import Purpose, withdraw
+from rehab.people.erased import keep_away
 from rehab.people.history import HistoryEntry, forget_values
 from rehab.people.models import Clinic, Ending, Erasing, Patient, User, new_pseudonym
 from rehab.sessions.corrections import forget_patient as forget_corrections
 from rehab.sessions.log import Remark, SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.visits import Visit
+from rehab.sessions.words import at_clinic
 from rehab.training.changes import OPEN
 
 
@@ -38,24 +40,31 @@ def end_program(patient: Patient, because: Ending, now: datetime) -> None:
     Raises StillOpen.
     """
     with transaction.atomic():
-        _lock_closed(patient)
-        patient.ended_at, patient.ended_because = now, because
-        patient.save(update_fields=["ended_at", "ended_because"])
+        _hold_closed(patient)
+        if patient.erased_at is None:
+            patient.ended_at, patient.ended_because = now, because
+            patient.save(update_fields=["ended_at", "ended_because"])
 
 
 def reopen_program(patient: Patient) -> None:
     """Put a patient back on the lists. An erased one stays away: nobody is there to come back."""
-    if patient.erased_at is None:
-        patient.ended_at, patient.ended_because = None, ""
-        patient.save(update_fields=["ended_at", "ended_because"])
+    with transaction.atomic():
+        patient.hold()
+        if patient.erased_at is None:
+            patient.ended_at, patient.ended_because = None, ""
+            patient.save(update_fields=["ended_at", "ended_because"])
 
 
 def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) -> None:
-    """Erase all that leads to a person, for good. Raises StillOpen."""
+    """Erase all that leads to a person, for good and once. Raises StillOpen."""
     with transaction.atomic():
-        _lock_closed(patient)
+        _hold_closed(patient)
+        if patient.erased_at is not None:
+            return  # somebody was quicker
         withdraw(patient, Purpose.BOARDS, by, now)
         known_as = patient.pseudonym
+        if patient.original_id is not None:
+            keep_away(patient.clinic_id, patient.original_id)
         patient.pseudonym = patient.code = new_pseudonym()
         patient.nickname = _("Erased")
         patient.body_mass_kg = patient.original_id = patient.alias = None
@@ -81,9 +90,9 @@ def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) ->
         )
 
 
-def _lock_closed(patient: Patient) -> None:
+def _hold_closed(patient: Patient) -> None:
     """Hold the patient's row. Raises StillOpen where a session could still go on."""
-    Patient.everywhere.select_for_update().get(pk=patient.pk)
+    patient.hold()
     sessions = TrainingSession.everywhere.filter(
         patient=patient, state__in=[state.value for state in OPEN]
     )
@@ -93,13 +102,20 @@ def _lock_closed(patient: Patient) -> None:
 
 
 def overdue(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
-    """Give the patients whom a clinic has kept for as long as it wants to."""
+    """Give the patients whom a clinic has kept for as long as it wants to.
+
+    It counts from the last session, or from the day on which the patient was taken in: sessions
+    that were imported are older than that. Whoever is expected again stays.
+    """
     patients = Patient.everywhere.filter(clinic=clinic, erased_at=None, simulated=False)
     if clinic.keep_months is None:
         return patients.none()
-    last = Coalesce(Max("sessions__created_at"), "created_at")
+    last = Greatest(Coalesce(Max("sessions__created_at"), "created_at"), "created_at")
     before = months_before(now, clinic.keep_months)
-    return patients.annotate(last_here=last).filter(last_here__lt=before).order_by("pk")
+    today = at_clinic(now, clinic).date()
+    expected = Visit.everywhere.filter(patient=OuterRef("pk"), day__gte=today)
+    kept = patients.annotate(last_here=last).filter(last_here__lt=before)
+    return kept.exclude(Exists(expected)).order_by("pk")
 
 
 def let_logs_go(clinic: Clinic, now: datetime) -> int:

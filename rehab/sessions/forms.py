@@ -17,7 +17,8 @@ from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
-from rehab.people.consent import Purpose, give, join_boards
+from rehab.people.consent import Purpose, give, join_boards, offered
+from rehab.people.forms import PatientRowForm
 from rehab.people.models import SIDES, Boards, Patient, User
 from rehab.people.refusals import in_words
 from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
@@ -46,7 +47,7 @@ FIRST_GOAL_W_KG = 3.9
 TRAINING_ONLY, WITH_BASELINE = "Training only", "Baseline, training, washout"
 
 
-class PatientForm(forms.ModelForm):
+class PatientForm(PatientRowForm):
     """A patient of the PT's clinic, new or to be mended."""
 
     class Meta:
@@ -59,10 +60,10 @@ class PatientForm(forms.ModelForm):
         self._by = by
         self.fields["paretic_side"].required = True
         self.fields["nickname"].widget.attrs["autofocus"] = True
-        if self.instance.pk is None:
+        if self.instance.is_new:
             self.fields["agrees"] = forms.MultipleChoiceField(
                 label=_("What the patient agrees to"),
-                choices=Purpose.choices,
+                choices=[(one.value, one.label) for one in offered(self.instance.clinic)],
                 required=False,
                 widget=forms.CheckboxSelectMultiple,
                 help_text=_(
@@ -82,7 +83,7 @@ class PatientForm(forms.ModelForm):
     def save(self, commit: bool = True) -> Patient:
         """Store the patient, and what a new one agrees to."""
         with transaction.atomic():
-            patient: Patient = super().save(commit)
+            patient = super().save(commit)
             for purpose in map(Purpose, self.cleaned_data.get("agrees", [])):
                 if purpose is Purpose.BOARDS:
                     join_boards(patient, Boards.CLINIC, self._by, timezone.now())
@@ -91,7 +92,7 @@ class PatientForm(forms.ModelForm):
         return patient
 
 
-class ScreenForm(forms.ModelForm):
+class ScreenForm(PatientRowForm):
     """How the patient's page looks and sounds for this patient."""
 
     class Meta:

@@ -60,7 +60,8 @@ class OriginalSession:
 
 @dataclass(slots=True)
 class Original:
-    """All that a file says. ``faults`` tells of sessions that cannot be understood, by their ids.
+    """All that a file says. ``faults`` tells of sessions that cannot be understood, by their ids,
+    and ``nameless`` of participants who have none that is a number.
 
     ``named`` counts the participants that have a name. None is read any further.
     """
@@ -68,7 +69,8 @@ class Original:
     participants: list[int]
     named: int
     sessions: list[OriginalSession] = field(default_factory=list)
-    faults: dict[int, str] = field(default_factory=dict)
+    faults: dict[int | str, str] = field(default_factory=dict)
+    nameless: dict[int | str, str] = field(default_factory=dict)
 
 
 def read_original(file: Path) -> Original:
@@ -87,16 +89,23 @@ def read_original(file: Path) -> Original:
         raise Damaged(
             f"{file.name} cannot be read as a SQLite database: {problem}. Find a whole copy."
         ) from problem
-    known = [row["participant_id"] for row in people]
-    original = Original(known, named=sum(bool(row["name"]) for row in people))
-    for row in rows:
+    original = Original([], named=sum(bool(row["name"]) for row in people))
+    for place, row in enumerate(people, 1):
+        try:
+            original.participants.append(_whole(row, "participant_id"))
+        except Unreadable as problem:
+            words = f"{problem}. Give it a number of its own, in both tables"
+            original.nameless[f"in row {place}"] = words
+    known = set(original.participants)
+    for place, row in enumerate(rows, 1):
         try:
             session = read_session(row)
             if session.participant not in known:
                 raise Unreadable(f"participant {session.participant} is not in the file")
             original.sessions.append(session)
         except Unreadable as problem:
-            original.faults[row["session_id"]] = str(problem)
+            key = row["session_id"]
+            original.faults[key if isinstance(key, int) else f"in row {place}"] = str(problem)
     return original
 
 
@@ -125,7 +134,7 @@ def read_session(row: dict[str, Any]) -> OriginalSession:
         raise Unreadable(f"feedback type {row['feedback_type']!r} is none of {', '.join(VALENCES)}")
     score = row["score"]
     return OriginalSession(
-        id=row["session_id"],
+        id=_whole(row, "session_id"),
         participant=_whole(row, "participant_id"),
         start=_start(row),
         duration_s=_duration(row["duration"]),

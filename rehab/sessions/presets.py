@@ -6,9 +6,9 @@ from typing import Any, ClassVar
 
 from django.core.exceptions import ValidationError
 from django.core.validators import MaxValueValidator, MinValueValidator
-from django.db import models
+from django.db import IntegrityError, models, transaction
 from django.utils.text import capfirst
-from django.utils.translation import gettext
+from django.utils.translation import gettext, gettext_noop
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
@@ -28,6 +28,7 @@ from rehab.training.valences import VALENCES, find_valence
 
 # Not of a preset: they belong to the person and the place.
 PERSONAL = ("station", "trained_side")
+NAME_TAKEN = gettext_noop("A preset of this name exists. Choose another name.")
 
 
 class Preset(ClinicRow):
@@ -92,7 +93,7 @@ class Preset(ClinicRow):
             models.UniqueConstraint(
                 fields=["clinic", "name"],
                 name="preset_name_once_per_clinic",
-                violation_error_message=_("A preset of this name exists. Choose another name."),
+                violation_error_message=_(NAME_TAKEN),
             )
         ]
 
@@ -176,7 +177,11 @@ def keep_preset(data: Any, patient: Patient, by: User, name: str) -> Preset:
     if not name:
         preset.name = _find_name(preset.about, by)
     preset.full_clean()
-    preset.save()
+    try:
+        with transaction.atomic():
+            preset.save()
+    except IntegrityError as problem:  # somebody was quicker
+        raise ValidationError(gettext(NAME_TAKEN)) from problem
     return preset
 
 

@@ -10,6 +10,7 @@ from django.db import transaction
 from django.utils.translation import gettext
 
 from rehab.feedback.valences import valences_of
+from rehab.people.consent import may_be_cared_for
 from rehab.people.models import Patient, User
 from rehab.sessions.cues import find_composed, quiet_cue
 from rehab.sessions.live import runtime
@@ -70,11 +71,6 @@ def create_session(
     session. Raises InvalidSetting for a plan that could not be walked, StationTaken, and
     CrossClinic where patient, station and the rest are not of one clinic; nothing is stored then.
     """
-    if patient.ended_at is not None:
-        said = gettext(
-            "%(patient)s's program has ended. Reopen it on the page “Consent and data” first."
-        )
-        raise InvalidSetting(said % {"patient": patient.nickname})
     measure = measure or Measure.everywhere.get(clinic=None, slug=A2.slug)
     if phases is None:
         if protocol is None:
@@ -128,6 +124,8 @@ def create_session(
         goal=goal.value,
     )
     with transaction.atomic():
+        patient.hold()  # nobody is erased meanwhile
+        _check_may_walk(patient)
         if station is not None and station.clinic_id == patient.clinic_id:
             # Two who set up at once: the second waits here, and then sees the first one's session.
             Station.everywhere.select_for_update(no_key=True).get(pk=station.pk)
@@ -137,6 +135,26 @@ def create_session(
     if live is not None:
         live.loop.call_soon_threadsafe(live.announce, session.pk, session.station_id)
     return session
+
+
+def _check_may_walk(patient: Patient) -> None:
+    """Refuse a patient who has left, or who has not agreed to what the clinic needs.
+
+    Raises InvalidSetting.
+    """
+    names = {"patient": patient.nickname}
+    if patient.ended_at is not None:
+        said = gettext(
+            "%(patient)s's program has ended. Reopen it on the page “Consent and data” first."
+        )
+        raise InvalidSetting(said % names)
+    if may_be_cared_for(patient):
+        return
+    said = gettext(
+        "%(patient)s has not agreed to care, and this clinic needs that. Note it on the page "
+        "“Consent and data” first."
+    )
+    raise InvalidSetting(said % names)
 
 
 def change_session(

@@ -43,13 +43,17 @@ def fill(count: int) -> None:
     from django.db import connection
 
     from rehab.boards.models import Leaderboard
+    from rehab.people.consent import Consent
     from rehab.people.models import Clinic, Patient
     from rehab.sessions.models import TrainingSession
     from tests.walks import strides, walk
+    from tests.world import agreeing
 
     clinic = Clinic.everywhere.create(name="Large")
-    first = Patient.everywhere.create(
-        clinic=clinic, code="0", nickname="0", paretic_side="left", boards="clinic"
+    first = agreeing(
+        Patient.everywhere.create(
+            clinic=clinic, code="0", nickname="0", paretic_side="left", boards="clinic"
+        )
     )
     walked = walk(first, "positive", strides(2, 1))
     TrainingSession.everywhere.filter(pk=walked.pk).update(plan={})
@@ -84,6 +88,7 @@ def fill(count: int) -> None:
         f"t.id = {first.pk}",
         new | {"code": text, "pseudonym": text, "alias": text, "nickname": text},
     )
+    copy(Consent, f"t.patient_id = {first.pk}", new | {"patient_id": "900000000 + i"})
     copy(
         TrainingSession,
         f"t.id = {walked.pk}",

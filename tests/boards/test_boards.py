@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from datetime import timedelta
 
 import pytest
 from django.core.management import call_command
+from django.db import connection
 from django.test import Client
+from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 from django.utils import timezone
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rehab.boards import entries
+from rehab.boards import building, entries
 from rehab.boards.choosing import choose
 from rehab.boards.choosing import place as place_of
+from rehab.boards.figures import read_figures
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.boards.showing import Viewer, show_after, show_waiting
 from rehab.boards.standings import Listed, Stored
@@ -26,7 +30,7 @@ from rehab.stations.models import Device, Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.walks import strides, walk
-from tests.world import NOW
+from tests.world import NOW, agreeing
 
 pytestmark = pytest.mark.django_db
 
@@ -39,7 +43,7 @@ def clinic() -> Clinic:
 
 
 def patient_of(clinic: Clinic, code: str, boards: str = "clinic", **fields) -> Patient:
-    return Patient.everywhere.create(
+    patient = Patient.everywhere.create(
         clinic=clinic,
         code=code,
         nickname=f"Nick {code}",
@@ -47,6 +51,7 @@ def patient_of(clinic: Clinic, code: str, boards: str = "clinic", **fields) -> P
         boards=boards,
         **fields,
     )
+    return agreeing(patient)
 
 
 def people_of(clinic: Clinic, count: int, **fields) -> list[Patient]:
@@ -90,7 +95,7 @@ def walk_two_types(patient: Patient, **how) -> TrainingSession:
         ({"types": "same", "metric": "hit_rate"}, False),
         ({"types": "chosen", "valences": ["positive"], "metric": "hit_rate"}, False),
         ({"types": "same", "metric": "score"}, False),
-        ({"types": "all", "metric": "hit_rate", "tie_breaker": "score"}, False),
+        ({"types": "same", "metric": "hit_rate", "tie_breaker": "score"}, False),
     ],
 )
 def test_a_session_of_two_types_stands_on_no_board_of_points_or_of_one_type(clinic, fields, stands):
@@ -104,8 +109,9 @@ def test_a_session_of_two_types_stands_on_no_board_of_points_or_of_one_type(clin
     assert BoardEntry.everywhere.filter(board=board, patient=people[0]).exists() == stands
 
 
-def test_a_session_of_two_types_is_compared_by_its_hits_alone(clinic):
-    person = patient_of(clinic, "A")
+@pytest.mark.parametrize("language", ["en", "es"])
+def test_a_session_of_two_types_is_compared_by_its_hits_alone(clinic, language):
+    person = patient_of(clinic, "A", language=language)
     device = Device(
         clinic=clinic,
         station=Station.everywhere.create(clinic=clinic, name="S"),
@@ -181,6 +187,28 @@ def test_four_participants_see_their_own_sessions_and_why_five_see_the_board(cli
     assert len(after.rows) == 3
 
 
+def test_simulated_patients_hide_no_person(clinic):
+    board = board_of(clinic, types="all", include_simulated=True, display="top", names="code")
+    simulated = [patient_of(clinic, f"S{number}", simulated=True) for number in range(5)]
+    sessions = [walk(one, "positive", strides(8, 2), simulated=True) for one in simulated]
+    tried = see(sessions[0])  # alone they are shown: whoever tries GARRY sees a board
+    assert tried.shared
+    assert tried.facts == "5 patients on it now."
+    people = people_of(clinic, 5)
+    walk(people[0], "positive", strides(9, 1))
+    for viewer in (Viewer(board, NOW, simulated[0]), Viewer(board, NOW, people[0])):
+        for made in (None, list(read_figures(board, NOW))):
+            shown = replace(viewer, made=made).show()
+            assert not shown.shared
+            assert "C-0" not in [row.title for row in shown.rows]
+            assert shown.facts.startswith("1 patient on it now. Under 5")
+    walk_down(people[1:])
+    for made in (None, list(read_figures(board, NOW))):
+        shown = Viewer(board, NOW, people[0], made=made).show()
+        assert shown.shared
+        assert shown.facts == "10 patients on it now."
+
+
 def test_nobody_is_shown_in_the_last_half_and_who_is_there_sees_the_own_sessions(clinic):
     board = board_of(clinic)
     sessions = walk_down(people_of(clinic, 9))
@@ -229,6 +257,43 @@ def test_a_tie_breaker_comes_before_the_earlier_date(clinic):
         people[1].alias,
         people[0].alias,
     ]
+
+
+def test_kept_points_break_ties_and_reward_no_short_walk(clinic):
+    board_of(
+        clinic,
+        types="chosen",
+        valences=["negative"],
+        tie_breaker="score",
+        display="top",
+        ties="earlier",
+    )
+    people = people_of(clinic, 6)
+    sessions = [
+        walk(one, "negative", strides(9 * tens, tens), days_ago=9 - tens)
+        for one, tens in zip(people, (1, 2, 3, 4, 5, 6), strict=True)
+    ]
+    walked_most = [one.alias for one in people[:2:-1]]
+    assert [row.title for row in see(sessions[5]).rows] == walked_most
+
+
+@pytest.mark.parametrize(
+    "gone", [{"steps"}, {"steps", "hit_rate", "active_minutes"}], ids=["no steps", "points alone"]
+)
+def test_lost_points_without_a_stake_are_told_to_nobody(clinic, gone):
+    """Sessions that were imported have their points, and may have nothing else."""
+    board = board_of(
+        clinic, metric="score", types="chosen", valences=["negative"], min_valid_strides=0
+    )
+    people = people_of(clinic, 6)
+    sessions = walk_down(people, "negative")
+    imported = SessionMetric.everywhere.filter(session=sessions[0])
+    imported.filter(slug__in=gone).delete()
+    entries.refresh(board)
+    assert set(BoardEntry.everywhere.values_list("patient", flat=True)) == {
+        one.pk for one in people[1:]
+    }
+    assert "−" not in page_of(sessions[0]).split('id="board-')[1].split("</section>")[0]
 
 
 def test_a_patient_with_mixed_types_has_a_row_on_each_list(clinic):
@@ -510,6 +575,123 @@ def test_dates_and_a_frozen_board_stay_as_they_were(clinic):
         assert BoardEntry.everywhere.get(board=board).figure == 50
 
 
+@pytest.mark.parametrize("period", ["dates", "all"])
+def test_another_time_zone_is_another_day_at_once(period):
+    clinic = Clinic.everywhere.create(name="Elm", boards_across=True)
+    began = {"period_from": NOW.date(), "period_to": NOW.date()} if period == "dates" else {}
+    how = {"metric": "active_minutes", "entry": "sum", "types": "all"}
+    board_of(clinic, period=period, **began, **how)
+    person = patient_of(clinic, "A")
+    for hours in (8, 8, 1):  # the first two are Friday's in California
+        walk(person, "positive", strides(2400, 0), now=NOW - timedelta(hours=hours))
+    before = everything()
+    assert BoardEntry.everywhere.get().figure == 60
+    clinic.time_zone = "America/Los_Angeles"
+    clinic.save()
+    kept = everything()
+    assert kept != before
+    call_command("rebuildboards", verbosity=0)
+    assert everything() == kept
+
+
+# --- a frozen board -------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def snapshot(clinic) -> tuple[Leaderboard, list[Patient], list[TrainingSession]]:
+    """A board of six that was frozen five days ago, with two sessions of each."""
+    people = people_of(clinic, 6)
+    walk_down(people, days_ago=12)
+    sessions = walk_down(people[::-1], "binary", days_ago=10)[::-1]
+    frozen = NOW.date() - timedelta(days=5)
+    board = board_of(clinic, types="all", frozen_on=frozen, display="top", names="code")
+    assert BoardEntry.everywhere.count() == 6
+    return board, people, sessions
+
+
+def test_nobody_enters_a_frozen_board_and_no_later_session_alters_it(clinic, snapshot):
+    board, people, sessions = snapshot
+    before = everything()
+    late = patient_of(clinic, "LATE", boards="own")
+    walk(late, "positive", strides(30, 0), days_ago=9)
+    late.boards = "clinic"
+    late.save()
+    walk(people[5], "positive", strides(30, 0))
+    brought = walk(people[5], "positive", strides(30, 0), days_ago=11)  # from a sensor's log
+    SessionMetric.everywhere.filter(session=brought, slug="hit_rate").delete()
+    SessionMetric.everywhere.create(session=brought, slug="hit_rate", value=1.0)
+    board.name = "Report"
+    board.save()
+    clinic.time_zone = "America/Los_Angeles"
+    clinic.save()
+    call_command("rebuildboards", verbosity=0)
+    assert everything() == before
+    assert "LATE" not in [row.title for row in see(sessions[0]).rows]
+
+
+def test_who_leaves_a_frozen_board_has_left_it(clinic, snapshot):
+    _board, people, _sessions = snapshot
+    rest = {one.pk for one in people}
+    for person, name, value in ((people[0], "boards", "own"), (people[1], "blinded", True)):
+        setattr(person, name, value)
+        person.save()
+        rest.remove(person.pk)
+        assert set(BoardEntry.everywhere.values_list("patient", flat=True)) == rest
+    people[0].boards = "clinic"
+    people[0].save()
+    walk(people[0], "positive", strides(9, 1))
+    assert set(BoardEntry.everywhere.values_list("patient", flat=True)) == rest
+    assert sum(BoardCount.everywhere.values_list("rows", flat=True)) == len(rest)
+    Patient.everywhere.filter(pk=people[2].pk).update(boards="own")  # behind our back
+    call_command("rebuildboards", verbosity=0)
+    assert set(BoardEntry.everywhere.values_list("patient", flat=True)) == rest - {people[2].pk}
+    assert sum(BoardCount.everywhere.values_list("rows", flat=True)) == len(rest) - 1
+
+
+def test_a_correction_reaches_a_frozen_board(clinic, snapshot):
+    _board, people, _sessions = snapshot
+    assert BoardEntry.everywhere.get(patient=people[0]).figure == 100
+    mine = TrainingSession.everywhere.filter(patient=people[0]).order_by("started_at")
+    first, second = mine
+    first.left_out = True
+    first.save()
+    assert BoardEntry.everywhere.get(patient=people[0]).figure == 75
+    second.left_out = True
+    second.save()
+    assert not BoardEntry.everywhere.filter(patient=people[0]).exists()
+    assert BoardEntry.everywhere.count() == 5
+    first.left_out = False
+    first.save()
+    assert BoardEntry.everywhere.count() == 5
+
+
+def test_another_measure_of_a_frozen_board_is_another_snapshot(clinic, snapshot):
+    board, _people, _sessions = snapshot
+    patient = patient_of(clinic, "LATE")
+    walk(patient, "positive", strides(9, 0), days_ago=9)
+    board.metric = "steps"
+    board.save()
+    assert BoardEntry.everywhere.get(patient=patient).figure == 9
+    assert BoardEntry.everywhere.count() == 7
+
+
+def test_what_left_the_period_before_the_freeze_is_not_in_it(clinic):
+    day = NOW.date()
+    people = people_of(clinic, 6)
+    board = board_of(clinic, types="all", display="top", frozen_on=day, names="code")
+    old = walk_down(people[:3], days_ago=20)
+    walk_down(people[3:], days_ago=3)
+    board.period = "days_30"
+    board.save()
+    assert BoardEntry.everywhere.count() == 6
+    Leaderboard.everywhere.update(frozen_on=day + timedelta(days=12))
+    after = NOW + timedelta(days=40)  # nobody looked meanwhile
+    assert not show_after(old[0], after)[0].shared
+    assert set(BoardEntry.everywhere.values_list("patient", flat=True)) == {
+        one.pk for one in people[3:]
+    }
+
+
 # --- rows follow from sessions -------------------------------------------------------------------
 
 
@@ -562,6 +744,79 @@ def test_trouble_with_boards_loses_no_step(clinic, monkeypatch, caplog):
     monkeypatch.undo()
     call_command("rebuildboards", verbosity=0)
     assert BoardEntry.everywhere.get().figure == 75
+
+
+def test_boards_that_did_not_follow_heal_by_themselves(
+    clinic, monkeypatch, caplog, django_capture_on_commit_callbacks
+):
+    board = board_of(clinic)
+    frozen = board_of(clinic, name="Frozen", frozen_on=NOW.date() - timedelta(days=5))
+    people = people_of(clinic, 6)
+    sessions = walk_down(people)
+    monkeypatch.setattr(building.builder, "wake", lambda: None)
+    with monkeypatch.context() as patch, django_capture_on_commit_callbacks(execute=True):
+        patch.setattr(entries, "read_figures", lambda *_: 1 / 0)
+        walk(people[5], "positive", strides(20, 0), days_ago=1)
+    assert "Boards did not follow" in caplog.text
+    assert entries.find_unbuilt() == board.pk
+    assert not Leaderboard.everywhere.get(pk=frozen.pk).is_being_built
+    told = {shown.title: shown.note for shown in show_after(sessions[0], NOW)}
+    assert told["Board"] == "This board is being built. These are your own sessions."
+    while entries.advance(board.pk, 50, NOW):
+        pass
+    assert BoardEntry.everywhere.get(board=board, patient=people[5]).figure == 100
+    assert sum(BoardCount.everywhere.values_list("rows", flat=True)) == 6
+
+
+def test_rows_are_those_of_the_board_as_it_is_not_as_it_was_read(clinic):
+    board_of(clinic, types="all")
+    person = patient_of(clinic, "A")
+    walk(person, "positive", strides(9, 1))
+    read = Leaderboard.everywhere.select_related("clinic").get()
+    board = Leaderboard.everywhere.get()
+    board.metric = "steps"
+    board.save()
+    entries.refresh(read, {person.pk}, NOW)
+    assert BoardEntry.everywhere.get().figure == 10
+
+
+def test_a_patients_rows_are_made_of_no_other_patients_figures(clinic):
+    """SQLite knows nothing of how many there are unless somebody tells it."""
+    board_of(clinic, types="chosen", period="week", metric="score", valences=["positive"])
+    person = patient_of(clinic, "A")
+    walk(person, "positive", strides(9, 1))
+    with CaptureQueriesContext(connection) as asked:
+        entries.refresh_patients({person.pk, *range(900, 960)}, NOW)
+    (query,) = [one["sql"] for one in asked.captured_queries if "sessionmetric" in one["sql"]]
+    if connection.vendor == "sqlite":
+        with connection.cursor() as cursor:
+            cursor.execute(f"EXPLAIN QUERY PLAN {query}")
+            plan = "; ".join(row[3] for row in cursor.fetchall())
+        assert "SCAN" not in plan, plan
+        assert "(patient_id=?)" in plan
+        assert "metric_by_value" not in plan
+
+
+def test_everyone_locks_boards_in_one_order_and_each_once(clinic, monkeypatch):
+    oak = Clinic.everywhere.create(name="Oak", boards_across=True)
+    boards = [
+        board_of(oak, name="a"),
+        board_of(None, name="b", among="across"),
+        board_of(clinic, name="c"),
+        board_of(None, name="d", among="across"),
+        board_of(oak, name="e"),
+    ]
+    both = {patient_of(clinic, "A", "across").pk, patient_of(oak, "B", "across").pk}
+    locked: list[int] = []
+    real = entries._lock
+
+    def lock(board_id: int) -> Leaderboard | None:
+        locked.append(board_id)
+        return real(board_id)
+
+    monkeypatch.setattr(entries, "_lock", lock)
+    entries.refresh_patients(both)
+    assert locked == [board.pk for board in boards]
 
 
 @settings(deadline=None, max_examples=40)

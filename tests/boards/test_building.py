@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import threading
 from datetime import timedelta
+from importlib import import_module
 
 import pytest
+from django.apps import apps
 from django.core.management import call_command
 from django.db.models import Sum
 from django.test import Client
@@ -19,7 +21,7 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from tests.walks import strides, walk
-from tests.world import NOW
+from tests.world import NOW, agreeing
 
 PEOPLE = 9
 
@@ -37,8 +39,14 @@ def woken(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
 def sessions(db: None, woken: list[bool]) -> list[TrainingSession]:
     clinic = Clinic.everywhere.create(name="Elm")
     people = [
-        Patient.everywhere.create(
-            clinic=clinic, code=f"C-{n}", nickname=f"N-{n}", paretic_side="left", boards="clinic"
+        agreeing(
+            Patient.everywhere.create(
+                clinic=clinic,
+                code=f"C-{n}",
+                nickname=f"N-{n}",
+                paretic_side="left",
+                boards="clinic",
+            )
         )
         for n in range(PEOPLE)
     ]
@@ -145,6 +153,146 @@ def test_another_measure_or_group_is_another_board(sessions):
     assert stored() == ([], [])
 
 
+def test_what_broke_ties_by_points_of_several_types_is_settled_when_garry_is_updated(sessions):
+    boards = {
+        (types, tie): make_board(sessions[0], name=f"{types} {tie}", types=types)
+        for types in ("all", "same")
+        for tie in ("", "score")
+    }
+    for (_types, tie), board in boards.items():
+        build(board)
+        Leaderboard.everywhere.filter(pk=board.pk).update(tie_breaker=tie)
+    import_module("rehab.migrations.0005_settle_tie_breakers").settle(apps, None)
+    now = {key: Leaderboard.everywhere.get(pk=board.pk) for key, board in boards.items()}
+    assert {key for key, board in now.items() if board.is_being_built} == {
+        ("all", "score"),
+        ("same", "score"),
+    }
+    assert {key for key, board in now.items() if board.tie_breaker} == {("same", "score")}
+    for board in now.values():
+        board.full_clean()
+        build(board)
+        kept = stored()
+        entries.refresh(board, now=NOW)
+        assert stored() == kept
+
+
+def test_how_a_board_is_shown_alters_no_row_and_hides_nothing(sessions, woken):
+    board = make_board(sessions[0], types="all")
+    first = Leaderboard.everywhere.get()  # as a form read it, before anything was built
+    entries.advance(board.pk, 4, NOW)
+    first.name, first.top_n, first.moment, first.display = "Renamed", 3, "waiting", "top"
+    first.save()
+    build(board)
+    built = stored()
+    woken.clear()
+    for name, value in (("show_ranks", False), ("ties", "dense"), ("names", "code")):
+        board = Leaderboard.everywhere.get()
+        setattr(board, name, value)
+        board.save()
+        assert not Leaderboard.everywhere.get().is_being_built
+    assert stored() == built
+    entries.refresh(board, now=NOW)
+    assert stored() == built
+    assert not woken
+
+
+def test_a_clinics_other_settings_hide_no_board(sessions):
+    Clinic.everywhere.update(boards_across=True)
+    clinic = Clinic.everywhere.get()
+    Patient.everywhere.update(boards="across")
+    across = Leaderboard(
+        name="Across", among="across", entry="best", types="all", min_valid_strides=1
+    )
+    across.save()
+    boards = [across, make_board(sessions[0])]
+    for board in boards:
+        build(board)
+    clinic.keep_log_months, clinic.name = 40, "Yew"
+    clinic.save()
+    assert entries.find_unbuilt() is None
+    clinic.time_zone = "Asia/Tokyo"
+    clinic.save()
+    assert entries.find_unbuilt() == boards[1].pk
+    assert not Leaderboard.everywhere.get(pk=across.pk).is_being_built
+    build(boards[1])
+    clinic.boards_across = False
+    clinic.save()
+    assert entries.find_unbuilt() == across.pk
+    assert not Leaderboard.everywhere.get(pk=boards[1].pk).is_being_built
+
+
+def test_of_a_group_only_those_are_made_anew_who_come_or_go(sessions, monkeypatch):
+    people = [session.patient for session in sessions]
+    board = make_board(sessions[0], among="group")
+    build(board)
+    made: list[set[int]] = []
+    real = entries.refresh
+
+    def refresh(board, patients=None, now=None, **how):
+        made.append(patients)
+        real(board, patients, now, **how)
+
+    monkeypatch.setattr(entries, "refresh", refresh)
+    board.group.set(people[:4])
+    board.group.set(people[1:5])
+    assert made == [{one.pk for one in people[:4]}, {people[0].pk}, {people[4].pk}]
+    kept = stored()
+    assert [row[0] for row in kept[0]] == [one.pk for one in people[1:5]]
+    real(board, now=NOW)
+    assert stored() == kept
+    board.group.set(people)  # five are many: they are built beside
+    assert len(made) == 3
+    assert entries.find_unbuilt() == board.pk
+
+
+def test_many_rows_of_another_day_are_made_beside_and_not_shown_meanwhile(sessions, woken):
+    board = make_board(sessions[0], period="days_30", types="all")
+    later = NOW + timedelta(days=30)
+    people = [session.patient for session in sessions]
+    build(board)
+    for person in people[:6]:
+        walk(person, "positive", strides(9, 1), days_ago=-20)
+    (shown,) = show_after(sessions[1], later)
+    assert shown.note == "This board is being built. These are your own sessions."
+    assert woken
+    assert len(entries.find_stale(board, later, 99)) == 6  # of three the best session is new
+    assert entries.find_outdated(later, 4) == board.pk
+    while entries.refresh_stale(board.pk, 2, later):
+        pass
+    kept = stored()
+    assert len(kept[0]) == 6
+    assert show_after(sessions[1], later)[0].shared
+    entries.refresh(board, now=later)
+    assert stored() == kept
+
+
+def test_a_few_rows_of_another_day_are_made_in_the_look(sessions, woken):
+    board = make_board(sessions[0], period="days_30", types="all")
+    build(board)
+    for session in sessions[:5]:
+        session.patient.boards = "own"
+        session.patient.save()
+    woken.clear()
+    show_after(sessions[8], NOW + timedelta(days=30))
+    assert stored() == ([], [])
+    assert not woken
+
+
+def test_the_thread_catches_up_with_the_calendar(transactional_db, sessions):
+    board = make_board(sessions[0])
+    build(board)
+    kept = stored()
+    BoardEntry.everywhere.update(stale_on=NOW.date() - timedelta(days=1), figure=1)
+    BoardCount.everywhere.all().delete()
+    BoardCount.everywhere.create(board=board, valence="positive", figure=1, rows=PEOPLE)
+    builder = Builder()
+    builder.wake()
+    while (thread := builder._thread) is not None:
+        thread.join(20)
+    assert stored() == kept
+
+
 def test_counts_that_went_wrong_are_mended(sessions):
     board = make_board(sessions[0])
     build(board)
@@ -187,6 +335,7 @@ def test_the_thread_builds_all_that_is_to_be_built_and_ends(sessions):
     assert builder._thread is None
     assert not Leaderboard.everywhere.filter(built_to__isnull=False).exists()
     assert BoardEntry.everywhere.count() == 2 * PEOPLE
+    boards[0].metric = "steps"
     boards[0].save()
     builder.stop()
     builder.wake()  # the server is stopping: the next one goes on

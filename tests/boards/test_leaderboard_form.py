@@ -1,12 +1,16 @@
 """A board that would rank by feedback type, or list a person twice, cannot be built."""
 
+from datetime import date
 from typing import Any
+from urllib.parse import urlencode
 
 import pytest
 from django.core.exceptions import ValidationError
 from django.urls import reverse, reverse_lazy
 
+from rehab.boards import admin, figures
 from rehab.boards.models import BoardEntry, Leaderboard
+from rehab.boards.rules import FIRST_DAY, LAST_DAY
 from rehab.people.aliases import MANNERS, draw_alias, words
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
@@ -52,6 +56,25 @@ def test_the_defaults_are_safe():
             "never above",
         ),
         ({"metric": "score", "types": "chosen", "valences": ["explicit"]}, "has no points"),
+        ({"tie_breaker": "score", "types": "all"}, "never above 0"),
+        (
+            {
+                "tie_breaker": "points_per_100_steps",
+                "types": "chosen",
+                "valences": ["positive", "negative"],
+            },
+            "never above",
+        ),
+        ({"tie_breaker": "score", "types": "chosen", "valences": ["explicit"]}, "has no points"),
+        (
+            {"period": "dates", "period_from": date(2026, 1, 1), "period_to": date.max},
+            "ends on the last one",
+        ),
+        (
+            {"period": "dates", "period_from": date.min, "period_to": date(2026, 1, 1)},
+            "from Jan. 1, 1970 to Dec. 31, 2199",
+        ),
+        ({"frozen_on": date.min}, "Give a day from"),
         ({"types": "chosen"}, "at least one type"),
         ({"types": "chosen", "valences": ["kind"]}, "positive, negative, binary, explicit"),
         ({"valences": "positive"}, "Give a list"),
@@ -143,6 +166,62 @@ def test_what_is_seen_in_the_preview_is_what_the_tablet_shows(world):
     assert rows[0].split() == rows[1].split()
 
 
+@pytest.mark.parametrize("zone", ["Pacific/Kiritimati", "America/Los_Angeles"])
+def test_the_first_and_the_last_day_can_be_chosen_and_none_beyond(world, zone):
+    Clinic.everywhere.filter(pk=world.clinic.pk).update(time_zone=zone)
+    client = client_of(world)
+    wanted = filled(among="clinic", entry="best", period="dates")
+    for first, last, status in (
+        (FIRST_DAY, LAST_DAY, 302),
+        (date(2026, 1, 1), date.max, 200),
+        (date.min, date(2026, 1, 1), 200),
+    ):
+        days = {"period_from": str(first), "period_to": str(last)}
+        page = client.get(PREVIEW, wanted | days)
+        assert page.status_code == 200
+        assert ("Give a day from" in page.content.decode()) == (status == 200)
+        assert client.post(reverse("admin:rehab_leaderboard_add"), wanted | days).status_code == (
+            status
+        )
+
+
+def test_a_saved_board_is_previewed_as_it_is_stored_until_its_rows_would_be_others(
+    world, monkeypatch
+):
+    fill_board(world)
+    board = Leaderboard.everywhere.get()
+    Patient.everywhere.create(clinic=world.clinic, code="N", nickname="N", boards="clinic")
+    people = list(Patient.everywhere.filter(clinic=world.clinic, boards="clinic"))
+    board.among = "group"
+    board.save()
+    board.group.set(people)
+    client = client_of(world)
+    fields = filled(**{name: getattr(board, name) for name in filled()}) | {"row": board.pk}
+    group = [patient.pk for patient in people]
+    read: list[bool] = []
+
+    def read_figures(*given: Any) -> Any:
+        read.append(True)
+        return figures.read_figures(*given)
+
+    monkeypatch.setattr(admin, "read_figures", read_figures)
+    shown: tuple[dict[str, Any], ...] = ({}, {"top_n": 3}, {"ties": "dense", "name": "Renamed"})
+    for other in shown:
+        page = client.get(PREVIEW, fields | {"group": group} | other).content.decode()
+        assert "5 patients on it now." in page
+    assert not read
+    made: tuple[dict[str, Any], ...] = (
+        {"metric": "steps"},
+        {"group": group[1:]},
+        {"frozen_on": "2026-01-01"},
+    )
+    for number, other in enumerate(made, start=1):
+        client.get(PREVIEW, fields | {"group": group} | other)
+        assert len(read) == number
+    client.get(PREVIEW, fields | {"among": "self", "entry": "each"})
+    assert len(read) == 3
+
+
 def test_a_preview_says_what_cannot_be(world):
     client = client_of(world)
     page = client.get(PREVIEW, filled(metric="score", types="all")).content.decode()
@@ -157,6 +236,27 @@ def test_a_group_has_patients_of_the_own_clinic_and_enough_of_them(world):
     assert "Choose at least 5 patients." in few
     foreign = client.get(PREVIEW, wanted | {"group": [other.patient.pk]}).content.decode()
     assert "not one of the available choices" in foreign
+
+
+def test_a_group_of_a_thousand_is_saved_and_one_of_more_is_told_what_to_do(world):
+    Patient.everywhere.bulk_create(
+        Patient(clinic=world.clinic, code=f"g{n}", nickname="G", pseudonym=f"G-{n}")
+        for n in range(1001)
+    )
+    client = client_of(world)
+    many = list(Patient.everywhere.filter(nickname="G").values_list("pk", flat=True))
+    wanted = filled(among="group", entry="best") | {"group": many}
+    for answer in (
+        client.get(PREVIEW, wanted),
+        client.post(reverse("admin:rehab_leaderboard_add"), wanted),
+    ):
+        assert answer.status_code == 200
+        assert "Choose at most 1000 patients, or all of the clinic." in answer.content.decode()
+    wanted["group"] = many[:1000]
+    # The server refuses addresses beyond 16 kB; keys have up to seven digits.
+    assert len(urlencode({**wanted, "group": [9_999_999] * 1000}, doseq=True)) < 15_000
+    assert client.post(reverse("admin:rehab_leaderboard_add"), wanted).status_code == 302
+    assert Leaderboard.everywhere.get(name="Board").group.count() == 1000
 
 
 @pytest.mark.parametrize(

@@ -22,11 +22,12 @@ from django.utils import timezone
 from rehab.people.first_start import first_clinic
 from rehab.people.models import Patient
 from tests.walks import strides, walk
+from tests.world import agreeing
 clinic = first_clinic()
 for number, name in enumerate("Rosa Ken Mia Omar Lena Pavel".split()):
-    patient = Patient.everywhere.create(
+    patient = agreeing(Patient.everywhere.create(
         clinic=clinic, code=f"R-{number}", nickname=name, paretic_side="left", boards="clinic"
-    )
+    ))
     walk(patient, "positive", strides(20 - number, number), now=timezone.now())
     print(patient.alias)
 Patient.everywhere.create(

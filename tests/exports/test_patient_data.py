@@ -7,7 +7,7 @@ import io
 import json
 import secrets
 import tracemalloc
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime, time
 from typing import Any
 
 import pytest
@@ -20,15 +20,17 @@ from django.urls import reverse
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.exports.archive import ZipResponse, write_csv, write_zip
 from rehab.exports.tables import PAGE, STEPS, TABLES, Selection, to_cell
 from rehab.people.audit import Act, AuditEntry
 from rehab.people.consent import Purpose, withdraw
-from rehab.people.models import Patient, User
+from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.corrections import Part, correct_session
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.visits import plan_visit
 from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
@@ -77,6 +79,7 @@ def test_a_patients_file_holds_everything_that_is_kept(world):
     files = fetch(world, Role.PT)
     assert set(files) == {
         *("README.txt", "patient.json", "consent.json", "codebook.csv"),
+        *("visits.json", "boards.json", "changes.json"),
         *("sessions.csv", "steps.csv", "events.csv", "corrections.csv"),
     }
     who = json.loads(files["patient.json"])
@@ -86,6 +89,76 @@ def test_a_patients_file_holds_everything_that_is_kept(world):
     assert agreed[0]["words"] == world.patient.consents.first().text.text
     assert len(rows_of(files["steps.csv"])) == Step.everywhere.count()
     assert len(rows_of(files["events.csv"])) == SessionEvent.everywhere.count()
+
+
+def test_the_file_says_what_is_in_it_in_the_language_of_whoever_asks(world):
+    Clinic.everywhere.update(language="es")
+    for url in (reverse("patient-data", args=[world.patient.pk]), reverse("export-sessions")):
+        readme = open_archive(body_of(client_of(world, Role.LEAD).get(url)))["README.txt"]
+        assert "una fila por paso" in readme
+        assert "Son datos de salud." in readme
+
+
+# Where the file tells the rows of each model that leads to a patient. Who looked is told from the
+# audit log (docs/privacy.md).
+TOLD_IN = {
+    "Consent": "consent.json",
+    "Visit": "visits.json",
+    "BoardEntry": "boards.json",
+    "Leaderboard_group": "boards.json",
+    "TrainingSession": "sessions.csv",
+    "Step": "steps.csv",
+    "SessionEvent": "events.csv",
+    "SessionMetric": "sessions.csv",
+    "SessionCorrection": "corrections.csv",
+    "AuditEntry": None,
+}
+RENAMED = {
+    "boards": "leaderboards",
+    "alias": "animal_name",
+    "blinded": "in_a_blinded_study",
+    "original_id": "participant_of_the_original",
+    "ended_at": "program_ended_at",
+    "ended_because": "program_ended_because",
+}
+
+
+def test_no_model_that_leads_to_a_patient_is_forgotten(world):
+    links = [
+        link.related_model.__name__
+        for model in (Patient, TrainingSession)
+        for link in model._meta.get_fields(include_hidden=True)
+        if link.auto_created and link.is_relation and not link.many_to_many
+    ]
+    assert set(links) == set(TOLD_IN)
+    files = fetch(world)
+    assert set(filter(None, TOLD_IN.values())) <= set(files)
+
+
+def test_every_detail_of_a_patient_is_told(world):
+    who = json.loads(fetch(world)["patient.json"])
+    names = {field.name for field in Patient._meta.concrete_fields} - {"id"}
+    assert set(who) == {RENAMED.get(name, name) for name in names}
+    assert who["screen_text"] == "normal"
+
+
+def test_visits_boards_and_earlier_values_are_told(world):
+    patient, board = world.patient, world.rows[Leaderboard]
+    plan_visit(patient, date(2031, 2, 3), time(9, 15))
+    client_of(world).post(
+        reverse("mend-patient", args=[patient.pk]),
+        {"nickname": "Rosa", "code": "R-1", "paretic_side": "right"},
+    )
+    board.group.add(patient)
+    files = fetch(world)
+    visits = json.loads(files["visits.json"])
+    assert {"day": "2031-02-03", "at": "09:15:00"} in visits
+    row, group = json.loads(files["boards.json"])
+    assert (row["board"], row["figure"]) == (board.name, world.rows[BoardEntry].figure)
+    assert group == {"in_the_group_of_the_board": board.name}
+    last = json.loads(files["changes.json"])[-1]
+    assert last["before_and_after"]["nickname"] == [patient.nickname, "Rosa"]
+    assert all(user.username not in files["changes.json"] for user in world.people.values())
 
 
 def test_read_back_the_numbers_are_the_same_to_the_last_digit(world):

@@ -14,12 +14,14 @@ from zoneinfo import ZoneInfo
 import pytest
 from django.core.management import CommandError, call_command
 
-from rehab.people.models import Clinic, Patient, User
+from rehab.people.erased import is_kept_away
+from rehab.people.models import Clinic, Erasing, Patient, User
 from rehab.people.roles import Role
+from rehab.sessions.endings import erase
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from tests.programs import Program, token_of
-from tests.world import signed_in
+from tests.world import NOW, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -167,6 +169,46 @@ def test_importing_again_takes_only_what_is_new(file, clinic):
     patient.save()
     run(file)
     assert Patient.everywhere.get(original_id=5).nickname == "Rosa"
+
+
+def test_who_was_erased_stays_away_with_all_sessions(file, clinic):
+    run(file)
+    bo = Patient.everywhere.get(original_id=2)
+    walked = bo.sessions.count()
+    erase(bo, Erasing.ASKED, None, NOW)
+    said = run(file)
+    assert counts(said) == {"participants": [4, 0, 3, 0], "sessions": [67, 0, 67 - walked, 0]}
+    assert f"1 participant(s) who were erased here, and their {walked} session(s)" in said
+    assert (Patient.everywhere.count(), TrainingSession.everywhere.count()) == (4, 67)
+    elsewhere = Clinic.everywhere.create(name="Birch")
+    assert counts(run(file, "--clinic", "Birch"))["participants"] == [4, 4, 0, 0]
+    assert elsewhere.patients.filter(original_id=2).exists()
+
+
+def test_of_whom_was_erased_nothing_is_kept_that_tells_the_number(file, clinic, settings):
+    run(file)
+    erase(Patient.everywhere.get(original_id=2), Erasing.ASKED, None, NOW)
+    assert is_kept_away(clinic.pk, 2)
+    assert not is_kept_away(clinic.pk, 1)
+    settings.SECRET_KEY = "another server's"
+    assert not is_kept_away(clinic.pk, 2)
+
+
+@pytest.mark.parametrize(("given", "shown"), [("'x9'", "'x9'"), ("NULL", "None")])
+def test_a_participant_without_a_number_is_told_with_the_cure(given, shown, file, clinic):
+    alter(
+        file,
+        "ALTER TABLE participants RENAME TO people",
+        "CREATE TABLE Participants(participant_id INTEGER, name TEXT)",
+        "INSERT INTO Participants SELECT * FROM people",
+        f"INSERT INTO Participants VALUES({given}, 'Eva')",
+    )
+    report, _ = refused(file)
+    place = 1 if given == "NULL" else 5  # they are read in the order of their numbers
+    words = f"participant in row {place}: participant_id {shown} is no number. Give it a number"
+    assert words in report
+    assert counts(report) == {"participants": [5, 4, 0, 1], "sessions": [67, 67, 0, 0]}
+    assert "Done." in run(file, "--partial")
 
 
 def test_a_dry_run_says_the_same_and_changes_nothing(file, clinic):

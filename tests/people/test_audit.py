@@ -13,7 +13,8 @@ from django.utils import timezone
 
 from rehab.people import audit, sightings
 from rehab.people.audit import Act, AppendOnly, AuditEntry, Recent, shorten
-from rehab.people.models import Clinic, Patient
+from rehab.people.factors import Authenticator
+from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.tokens import ApiToken
 from rehab.sessions.log import Step
@@ -254,3 +255,30 @@ def test_what_was_noted_is_forgotten_in_its_turn(monkeypatch):
     assert [recent.is_new(key, NOW) for key in "abab"] == [True, True, False, False]
     assert recent.is_new("c", NOW)
     assert recent.is_new("a", NOW)
+
+
+@pytest.mark.parametrize("model", [Device, ApiToken])
+def test_a_new_token_is_noted(model, world):
+    row = world.rows[model]
+    url = reverse(f"admin:rehab_{model.__name__.lower()}_changelist")
+    client_of(world, Role.LEAD).post(url, {"action": "renew_tokens", "_selected_action": row.pk})
+    entry = entries().get(act=Act.TOKEN)
+    assert (entry.by, entry.about) == (
+        world.people[Role.LEAD],
+        f"{model._meta.verbose_name}: {row}",
+    )
+
+
+def test_without_a_log_no_second_factor_goes_and_no_token_changes(world, monkeypatch):
+    def fail(*args, **kwargs):
+        raise DatabaseError("full")
+
+    monkeypatch.setattr(AuditEntry, "save", fail)
+    lead = client_of(world, Role.LEAD, raise_request_exception=False)
+    for model, action in ((Device, "renew_tokens"), (User, "remove_second_factors")):
+        url = reverse(f"admin:rehab_{model.__name__.lower()}_changelist")
+        row = world.rows[model]
+        assert lead.post(url, {"action": action, "_selected_action": row.pk}).status_code == 500
+    device = world.device
+    assert Device.everywhere.get(pk=device.pk).token_hash == device.token_hash
+    assert Authenticator.everywhere.filter(user=world.rows[User]).exists()

@@ -20,6 +20,7 @@ from rehab.people.consent import (
     current_text,
     give,
     holding,
+    offered,
     withdraw,
     write_text,
 )
@@ -27,6 +28,9 @@ from rehab.people.models import Boards, Clinic, Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.services import create_session
+from rehab.training.goals import GoalRule
+from rehab.training.measures import InvalidSetting
 from tests.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
@@ -61,11 +65,14 @@ def test_words_that_somebody_agreed_to_never_change(world):
         text.save()
 
 
-def test_a_clinic_begins_with_words_that_name_every_purpose_but_are_its_own_to_change():
-    clinic = Clinic.everywhere.create(name="New")
+@pytest.mark.parametrize("networks", ["", "192.168.1.0/24"])
+def test_a_clinic_begins_with_words_that_name_all_it_asks_for_but_are_its_own_to_change(networks):
+    clinic = Clinic.everywhere.create(name="New", networks=networks)
     first = current_text(clinic)
     assert first.version == 1
-    assert all(f"{purpose.label}:" in first.text for purpose in Purpose)
+    named = [purpose for purpose in Purpose if f"{purpose.label}:" in first.text]
+    assert named == offered(clinic)
+    assert (Purpose.REMOTE in named) == bool(networks)
     assert current_text(clinic) == first
     assert ConsentText.everywhere.filter(clinic=clinic).count() == 1
 
@@ -123,6 +130,32 @@ def test_the_page_says_where_the_words_have_changed_since(world, pt):
     assert b"words have changed since" in pt.get(url).content
 
 
+def test_a_patient_whom_two_take_in_at_once_is_told_by_the_form(world, pt, monkeypatch):
+    find_good = Patient.full_clean
+
+    def be_slower(patient, *args, **kwargs):
+        find_good(patient, *args, **kwargs)
+        monkeypatch.setattr(Patient, "full_clean", find_good)
+        Patient.everywhere.create(clinic=world.clinic, code="R1", nickname="Rosa")
+
+    monkeypatch.setattr(Patient, "full_clean", be_slower)
+    given = {"nickname": "Rosa", "code": "R1", "paretic_side": "left", "agrees": ["care"]}
+    page = pt.post(reverse("new-patient"), given)
+    assert page.status_code == 200
+    assert "Code R1 already exists: it is Rosa" in page.content.decode()
+    assert Patient.everywhere.filter(code="R1").count() == 1
+
+
+def test_the_demo_patient_is_one_and_takes_nobodys_code(world, pt):
+    for _ in range(2):
+        assert pt.post(reverse("demo")).status_code == 302
+    demo = Patient.everywhere.get(code="demo")
+    Patient.everywhere.filter(pk=demo.pk).update(simulated=False)
+    page = pt.post(reverse("demo"), follow=True)
+    assert "Demo has the code demo. Give that patient another code first." in page.content.decode()
+    assert Patient.everywhere.filter(code="demo").count() == 1
+
+
 def test_the_new_patient_form_notes_what_is_agreed_to(world, pt):
     given = {"nickname": "Rosa", "code": "R1", "paretic_side": "left", "agrees": ["care", "boards"]}
     assert pt.post(reverse("new-patient"), given).status_code == 302
@@ -147,14 +180,31 @@ def test_boards_with_others_need_consent(world):
     patient.full_clean()
 
 
-def test_the_admin_refuses_boards_without_consent(world):
-    withdraw(world.patient, Purpose.BOARDS, None, NOW)
+@pytest.mark.parametrize(("before", "asked"), [("own", "clinic"), ("clinic", "own")])
+def test_the_admin_shows_boards_and_leads_to_where_they_are_agreed_to(before, asked, world, pt):
+    tap(pt, world.patient, "boards", before)
     lead = client_of(world, Role.LEAD)
     url = reverse("admin:rehab_patient_change", args=[world.patient.pk])
-    given = {"code": "c", "nickname": "n", "language": "en", "boards": "clinic"}
-    page = lead.post(url, given)
-    assert b"consent to boards" in page.content
-    assert Patient.everywhere.get(pk=world.patient.pk).boards == Boards.OWN
+    consent = reverse("consent", kwargs={"patient_id": world.patient.pk})
+    assert f'href="{consent}"' in lead.get(url).content.decode()
+    held = list(Consent.everywhere.values_list("pk", "withdrawn_at"))
+    given = {"code": "c", "nickname": "n", "language": "en", "boards": asked}
+    assert lead.post(url, given).status_code == 302
+    stored = Patient.everywhere.get(pk=world.patient.pk)
+    assert (stored.nickname, stored.boards) == ("n", before)
+    assert list(Consent.everywhere.values_list("pk", "withdrawn_at")) == held
+
+
+def test_every_level_of_boards_is_noted_and_who_goes_further_agrees_again(world, pt):
+    Clinic.everywhere.update(boards_across=True)
+    Consent.everywhere.filter(patient=world.patient, purpose="boards").delete()
+    for says in ("total", "across", "across", "clinic"):
+        tap(pt, world.patient, "boards", says)
+    rows = Consent.everywhere.filter(patient=world.patient, purpose="boards").order_by("pk")
+    assert [row.level for row in rows] == ["total", "across", "clinic"]
+    assert [row.withdrawn_at is None for row in rows] == [False, False, True]
+    page = pt.get(reverse("consent", kwargs={"patient_id": world.patient.pk})).content.decode()
+    assert str(Boards.ACROSS.label) in page
 
 
 def test_withdrawing_takes_the_patient_off_all_boards_at_once(world, pt):
@@ -169,6 +219,88 @@ def test_withdrawing_takes_the_patient_off_all_boards_at_once(world, pt):
 def test_leaving_boards_on_the_tablet_withdraws_the_consent(world, pt):
     pt.post(reverse("leave-boards", kwargs={"session_id": world.session.pk}))
     assert "boards" not in holding(world.patient)
+
+
+# --- care -----------------------------------------------------------------------------------------
+
+
+def set_up(world: World) -> TrainingSession:
+    walked = world.session
+    return create_session(
+        world.patient,
+        valence="positive",
+        goal=GoalRule(value=1.0),
+        protocol=walked.protocol,
+        measure=walked.measure,
+    )
+
+
+def test_a_clinic_may_need_consent_to_care_before_a_session(world, pt):
+    consent = reverse("consent", kwargs={"patient_id": world.patient.pk})
+    assert "no session without it" not in pt.get(consent).content.decode()
+    set_up(world)  # off, unless the clinic says so
+    world.clinic.care_needs_consent = True
+    world.clinic.save()
+    with pytest.raises(InvalidSetting, match="not agreed to care.*Consent and data"):
+        set_up(world)
+    tap(pt, world.patient, "care", "yes")
+    set_up(world)
+    page = pt.post(consent, {"purpose": "care", "says": "no"}, follow=True).content.decode()
+    assert "This clinic sets up no session without it." in page
+    assert f'href="{reverse("records", args=[world.patient.pk])}">End the program' in page
+    with pytest.raises(InvalidSetting):
+        set_up(world)
+    Patient.everywhere.filter(pk=world.patient.pk).update(simulated=True)
+    set_up(world)
+
+
+# --- remote view ----------------------------------------------------------------------------------
+
+HERE, AWAY = "192.168.1.7", "203.0.113.9"
+
+
+@pytest.mark.parametrize("name", ["monitor", "walk"])
+def test_from_elsewhere_a_session_is_watched_with_consent_only(name, world, pt):
+    session = set_up(world)
+    url, consent = reverse(name, args=[session.pk]), reverse("consent", args=[world.patient.pk])
+    assert pt.get(url, REMOTE_ADDR=AWAY).status_code == 200  # no networks: nobody is asked
+    assert 'value="remote"' not in pt.get(consent).content.decode()
+    Clinic.everywhere.update(networks="192.168.1.0/24\n2001:db8::/48")
+    for address, opens in (
+        *((HERE, True), ("2001:db8:0:5::9", True), ("127.0.0.1", True)),
+        *((AWAY, False), ("192.168.2.7", False), ("2001:db9::1", False), ("?", False)),
+    ):
+        answer = pt.get(url, REMOTE_ADDR=address)
+        assert (answer.status_code == 200) == opens, address
+    told = pt.get(url, REMOTE_ADDR=AWAY, follow=True)
+    assert told.redirect_chain == [(consent, 302)]
+    assert "has not agreed to remote view" in told.content.decode()
+    tap(pt, world.patient, "remote", "yes")
+    assert pt.get(url, REMOTE_ADDR=AWAY).status_code == 200
+    tap(pt, world.patient, "remote", "no")
+    assert pt.get(url, REMOTE_ADDR=AWAY).status_code == 302
+
+
+def test_what_is_not_offered_can_be_withdrawn_but_not_given(world, pt):
+    tap(pt, world.patient, "remote", "yes")
+    assert "remote" not in holding(world.patient)
+    give(world.patient, Purpose.REMOTE, None, NOW)  # before the clinic took its networks away
+    tap(pt, world.patient, "remote", "no")
+    assert "remote" not in holding(world.patient)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("192.168.1.7/24", "is no network"),
+        ("our floor", "is no network"),
+        ("2001:db8:1:2:3::/80", "too small"),
+    ],
+)
+def test_what_is_no_network_is_refused(text, words, world):
+    world.clinic.networks = text
+    with pytest.raises(ValidationError, match=words):
+        world.clinic.full_clean()
 
 
 # --- research -------------------------------------------------------------------------------------
@@ -211,3 +343,18 @@ def test_what_exists_when_garry_is_updated_goes_on(world):
     assert [(row.patient, row.text) for row in Consent.everywhere.all()] == [(world.patient, None)]
     world.patient.full_clean()
     assert not holding(quiet)
+
+
+def test_an_update_lets_boards_and_consent_say_the_same(world):
+    board = BoardEntry.everywhere.get(patient=world.patient).board
+    left = Patient.everywhere.create(clinic=world.clinic, code="l", nickname="L", boards="across")
+    kept = Patient.everywhere.create(clinic=world.clinic, code="k", nickname="K")
+    give(kept, Purpose.BOARDS, None, NOW)
+    Consent.everywhere.update(level="")
+    import_module("rehab.migrations.0004_what_was_agreed_to").tell_levels(apps, None)
+    assert holding(world.patient)["boards"].level == "clinic"
+    assert "boards" not in holding(kept)
+    left.refresh_from_db()
+    assert left.boards == Boards.OWN
+    board.refresh_from_db()
+    assert board.built_to == 0  # made anew, without whoever no longer agrees

@@ -151,3 +151,13 @@ def test_erased_values_are_gone_but_not_who_and_when(world):
     assert entry.values["nickname"] is None
     url = reverse("admin:rehab_patient_history", args=[world.patient.pk])
     assert "erased" in client_of(world, Role.LEAD).get(url).content.decode()
+
+
+def test_an_accounts_page_tells_which_role_it_had(world):
+    pt, lead = world.people[Role.PT], client_of(world, Role.LEAD)
+    given = {"username": pt.username, "role": "lead", "is_active": "on"}
+    assert lead.post(reverse("admin:rehab_user_change", args=[pt.pk]), given).status_code == 302
+    words = lead.get(reverse("admin:rehab_user_history", args=[pt.pk])).content.decode()
+    assert "Physical therapist → Clinic lead" in words
+    birch = client_of(build_world("birch"), Role.LEAD)
+    assert birch.get(reverse("admin:rehab_user_history", args=[pt.pk])).status_code == 404

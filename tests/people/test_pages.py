@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from django.urls import reverse
 
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
@@ -149,3 +150,32 @@ def test_shared_rows_are_the_hosts_to_change(world):
         assert client.get(f"{url}change/").status_code == 200
         assert client.post(f"{url}change/", {"name": "mine"}).status_code == 403
         assert client.post(f"{url}delete/", {"post": "yes"}).status_code == 403
+
+
+PRIVATE = {
+    "patient_id": (
+        "start",
+        "patient",
+        "history",
+        "records",
+        "consent",
+        "take-home",
+        "patient-data",
+    ),
+    "session_id": ("session", "report", "monitor", "scores", "walk"),
+}
+
+
+def test_no_browser_keeps_a_page_with_patients(db):
+    """Going back after the sign-out asks the server again."""
+    world = build_world("amber")
+    pt, keys = client_of(world), {"patient_id": world.patient.pk, "session_id": world.session.pk}
+    for key, names in PRIVATE.items():
+        for name in names:
+            url = reverse(name, kwargs={} if name == "start" else {key: keys[key]})
+            kept = pt.get(url).headers["Cache-Control"]
+            assert "no-store" in kept, name
+    for path in ("patients", f"patients/{world.patient.pk}", "sessions", "me"):
+        assert pt.get(f"/api/v1/{path}").headers["Cache-Control"] == "private, no-store"
+    for name in ("sign-in", "tablet-app", "healthz"):
+        assert "private, no-store" not in pt.get(reverse(name)).headers.get("Cache-Control", "")

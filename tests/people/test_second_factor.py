@@ -13,6 +13,7 @@ from django.urls import reverse
 from django.utils import timezone
 
 from rehab.people import codes, factors
+from rehab.people.audit import AuditEntry
 from rehab.people.codes import STEP_S, code_of, new_secret, step_of
 from rehab.people.factors import Authenticator, RecoveryCode
 from rehab.people.models import Clinic, User
@@ -346,6 +347,29 @@ def test_a_lead_asks_for_it_and_helps_whoever_lost_it(client, pt, app):
     assert not factors.authenticators_of(pt).exists()
     assert factors.authenticators_of(lead).exists()
     assert enter(Client()) == reverse("set-up-second-factor")
+
+
+@pytest.mark.parametrize(
+    ("action", "act"), [("remove_second_factors", "factors"), ("unlock", "unlock")]
+)
+def test_what_a_lead_does_to_an_accounts_door_is_noted(action, act, client, pt, app):
+    lead = User.everywhere.create_user("lead", password=PASSWORD, role=Role.LEAD, clinic=pt.clinic)
+    enter(client, "lead")
+    client.post("/admin/rehab/user/", {"action": action, "_selected_action": pt.pk})
+    entry = AuditEntry.everywhere.get(act=act)
+    assert (entry.by, entry.clinic, entry.about) == (lead, pt.clinic, f"user: {pt}")
+    assert entry.address == "127.0.0.0/24"
+
+
+def test_a_host_is_noted_in_the_accounts_clinic_and_a_hosts_own_account_in_the_servers_log(
+    client, pt, caplog
+):
+    host = User.everywhere.create_user("host", password=PASSWORD, role=Role.HOST)
+    enter(client, "host")
+    for account in (pt, host):
+        client.post("/admin/rehab/user/", {"action": "unlock", "_selected_action": account.pk})
+    assert AuditEntry.everywhere.get(act="unlock").clinic == pt.clinic
+    assert "user: host, by host" in caplog.text
 
 
 def test_a_lead_of_another_clinic_removes_nothing(client, pt, app):

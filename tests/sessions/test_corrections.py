@@ -7,22 +7,24 @@ import re
 from typing import Any
 
 import pytest
+from django.core.exceptions import ValidationError
 from django.urls import reverse
 
 from rehab.boards import entries
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.people.consent import Purpose, give
-from rehab.people.models import Patient
+from rehab.people.models import Erasing, Patient
 from rehab.people.roles import Role
 from rehab.sessions import corrections
 from rehab.sessions.corrections import Part, SessionCorrection, correct_session
 from rehab.sessions.dashboard import read_week
+from rehab.sessions.endings import erase
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.takehome import sum_up_for_home
 from rehab.sessions.trend import read_trend
 from tests.walks import strides, walk
-from tests.world import NOW, World, build_world, client_of
+from tests.world import NOW, World, agreeing, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -33,9 +35,10 @@ def world() -> World:
 
 
 def patient_of(world: World, name: str, **fields) -> Patient:
-    return Patient.everywhere.create(
+    patient = Patient.everywhere.create(
         clinic=world.clinic, code=f"K-{ord(name[0])}", nickname=name, paretic_side="left", **fields
     )
+    return agreeing(patient)
 
 
 @pytest.fixture
@@ -318,3 +321,20 @@ def test_the_api_says_what_is_left_out(world, rosa):
     correct(world, session, counts="no")
     told = client_of(world).get(f"/api/v1/sessions/{session.pk}").json()
     assert told["left_out"] is True
+
+
+def test_nobody_who_is_erased_is_offered_or_taken_as_who_walked(world, rosa, omar):
+    erase(rosa, Erasing.ASKED, None, NOW)
+    pt, url = client_of(world), reverse("correct", args=[world.session.pk])
+    page = pt.get(url).content.decode()
+    assert f'value="{omar.pk}"' in page
+    assert f'value="{rosa.pk}"' not in page
+    with pytest.raises(ValidationError, match="no such patient"):
+        correct_session(
+            world.session, {Part.PATIENT: rosa.pseudonym}, "Why.", world.people[Role.PT], NOW
+        )
+    erase(world.patient, Erasing.ASKED, None, NOW)  # who did walk stays chosen
+    assert f'value="{world.patient.pk}" selected' in pt.get(url).content.decode()
+    group = pt.get(reverse("admin:rehab_leaderboard_add")).content.decode()
+    assert f'name="group" value="{omar.pk}"' in group
+    assert f'name="group" value="{rosa.pk}"' not in group

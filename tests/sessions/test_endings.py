@@ -237,6 +237,8 @@ def retain(*options: str) -> str:
 def last_walked(world: World, days: int) -> None:
     moment = datetime.now(UTC) - timedelta(days=days)
     TrainingSession.everywhere.filter(patient=world.patient).update(created_at=moment)
+    Patient.everywhere.filter(pk=world.patient.pk).update(created_at=moment)
+    Visit.everywhere.filter(patient=world.patient).update(day=moment.date())
 
 
 @pytest.mark.parametrize(("days", "erased"), [(58, False), (63, True)])
@@ -251,6 +253,27 @@ def test_who_was_kept_long_enough_is_erased(days, erased, world):
     if erased:
         assert world.patient.erased_because == Erasing.RETENTION
         assert "0 patient(s) erased" in retain()
+
+
+def test_who_was_imported_a_moment_ago_stays_however_old_the_sessions_are(world):
+    world.clinic.keep_months = 2
+    last_walked(world, 400)
+    taken_in = datetime.now(UTC) - timedelta(days=58)
+    Patient.everywhere.filter(pk=world.patient.pk).update(created_at=taken_in)
+    assert not overdue(world.clinic, datetime.now(UTC)).exists()
+    assert overdue(world.clinic, datetime.now(UTC) + timedelta(days=5)).get() == world.patient
+
+
+@pytest.mark.parametrize(
+    ("zone", "day", "stays"),
+    [("UTC", 21, True), ("UTC", 20, False), ("Pacific/Honolulu", 20, True)],
+)
+def test_who_is_expected_again_stays_by_the_clinics_day(zone, day, stays, world):
+    now = datetime(2026, 11, 21, 8, 0, tzinfo=UTC)  # in Honolulu it is still the day before
+    world.clinic.keep_months, world.clinic.time_zone = 2, zone
+    last_walked(world, 400)
+    Visit.everywhere.filter(patient=world.patient).update(day=now.date().replace(day=day))
+    assert overdue(world.clinic, now).exists() == (not stays)
 
 
 def test_without_a_wish_nobody_goes_and_each_clinic_has_its_own(world):

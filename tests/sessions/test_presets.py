@@ -169,6 +169,20 @@ def test_without_a_name_it_says_what_it_is_and_never_the_same_twice(pt, world, p
     assert sorted(names) == [words, f"{words} (2)"]
 
 
+def test_a_name_that_somebody_else_takes_this_moment_is_told(pt, world, patient, monkeypatch):
+    find_good = Preset.full_clean
+
+    def be_slower(preset: Preset) -> None:
+        find_good(preset)
+        monkeypatch.setattr(Preset, "full_clean", find_good)
+        preset_of(world, name=preset.name)
+
+    monkeypatch.setattr(Preset, "full_clean", be_slower)
+    page = pt.post(f"/patients/{patient.pk}/new/", choices(preset_name="Twice"))
+    assert "A preset of this name exists" in page.content.decode()
+    assert Preset.everywhere.filter(name="Twice").count() == 1
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [

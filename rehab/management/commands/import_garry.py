@@ -12,6 +12,7 @@ from zoneinfo import ZoneInfo
 from django.core.management import BaseCommand, CommandError
 from django.db import transaction
 
+from rehab.people.erased import is_kept_away
 from rehab.people.first_start import first_clinic, prepare_database
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
@@ -37,17 +38,25 @@ class TakeOver:
         self.original = original
         self.taken: Counter[str] = Counter()
         self.here: Counter[str] = Counter()
+        self.erased: Counter[str] = Counter()
         self.faults = {
-            "participants": dict[int, str](),
+            "participants": dict(original.nameless),
             "sessions": dict(original.faults),
         }
         self._measure = Measure.everywhere.get(clinic=None, slug=A2.slug)
         self._zone = ZoneInfo(clinic.time_zone)
 
     def run(self) -> None:
-        """Take over all that can be."""
-        patients = {pk: self._take_participant(pk) for pk in self.original.participants}
+        """Take over all that can be; whoever was erased here stays away."""
+        away = {pk for pk in self.original.participants if is_kept_away(self.clinic.pk, pk)}
+        self.erased["participants"] = len(away)
+        patients = {
+            pk: self._take_participant(pk) for pk in self.original.participants if pk not in away
+        }
         for found in self.original.sessions:
+            if found.participant in away:
+                self.erased["sessions"] += 1
+                continue
             patient = patients[found.participant]
             if patient is None:
                 words = f"participant {found.participant} could not be taken over"
@@ -131,7 +140,7 @@ class TakeOver:
     def report(self) -> list[str]:
         """Tell what was read, what became of it, and why some of it could not be taken."""
         read = {
-            "participants": len(self.original.participants),
+            "participants": len(self.original.participants) + len(self.original.nameless),
             "sessions": len(self.original.sessions) + len(self.original.faults),
         }
         lines = [f"{'':14}{'read':>6}{'taken over':>12}{'here before':>13}{'could not':>11}"]
@@ -142,7 +151,7 @@ class TakeOver:
         lines += [
             f"  {noun.removesuffix('s')} {pk}: {words}."
             for noun, faults in self.faults.items()
-            for pk, words in sorted(faults.items())
+            for pk, words in sorted(faults.items(), key=lambda one: (isinstance(one[0], str), one))
         ]
         return lines + self._left_out()
 
@@ -155,6 +164,11 @@ class TakeOver:
             lines.append(
                 f"Left out: {self.original.named} name(s). GARRY keeps no real names: patients are "
                 "called P1, P2, … until a therapist gives them a nickname."
+            )
+        if self.erased["participants"]:
+            lines.append(
+                f"Left out: {self.erased['participants']} participant(s) who were erased here, and "
+                f"their {self.erased['sessions']} session(s)."
             )
         if unpaid:
             lines.append(

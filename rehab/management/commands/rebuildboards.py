@@ -1,12 +1,16 @@
-"""`manage.py rebuildboards`: make the rows of every leaderboard anew, from the sessions."""
+"""`manage.py rebuildboards`: make the rows of every leaderboard anew, from the sessions.
+
+Those of a frozen board stay, without who may no longer stand on it; they are counted anew.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 from django.core.management.base import BaseCommand
+from django.utils import timezone
 
-from rehab.boards.entries import refresh, tidy
+from rehab.boards.entries import is_snapshot, refresh, thin_out, tidy
 from rehab.boards.models import BoardEntry, Leaderboard
 
 
@@ -18,7 +22,10 @@ class Command(BaseCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Rebuild and say how many rows each board has."""
         for board in Leaderboard.everywhere.select_related("clinic").order_by("pk"):
-            refresh(board)
+            if is_snapshot(board, timezone.now()):
+                thin_out(board)
+            else:
+                refresh(board)
             if options["verbosity"]:
                 rows = BoardEntry.everywhere.filter(board=board).count()
                 self.stdout.write(f"{board}: {rows} rows")

@@ -20,6 +20,8 @@ from rehab.people.consent import (
     give,
     holding,
     join_boards,
+    may_be_cared_for,
+    offered,
     withdraw,
     write_text,
 )
@@ -52,6 +54,7 @@ class Choice:
     held: Consent | None
     is_old: bool  # to words that have changed since
     options: list[tuple[str, str, bool]]  # what is sent, its words, whether it is so now
+    lacks: bool  # without it no session is set up
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -65,7 +68,7 @@ def show_consent(request: HttpRequest, patient_id: int) -> HttpResponse:
         purpose, says = request.POST.get("purpose"), request.POST.get("says", "")
         if purpose == Purpose.BOARDS and says in Boards.values:
             join_boards(patient, Boards(says), user, timezone.now())
-        elif purpose in Purpose.values and says in ("yes", "no"):
+        elif purpose in (*offered(patient.clinic), *holding(patient)) and says in ("yes", "no"):
             act = give if says == "yes" else withdraw
             act(patient, Purpose(purpose), user, timezone.now())
         else:
@@ -85,7 +88,8 @@ def list_choices(patient: Patient) -> list[Choice]:
     """Give every purpose with what holds of it."""
     held, text = holding(patient), current_text(patient.clinic)
     choices = []
-    for purpose in Purpose:
+    asked = {*offered(patient.clinic), *map(Purpose, held)}
+    for purpose in (one for one in Purpose if one in asked):
         row = held.get(purpose)
         if purpose == Purpose.BOARDS:
             now = patient.boards if row else Boards.OWN
@@ -95,7 +99,8 @@ def list_choices(patient: Patient) -> list[Choice]:
         else:
             options = [("yes", _("Yes"), row is not None), ("no", _("No"), row is None)]
         is_old = row is not None and row.text_id != text.pk
-        choices.append(Choice(purpose, str(MEANING[purpose]), row, is_old, options))
+        lacks = purpose == Purpose.CARE and not may_be_cared_for(patient)
+        choices.append(Choice(purpose, str(MEANING[purpose]), row, is_old, options, lacks))
     return choices
 
 

@@ -16,8 +16,10 @@ from django.utils import timezone
 from django.utils.module_loading import import_string
 
 from rehab.people import browser_sessions
+from rehab.people.consent import may_be_watched
 from rehab.people.entry import holds
-from rehab.people.models import User
+from rehab.people.lockout import find_address
+from rehab.people.models import Patient, User
 from rehab.sessions.models import TrainingSession
 from rehab.stations import tablets
 from rehab.stations.models import Device, find_device
@@ -124,6 +126,21 @@ def keep_signed_in(scopes: Sequence[Mapping[str, Any]]) -> None:
 def may_open(actor: Actor, session_id: int) -> bool:
     """Say whether the session is one that this actor sees."""
     return TrainingSession.objects.visible_to(actor).filter(pk=session_id).exists()
+
+
+def address_of(scope: Mapping[str, Any]) -> str:
+    """Give the address that a socket comes from."""
+    forwarded = headers_of(scope).get("x-forwarded-for", "")
+    return find_address(forwarded, (scope.get("client") or [""])[0])
+
+
+@database_sync_to_async
+def may_watch(actor: Actor, session_id: int, scope: Mapping[str, Any]) -> bool:
+    """Say whether a person may watch from there; a device stands where it stands."""
+    if not isinstance(actor, User):
+        return True
+    patients = Patient.everywhere.filter(sessions=session_id).select_related("clinic")
+    return may_be_watched(patients.get(), address_of(scope))
 
 
 @database_sync_to_async

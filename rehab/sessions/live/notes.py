@@ -16,8 +16,7 @@ from django.utils import timezone
 
 from rehab.people import audit
 from rehab.people.audit import Act
-from rehab.people.lockout import find_address
-from rehab.sessions.live.admission import Actor, headers_of
+from rehab.sessions.live.admission import Actor, address_of
 from rehab.sessions.models import TrainingSession
 
 log = logging.getLogger(__name__)
@@ -45,9 +44,7 @@ class Notes:
         key = (type(actor).__name__, getattr(actor, "pk", None), path)
         if act is Act.VIEW and not audit.recent.is_new(key, now):
             return
-        forwarded = headers_of(scope).get("x-forwarded-for", "")
-        address = find_address(forwarded, (scope.get("client") or [""])[0])
-        facts = {"about": path, "address": address, "now": now}
+        facts = {"about": path, "address": address_of(scope), "now": now}
         self._waiting.append(Note(session_id, act, actor, facts))
         if self._writing is None:
             loop = asyncio.get_running_loop()

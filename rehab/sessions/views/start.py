@@ -5,10 +5,12 @@ from __future__ import annotations
 from datetime import timedelta
 from typing import Any
 
+from django.contrib import messages
 from django.db.models import Count, Max, Q, QuerySet
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
+from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
@@ -107,8 +109,8 @@ def add_patient(request: HttpRequest) -> HttpResponse:
     """Take a new patient in."""
     user = person(request)
     form = PatientForm(request.POST or None, by=user)
-    if request.method == "POST" and form.is_valid():
-        return redirect("setup", patient_id=form.save().pk)
+    if request.method == "POST" and form.keep():
+        return redirect("setup", patient_id=form.instance.pk)
     return render(request, "sessions/patient_form.html", {"form": form})
 
 
@@ -119,8 +121,7 @@ def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     user = person(request)
     patient = get_object_or_404(patients_of(user), pk=patient_id)
     form = PatientForm(request.POST or None, by=user, instance=patient)
-    if request.method == "POST" and form.is_valid():
-        form.save()
+    if request.method == "POST" and form.keep():
         return redirect("patient", patient_id=patient.pk)
     context = {"form": form, "patient": Patient.objects.visible_to(user).get(pk=patient_id)}
     return render(request, "sessions/patient_form.html", context)
@@ -132,8 +133,7 @@ def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Fit the patient's page to this patient's eyes and ears."""
     patient = get_object_or_404(patients_of(person(request)), pk=patient_id)
     form = ScreenForm(request.POST or None, instance=patient)
-    if request.method == "POST" and form.is_valid():
-        form.save()
+    if request.method == "POST" and form.keep():
         return redirect("patient", patient_id=patient.pk)
     return render(request, "sessions/screen_form.html", {"form": form, "patient": patient})
 
@@ -143,14 +143,12 @@ def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
 def add_demo(request: HttpRequest) -> HttpResponse:
     """Let somebody who only looks around begin with a simulated patient."""
     user = person(request)
-    patient = Patient.objects.visible_to(user).filter(simulated=True, code=DEMO_CODE).first()
-    if patient is None:
-        patient = Patient(
-            clinic=clinic_of(user),
-            code=DEMO_CODE,
-            nickname="Demo",
-            paretic_side="left",
-            simulated=True,
-        )
-        patient.save()
+    patient, _made = Patient.objects.visible_to(user).get_or_create(
+        clinic=clinic_of(user),
+        code=DEMO_CODE,
+        defaults={"nickname": "Demo", "paretic_side": "left", "simulated": True},
+    )
+    if not patient.simulated:
+        said = _("%(nickname)s has the code %(code)s. Give that patient another code first.")
+        messages.error(request, said % {"nickname": patient.nickname, "code": patient.code})
     return redirect("patient", patient_id=patient.pk)

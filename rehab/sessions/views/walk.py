@@ -10,9 +10,12 @@ from django.urls import reverse
 from django.views.decorators.clickjacking import xframe_options_sameorigin
 
 from rehab.people.access import actor_of, for_roles
+from rehab.people.consent import may_be_watched
 from rehab.people.language import speak_to
+from rehab.people.lockout import client_address
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.views.monitor import ask_for_consent
 from rehab.training.changes import ENDED, State
 
 
@@ -22,14 +25,16 @@ from rehab.training.changes import ENDED, State
 def show_walk(request: HttpRequest, session_id: int) -> HttpResponse:
     """Show a session as the patient sees it; one that has ended shows its scores."""
     sessions = TrainingSession.objects.visible_to(actor_of(request)).select_related(
-        "patient", "station"
+        "patient__clinic", "station"
     )
     session = get_object_or_404(sessions, pk=session_id)
+    alone = not request.user.is_authenticated
+    if not alone and not may_be_watched(session.patient, client_address(request)):
+        return ask_for_consent(request, session.patient)
     mirror = "mirror" in request.GET
     speak_to(session.patient)
     if State(session.state) in ENDED and not mirror:
         return redirect("scores", session_id=session.pk)
-    alone = not request.user.is_authenticated
     context = {
         "session": session,
         "mirror": mirror,

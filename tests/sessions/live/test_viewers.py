@@ -14,7 +14,7 @@ from asgiref.sync import ThreadSensitiveContext, sync_to_async
 from django.contrib.sessions.models import Session
 from django.utils import timezone
 
-from rehab.people.models import User
+from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.sessions.live import hub, owners
 from rehab.sessions.live import runtime as runtimes
@@ -548,6 +548,28 @@ async def test_who_may_open_which_page(place, elsewhere, begun):
                 assert code == expected, (options, kind)
                 assert error["message"]
                 assert len(page.heard) == 1
+
+
+async def test_from_elsewhere_people_watch_with_consent_and_the_tablet_stays(place, begun):
+    session = await begun(place)
+    await sync_to_async(Clinic.everywhere.update)(networks="192.168.1.0/24")
+
+    async def code_of(
+        kind: type[PatientPage | MonitorPage], address: str, **who: Any
+    ) -> int | None:
+        page = kind(session.pk, **who)
+        page.wire.scope["client"] = (address, 1)
+        if address == "192.168.1.7" or "token" in who:
+            await page.watch()
+            await page.hang_up()
+            return None
+        await page.dial()
+        return (await page.sent_away())[0]
+
+    for kind in (PatientPage, MonitorPage):
+        assert await code_of(kind, "192.168.1.7", user=place.pt) is None
+        assert await code_of(kind, "203.0.113.9", user=place.pt) == 4004
+    assert await code_of(PatientPage, "203.0.113.9", token=place.tokens["tablet"]) is None
 
 
 @pytest.mark.parametrize("origin", ["https://evil.example", None, "http://localhost.evil.example"])

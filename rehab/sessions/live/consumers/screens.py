@@ -20,7 +20,7 @@ from rehab.people.refusals import in_words
 from rehab.people.roles import Role
 from rehab.sessions.events import Audience, history_entry, to_text
 from rehab.sessions.facts import Message
-from rehab.sessions.live.admission import Actor, find_actor, may_open
+from rehab.sessions.live.admission import Actor, find_actor, may_open, may_watch
 from rehab.sessions.live.consumers.base import Closing, Socket
 from rehab.sessions.live.hub import Lagged, Unseen, Viewer
 from rehab.sessions.live.messages import (
@@ -62,6 +62,8 @@ class ScreenConsumer(Socket):
             raise Closing(4001, "sign_in", "Sign in again, or pair the tablet again.")
         if not self.is_welcome(self.actor) or not await may_open(self.actor, session_id):
             raise Closing(4004, "no_session", "There is no such session for you.")
+        if not await may_watch(self.actor, session_id, self.scope):
+            raise Closing(4004, "elsewhere", "The patient has not agreed to remote view.")
         try:
             self.live = live = await self.runtime.session(session_id)
         except OwnedElsewhere as problem:

@@ -1,0 +1,220 @@
+"""What two people do with one patient at the same moment: nobody's act undoes another's."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from django.db import connections
+from django.test import Client
+from django.urls import reverse
+
+from rehab.boards import entries
+from rehab.boards.models import BoardEntry
+from rehab.people.consent import (
+    Consent,
+    Purpose,
+    current_text,
+    give,
+    holding,
+    join_boards,
+    withdraw,
+)
+from rehab.people.models import Boards, Erasing, Patient
+from rehab.people.roles import Role
+from rehab.people.tokens import ApiToken
+from rehab.sessions.defaults import install_defaults
+from rehab.sessions.endings import erase
+from rehab.sessions.services import create_session
+from rehab.training.goals import GoalRule
+from rehab.training.measures import InvalidSetting
+from tests.world import NOW, World, build_world, client_of
+
+pytestmark = pytest.mark.django_db
+SCREEN = {"screen_side": "left", "screen_text": "large"}
+DETAILS = {"nickname": "Rosa", "code": "R-1", "paretic_side": "left", "body_mass_kg": 70}
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+def save_screen(world: World) -> Any:
+    return client_of(world).post(reverse("screen", args=[world.patient.pk]), SCREEN)
+
+
+def save_details(world: World) -> Any:
+    return client_of(world).post(reverse("mend-patient", args=[world.patient.pk]), DETAILS)
+
+
+def patch(world: World) -> Any:
+    holder: ApiToken = world.rows[ApiToken]
+    token = holder.new_token()
+    holder.save()
+    return Client(headers={"Authorization": f"Bearer {token}"}).patch(
+        f"/api/v1/patients/{world.patient.pk}", DETAILS, content_type="application/json"
+    )
+
+
+def between(monkeypatch: pytest.MonkeyPatch, act: Callable[[], Any]) -> None:
+    """Let somebody else act once a row was read and found good, before it is stored."""
+    find_good, done = Patient.full_clean, list[bool]()
+
+    def stop_there(patient: Patient, *args: Any, **kwargs: Any) -> None:
+        find_good(patient, *args, **kwargs)
+        if not done:
+            done.append(True)
+            act()
+
+    monkeypatch.setattr(Patient, "full_clean", stop_there)
+
+
+@pytest.mark.parametrize(
+    ("save", "status"), [(save_screen, 200), (save_details, 200), (patch, 409)]
+)
+def test_who_is_erased_while_somebody_saves_stays_erased(save, status, world, monkeypatch):
+    patient = Patient.everywhere.get(pk=world.patient.pk)
+    between(monkeypatch, lambda: erase(patient, Erasing.ASKED, None, NOW))
+    answer = save(world)
+    assert (answer.status_code, b"This person is erased" in answer.content) == (status, True)
+    stored = Patient.everywhere.get(pk=patient.pk)
+    assert (stored.nickname, stored.code) == ("Erased", stored.pseudonym)
+    assert (stored.erased_at, stored.body_mass_kg, stored.alias) == (NOW, None, None)
+    assert stored.screen_side == "right"
+
+
+@pytest.mark.parametrize("save", [save_screen, save_details, patch])
+def test_who_leaves_the_boards_while_somebody_saves_has_left_them(save, world, monkeypatch):
+    leave = reverse("leave-boards", kwargs={"session_id": world.session.pk})
+    between(monkeypatch, lambda: client_of(world).post(leave))
+    assert save(world).status_code in (200, 302)
+    stored = Patient.everywhere.get(pk=world.patient.pk)
+    assert stored.boards == Boards.OWN
+    assert "boards" not in holding(stored)
+    assert not BoardEntry.everywhere.filter(patient=stored).exists()
+
+
+def test_whoever_read_the_patient_before_withdraws_and_erases_what_is_there_now(world):
+    early, erasing = (Patient.everywhere.get(pk=world.patient.pk) for _ in range(2))
+    early.boards = erasing.boards = Boards.OWN  # read before the patient joined
+    withdraw(early, Purpose.BOARDS, None, NOW)
+    assert Patient.everywhere.get(pk=early.pk).boards == Boards.OWN
+    join_boards(world.patient, Boards.ACROSS, None, NOW)
+    erase(erasing, Erasing.ASKED, None, NOW)
+    stored = Patient.everywhere.get(pk=early.pk)
+    assert (stored.boards, stored.alias) == (Boards.OWN, None)
+    assert not BoardEntry.everywhere.filter(patient=stored).exists()
+
+
+def test_nobody_agrees_joins_or_walks_for_a_person_who_was_just_erased(world):
+    stale = [Patient.everywhere.get(pk=world.patient.pk) for _ in range(3)]
+    erase(world.patient, Erasing.ASKED, None, NOW)
+    agreed = Consent.everywhere.count()
+    give(stale[0], Purpose.CARE, None, NOW)
+    join_boards(stale[1], Boards.CLINIC, None, NOW)
+    assert Consent.everywhere.count() == agreed
+    assert Patient.everywhere.get(pk=world.patient.pk).boards == Boards.OWN
+    walked = world.session
+    with pytest.raises(InvalidSetting, match="has ended"):
+        create_session(
+            stale[2],
+            valence="positive",
+            goal=GoalRule(value=1.0),
+            protocol=walked.protocol,
+            measure=walked.measure,
+        )
+
+
+def test_who_no_longer_agrees_stands_on_no_board_whatever_the_row_says(world):
+    board = BoardEntry.everywhere.get(patient=world.patient).board
+    Consent.everywhere.filter(patient=world.patient).update(withdrawn_at=NOW)
+    entries.refresh(board)
+    assert not BoardEntry.everywhere.filter(patient=world.patient).exists()
+    Patient.everywhere.filter(pk=world.patient.pk).update(simulated=True)  # agrees to everything
+    entries.refresh(board)
+    assert BoardEntry.everywhere.filter(patient=world.patient).exists()
+
+
+def test_a_screen_setting_costs_boards_nothing(world):
+    entry = BoardEntry.everywhere.get(patient=world.patient)
+    entry.delete()  # whoever looks at boards again would bring it back
+    patient = Patient.everywhere.get(pk=world.patient.pk)
+    patient.screen_still = True
+    patient.keep("screen_still")
+    assert not BoardEntry.everywhere.exists()
+    patient.blinded = False
+    patient.keep("blinded")
+    assert BoardEntry.everywhere.exists()
+
+
+# --- at the same time ---------------------------------------------------------------------------
+
+
+@pytest.fixture
+def busy(transactional_db: None) -> World:
+    """A world whose rows other threads see."""
+    install_defaults()
+    return build_world("amber")
+
+
+def at_once(*acts: Callable[[], Any]) -> list[Any]:
+    """Act in a thread each, all at the same moment."""
+    start, answers = threading.Barrier(len(acts)), [None] * len(acts)
+
+    def run(number: int, act: Callable[[], Any]) -> None:
+        try:
+            start.wait(10)
+            answers[number] = act()
+        finally:
+            connections.close_all()
+
+    threads = [threading.Thread(target=run, args=one) for one in enumerate(acts)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return answers
+
+
+def test_the_admin_holds_the_patient_whom_it_changes(busy, monkeypatch):
+    """The erasing comes while the form is looked at, and is done after it or before it."""
+    patient, lead = busy.patient, client_of(busy, Role.LEAD)
+    other = Patient.everywhere.get(pk=patient.pk)
+    found, threads = Patient.full_clean, list[threading.Thread]()
+
+    def run() -> None:
+        erase(other, Erasing.ASKED, None, NOW)
+        connections.close_all()
+
+    def erase_beside(row: Patient, *args: Any, **kwargs: Any) -> None:
+        found(row, *args, **kwargs)
+        if not threads:
+            act = threading.Thread(target=run)
+            threads.append(act)
+            act.start()
+            act.join(0.3)  # it has to wait
+
+    monkeypatch.setattr(Patient, "full_clean", erase_beside)
+    given = {"code": "R-1", "nickname": "Rosa", "paretic_side": "left", "language": "en"}
+    change = reverse("admin:rehab_patient_change", args=[patient.pk])
+    assert lead.post(change, given).status_code == 302
+    threads[0].join()
+    stored = Patient.everywhere.get(pk=patient.pk)
+    assert (stored.nickname, stored.erased_at) == ("Erased", NOW)
+
+
+def test_a_consent_that_is_tapped_twice_is_noted_once(busy):
+    current_text(busy.clinic)
+    url = reverse("consent", args=[busy.patient.pk])
+    browsers = [client_of(busy) for _ in range(2)]
+    for _ in range(5):
+        withdraw(busy.patient, Purpose.CARE, None, NOW)
+        taps = [
+            lambda one=one: one.post(url, {"purpose": "care", "says": "yes"}).status_code
+            for one in browsers
+        ]
+        assert at_once(*taps) == [302, 302]
+        assert Consent.everywhere.filter(purpose="care", withdrawn_at=None).count() == 1
