@@ -15,11 +15,13 @@ from typing import Any
 from robot.gestures import (
     GESTURE_MAX_S,
     GESTURES,
+    NOT_FINITE,
     ORIGINALS,
     BadGesture,
     BadGoal,
     Gesture,
     Goal,
+    Marked,
     check_goal,
     needed_time_s,
     stages,
@@ -85,15 +87,15 @@ def read_gesture(data: Any) -> Gesture:
 
 def _read_move(number: int, step: Any) -> Move:
     if not isinstance(step, Mapping):
-        raise BadGesture(f"Step {number} is no object.")
+        raise BadGesture("Step {number} is no object.", number=number)
     given = {name: step[name] for name in NUMBERS if step.get(name) is not None}
     for name, value in given.items():
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise BadGesture(f'Step {number}: "{name}" is a number.')
+            raise BadGesture('Step {number}: "{name}" is a number.', number=number, name=name)
     try:
         return Move(**{name: float(value) for name, value in given.items()})
     except OverflowError:
-        raise BadGesture(f"Step {number} has a number that is not finite.") from None
+        raise BadGesture(NOT_FINITE, part=Marked("Step"), number=number) from None
 
 
 def check_name(name: Any) -> str:
@@ -101,7 +103,7 @@ def check_name(name: Any) -> str:
     if not isinstance(name, str) or not NAME.fullmatch(name):
         raise BadGesture("A gesture's name has 1 to 32 letters, digits, hyphens or underscores.")
     if name in GESTURES or name in ORIGINALS:
-        raise BadGesture(f"Every robot knows {name} already. Choose another name.")
+        raise BadGesture("Every robot knows {name} already. Choose another name.", name=name)
     return name
 
 
@@ -109,7 +111,7 @@ def compose(name: Any, moves: Sequence[Move]) -> Gesture:
     """Make a gesture of steps. Raises BadGesture, which names the step and the cure."""
     check_name(name)
     if not 1 <= len(moves) <= MOVES_MAX:
-        raise BadGesture(f"A gesture has 1 to {MOVES_MAX} steps.")
+        raise BadGesture("A gesture has 1 to {most} steps.", most=MOVES_MAX)
     for number, move in enumerate(moves, start=1):
         _check_move(number, move)
     of_steps = list(_to_goals(moves))
@@ -121,21 +123,27 @@ def compose(name: Any, moves: Sequence[Move]) -> Gesture:
         goals[-1] = _at_home(goals[-1])
         return Gesture(name, name, tuple(_give_times(goals, owners, moves)))
     except BadGoal as problem:
-        raise BadGesture(f"Step {owners[problem.number - 1]} {problem.what}") from None
+        raise problem.of_step(owners[problem.number - 1]) from None
 
 
 def _check_move(number: int, move: Move) -> None:
     numbers = (move.turn_rad, move.forward_m, move.hold_s, move.pace, move.within_s or 0.0)
     if not all(map(math.isfinite, numbers)):
-        raise BadGesture(f"Step {number} has a number that is not finite.")
+        raise BadGesture(NOT_FINITE, part=Marked("Step"), number=number)
     if not (move.turn_rad or move.forward_m or move.hold_s):
-        raise BadGesture(f"Step {number} does nothing. Give it a turn, a way or a pause.")
+        raise BadGesture(
+            "Step {number} does nothing. Give it a turn, a way or a pause.", number=number
+        )
     if 0 < abs(move.forward_m) < LEAST_WAY_M:
         raise BadGesture(
-            f"Step {number} goes less than {LEAST_WAY_M:g} m, which nobody sees. Make it longer."
+            "Step {number} goes less than {least:g} m, which nobody sees. Make it longer.",
+            number=number,
+            least=LEAST_WAY_M,
         )
     if 0 < abs(move.turn_rad) < LEAST_TURN_RAD:
-        raise BadGesture(f"Step {number} turns by less than 1°, which nobody sees. Turn further.")
+        raise BadGesture(
+            "Step {number} turns by less than 1°, which nobody sees. Turn further.", number=number
+        )
 
 
 def places(moves: Sequence[Move]) -> list[Pose]:
@@ -171,12 +179,24 @@ def _at_home(last: Goal) -> Goal:
     """Give the last goal as home itself. Raises BadGesture where it is elsewhere."""
     heading_rad = math.tau * round(last.heading_rad / math.tau)
     away_m, off_rad = last.pose.distance_m(HOME), last.heading_rad - heading_rad
-    where = [f"{100 * away_m:.0f} cm from home"] if away_m else []
+    far, turned = 100 * away_m, abs(math.degrees(off_rad))
+    side = Marked("left") if off_rad > 0 else Marked("right")
+    if abs(off_rad) > HOME_RAD and away_m:
+        raise BadGesture(
+            "It ends {far:.0f} cm from home, turned by {turned:.0f}° to the {side}. Add steps that "
+            "lead back home.",
+            far=far,
+            turned=turned,
+            side=side,
+        )
     if abs(off_rad) > HOME_RAD:
-        side = "left" if off_rad > 0 else "right"
-        where.append(f"turned by {abs(math.degrees(off_rad)):.0f}° to the {side}")
-    if where:
-        raise BadGesture(f"It ends {', '.join(where)}. Add steps that lead back home.")
+        raise BadGesture(
+            "It ends turned by {turned:.0f}° to the {side}. Add steps that lead back home.",
+            turned=turned,
+            side=side,
+        )
+    if away_m:
+        raise BadGesture("It ends {far:.0f} cm from home. Add steps that lead back home.", far=far)
     return replace(last, x_m=0.0, y_m=0.0, heading_rad=heading_rad)
 
 
@@ -194,7 +214,8 @@ def _give_times(
             given_s = min(GENEROUS * all_s + MOMENT_S, max(GESTURE_MAX_S, all_s))
         elif given_s < all_s:
             raise BadGesture(
-                f"Step {owner} needs {math.ceil(10 * all_s) / 10:.1f} s. Give it as long, or leave "
-                "its time empty."
+                "Step {number} needs {needed:.1f} s. Give it as long, or leave its time empty.",
+                number=owner,
+                needed=math.ceil(10 * all_s) / 10,
             )
         yield replace(goal, within_s=min(given_s * least_s / all_s, GESTURE_MAX_S))

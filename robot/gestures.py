@@ -34,16 +34,36 @@ def gettext_noop(text: str) -> str:
     return text
 
 
+NOT_FINITE = gettext_noop("{part} {number} has a number that is not finite.")
+
+
+class Marked(str):
+    """A word that has a translation, as it stands in a sentence."""
+
+    __slots__ = ()
+
+
 class BadGesture(ValueError):
-    """A gesture that a base could not perform; the message says what would be one."""
+    """A gesture that a base could not perform; the message says what would be one.
+
+    It is ``template`` with ``values`` in its places: whoever shows it says it in another language.
+    """
+
+    def __init__(self, template: str, /, **values: object) -> None:
+        super().__init__(template.format(**values) if values else template)
+        self.template, self.values = template, values
 
 
 class BadGoal(BadGesture):
-    """A gesture of which one goal is at fault: ``number`` says which, ``what`` what it does."""
+    """A gesture of which one goal is at fault: ``number`` says which."""
 
-    def __init__(self, number: int, what: str) -> None:
-        super().__init__(f"Goal {number} {what}")
-        self.number, self.what = number, what
+    def __init__(self, number: int, template: str, /, **values: object) -> None:
+        super().__init__(template, part=Marked("Goal"), number=number, **values)
+        self.number = number
+
+    def of_step(self, number: int) -> BadGesture:
+        """Say it of the step that the goal belongs to."""
+        return BadGesture(self.template, **self.values | {"part": Marked("Step"), "number": number})
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +148,7 @@ class Gesture:
 def check_gesture(gesture: Gesture) -> None:
     """Raise BadGesture, with the cure, for a gesture that is not safe and possible."""
     if not 1 <= len(gesture.goals) <= GOALS_MAX:
-        raise BadGesture(f"A gesture has 1 to {GOALS_MAX} goals.")
+        raise BadGesture("A gesture has 1 to {most} goals.", most=GOALS_MAX)
     for number, goal in enumerate(gesture.goals, start=1):
         check_goal(number, goal)
     last = gesture.goals[-1].pose
@@ -137,12 +157,18 @@ def check_gesture(gesture: Gesture) -> None:
     needed_s = [needed_time_s(*stage) for stage in stages(gesture.goals, DEFAULT_LIMITS)]
     if sum(needed_s) > GESTURE_MAX_S:
         raise BadGesture(
-            f"This takes up to {sum(needed_s):.1f} s; a gesture takes at most {GESTURE_MAX_S:g} s. "
-            "Make it smaller, or leave something out."
+            "This takes up to {took:.1f} s; a gesture takes at most {most:g} s. Make it smaller, "
+            "or leave something out.",
+            took=sum(needed_s),
+            most=GESTURE_MAX_S,
         )
     for number, (goal, least_s) in enumerate(zip(gesture.goals, needed_s, strict=True), start=1):
         if goal.within_s < least_s:
-            raise BadGoal(number, f"needs {math.ceil(10 * least_s) / 10:.1f} s; give it as long.")
+            raise BadGoal(
+                number,
+                "{part} {number} needs {needed:.1f} s; give it as long.",
+                needed=math.ceil(10 * least_s) / 10,
+            )
     _check_ways_back(gesture.goals)
 
 
@@ -155,19 +181,30 @@ def check_goal(number: int, goal: Goal) -> None:
     """Raise BadGoal for a goal that no gesture may have, whatever comes before it."""
     numbers = (goal.x_m, goal.y_m, goal.heading_rad, goal.within_s, goal.pace, goal.hold_s)
     if not all(map(math.isfinite, numbers)):
-        raise BadGoal(number, "has a number that is not finite.")
+        raise BadGoal(number, NOT_FINITE)
     away_m = goal.pose.distance_m(HOME)
     if away_m > REACH_M:
         raise BadGoal(
             number,
-            f"goes {away_m:.2f} m away from home, further than {REACH_M:g} m. Make it shorter.",
+            "{part} {number} goes {away:.2f} m away from home, further than {most:g} m. Make it "
+            "shorter.",
+            away=away_m,
+            most=REACH_M,
         )
     if abs(goal.heading_rad) > TURN_MAX_RAD:
-        raise BadGoal(number, "turns more than once around. Turn back first, or less.")
+        raise BadGoal(
+            number, "{part} {number} turns more than once around. Turn back first, or less."
+        )
     if not LEAST_PACE <= goal.pace <= 1:
-        raise BadGoal(number, f"has a pace outside {LEAST_PACE:g} to 1.")
+        raise BadGoal(
+            number, "{part} {number} has a pace outside {least:g} to 1.", least=LEAST_PACE
+        )
     if not (0 < goal.within_s <= GESTURE_MAX_S and 0 <= goal.hold_s <= goal.within_s):
-        raise BadGoal(number, f"may take up to {GESTURE_MAX_S:g} s, its hold included.")
+        raise BadGoal(
+            number,
+            "{part} {number} may take up to {most:g} s, its hold included.",
+            most=GESTURE_MAX_S,
+        )
 
 
 def _check_ways_back(goals: Sequence[Goal]) -> None:
@@ -183,7 +220,7 @@ def _check_ways_back(goals: Sequence[Goal]) -> None:
             elif not lies_on(start, goal.pose, seen):
                 raise BadGoal(
                     number,
-                    "backs where it did not come from; there is no bumper behind. "
+                    "{part} {number} backs where it did not come from; there is no bumper behind. "
                     "Let it face the way, or go ahead first.",
                 )
         start = goal.pose

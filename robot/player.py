@@ -6,12 +6,12 @@ import math
 from collections import deque
 from dataclasses import replace
 
-from robot.gestures import LEAST_PACE, NEAR_M, NEAR_RAD, Gesture, Goal
+from robot.gestures import LEAST_PACE, NEAR_M, NEAR_RAD, Gesture, Goal, gettext_noop
 from robot.legs import Drive, Leg, Turn, plan_legs
 from robot.motion import HOME, STILL, Limits, Pose, Twist, wrap
 
 DONE = "done"
-OUT_OF_TIME = "out_of_time"
+OUT_OF_TIME = gettext_noop("out_of_time")
 BAD_ODOMETRY = "bad_odometry"
 
 # Slowing down is begun for this share of what the limits allow, so that an order that comes a

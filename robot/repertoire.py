@@ -40,7 +40,9 @@ class Repertoire:
             try:
                 gesture = admit_gesture(data, self._limits)
                 if gesture.name in self.own:
-                    raise BadGesture(f"This robot has a gesture {gesture.name} of its own.")
+                    raise BadGesture(
+                        "This robot has a gesture {name} of its own.", name=gesture.name
+                    )
             except BadGesture as problem:
                 name = data.get("name") if isinstance(data, dict) else None
                 # A name that every robot knows means that gesture, whatever else comes under it.

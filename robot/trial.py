@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 from robot.composed import read_gesture
-from robot.gestures import TETHER_M, BadGesture, Gesture
+from robot.gestures import TETHER_M, BadGesture, Gesture, Marked
 from robot.motion import DEFAULT_LIMITS, HOME, TICK_S, Limits, Pose, advance
 from robot.player import DONE, Player
 
@@ -53,13 +53,18 @@ def _check_trial(gesture: Gesture, limits: Limits) -> None:
     trial = try_gesture(gesture, limits)
     if trial.farthest_m > TETHER_M:
         raise BadGesture(
-            f"Simulated, it goes {trial.farthest_m:.2f} m from home, past the tether of "
-            f"{TETHER_M:g} m. Make it smaller."
+            "Simulated, it goes {far:.2f} m from home, past the tether of {tether:g} m. Make it "
+            "smaller.",
+            far=trial.farthest_m,
+            tether=TETHER_M,
         )
     end = trial.way[-1]
     away_m, off_rad = end.distance_m(HOME), end.turn_rad(HOME)
     if trial.outcome != DONE or away_m > END_M or off_rad > END_RAD:
         raise BadGesture(
-            f"Simulated, it ends after {trial.took_s:.1f} s, {away_m:.2f} m from home "
-            f"({trial.outcome}). Give its steps more time, or make them smaller."
+            "Simulated, it ends after {took:.1f} s, {far:.2f} m from home ({outcome}). Give its "
+            "steps more time, or make them smaller.",
+            took=trial.took_s,
+            far=away_m,
+            outcome=Marked(trial.outcome),
         )

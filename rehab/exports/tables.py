@@ -11,6 +11,7 @@ import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
+from itertools import islice
 from typing import Any, NamedTuple
 
 from django.db.models import QuerySet
@@ -158,11 +159,19 @@ class Selection:
             page = self.keys[first : first + SESSIONS_PAGE]
             yield from self.sessions.filter(pk__in=page).select_related(*related).order_by("pk")
 
+    def _with_figures(self) -> Iterator[tuple[TrainingSession, dict[str, float]]]:
+        """Give the sessions with their figures, which are read for a page at once."""
+        sessions = self.read_sessions()
+        while page := list(islice(sessions, SESSIONS_PAGE)):
+            figures: dict[int, dict[str, float]] = {session.pk: {} for session in page}
+            found = SessionMetric.objects.visible_to(self.user).filter(session__in=list(figures))
+            for key, slug, value in found.values_list("session_id", "slug", "value"):
+                figures[key][slug] = value
+            yield from ((session, figures[session.pk]) for session in page)
+
     def session_rows(self) -> Iterator[tuple[Any, ...]]:
         """Give the rows of ``SESSIONS``."""
-        for session in self.read_sessions():
-            found = SessionMetric.objects.visible_to(self.user).filter(session=session)
-            figures = dict(found.values_list("slug", "value"))
+        for session, figures in self._with_figures():
             target = session.plan["target"]
             yield (
                 session.pk,

@@ -14,6 +14,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.wording import FALLBACK, words_in
 from rehab.people.models import Clinic
+from rehab.people.refusals import in_words
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import (
@@ -77,7 +78,7 @@ class FeedbackType(ClinicRow):
         except KeyError:
             raise ValidationError({"slug": _("There is no such feedback type.")}) from None
         except InvalidSetting as problem:
-            raise ValidationError(str(problem)) from problem
+            raise ValidationError(in_words(problem)) from problem
 
     def to_valence(self, language: str, bands: Sequence[Band] | None = None) -> Valence:
         """Give it as the rules know it, worded in a language; its stored bands unless given.

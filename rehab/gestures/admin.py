@@ -15,6 +15,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.gestures.picture import draw
 from rehab.people.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
+from rehab.people.refusals import in_words
 from robot.composed import MOVES_MAX, to_data
 from robot.gestures import TETHER_M, BadGesture
 from robot.trial import Trial, admit_gesture, try_gesture
@@ -41,7 +42,7 @@ class StepFormSet(RowFormSet):
         try:
             admit_gesture(to_data("composed", [step.to_move() for step in kept]))
         except BadGesture as problem:
-            raise ValidationError(str(problem)) from problem
+            raise ValidationError(in_words(problem)) from problem
 
 
 class StepForm(forms.ModelForm):
@@ -96,7 +97,7 @@ class GestureAdmin(ScopedAdmin):
         try:
             return tell(try_gesture(admit_gesture(gesture.to_data())))
         except BadGesture as problem:
-            return str(problem)
+            return in_words(problem)
 
     @admin.display(description=_("where it goes"))
     def picture(self, gesture: Gesture) -> str:
@@ -106,6 +107,6 @@ class GestureAdmin(ScopedAdmin):
         try:
             trial = try_gesture(admit_gesture(gesture.to_data()))
         except BadGesture as problem:
-            return str(problem)
+            return in_words(problem)
         words = tell(trial)
         return format_html("{}<p>{}</p>", draw(gesture.to_moves(), trial, words), words)

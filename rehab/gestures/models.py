@@ -10,6 +10,7 @@ from django.db import models
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
+from rehab.people.refusals import in_words
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
 from robot.composed import Move, check_name, to_data
 from robot.gestures import BadGesture
@@ -43,7 +44,7 @@ class Gesture(ClinicRow):
         try:
             check_name(self.name)
         except BadGesture as problem:
-            raise ValidationError({"name": str(problem)}) from problem
+            raise ValidationError({"name": in_words(problem)}) from problem
 
     def to_moves(self) -> list[Move]:
         """Give the steps as a robot knows them."""

@@ -196,8 +196,14 @@ class TrainingSessionAdmin(ScopedAdmin):
         )
 
 
+class SessionLogAdmin(ReadOnlyAdmin):
+    """Pages of a session's log: its own page leads to those of that session."""
+
+    linked_by = ("session__id__exact",)
+
+
 @admin.register(Step)
-class StepAdmin(ReadOnlyAdmin):
+class StepAdmin(SessionLogAdmin):
     """A session's steps."""
 
     list_display = (
@@ -219,7 +225,7 @@ class StepAdmin(ReadOnlyAdmin):
 
 
 @admin.register(SessionEvent)
-class SessionEventAdmin(ReadOnlyAdmin):
+class SessionEventAdmin(SessionLogAdmin):
     """A session's events."""
 
     list_display = ("session", "after_number", "kind", "old", "value", "by", "at", "data")
@@ -228,7 +234,7 @@ class SessionEventAdmin(ReadOnlyAdmin):
 
 
 @admin.register(SessionMetric)
-class SessionMetricAdmin(ReadOnlyAdmin):
+class SessionMetricAdmin(SessionLogAdmin):
     """A session's figures."""
 
     list_display = ("session", "slug", "value")

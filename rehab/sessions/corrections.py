@@ -74,10 +74,14 @@ class SessionCorrection(ScopedModel):
 
 
 class CorrectionForm(forms.Form):
-    """The form of a correction: what is to hold from now on, and why."""
+    """The form of a correction: what is to hold from now on, and why.
+
+    Beside each field the page sends what stood there when it was opened: only what differs from
+    that is altered, and nothing where somebody else has altered the session meanwhile.
+    """
 
     patient: forms.ModelChoiceField[Patient] = forms.ModelChoiceField(
-        queryset=None, empty_label=None, label=_("Who walked")
+        queryset=None, empty_label=None, label=_("Who walked"), show_hidden_initial=True
     )
     counts = forms.TypedChoiceField(
         label=_("This session"),
@@ -86,10 +90,12 @@ class CorrectionForm(forms.Form):
             ("no", _("Is left out of figures, boards and trends")),
         ],
         widget=forms.RadioSelect,
+        show_hidden_initial=True,
     )
     note = forms.CharField(
         label=_("Note"),
         required=False,
+        show_hidden_initial=True,
         max_length=500,
         widget=forms.Textarea(attrs={"rows": 3}),
         help_text=_("What whoever reads this session should know."),
@@ -103,17 +109,13 @@ class CorrectionForm(forms.Form):
 
     def __init__(self, *args: Any, session: TrainingSession, by: User, **options: Any) -> None:
         self.session, self.by = session, by
-        self.before = {
-            Part.PATIENT: session.patient.pseudonym,
-            Part.COUNTS: "no" if session.left_out else "yes",
-            Part.NOTE: find_note(session, by),
-        }
+        self.holds = read_parts(session, by)
         options.setdefault(
             "initial",
             {
                 "patient": session.patient_id,
-                "counts": self.before[Part.COUNTS],
-                "note": self.before[Part.NOTE],
+                "counts": self.holds[Part.COUNTS],
+                "note": self.holds[Part.NOTE],
             },
         )
         super().__init__(*args, **options)
@@ -124,7 +126,7 @@ class CorrectionForm(forms.Form):
 
     def clean_note(self) -> str:
         """Refuse the patient's name in the note."""
-        return self._nameless(self.cleaned_data["note"])
+        return _in_lines(self._nameless(self.cleaned_data["note"]))
 
     def clean_reason(self) -> str:
         """Refuse a patient's name in the reason."""
@@ -149,20 +151,63 @@ class CorrectionForm(forms.Form):
             )
         return data
 
+    @property
+    def counts_seen(self) -> str:
+        """Give the hidden field of ``counts``: a page that draws each choice leaves it out."""
+        return self["counts"].as_hidden(only_initial=True)
+
+    @property
+    def seen(self) -> dict[Part, str]:
+        """Give what stood there when the page was opened; empty for what the page did not send."""
+        given = {part: self._seen_value(part) for part in Part}
+        walkers: Any = self.fields["patient"]
+        key = given[Part.PATIENT]
+        walker = walkers.queryset.filter(pk=key).first() if key.isdecimal() else None
+        return given | {Part.PATIENT: walker.pseudonym if walker else ""}
+
+    def _seen_value(self, part: Part) -> str:
+        return _in_lines(str(self.data.get(self.add_initial_prefix(part.value), "")).strip())
+
     def changes(self) -> dict[Part, str]:
-        """Give what is altered, as corrections write it."""
+        """Give what is altered of what was seen, as corrections write it."""
         wanted = {
             Part.PATIENT: self.cleaned_data["patient"].pseudonym,
             Part.COUNTS: self.cleaned_data["counts"],
             Part.NOTE: self.cleaned_data["note"],
         }
-        return {part: new for part, new in wanted.items() if new != self.before[part]}
+        seen = self.seen
+        return {part: new for part, new in wanted.items() if new != seen[part]}
 
-    def save(self, now: datetime) -> list[SessionCorrection]:
-        """Correct the session."""
-        return correct_session(
-            self.session, self.changes(), self.cleaned_data["reason"], self.by, now
-        )
+    def create(self, now: datetime) -> bool:
+        """Correct the session, or say in ``errors`` what hinders."""
+        if not self.is_valid():
+            return False
+        changes, reason = self.changes(), self.cleaned_data["reason"]
+        try:
+            correct_session(self.session, changes, reason, self.by, now, self.seen)
+        except ValidationError as problem:
+            self.add_error(None, problem)
+            self._catch_up(changes)
+            return False
+        return True
+
+    def _catch_up(self, changes: dict[Part, str]) -> None:
+        """Show what holds by now, but for what this person altered."""
+        stored = TrainingSession.objects.visible_to(self.by).select_related("patient")
+        session = stored.get(pk=self.session.pk)
+        holds = read_parts(session, self.by) | {Part.PATIENT: str(session.patient_id)}
+        sent: Any = self.data
+        data = sent.copy()
+        for part, value in holds.items():
+            data[self.add_initial_prefix(part.value)] = value
+            if part not in changes:
+                data[self.add_prefix(part.value)] = value
+        self.data = data
+
+
+def _in_lines(words: str) -> str:
+    """Give words as they are stored: browsers send lines that end in two characters."""
+    return words.replace("\r\n", "\n")
 
 
 def forget_patient(patient: Patient, pseudonym: str) -> None:
@@ -181,6 +226,15 @@ def find_note(session: TrainingSession, reader: Any) -> str:
     return notes.order_by("-pk").values_list("new", flat=True).first() or ""
 
 
+def read_parts(session: TrainingSession, reader: Any) -> dict[Part, str]:
+    """Give what holds of a session, as corrections write it."""
+    return {
+        Part.PATIENT: session.patient.pseudonym,
+        Part.COUNTS: "no" if session.left_out else "yes",
+        Part.NOTE: _in_lines(find_note(session, reader)),
+    }
+
+
 def may_correct(session: TrainingSession) -> bool:
     """Whether a session can be corrected: what still runs is ended first."""
     return State(session.state) not in OPEN
@@ -188,21 +242,25 @@ def may_correct(session: TrainingSession) -> bool:
 
 @transaction.atomic
 def correct_session(
-    session: TrainingSession, changes: dict[Part, str], reason: str, by: User, now: datetime
+    session: TrainingSession,
+    changes: dict[Part, str],
+    reason: str,
+    by: User,
+    now: datetime,
+    seen: dict[Part, str] | None = None,
 ) -> list[SessionCorrection]:
     """Put down corrections and let them take effect, both or neither.
 
-    Raises ValidationError for a session that still runs, and for a patient whom ``by`` cannot see.
+    ``seen`` is what ``by`` took to hold. Raises ValidationError where something else does, for a
+    session that still runs, and for a patient whom ``by`` cannot see.
     """
     rows = TrainingSession.objects.visible_to(by).select_for_update(of=("self",))
     stored = rows.select_related("patient").get(pk=session.pk)
     if not may_correct(stored):
         raise ValidationError(gettext("This session still runs. End it first."))
-    before = {
-        Part.PATIENT: stored.patient.pseudonym,
-        Part.COUNTS: "no" if stored.left_out else "yes",
-        Part.NOTE: find_note(stored, by),
-    }
+    before = read_parts(stored, by)
+    if seen is not None and seen != before:
+        raise ValidationError(_tell_meanwhile(stored, before, seen, by))
     if Part.PATIENT in changes:
         patients = Patient.objects.visible_to(by).filter(erased_at=None)
         walker = patients.filter(pseudonym=changes[Part.PATIENT]).first()
@@ -222,6 +280,23 @@ def correct_session(
     for correction in made:
         correction.save()
     return made
+
+
+def _tell_meanwhile(
+    session: TrainingSession, before: dict[Part, str], seen: dict[Part, str], reader: User
+) -> str:
+    """Say what was altered since somebody opened the form, and by whom."""
+    told = tell_corrections(session, reader)
+    found = []
+    for part in (part for part in Part if before[part] != seen[part]):
+        newest = next((one for one in told if one["row"].part == part), None)
+        if newest is not None:
+            found.append(f"{part.label}: {newest['new'] or '–'} ({newest['row'].by or '–'})")
+    said = gettext(
+        "Somebody else has corrected this session meanwhile. %(what)s. Below stands what holds "
+        "now, with your changes. Look it over and correct it again."
+    )
+    return said % {"what": " · ".join(found) or "–"}
 
 
 def tell_corrections(session: TrainingSession, reader: User) -> list[dict[str, Any]]:

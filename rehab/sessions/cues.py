@@ -12,6 +12,7 @@ from rehab.feedback.valences import valences_of
 from rehab.gestures.choices import gesture_choices
 from rehab.gestures.models import Gesture
 from rehab.people.models import Patient, User
+from rehab.people.refusals import in_words
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import Cue
 from robot.gestures import GESTURES, ORIGINALS, BadGesture
@@ -77,7 +78,8 @@ def find_composed(patient: Patient, cue: Cue) -> Iterator[dict[str, Any]]:
             admit_gesture(data)
         except BadGesture as problem:
             raise InvalidSetting(
-                gettext("Gesture %(name)s: %(problem)s") % {"name": name, "problem": problem}
+                gettext("Gesture %(name)s: %(problem)s")
+                % {"name": name, "problem": in_words(problem)}
             ) from problem
         yield data
 

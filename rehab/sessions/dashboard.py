@@ -16,6 +16,7 @@ from rehab.people.access import clinic_of
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Right, Role, rights_of
 from rehab.sessions.live import runtime
+from rehab.sessions.live.session import LiveSession
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.trend import with_figures
@@ -25,7 +26,7 @@ from rehab.stations.presence import is_overdue, say_state
 from rehab.training.changes import OPEN, State
 from rehab.training.valences import VALENCES
 
-SHOWN = 40  # sessions of today
+SHOWN = 40  # sessions of today that are over; open ones are shown all
 LONG_OPEN = timedelta(hours=3)  # no visit takes as long
 REVOKED_FOR = timedelta(days=7)  # so long it is told that a device is shut out
 # Who walks stands on top, then what could go on, then what is over.
@@ -142,14 +143,15 @@ def _sees(user: User, model: type) -> bool:
 def read_today(user: User, clinic: Clinic, now: datetime) -> list[Today]:
     """Give today's sessions by the clinic's clock, and every open one, those that run on top."""
     midnight = at_clinic(now, clinic).replace(hour=0, minute=0, second=0, microsecond=0)
-    wanted = Q(state__in=[state.value for state in OPEN])
-    wanted |= Q(created_at__gte=midnight) | Q(started_at__gte=midnight)
-    sessions = TrainingSession.objects.visible_to(user).filter(wanted).defer("plan")
-    rows = list(
+    is_open = Q(state__in=[state.value for state in OPEN])
+    begun = Q(created_at__gte=midnight) | Q(started_at__gte=midnight)
+    sessions = TrainingSession.objects.visible_to(user).filter(is_open | begun).defer("plan")
+    lines = (
         with_figures(user, sessions)
         .select_related("patient", "station", "measure")
-        .order_by("-created_at", "-pk")[:SHOWN]
+        .order_by("-created_at", "-pk")
     )
+    rows = [*lines.filter(is_open), *lines.exclude(is_open)[:SHOWN]]
     rows.sort(key=lambda row: ORDER.index(State(row.state)))
     by_name = user.role != Role.RESEARCHER
     return [
@@ -160,10 +162,24 @@ def read_today(user: User, clinic: Clinic, now: datetime) -> list[Today]:
             state=row.get_state_display(),
             open=State(row.state) in OPEN,
             walked=say_duration(row.active_s),
-            hit_rate=say_rate(getattr(row, "metric_hit_rate", None)),
+            hit_rate=_say_hits(row),
         )
         for row in rows
     ]
+
+
+def _say_hits(row: Any) -> str:
+    """Give the hit rate; of an open session as it stands by now, where this process runs it."""
+    if State(row.state) not in OPEN:
+        return say_rate(row.metric_hit_rate)
+    running = _find_running(row)
+    rate = running.actor.fold.feedback.hit_rate if running else None
+    return "" if rate is None else say_rate(rate)
+
+
+def _find_running(session: TrainingSession) -> LiveSession | None:
+    live = runtime.peek()
+    return live.sessions.get(session.pk) if live else None
 
 
 def _say_time(moment: datetime, midnight: datetime) -> str:
@@ -264,8 +280,7 @@ def read_places(user: User, open_now: list[TrainingSession], now: datetime) -> I
 
 def find_here(session: TrainingSession, now: datetime) -> dict[str, bool]:
     """Give what is connected to a session of this process; nothing where another one runs it."""
-    live = runtime.peek()
-    running = live.sessions.get(session.pk) if live else None
+    running = _find_running(session)
     if running is None:
         return {}
     told = running.presence(now)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from datetime import datetime, time, timedelta
+from datetime import date, datetime, time, timedelta
 from typing import Any
 from zoneinfo import ZoneInfo
 
@@ -11,6 +11,7 @@ from django import forms
 from django.conf import settings
 from django.contrib.admin import ListFilter
 from django.core.exceptions import ValidationError
+from django.core.validators import MaxValueValidator, MinValueValidator
 from django.db.models import QuerySet
 from django.db.models.functions import Coalesce
 from django.http import HttpRequest
@@ -27,12 +28,17 @@ from rehab.stations.models import Station
 # Name in the form → what it narrows, and how many of the form's units make one of the column's.
 RANGES = {"score": ("metric_score", 1), "hits": ("metric_hit_rate", 100), "goal": ("goal", 1)}
 
+# No session lies beyond; the days around them are still days in every time zone.
+FIRST_DAY, LAST_DAY = date(1900, 1, 1), date(2999, 12, 31)
+NO_DAY = _("Give a day of the years 1900 to 2999.")
+DAYS = [MinValueValidator(FIRST_DAY, NO_DAY), MaxValueValidator(LAST_DAY, NO_DAY)]
+
 
 class FindForm(forms.Form):
     """What sessions are looked for by. Everything may be left empty."""
 
-    first = forms.DateField(required=False, label=_("From"))
-    last = forms.DateField(required=False, label=_("To"))
+    first = forms.DateField(required=False, validators=DAYS, label=_("From"))
+    last = forms.DateField(required=False, validators=DAYS, label=_("To"))
     place: forms.ModelChoiceField[Station] = forms.ModelChoiceField(
         queryset=None, required=False, label=_("Station")
     )

@@ -20,11 +20,12 @@ from rehab.people.access import clinic_of
 from rehab.people.consent import Purpose, give, join_boards, offered
 from rehab.people.forms import PatientRowForm
 from rehab.people.models import SIDES, Boards, Patient, User
+from rehab.people.refusals import in_words
 from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocols import Protocol
-from rehab.sessions.services import create_session
+from rehab.sessions.services import StationTaken, check_station, create_session
 from rehab.sessions.words import LEVELS, RECORDING, SIMULATED, say_source
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
@@ -159,17 +160,10 @@ class SessionForm(forms.Form):
     def clean_station(self) -> Station:
         """Refuse a station where somebody else may be walking right now."""
         station: Station = self.cleaned_data["station"]
-        busy = TrainingSession.objects.visible_to(self.by).filter(
-            station=station, state__in=[state.value for state in OPEN]
-        )
-        if (session := busy.select_related("patient").first()) is not None:
-            raise ValidationError(
-                _(
-                    "%(station)s still has an open session of %(patient)s. End it first, or choose "
-                    "another station."
-                ),
-                params={"station": station, "patient": session.patient},
-            )
+        try:
+            check_station(station)
+        except StationTaken as problem:
+            raise ValidationError(in_words(problem)) from problem
         return station
 
     def clean_source(self) -> str:
@@ -227,9 +221,11 @@ class SessionForm(forms.Form):
             return None
         try:
             return self.save()
+        except StationTaken as problem:  # just now, by somebody else
+            self.add_error("station", in_words(problem))
         except InvalidSetting as problem:
-            self.add_error(None, str(problem))
-            return None
+            self.add_error(None, in_words(problem))
+        return None
 
 
 def _arguments(kind: str, name: str, patient: Patient) -> list[str]:

@@ -13,6 +13,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
 from rehab.people.models import Clinic, Patient, User
+from rehab.people.refusals import in_words
 from rehab.people.scope import ClinicRow, Scope
 from rehab.sessions.cues import USUAL, name_gestures
 from rehab.sessions.forms import LIVE, SessionForm
@@ -118,7 +119,7 @@ class Preset(ClinicRow):
                 robot_intensity=ROBOT_LEVELS[self.robot],
             )
         except InvalidSetting as problem:
-            raise ValidationError(str(problem)) from problem
+            raise ValidationError(in_words(problem)) from problem
 
     @property
     def about(self) -> str:

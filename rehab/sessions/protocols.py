@@ -11,6 +11,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
+from rehab.people.refusals import in_words
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
 from rehab.training import measures as rules
 from rehab.training.phases import PHASE_KINDS, Phase
@@ -177,4 +178,4 @@ class ProtocolPhase(ScopedModel):
         try:
             self.to_rule()
         except rules.InvalidSetting as problem:
-            raise ValidationError(str(problem)) from problem
+            raise ValidationError(in_words(problem)) from problem

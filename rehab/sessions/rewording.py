@@ -14,6 +14,7 @@ from django.utils.translation import gettext as _
 from rehab.feedback.models import FeedbackType, words_edited
 from rehab.feedback.valences import usual_valence
 from rehab.people.models import User
+from rehab.people.refusals import in_words
 from rehab.sessions.live import runtime
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import NotStored
@@ -44,9 +45,13 @@ def on_words_edited(
         except (InvalidSetting, OwnedElsewhere, NotStored) as problem:
             problems.append(
                 _("The open session of %(patient)s keeps its words: %(problem)s")
-                % {"patient": session.patient.nickname, "problem": problem}
+                % {"patient": session.patient.nickname, "problem": _say(problem)}
             )
     return problems
+
+
+def _say(problem: Exception) -> str:
+    return in_words(problem) if isinstance(problem, InvalidSetting) else str(problem)
 
 
 async def _reword(session_id: int, worded: Valence, by: User) -> None:

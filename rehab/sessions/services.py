@@ -17,13 +17,31 @@ from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocols import Measure, Protocol
 from rehab.stations.models import Station
-from rehab.training.changes import ChangeKind, PauseReason, Value
+from rehab.training.changes import OPEN, ChangeKind, PauseReason, Value
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.plans import DEFAULT_ACTIVATION_THRESHOLD, SessionPlan
 from rehab.training.steps import Side
 from rehab.training.valences import Cue, Valence, find_valence
+
+
+class StationTaken(InvalidSetting):
+    """A session is open at this station: its tablet shows one, and its sensor feeds one."""
+
+
+def check_station(station: Station) -> None:
+    """Raise StationTaken where a session is open at a station."""
+    states = [state.value for state in OPEN]
+    taken = TrainingSession.everywhere.filter(
+        station=station, clinic=station.clinic_id, state__in=states
+    )
+    if (session := taken.select_related("patient").first()) is not None:
+        said = gettext(
+            "%(station)s still has an open session of %(patient)s. End it first, or choose "
+            "another station."
+        )
+        raise StationTaken(said % {"station": station, "patient": session.patient})
 
 
 def create_session(
@@ -50,8 +68,8 @@ def create_session(
     Phases are given, or come from the protocol; the robot's cue is given, or the feedback type's.
     Feedback is the clinic's own, in the patient's language.
     ``runs`` are arguments of `python -m rehab.sources` for a source that the server runs beside the
-    session. Raises InvalidSetting for a plan that could not be walked and CrossClinic where
-    patient, station and the rest are not of one clinic; nothing is stored then.
+    session. Raises InvalidSetting for a plan that could not be walked, StationTaken, and
+    CrossClinic where patient, station and the rest are not of one clinic; nothing is stored then.
     """
     measure = measure or Measure.everywhere.get(clinic=None, slug=A2.slug)
     if phases is None:
@@ -108,6 +126,10 @@ def create_session(
     with transaction.atomic():
         patient.hold()  # nobody is erased meanwhile
         _check_may_walk(patient)
+        if station is not None and station.clinic_id == patient.clinic_id:
+            # Two who set up at once: the second waits here, and then sees the first one's session.
+            Station.everywhere.select_for_update(no_key=True).get(pk=station.pk)
+            check_station(station)
         session.save()
     live = runtime.peek()
     if live is not None:

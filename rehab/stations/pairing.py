@@ -15,6 +15,8 @@ from rehab.stations.models import Device, Pairing, Station
 LIFETIME = timedelta(minutes=5)
 CODE_LENGTH = 6  # of 31 characters: one in 900 million, with ten tries in five minutes
 MOST_OPEN = 500  # codes at a time on one server; a flood of strangers ends there
+MOST_SHOWN = 20  # of these for one address, as a clinic's tablets may share one
+MOST_BEGUN = 100  # for one address within the lifetime of a code; a tablet keeps its own
 TRIES = 10
 
 
@@ -22,19 +24,39 @@ class PairingRefused(ValueError):
     """A pairing that cannot be; the message says what to do."""
 
 
-def begin(now: datetime) -> tuple[Pairing, str]:
+class PairingFlooded(PairingRefused):
+    """One address asks for more codes than tablets can show."""
+
+
+def begin(address: str, now: datetime) -> tuple[Pairing, str]:
     """Make a code to be shown, and the secret by which the tablet is known until it is approved.
 
-    Raises PairingRefused where too many codes are open.
+    A new code takes the place of the oldest one of an address that has its share of them. Raises
+    PairingFlooded where that address never stops, and PairingRefused where too many are open.
     """
     Pairing.everywhere.filter(expires_at__lte=now).delete()
+    if _count(f"pairing-begun-{address}") > MOST_BEGUN:
+        raise PairingFlooded(
+            _("Too many codes were asked for from this network. Try again in five minutes.")
+        )
+    shown = f"pairing-shown-{address}"
+    mine = Pairing.everywhere.filter(pk__in=cache.get(shown, []), device__isnull=True)
+    kept = list(mine.order_by("-pk").values_list("pk", flat=True)[: MOST_SHOWN - 1])
+    mine.exclude(pk__in=kept).delete()
     if Pairing.everywhere.count() >= MOST_OPEN:
         raise PairingRefused(_("Too many tablets are being paired. Try again in five minutes."))
     secret = secrets.token_urlsafe(32)
     code = "".join(secrets.choice(UNAMBIGUOUS) for _ in range(CODE_LENGTH))
     pairing = Pairing(code=code, secret_hash=hash_token(secret), expires_at=now + LIFETIME)
     pairing.save()
+    cache.set(shown, [*kept, pairing.pk], LIFETIME.total_seconds())
     return pairing, secret
+
+
+def _count(name: str) -> int:
+    """Count one more of something within the lifetime of a code; give how many there were."""
+    cache.add(name, 0, LIFETIME.total_seconds())
+    return cache.incr(name)
 
 
 def find(secret: str, now: datetime) -> Pairing | None:
@@ -49,8 +71,7 @@ def approve(code: str, station: Station, by: int, now: datetime) -> Device:
     Raises PairingRefused.
     """
     tries = f"pairing-tries-{by}"
-    cache.add(tries, 0, LIFETIME.total_seconds())
-    if cache.incr(tries) > TRIES:
+    if _count(tries) > TRIES:
         raise PairingRefused(_("Too many wrong codes. Wait five minutes."))
     wanted = Pairing.everywhere.filter(
         code=code.strip().upper(), device__isnull=True, expires_at__gt=now

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from rehab.training.marking import AnyOf, Marked, gettext_noop
 from rehab.training.measures import InvalidSetting
 
 
@@ -93,12 +94,40 @@ TRANSITIONS: dict[ChangeKind, tuple[frozenset[State], State | None]] = {
 }
 
 
+# How refusals name them: programs know these words, and pages have them translated.
+STATE_WORDS = {
+    State.READY: gettext_noop("ready"),
+    State.RUNNING: gettext_noop("running"),
+    State.PAUSED: gettext_noop("paused"),
+    State.FINISHED: gettext_noop("finished"),
+    State.ABORTED: gettext_noop("aborted"),
+}
+KIND_WORDS = {
+    ChangeKind.START: gettext_noop("start"),
+    ChangeKind.PAUSE: gettext_noop("pause"),
+    ChangeKind.RESUME: gettext_noop("resume"),
+    ChangeKind.FINISH: gettext_noop("finish"),
+    ChangeKind.ABORT: gettext_noop("abort"),
+    ChangeKind.GOAL: gettext_noop("goal"),
+    ChangeKind.GAIN: gettext_noop("gain"),
+    ChangeKind.PHASE: gettext_noop("phase"),
+    ChangeKind.ACTIVATION_THRESHOLD: gettext_noop("activation_threshold"),
+    ChangeKind.ROBOT_INTENSITY: gettext_noop("robot_intensity"),
+    ChangeKind.VALENCE: gettext_noop("valence"),
+    ChangeKind.WORDS: gettext_noop("words"),
+    ChangeKind.WORDS_SHOWN: gettext_noop("words_shown"),
+    ChangeKind.CHART_STYLE: gettext_noop("chart_style"),
+}
+
+
 def next_state(state: State, kind: ChangeKind) -> State:
     """Give the state after a change. Raises Refused, saying when it would be allowed."""
     allowed, leads_to = TRANSITIONS[kind]
     if state not in allowed:
         raise Refused(
-            f"A session that is {state} cannot take the change '{kind}'; "
-            f"it must be {' or '.join(sorted(allowed))}."
+            "A session that is {state} cannot take the change '{kind}'; it must be {allowed}.",
+            state=Marked(STATE_WORDS[state]),
+            kind=Marked(KIND_WORDS[kind]),
+            allowed=AnyOf(sorted(STATE_WORDS[each] for each in allowed)),
         )
     return leads_to or state

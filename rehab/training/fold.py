@@ -7,8 +7,18 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-from rehab.training.changes import Change, ChangeKind, PauseReason, Refused, State, next_state
+from rehab.training.changes import (
+    KIND_WORDS,
+    STATE_WORDS,
+    Change,
+    ChangeKind,
+    PauseReason,
+    Refused,
+    State,
+    next_state,
+)
 from rehab.training.goals import MIN_BASELINE_STRIDES
+from rehab.training.marking import Marked
 from rehab.training.measures import InvalidSetting, check_gain
 from rehab.training.plans import (
     ChartStyle,
@@ -120,7 +130,10 @@ class SessionFold:
         """
         running = self.state is State.RUNNING
         if not running and self.state is not State.PAUSED:
-            raise Refused(f"A session that is {self.state} takes no steps; it must be running.")
+            raise Refused(
+                "A session that is {state} takes no steps; it must be running.",
+                state=Marked(STATE_WORDS[self.state]),
+            )
         if measurement.number != self.last_number + 1:
             raise InvalidMeasurement(
                 f"Step {measurement.number} does not follow step {self.last_number}; "
@@ -221,8 +234,10 @@ class SessionFold:
     def _goal_from_baseline(self) -> float | None:
         if self.baseline_mean is None:
             raise Refused(
-                f"The goal needs {MIN_BASELINE_STRIDES} valid baseline strides and has "
-                f"{self.tally_of('baseline').valid}. Walk on, or set the goal as a value."
+                "The goal needs {needed} valid baseline strides and has {had}. Walk on, or set the "
+                "goal as a value.",
+                needed=MIN_BASELINE_STRIDES,
+                had=self.tally_of("baseline").valid,
             )
         return self.plan.goal.resolve(self.plan.measure, self.baseline_mean)
 
@@ -266,7 +281,8 @@ class SessionFold:
         if not isinstance(slug, str) or slug not in self.valences:
             known = ", ".join(self.valences)
             raise InvalidSetting(
-                f"The feedback type of this session can be changed to one of: {known}."
+                "The feedback type of this session can be changed to one of: {known}.",
+                known=known,
             )
         if slug == self.valence.slug:
             self.next_valence = ""
@@ -292,8 +308,9 @@ class SessionFold:
     def _phase_index(self, value: float) -> int:
         if not 0 <= value < len(self.plan.phases) or value != int(value):
             raise InvalidSetting(
-                f"This session has no phase {value:g}; its phases are numbered "
-                f"0 to {len(self.plan.phases) - 1}."
+                "This session has no phase {value:g}; its phases are numbered 0 to {last}.",
+                value=value,
+                last=len(self.plan.phases) - 1,
             )
         return int(value)
 
@@ -301,7 +318,10 @@ class SessionFold:
 def _needed(change: Change) -> float:
     value: object = change.value  # JSON knows true and false beside numbers
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InvalidSetting(f"The change '{change.kind}' needs a value, and that is a number.")
+        raise InvalidSetting(
+            "The change '{kind}' needs a value, and that is a number.",
+            kind=Marked(KIND_WORDS[change.kind]),
+        )
     return value
 
 
@@ -315,4 +335,6 @@ def _style(value: object) -> ChartStyle:
     try:
         return ChartStyle(value)  # type: ignore[arg-type]  # whatever it is, it is looked up
     except ValueError:
-        raise InvalidSetting(f"A chart's style is one of: {', '.join(ChartStyle)}.") from None
+        raise InvalidSetting(
+            "A chart's style is one of: {known}.", known=", ".join(ChartStyle)
+        ) from None

@@ -27,7 +27,8 @@ class GoalRule:
         percent = self.percent_of_baseline
         if percent is not None and not 50 <= percent <= 200:
             raise InvalidSetting(
-                f"A goal of {percent:g} % of baseline cannot be used. Give 50 to 200 %."
+                "A goal of {percent:g} % of baseline cannot be used. Give 50 to 200 %.",
+                percent=percent,
             )
 
     @property

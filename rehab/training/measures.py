@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rehab.training.marking import gettext_noop
+from rehab.training.marking import Marked, gettext_noop
 
 GAIN_MIN = 0.5
 GAIN_MAX = 1.5
@@ -13,7 +13,14 @@ BOUND_MAX = 1e9
 
 
 class InvalidSetting(ValueError):
-    """A setting that cannot be used; the message says what would be accepted."""
+    """A setting that cannot be used; the message says what would be accepted.
+
+    It is ``template`` with ``values`` in its places: whoever shows it says it in another language.
+    """
+
+    def __init__(self, template: str, /, **values: object) -> None:
+        super().__init__(template.format(**values) if values else template)
+        self.template, self.values = template, values
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,16 +43,23 @@ class Measure:
 
     def __post_init__(self) -> None:
         if not -BOUND_MAX <= self.value_min < self.value_max <= BOUND_MAX:
-            raise InvalidSetting(f"{self.name}: the smallest value must lie below the largest.")
+            raise InvalidSetting(
+                "{name}: the smallest value must lie below the largest.", name=Marked(self.name)
+            )
         if not 0 <= self.goal_min < self.goal_max <= BOUND_MAX:
-            raise InvalidSetting(f"{self.name}: goals need a range above 0.")
+            raise InvalidSetting("{name}: goals need a range above 0.", name=Marked(self.name))
 
     def check_goal(self, goal: float) -> float:
         """Give the goal back as a number. Raises InvalidSetting outside (goal_min, goal_max]."""
         if not self.goal_min < goal <= self.goal_max:
             raise InvalidSetting(
-                f"A goal of {goal:g} {self.unit} cannot be used for {self.name}. "
-                f"Give one above {self.goal_min:g} and up to {self.goal_max:g} {self.unit}."
+                "A goal of {goal:g} {unit} cannot be used for {name}. "
+                "Give one above {least:g} and up to {most:g} {unit}.",
+                goal=goal,
+                unit=self.unit,
+                name=Marked(self.name),
+                least=self.goal_min,
+                most=self.goal_max,
             )
         return float(goal)
 
@@ -69,6 +83,9 @@ def check_gain(gain: float) -> float:
     """Give the gain back as a number. Raises InvalidSetting outside [GAIN_MIN, GAIN_MAX]."""
     if not GAIN_MIN <= gain <= GAIN_MAX:
         raise InvalidSetting(
-            f"A gain of {gain:g} cannot be used. Give one from {GAIN_MIN} to {GAIN_MAX}."
+            "A gain of {gain:g} cannot be used. Give one from {least:g} to {most:g}.",
+            gain=gain,
+            least=GAIN_MIN,
+            most=GAIN_MAX,
         )
     return float(gain)

@@ -50,7 +50,9 @@ def find_phase_kind(slug: str) -> PhaseKind:
         return PHASE_KINDS[slug]
     except KeyError:
         raise InvalidSetting(
-            f"There is no phase kind {slug!r}. Known kinds: {', '.join(PHASE_KINDS)}."
+            "There is no phase kind {slug!r}. Known kinds: {known}.",
+            slug=slug,
+            known=", ".join(PHASE_KINDS),
         ) from None
 
 
@@ -74,9 +76,13 @@ class Phase:
         find_phase_kind(self.kind)
         check_gain(self.gain)
         if self.strides is not None and self.strides < 1:
-            raise InvalidSetting(f"Phase {self.name!r} needs at least 1 stride, or no limit.")
+            raise InvalidSetting(
+                "Phase {name!r} needs at least 1 stride, or no limit.", name=self.name
+            )
         if self.seconds is not None and not (math.isfinite(self.seconds) and self.seconds > 0):
-            raise InvalidSetting(f"Phase {self.name!r} needs more than 0 seconds, or no limit.")
+            raise InvalidSetting(
+                "Phase {name!r} needs more than 0 seconds, or no limit.", name=self.name
+            )
 
     def is_over(self, strides: int, seconds: float) -> bool:
         """Say whether a phase that has lasted so long has reached one of its limits."""

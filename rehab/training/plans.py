@@ -31,7 +31,7 @@ def check_robot_intensity(intensity: float) -> float:
     """Give the intensity back as a number. Raises InvalidSetting for one that is no level."""
     if intensity not in ROBOT_LEVELS.values():
         levels = ", ".join(f"{level} ({value:g})" for level, value in ROBOT_LEVELS.items())
-        raise InvalidSetting(f"A robot's intensity is one of: {levels}.")
+        raise InvalidSetting("A robot's intensity is one of: {levels}.", levels=levels)
     return float(intensity)
 
 

@@ -12,7 +12,7 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import Any
 
-from rehab.training.marking import gettext_noop
+from rehab.training.marking import Marked, gettext_noop
 from rehab.training.measures import InvalidSetting
 
 # More would say no more, and overflow where points are stored.
@@ -73,22 +73,33 @@ class Valence:
     cue: Cue
 
     def __post_init__(self) -> None:
+        label = Marked(self.label)
         if (self.hit_points is None) != (self.miss_points is None):
-            raise InvalidSetting(f"{self.label}: give points for hits and misses, or for neither.")
+            raise InvalidSetting(
+                "{type}: give points for hits and misses, or for neither.", type=label
+            )
         if not 0 <= (self.hit_points or 0) <= POINTS_MAX:
-            raise InvalidSetting(f"{self.label}: a hit pays 0 to {POINTS_MAX} points.")
+            raise InvalidSetting(
+                "{type}: a hit pays 0 to {most} points.", type=label, most=POINTS_MAX
+            )
         if not -POINTS_MAX <= (self.miss_points or 0) <= 0:
-            raise InvalidSetting(f"{self.label}: a miss costs 0 to {POINTS_MAX} points.")
+            raise InvalidSetting(
+                "{type}: a miss costs 0 to {most} points.", type=label, most=POINTS_MAX
+            )
         starts = [band.from_performance for band in self.bands]
         rising = all(low < high for low, high in pairwise(starts))
         if not rising or starts[:1] != [0] or not all(map(math.isfinite, starts)):
-            raise InvalidSetting(f"{self.label}: the first band begins at 0, each next one higher.")
+            raise InvalidSetting(
+                "{type}: the first band begins at 0, each next one higher.", type=label
+            )
         if self.has_points and 1 not in starts:
-            raise InvalidSetting(f"{self.label}: one band must begin at 1, the goal.")
+            raise InvalidSetting("{type}: one band must begin at 1, the goal.", type=label)
         if len(self.bands) > BANDS_MAX:
-            raise InvalidSetting(f"{self.label}: at most {BANDS_MAX} bands.")
+            raise InvalidSetting("{type}: at most {most} bands.", type=label, most=BANDS_MAX)
         if any(len(band.words) > WORDS_MAX for band in self.bands):
-            raise InvalidSetting(f"{self.label}: words have at most {WORDS_MAX} characters.")
+            raise InvalidSetting(
+                "{type}: words have at most {most} characters.", type=label, most=WORDS_MAX
+            )
 
     @property
     def has_points(self) -> bool:
@@ -195,7 +206,9 @@ def find_valence(slug: str) -> Valence:
         return VALENCES[slug]
     except KeyError:
         raise InvalidSetting(
-            f"There is no valence {slug!r}. Known valences: {', '.join(VALENCES)}."
+            "There is no valence {slug!r}. Known valences: {known}.",
+            slug=slug,
+            known=", ".join(VALENCES),
         ) from None
 
 
@@ -209,13 +222,24 @@ def edit_valence(
 ) -> Valence:
     """Give a valence as somebody made it anew. Raises InvalidSetting where it would be no such."""
     usual = find_valence(slug)
+    label = Marked(usual.label)
     if not usual.keeps_character(hit_points, miss_points):
-        hit = "pays for a hit" if usual.hit_points else "pays nothing for a hit"
-        miss = "takes for a miss" if usual.miss_points else "takes nothing for a miss"
-        rule = f"{hit} and {miss}" if usual.has_points else "has no points"
-        raise InvalidSetting(f"{usual.label} feedback {rule}. Choose another type for other rules.")
+        if not usual.has_points:
+            raise InvalidSetting(
+                "{type} feedback has no points. Choose another type for other rules.", type=label
+            )
+        hit = Marked("pays for a hit") if usual.hit_points else Marked("pays nothing for a hit")
+        miss = (
+            Marked("takes for a miss") if usual.miss_points else Marked("takes nothing for a miss")
+        )
+        raise InvalidSetting(
+            "{type} feedback {hit} and {miss}. Choose another type for other rules.",
+            type=label,
+            hit=hit,
+            miss=miss,
+        )
     if not usual.has_points and cue != Cue():
-        raise InvalidSetting(f"{usual.label} feedback only informs: its robot stands still.")
+        raise InvalidSetting("{type} feedback only informs: its robot stands still.", type=label)
     return replace(
         usual, hit_points=hit_points, miss_points=miss_points, bands=tuple(bands), cue=cue
     )
@@ -235,8 +259,8 @@ def bands_from_json(data: Any) -> tuple[Band, ...]:
         return tuple(_band_from_json(entry) for entry in data)
     except (KeyError, TypeError, ValueError):
         raise InvalidSetting(
-            "A band has from_performance (a number), words (a text) and confetti "
-            f"({', '.join(Confetti)})."
+            "A band has from_performance (a number), words (a text) and confetti ({known}).",
+            known=", ".join(Confetti),
         ) from None
 
 

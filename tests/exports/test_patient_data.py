@@ -13,7 +13,9 @@ from typing import Any
 import pytest
 from asgiref.sync import sync_to_async
 from django.core.management import CommandError, call_command
+from django.db import connection
 from django.test import AsyncClient, Client
+from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 from hypothesis import given
 from hypothesis import strategies as st
@@ -52,6 +54,22 @@ def fetch(world: World, role: Role = Role.LEAD) -> dict[str, str]:
 
 def to_number(text: str) -> float | None:
     return float(text) if text else None
+
+
+def test_a_table_of_sessions_costs_the_same_however_many_there_are(world):
+    user = world.people[Role.LEAD]
+
+    def cost() -> int:
+        chosen = Selection(user, TrainingSession.objects.visible_to(user), named=True)
+        with CaptureQueriesContext(connection) as queries:
+            told = list(chosen.session_rows())
+        assert len(told) == TrainingSession.everywhere.count()
+        return len(queries)
+
+    before = cost()
+    for _ in range(5):
+        walk(world.patient, "positive", [3.0, 1.0])
+    assert cost() == before
 
 
 # --- one patient ----------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 from typing import Any
 
@@ -50,17 +51,34 @@ def omar(world: World) -> Patient:
     return patient_of(world, "Omar", boards="clinic")
 
 
+def opened(world: World, session: TrainingSession, role: Role = Role.PT) -> dict[str, str]:
+    """Open the form, and give what its page sends where nobody touches a field."""
+    page = client_of(world, role).get(reverse("correct", args=[session.pk])).content.decode()
+    return sent_by(page)
+
+
+def sent_by(page: str) -> dict[str, str]:
+    """Give what a page with the form sends."""
+    form = re.search(r'<form method="post" class="fields card">.*?</form>', page, re.DOTALL)
+    found: dict[str, str] = {}
+    for tag in re.findall(r"<input[^>]*>", form[0] if form else ""):
+        attributes = dict(re.findall(r'([\w-]+)="([^"]*)"', tag))
+        if attributes.get("type") == "hidden" or " checked" in tag:
+            found[attributes["name"]] = html.unescape(attributes.get("value", ""))
+    for name, words in re.findall(
+        r'<textarea name="(\w+)".*?>\s*(.*?)</textarea>', page, re.DOTALL
+    ):
+        found[name] = html.unescape(words)
+    chosen = re.search(r'<select name="patient".*?<option value="(\d+)" selected', page, re.DOTALL)
+    return found | ({"patient": chosen[1]} if chosen else {})
+
+
 def correct(world: World, session: TrainingSession, role: Role = Role.PT, **changes):
-    """Send the form as the page does: what is not told stays as it is."""
+    """Send the form as its page does, with these fields altered."""
     session.refresh_from_db()
-    before = {
-        "patient": session.patient_id,
-        "counts": "no" if session.left_out else "yes",
-        "note": "",
-        "reason": "Read off the sheet.",
-    }
     url = reverse("correct", args=[session.pk])
-    return client_of(world, role).post(url, before | changes)
+    sent = opened(world, session, role) | {"reason": "Read off the sheet."} | changes
+    return client_of(world, role).post(url, sent)
 
 
 def log_of(session: TrainingSession) -> list[object]:
@@ -203,6 +221,40 @@ def test_a_correction_that_says_too_little_or_too_much_is_refused(world, rosa, c
     assert page.status_code == 200
     assert words in page.content.decode()
     assert not SessionCorrection.everywhere.filter(session=session).exists()
+
+
+def test_an_older_form_undoes_nothing_and_shows_what_was_altered_meanwhile(world, rosa, omar):
+    session = walk(rosa, "positive", strides(3, 1))
+    url, client = reverse("correct", args=[session.pk]), client_of(world)
+    older = opened(world, session)
+    correct(world, session, Role.LEAD, counts="no", patient=str(omar.pk))
+    page = client.post(url, older | {"note": "Walked with\r\na cane.", "reason": "Told later."})
+    said = html.unescape(page.content.decode())
+    lead = world.people[Role.LEAD]
+    assert f"Who walked: Omar ({lead}) · Counts: left out ({lead})" in said
+    session.refresh_from_db()
+    assert (session.patient, session.left_out) == (omar, True)
+    assert SessionCorrection.everywhere.filter(session=session).count() == 2
+    again = sent_by(page.content.decode())
+    assert (again["patient"], again["counts"]) == (str(omar.pk), "no")
+    assert again["note"] == "Walked with\r\na cane."
+    assert client.post(url, again).status_code == 302
+    session.refresh_from_db()
+    assert (session.patient, session.left_out) == (omar, True)
+    newest = SessionCorrection.everywhere.filter(session=session).order_by("-pk")[0]
+    assert (newest.part, newest.new) == (Part.NOTE, "Walked with\na cane.")
+    assert newest.reason == "Told later."
+    still = client.post(url, opened(world, session) | {"reason": "Nothing."})
+    assert "Nothing is altered" in still.content.decode()
+
+
+def test_a_form_that_does_not_say_what_it_showed_alters_nothing(world, rosa):
+    session = walk(rosa, "positive", strides(3, 1))
+    sent = {"patient": rosa.pk, "counts": "no", "note": "", "reason": "The cable was loose."}
+    page = client_of(world).post(reverse("correct", args=[session.pk]), sent)
+    assert "meanwhile" in page.content.decode()
+    session.refresh_from_db()
+    assert not session.left_out
 
 
 def test_another_clinics_patient_cannot_have_walked_here(world, rosa):

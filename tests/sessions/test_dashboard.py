@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from datetime import datetime, timedelta
+from types import SimpleNamespace
 from zoneinfo import ZoneInfo
 
 import pytest
@@ -14,11 +15,14 @@ from django.utils import timezone
 from rehab.people.consent import Purpose, give
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
+from rehab.sessions import dashboard
 from rehab.sessions.dashboard import find_matters, look, read_today, read_week
+from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import say_seen
 from rehab.training.changes import ChangeKind, State
+from rehab.training.tallies import Tally
 from tests.walks import RIGHT, strides, walk
 from tests.world import World, build_world, client_of, mark, signed_in
 
@@ -122,6 +126,38 @@ def test_today_lists_open_sessions_first_and_yesterdays_not_at_all(world, rosa):
     assert [key for key, _, _ in told[:3]] == [runs.pk, left.pk, done.pk]
     assert told[2][2] == "75\N{NO-BREAK SPACE}%"
     assert [line.time for line in lines][:3] == ["08:00", "Sep 14, 10:00", "09:00"]
+
+
+def test_what_was_left_open_is_told_however_many_walked_since(world, rosa, monkeypatch):
+    monkeypatch.setattr(dashboard, "SHOWN", 3)
+    pt = world.people[Role.PT]
+    left = ago(rosa, "positive", strides(3, 1), NOW - timedelta(days=1), end=None)
+    for hours in range(5):
+        ago(rosa, "binary", strides(1, 1), NOW - timedelta(hours=hours))
+    told = look(pt, NOW)
+    assert [line.state for line in told["today"]] == ["Running", *["Finished"] * 3]
+    assert told["today"][0].session == left
+    assert told["walking"] == 1
+    assert "The session of Rosa is open since Sep 15" in told["matters"][0].words
+
+
+def test_the_hit_rate_of_who_walks_is_told_as_it_stands(world, rosa, monkeypatch):
+    session = ago(rosa, "positive", strides(3, 1), NOW, end=None)
+    pt = world.people[Role.PT]
+    assert read_today(pt, world.clinic, NOW)[0].hit_rate == ""  # another process runs it
+    fold = SimpleNamespace(feedback=Tally(judged=4, hits=3))
+    running = SimpleNamespace(
+        actor=SimpleNamespace(fold=fold),
+        presence=lambda _now: {"source": True, "tablets": 0, "robot": False},
+    )
+    live = SimpleNamespace(sessions={session.pk: running})
+    monkeypatch.setattr(runtime, "peek", lambda: live)
+    assert read_today(pt, world.clinic, NOW)[0].hit_rate == "75\N{NO-BREAK SPACE}%"
+    page = front(pt)
+    assert (
+        "75\N{NO-BREAK SPACE}%"
+        in re.search(r'<li class="running open">.*?</li>', page, re.DOTALL)[0]
+    )
 
 
 def test_a_session_left_open_and_devices_shut_out_want_attention(world, rosa):

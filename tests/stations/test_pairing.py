@@ -112,6 +112,36 @@ def test_a_flood_of_strangers_ends_somewhere(monkeypatch):
     assert "Try again in five minutes" in pages[-1].content.decode()
 
 
+def test_a_flood_from_one_address_shuts_no_other_clinic_out(monkeypatch):
+    monkeypatch.setattr(pairing, "MOST_OPEN", 6)
+    monkeypatch.setattr(pairing, "MOST_SHOWN", 3)
+    monkeypatch.setattr(pairing, "MOST_BEGUN", 8)
+    early, elsewhere = Client(REMOTE_ADDR="203.0.113.9"), Client(REMOTE_ADDR="203.0.113.9")
+    code = shown_code(early)
+    pages = [Client(REMOTE_ADDR="198.51.100.7").get("/tablet/") for _ in range(10)]
+    assert [page.status_code for page in pages] == [200] * 8 + [429] * 2
+    assert "Too many codes were asked for" in pages[-1].content.decode()
+    codes = [page.context["code"] for page in pages[:8]]
+    left = Pairing.everywhere.filter(code__in=codes).order_by("pk")
+    assert list(left.values_list("code", flat=True)) == codes[-3:]  # the oldest gave way
+    assert shown_code(early) == code
+    assert elsewhere.get("/tablet/").status_code == 200
+    cache.clear()  # five minutes later; of an IPv6 address the network counts
+    Pairing.everywhere.all().delete()
+    first = shown_code(Client(REMOTE_ADDR="2001:db8::1"))
+    for last in range(2, 5):
+        shown_code(Client(REMOTE_ADDR=f"2001:db8::{last}"))
+    assert not Pairing.everywhere.filter(code=first).exists()
+
+
+def test_a_tablet_that_was_let_in_gives_way_to_none(pt, station, monkeypatch):
+    monkeypatch.setattr(pairing, "MOST_SHOWN", 1)
+    tablet = Client()
+    pt.post("/tablets/pair/", {"code": shown_code(tablet), "station": station.pk})
+    assert shown_code(Client())
+    assert tablet.get("/tablet/state/").json()["paired"] is True
+
+
 def test_nobody_pairs_to_a_station_of_another_clinic(pt):
     birch = build_world("birch")
     form = {"code": shown_code(Client()), "station": birch.rows[Station].pk}

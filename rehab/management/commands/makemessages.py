@@ -7,11 +7,23 @@ from django.core.management.commands import makemessages
 OPTIONS = makemessages.Command
 DATED = '"POT-Creation-Date:'  # differs each time, and says nothing
 
+# Which argument says what a pure room refuses. The comment tells that no patient reads it.
+REFUSALS = [
+    f'--keyword={name}:{place},"refusal"'
+    for name, place in (
+        ("InvalidSetting", 1),
+        ("Refused", 1),
+        ("BadGesture", 1),
+        ("BadGoal", 2),
+        ("Marked", 1),
+    )
+]
+
 
 class Command(makemessages.Command):
     """Collects what is to be translated into locale/. Guesses no translation."""
 
-    xgettext_options = [*OPTIONS.xgettext_options, "--keyword=n_:1,2"]
+    xgettext_options = [*OPTIONS.xgettext_options, "--keyword=n_:1,2", *REFUSALS]
     msgmerge_options = [*OPTIONS.msgmerge_options, "--no-fuzzy-matching"]
 
     def write_po_file(self, potfile: str, locale: str) -> None:

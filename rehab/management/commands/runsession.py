@@ -165,7 +165,7 @@ def recorded_plan(
     goal = options["goal"] if options["goal"] is not None else recording.goal
     if goal is None:
         raise InvalidSetting(
-            f"Recording {recording.name} names no goal. Give one: --goal 2.55 (W/kg)."
+            "Recording {name} names no goal. Give one: --goal 2.55 (W/kg).", name=recording.name
         )
     return phases, GoalRule(value=goal)
 
@@ -174,7 +174,7 @@ def synthetic_plan(options: dict[str, Any]) -> tuple[tuple[Phase, ...], GoalRule
     """Give phases and goal of a simulated patient: a tenth of the strides is washout."""
     count = options["strides"]
     if count < MIN_SYNTHETIC_STRIDES:
-        raise InvalidSetting(f"Give --strides {MIN_SYNTHETIC_STRIDES} or more.")
+        raise InvalidSetting("Give --strides {least} or more.", least=MIN_SYNTHETIC_STRIDES)
     washout = count // 10
     phases = (
         make_phase("baseline", strides=BASELINE_STRIDES),

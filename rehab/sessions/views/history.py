@@ -189,8 +189,7 @@ def correct(request: HttpRequest, session_id: int) -> HttpResponse:
         messages.error(request, gettext("This session still runs. End it before you correct it."))
         return redirect("session", session_id=session.pk)
     form = CorrectionForm(request.POST or None, session=session, by=user)
-    if request.method == "POST" and form.is_valid():
-        form.save(timezone.now())
+    if request.method == "POST" and form.create(timezone.now()):
         messages.success(request, gettext("Corrected. Figures, boards and trends follow it."))
         return redirect("session", session_id=session.pk)
     return render(request, "sessions/correct.html", {"session": session, "form": form})

@@ -13,6 +13,7 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_safe
 
 from rehab.people.access import public, tablet_of
+from rehab.people.lockout import client_address
 from rehab.sessions.models import TrainingSession
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device
@@ -43,9 +44,10 @@ def show_tablet(request: HttpRequest) -> HttpResponse:
     if begun is not None and begun.device is None:
         return _show_code(request, begun.code)
     try:
-        begun, secret = pairing.begin(now)
+        begun, secret = pairing.begin(client_address(request), now)
     except pairing.PairingRefused as refused:
-        return render(request, "sessions/tablet.html", {"problem": refused}, status=503)
+        status = 429 if isinstance(refused, pairing.PairingFlooded) else 503
+        return render(request, "sessions/tablet.html", {"problem": refused}, status=status)
     response = _show_code(request, begun.code)
     tablets.remember(response, SECRET, secret, pairing.LIFETIME.total_seconds())
     return response

@@ -319,18 +319,26 @@ def open_session(
     valence: str = "binary",
     goal: GoalRule | None = None,
     at_station: bool = True,
+    beside: bool = False,
     cue: Cue | None = None,
 ) -> TrainingSession:
-    """Make a session that is ready at the place's station."""
-    return create_session(
+    """Make a session that is ready at the place's station.
+
+    ``beside`` puts it there though another one is open, as databases of before may have it.
+    """
+    session = create_session(
         place.patient,
         valence=valence,
         goal=goal or GoalRule(value=3.0),
         phases=phases or (make_phase("training"),),
         cue=cue,
-        station=place.station if at_station else None,
+        station=place.station if at_station and not beside else None,
         created_by=place.pt,
     )
+    if beside:
+        session.station = place.station
+        session.save(update_fields=["station"])
+    return session
 
 
 async def change(session: TrainingSession, kind: str, value: float | None = None) -> None:

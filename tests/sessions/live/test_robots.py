@@ -250,7 +250,7 @@ async def test_a_stop_holds_where_it_and_the_arming_after_it_are_lost(place, beg
 async def test_a_stop_holds_in_a_session_that_is_loaded_before_it_is_stored(
     place, begun, ready, stall
 ):
-    first, second = await begun(place), await ready(place)
+    first, second = await begun(place), await ready(place, beside=True)
     tablet = place.tablet(first)
     await tablet.watch()
     stall.begin()
@@ -267,7 +267,7 @@ async def test_a_stop_holds_in_a_session_that_is_loaded_before_it_is_stored(
 async def test_a_stop_lost_in_one_session_holds_in_the_other_of_its_station(
     place, begun, ready, monkeypatch, opened
 ):
-    first, second = await begun(place), await ready(place)
+    first, second = await begun(place), await ready(place, beside=True)
     here = runtimes.current()
     live = await here.session(first.pk)
     if opened == "before":

@@ -199,7 +199,7 @@ async def test_a_session_opened_before_the_last_one_ended_is_taken_up_after_it(p
     first = await begun(place)
     source = await place.source().dial()
     await source.hello()
-    second = await ready(place)
+    second = await ready(place, beside=True)
     await turns()
     await source.walk(4.0)
     assert await rows(first, "number") == [1]
@@ -210,7 +210,7 @@ async def test_a_session_opened_before_the_last_one_ended_is_taken_up_after_it(p
 
 async def test_a_source_may_name_one_of_its_stations_sessions(place, begun, ready):
     named = await begun(place)
-    await ready(place)
+    await ready(place, beside=True)
     source = await place.source().dial()
     assert (await source.hello(session=named.pk))["session"] == named.pk
 

@@ -7,6 +7,7 @@ import asyncio
 import pytest
 from asgiref.sync import sync_to_async
 
+from rehab.people.models import Clinic, User
 from rehab.sessions.events import Audience, snapshot
 from rehab.sessions.live import runtime
 from rehab.sessions.live import session as sessions
@@ -97,6 +98,23 @@ async def test_without_a_further_phase_the_type_stays(place, begun):
     answer = await monitor.change("valence", "happy")
     assert "can be changed to one of: binary, positive" in answer["message"]
     assert await events_of(session, "valence") == []
+
+
+async def test_a_refusal_is_said_in_the_language_of_its_page(place, begun):
+    await Clinic.everywhere.filter(pk=place.clinic.pk).aupdate(language="es")
+    session = await begun(place)
+    monitor = place.monitor(session)
+    await monitor.watch()
+    answer = await monitor.change("start")
+    assert answer["message"] == (
+        "Una sesión en marcha no admite el cambio «inicio»; debe estar lista."
+    )
+    answer = await monitor.change("gain", 0.25)
+    assert answer["message"] == "No se puede usar una ganancia de 0,25. Dé una de 0,5 a 1,5."
+    await User.everywhere.filter(pk=place.pt.pk).aupdate(language="en")
+    monitor = place.monitor(session)
+    await monitor.watch()
+    assert "A gain of 0.25 cannot be used" in (await monitor.change("gain", 0.25))["message"]
 
 
 async def test_words_and_chart_hold_from_the_next_step_and_are_in_the_log(place, begun):

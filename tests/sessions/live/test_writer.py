@@ -75,7 +75,7 @@ def bench(live_path, stall, monkeypatch):
 
 @pytest.fixture
 async def actors(place, ready, bench) -> list[SessionActor]:
-    actors = [SessionActor(await ready(place)) for _ in range(3)]
+    actors = [SessionActor(await ready(place, at_station=False)) for _ in range(3)]
     for actor in actors:
         bench.submit(actor, actor.change(Change(ChangeKind.START), None, NOW))
     return actors
@@ -260,7 +260,7 @@ async def test_of_two_that_claim_a_session_at_once_one_has_it(place, ready, monk
 async def test_of_many_that_claim_a_session_at_once_one_has_it(place, ready, monkeypatch):
     process, count = call_processes(monkeypatch), 4
     for _ in range(5):
-        session = await ready(place)
+        session = await ready(place, at_station=False)
         together = threading.Barrier(count)
 
         def claim(

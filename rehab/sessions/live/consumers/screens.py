@@ -8,10 +8,15 @@ from collections.abc import Awaitable
 from typing import ClassVar
 from urllib.parse import parse_qs
 
+from channels.db import database_sync_to_async
+from django.conf import settings
 from django.utils import timezone
+from django.utils.translation import override
 
 from rehab.people.audit import Act
+from rehab.people.language import language_of
 from rehab.people.models import User
+from rehab.people.refusals import in_words
 from rehab.people.roles import Role
 from rehab.sessions.events import Audience, history_entry, to_text
 from rehab.sessions.facts import Message
@@ -47,6 +52,7 @@ class ScreenConsumer(Socket):
     robot_orders: ClassVar[tuple[str, ...]] = ("stop",)
     tablet_changes: ClassVar[frozenset[ChangeKind]] = frozenset()
     viewer: Viewer | None = None
+    language = settings.LANGUAGE_CODE
 
     async def opened(self) -> None:
         """Let the right people in and begin to send."""
@@ -65,6 +71,10 @@ class ScreenConsumer(Socket):
         if isinstance(self.actor, Device):
             live.tablets += 1
             live.tablet_heard_at = timezone.now()
+        self.language = live.actor.fold.plan.language  # what the patient reads
+        if self.audience is Audience.MONITOR and isinstance(self.actor, User):
+            theirs = await database_sync_to_async(language_of)(self.actor)
+            self.language = theirs or settings.LANGUAGE_CODE
         self.start(self._pump(live, _after(self.scope["query_string"])))
         self.runtime.notes.add(Act.VIEW, self.actor, session_id, self.scope)
 
@@ -163,11 +173,16 @@ class ScreenConsumer(Socket):
         try:
             await work
         except InvalidSetting as problem:
-            await self._refuse(mark, "refused", str(problem))
+            await self._refuse(mark, "refused", self._in_words(problem))
         except NotStored as problem:
             await self._refuse(mark, "not_stored", str(problem))
         else:
             await self.say({"type": "done", "id": mark})
+
+    def _in_words(self, problem: InvalidSetting) -> str:
+        """Say a refusal in the page's language."""
+        with override(self.language):
+            return in_words(problem)
 
     async def _order_robot(self, message: Message) -> None:
         """Stop the robot, whoever asks; let it move again where a person asks."""

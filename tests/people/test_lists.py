@@ -1,0 +1,105 @@
+"""A list of the admin is narrowed by its own filters and our own links, and by nothing else."""
+
+from __future__ import annotations
+
+import html
+import re
+from urllib.parse import urljoin, urlsplit
+
+import pytest
+from django.contrib import admin
+from django.test import Client
+from django.urls import reverse
+
+from rehab.people.roles import Role
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.protocol_admin import PresetAdmin
+from tests.world import World, build_world, client_of, scoped_models
+
+pytestmark = pytest.mark.django_db
+
+LOOKUPS = ("icontains", "isnull")
+REGISTERED = [model for model in scoped_models() if admin.site.is_registered(model)]
+SESSIONS = "admin:rehab_trainingsession_changelist"
+
+
+@pytest.fixture
+def world() -> World:
+    return build_world("amber")
+
+
+def list_of(model: type) -> str:
+    return reverse(f"admin:rehab_{model.__name__.lower()}_changelist")
+
+
+def is_refused(client: Client, url: str, **asked: str) -> bool:
+    answer = client.get(url, asked)
+    return answer.status_code == 400 or answer.headers.get("Location", "").endswith("?e=1")
+
+
+def test_a_researcher_cannot_ask_letter_by_letter_what_is_hidden(world):
+    TrainingSession.everywhere.filter(pk=world.session.pk).update(
+        source="Recording: maria_lopez.csv", original={"participant_id": 7}
+    )
+    client, url = client_of(world, Role.RESEARCHER), reverse(SESSIONS)
+    assert client.get(url).context["cl"].result_count == 1
+    for digit in ("7", "8"):
+        assert is_refused(client, url, original__participant_id__icontains=digit)
+        assert is_refused(client, url, original__icontains=digit)
+    assert is_refused(client, url, source__icontains="maria")
+    assert is_refused(client, url, metric_score__gt="0")  # of what the list adds by itself
+
+
+@pytest.mark.parametrize("model", REGISTERED, ids=lambda model: model.__name__)
+def test_a_list_is_not_narrowed_by_fields_that_it_has_no_filter_for(world, model):
+    client, url = client_of(world, Role.LEAD), list_of(model)
+    if "cl" not in client.get(url).context:
+        return  # a page of its own, which always shows all
+    pages = admin.site.get_model_admin(model)
+    offered = {one[0] if isinstance(one, tuple) else one for one in pages.list_filter}
+    asked = [f"{field.name}__{lookup}" for field in model._meta.fields for lookup in LOOKUPS]
+    asked += [f.name for f in model._meta.fields if f.name not in offered] + ["pk", "pk__in"]
+    for name in asked:
+        field, _, lookup = name.rpartition("__")
+        if lookup == "isnull" and field in offered:
+            continue  # "empty", where a filter has it
+        assert is_refused(client, url, **{name: "1"}), name
+
+
+def test_the_check_above_finds_a_list_that_takes_any_field(world, monkeypatch):
+    monkeypatch.setattr(PresetAdmin, "get_changelist", admin.ModelAdmin.get_changelist)
+    url = reverse("admin:rehab_preset_changelist")
+    assert not is_refused(client_of(world, Role.LEAD), url, name__icontains="1")
+
+
+@pytest.mark.parametrize("role", [Role.LEAD, Role.PT, Role.RESEARCHER])
+def test_every_link_on_a_list_and_on_a_rows_page_leads_somewhere(world, role):
+    """Filters, days, columns, and what a session's page says of its log."""
+    client = client_of(world, role)
+    lists = [url for model in REGISTERED if client.get(url := list_of(model)).status_code == 200]
+    session = reverse("admin:rehab_trainingsession_change", args=[world.session.pk])
+    followed = set()
+    for url in (*lists, session):
+        page = client.get(url).content.decode()
+        for link in re.findall(r'href="([^"]*\?[^"]*)"', page):
+            there = urljoin(url, html.unescape(link))
+            if urlsplit(there).path in lists and there not in followed:
+                followed.add(there)
+                assert client.get(there).status_code == 200, (url, there)
+    names = {name for there in followed for name in re.findall(r"[?&](\w+)=", there)}
+    assert {"session__id__exact", "valence__exact", "state__exact", "o"} <= names
+    assert any(name.startswith("created_at__") for name in names)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"created_at__year": "9999"},
+        {"created_at__year": "9999", "created_at__month": "12"},
+        {"created_at__year": "0"},
+        {"created_at__year": "many"},
+        {"created_at__month": "3"},
+    ],
+)
+def test_a_day_of_no_calendar_is_refused(world, asked):
+    assert is_refused(client_of(world), reverse(SESSIONS), **asked)

@@ -1,0 +1,182 @@
+"""What rules refuse is said in the language of the page, and in English to programs and logs."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from string import Formatter
+
+import polib
+import pytest
+from django.test import Client
+from django.urls import reverse
+from django.utils.translation import override
+
+from rehab.people.models import Clinic, Patient
+from rehab.people.refusals import in_words
+from rehab.people.roles import Role
+from rehab.sessions.protocols import Protocol
+from rehab.stations.models import Station
+from rehab.training.changes import ChangeKind, Refused, State, next_state
+from rehab.training.goals import GoalRule
+from rehab.training.measures import A2, InvalidSetting
+from rehab.training.phases import Phase
+from rehab.training.valences import VALENCES, Cue, edit_valence
+from robot.composed import Move, compose
+from robot.gestures import BadGesture
+from tests.feedback.test_feedback_types import form as feedback_form
+from tests.gestures.test_composing import filled as gesture_form
+from tests.programs import program_of
+from tests.sessions.test_two_at_once import choices
+from tests.world import World, build_world, client_of
+
+CATALOG = Path(__file__).parents[2] / "locale/es/LC_MESSAGES/django.po"
+ENGLISH = re.compile(
+    r"\b(the|a|an|of|and|or|is|be|must|needs|give|cannot|from|to)\b", re.IGNORECASE
+)
+
+
+def said(act: Callable[[], object], language: str = "es") -> str:
+    with override(language):
+        try:
+            act()
+        except (InvalidSetting, BadGesture) as problem:
+            return in_words(problem)
+    raise AssertionError("nothing was refused")
+
+
+@pytest.mark.parametrize(
+    ("act", "words"),
+    [
+        (
+            lambda: A2.check_goal(16.5),
+            "No se puede usar un objetivo de 16,5 W/kg para potencia de propulsión del tobillo A2.",
+        ),
+        (lambda: Phase("training", "Bloque", True, strides=0), "La fase 'Bloque' necesita"),
+        (GoalRule, "Dé el objetivo como valor o como porcentaje"),
+        (
+            lambda: next_state(State.READY, ChangeKind.FINISH),
+            "Una sesión lista no admite el cambio «fin»; debe estar en pausa o en marcha.",
+        ),
+        (
+            lambda: edit_valence(
+                "negative", hit_points=1, miss_points=0, bands=VALENCES["negative"].bands, cue=Cue()
+            ),
+            "Negativa: esta retroalimentación no da nada por un acierto y quita puntos",
+        ),
+        (
+            lambda: compose("wave", [Move(turn_rad=0.5)]),
+            "Termina con un giro de 29° a la izquierda. Añada pasos que vuelvan al origen.",
+        ),
+        (lambda: compose("wave", [Move(forward_m=0.4)]), "Paso 1: se aleja 0,40 m del origen"),
+    ],
+)
+def test_a_refusal_is_said_in_spanish_with_its_values(act, words):
+    assert words in said(act)
+    assert not ENGLISH.search(re.sub("a2|'.*?'| a ", "", said(act))), said(act)
+
+
+def test_the_message_itself_stays_english():
+    with override("es"), pytest.raises(Refused) as refused:
+        next_state(State.READY, ChangeKind.FINISH)
+    assert str(refused.value) == (
+        "A session that is ready cannot take the change 'finish'; it must be paused or running."
+    )
+    assert said(lambda: A2.check_goal(16.5), "en").startswith("A goal of 16.5 W/kg cannot be used")
+
+
+def test_what_is_no_template_is_said_as_it_is():
+    assert in_words(InvalidSetting("Rosa {K-7} ended.")) == "Rosa {K-7} ended."
+
+
+def test_every_translated_refusal_takes_the_values_of_its_source():
+    refusals = [e for e in polib.pofile(str(CATALOG)) if e.comment == "refusal"]
+    assert len(refusals) > 60
+    for entry in refusals:
+        places = {name for _, name, _, _ in Formatter().parse(entry.msgid) if name}
+        for text in (entry.msgid, entry.msgstr):
+            assert text.format(**dict.fromkeys(places, 1.5)), entry
+
+
+# --- forms ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def world(db: None) -> World:
+    world = build_world("amber")
+    Clinic.everywhere.filter(pk=world.clinic.pk).update(language="es")
+    return world
+
+
+def complaints(client: Client, url: str, data: Mapping[str, object]) -> str:
+    """Send a form that is refused; give what its page complains of."""
+    answer = client.post(url, data)
+    assert answer.status_code == 200
+    lists = re.findall(
+        r'class="(?:errorlist|wrong)[^>]*>(.*?)</(?:ul|p|div)>',
+        html.unescape(answer.content.decode()),
+        re.DOTALL,
+    )
+    found = " ".join(re.sub("<[^>]*>", " ", one) for one in lists).strip()
+    assert found
+    assert not ENGLISH.search(re.sub(r"'.*?'| a ", " ", found)), found
+    return found
+
+
+def test_a_protocol_is_refused_in_spanish(world):
+    phases = {"kind": "training", "name": "Bloque", "feedback": "on", "gain": "9", "position": "1"}
+    data = {f"phases-0-{name}": value for name, value in phases.items()}
+    data |= {"name": "Uno", "phases-TOTAL_FORMS": "1", "phases-INITIAL_FORMS": "0"}
+    found = complaints(client_of(world), reverse("admin:rehab_protocol_add"), data)
+    assert "No se puede usar una ganancia de 9. Dé una de 0,5 a 1,5." in found
+
+
+def test_a_preset_is_refused_in_spanish(world):
+    data = {
+        "name": "x",
+        "valence": "positive",
+        "goal_by": "value",
+        "robot": "normal",
+        "robot_above": "(usual)",
+        "robot_below": "(usual)",
+        "source": "",
+        "protocol": world.rows[Protocol].pk,
+    }
+    found = complaints(client_of(world), reverse("admin:rehab_preset_add"), data)
+    assert "Dé el objetivo como valor o como porcentaje de la línea base." in found
+
+
+def test_a_feedback_type_is_refused_in_spanish(world):
+    url = f"{reverse('admin:rehab_feedbacktype_add')}?slug=positive"
+    data = feedback_form("positive", hit_points="0")
+    found = complaints(client_of(world, Role.LEAD), url, data)
+    assert "Positiva: esta retroalimentación da puntos por un acierto y no quita nada" in found
+    data = feedback_form("positive", **{"bands-2-from_percent": "99"})
+    found = complaints(client_of(world, Role.LEAD), url, data)
+    assert "Positiva: una franja debe empezar en 1, el objetivo." in found
+
+
+def test_a_gesture_is_refused_in_spanish(world):
+    url = reverse("admin:rehab_gesture_add")
+    found = complaints(client_of(world), url, gesture_form("ola", [{"turn_deg": 30}]))
+    assert "Termina con un giro de 30° a la izquierda." in found
+    found = complaints(client_of(world), url, gesture_form("nod", [{"hold_s": 1}]))
+    assert "Todos los robots conocen ya nod." in found
+
+
+def test_a_set_up_is_refused_in_spanish_and_to_a_program_in_english(world):
+    rosa = Patient.everywhere.create(
+        clinic=world.clinic, code="K-1", nickname="Rosa", paretic_side="left"
+    )
+    station = Station.everywhere.create(clinic=world.clinic, name="Ventana")
+    percent = choices(station) | {"goal_by": "percent", "goal_percent": "100"}
+    page = client_of(world).post(f"/patients/{rosa.pk}/new/", percent)
+    told = str(page.context["form"].errors)
+    assert "necesita una fase de línea base antes de la primera retroalimentación" in told
+    asked = {"patient": rosa.pk, "station": station.pk, "goal_percent": 100}
+    training = Protocol.everywhere.get(name="Training only", clinic=None)
+    status, answer = program_of(world, Role.PT).post("/sessions", protocol=training.pk, **asked)
+    assert status == 409
+    assert "needs a baseline phase before the first feedback" in str(answer)

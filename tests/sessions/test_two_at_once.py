@@ -1,0 +1,145 @@
+"""Two act at the same moment: one session is open at a station, one correction is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+from typing import Any
+
+import pytest
+from django.db import connections
+from django.urls import reverse
+
+from rehab.people.models import Patient
+from rehab.people.roles import Role
+from rehab.sessions.corrections import SessionCorrection
+from rehab.sessions.defaults import install_defaults
+from rehab.sessions.forms import SessionForm
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.protocols import Protocol
+from rehab.sessions.services import StationTaken
+from rehab.stations.models import Station
+from tests.programs import program_of
+from tests.world import World, build_world, client_of
+
+
+@pytest.fixture
+def world(transactional_db: None) -> World:
+    install_defaults()
+    return build_world("amber")
+
+
+@pytest.fixture
+def station(world: World) -> Station:
+    return Station.everywhere.create(clinic=world.clinic, name="Window")
+
+
+@pytest.fixture
+def people(world: World) -> list[Patient]:
+    return [
+        Patient.everywhere.create(
+            clinic=world.clinic, code=f"K-{name}", nickname=name, paretic_side="left"
+        )
+        for name in ("Rosa", "Omar")
+    ]
+
+
+def choices(station: Station) -> dict[str, Any]:
+    return {
+        "valence": "binary",
+        "goal_by": "value",
+        "goal_value": "3",
+        "source": "live",
+        "trained_side": "left",
+        "robot": "off",
+        "robot_above": "(usual)",
+        "robot_below": "(usual)",
+        "protocol": Protocol.everywhere.get(name="Training only", clinic=None).pk,
+        "station": station.pk,
+    }
+
+
+def at_once(*acts: Callable[[], Any]) -> list[Any]:
+    """Do things at the same moment, each in a thread of its own with its own connection."""
+    gate = Barrier(len(acts))
+
+    def go(act: Callable[[], Any]) -> Any:
+        try:
+            gate.wait(20)
+            return act()
+        finally:
+            connections.close_all()
+
+    with ThreadPoolExecutor(len(acts)) as pool:
+        return [one.result(30) for one in [pool.submit(go, act) for act in acts]]
+
+
+def open_at(station: Station) -> int:
+    return TrainingSession.everywhere.filter(station=station, state="ready").count()
+
+
+def test_of_two_forms_that_were_both_free_to_go_one_creates(world, station, people):
+    for _ in range(5):
+        forms = [
+            SessionForm(choices(station), patient=patient, by=world.people[Role.PT])
+            for patient in people
+        ]
+        assert all(form.is_valid() for form in forms)
+        made = at_once(*(form.create for form in forms))
+        assert open_at(station) == 1
+        assert made.count(None) == 1
+        refused = forms[made.index(None)]
+        assert "Window still has an open session of" in str(refused.errors["station"])
+        TrainingSession.everywhere.filter(station=station).update(state="aborted")
+
+
+def test_pages_and_programs_obey(world, station, people):
+    program = program_of(world, Role.PT)
+
+    def by_page(patient: Patient) -> Callable[[], int]:
+        browser = client_of(world)
+        return lambda: browser.post(f"/patients/{patient.pk}/new/", choices(station)).status_code
+
+    def by_program(patient: Patient) -> Callable[[], int]:
+        asked = {"patient": patient.pk, "station": station.pk, "feedback_type": "binary"}
+        return lambda: program.post("/sessions", **asked)[0]
+
+    rosa, omar = people
+    for acts, answers in (
+        ((by_page(rosa), by_page(omar)), [{302, 200}]),
+        ((by_page(rosa), by_program(omar)), [{302, 409}, {200, 201}]),
+        ((by_program(rosa), by_program(omar)), [{201, 409}]),
+    ):
+        assert set(at_once(*acts)) in answers
+        assert open_at(station) == 1
+        TrainingSession.everywhere.filter(station=station).update(state="aborted")
+
+
+def test_a_station_that_is_taken_is_refused_whoever_asks(world, station, people):
+    rosa, omar = people
+    by = world.people[Role.PT]
+    first = SessionForm(choices(station), patient=rosa, by=by)
+    second = SessionForm(choices(station), patient=omar, by=by)
+    assert first.is_valid()
+    assert second.is_valid()
+    first.save()
+    with pytest.raises(StationTaken, match="Rosa"):
+        second.save()
+
+
+def test_of_two_corrections_of_the_same_form_one_is_made(world):
+    session = world.session
+    note = SessionCorrection.everywhere.get(session=session).new
+    seen = {"initial-patient": session.patient_id, "initial-counts": "yes", "initial-note": note}
+    sent = {"patient": session.patient_id, "reason": "It slipped."} | seen
+    url = reverse("correct", args=[session.pk])
+
+    def by(role: Role, **changes: str) -> Callable[[], int]:
+        browser = client_of(world, role)
+        given = {"counts": "yes", "note": note} | sent | changes
+        return lambda: browser.post(url, given).status_code
+
+    acts = by(Role.LEAD, counts="no"), by(Role.PT, note="Another note.")
+    assert sorted(at_once(*acts)) == [200, 302]
+    assert SessionCorrection.everywhere.filter(session=session).count() == 2
