@@ -352,6 +352,7 @@ def test_a_stop_that_may_not_have_arrived_is_not_believed(server, browser):
         page = open_page(context, walk)
         button = page.locator("button.robot")
         expect(button).to_have_text("Stop robot")
+        expect(button).to_be_visible()  # once the page knows of the robot
         wire.freeze()  # nothing is closed: the tablet's Wi-Fi is just gone
         page.click("text=Stop robot")
         expect(button).to_have_text("Stop sent")
