@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from django.db import connection
-from django.db.models import Count, F, Q, QuerySet, Sum
+from django.db.models import F, QuerySet, Sum
 
 from rehab.boards.figures import Figure
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
@@ -21,6 +21,21 @@ Ties = Leaderboard.Ties
 Columns = tuple[int, int, int | None, str]
 COLUMNS = ("patient_id", "figure", "stake", "key")
 MERIT, KEY = 10, 44  # digits of a key that say the figure, and all (figures.py, make_key)
+
+# A patient's row; how many rows, and how many figures, are better; how many are equal, with the
+# first and the last key among them. By hand: Django takes longer to write it than it takes to find.
+_COUNTS = "FROM rehab_boardcount c WHERE c.board_id = e.board_id AND c.valence = e.valence"
+_EQUALS = f"""FROM rehab_boardentry o WHERE o.board_id = e.board_id AND o.valence = e.valence
+    AND o."key" > SUBSTR(e."key", 1, {MERIT})
+    AND o."key" <= SUBSTR(e."key", 1, {MERIT}) || '{"9" * (KEY - MERIT)}'"""
+PLACE = f"""
+SELECT {", ".join(f'e."{column}"' for column in COLUMNS)},
+    (SELECT COALESCE(SUM(c."rows"), 0) {_COUNTS} AND c.figure {{better}} e.figure),
+    (SELECT COUNT(*) {_COUNTS} AND c.figure {{better}} e.figure),
+    (SELECT COALESCE(SUM(c."rows"), 1) {_COUNTS} AND c.figure = e.figure),
+    (SELECT MAX(o."key") {_EQUALS}), (SELECT MIN(o."key") {_EQUALS})
+FROM rehab_boardentry e WHERE e.board_id = %s AND e.valence = %s AND e.patient_id = %s
+"""  # noqa: S608 (names of ours)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,24 +141,21 @@ class Stored:
 
     def find(self, patient_id: int) -> Placed | None:
         """Give a patient's row. Its place: all whose figures are better, and one."""
-        rows = self.find_rows().filter(patient=patient_id)
-        for row in rows.values_list(*COLUMNS):
-            figure = row[1]
-            better = "figure__gt" if self._board.higher_is_better else "figure__lt"
-            sums = self._counts.aggregate(
-                ahead=Sum("rows", filter=Q(**{better: figure}), default=0),
-                figures=Count("pk", filter=Q(**{better: figure})),
-                equals=Sum("rows", filter=Q(figure=figure), default=1),
-            )
-            shared = 1 + sums["ahead"]
-            match self._board.ties:
-                case Ties.DENSE:
-                    return make_placed(row, shared, 1 + sums["figures"])
-                case Ties.EARLIER:
-                    before = self._count_equals_before(row[3], sums["equals"])
-                    return make_placed(row, shared, shared + before)
-            return make_placed(row, shared, shared)
-        return None
+        better = ">" if self._board.higher_is_better else "<"
+        with connection.cursor() as cursor:
+            cursor.execute(PLACE.format(better=better), [self._board.pk, self._valence, patient_id])
+            found = cursor.fetchone()
+        if found is None:
+            return None
+        ahead, figures, equals = (int(number) for number in found[4:7])
+        row, shared = found[:4], 1 + ahead
+        match self._board.ties:
+            case Ties.DENSE:
+                return make_placed(row, shared, 1 + figures)
+            case Ties.EARLIER:
+                before = self._count_equals_before(row[3], found[7:], equals)
+                return make_placed(row, shared, shared + before)
+        return make_placed(row, shared, shared)
 
     def top(self, n: int) -> list[Placed]:
         """Give the best: their places follow from their order alone."""
@@ -180,35 +192,16 @@ class Stored:
                 return make_placed(row, shared, beside.rank + step)
         return make_placed(row, shared, shared)
 
-    def _count_equals_before(self, key: str, size: int) -> int:
+    def _count_equals_before(self, key: str, ends: tuple[str, ...], size: int) -> int:
         """Count the rows of the same figure that stand before one, from the nearer end.
 
         A figure may have some ten thousand rows; which end is nearer is guessed from the keys.
         """
-        first, last = self._find_ends(key)
+        rows, (first, last) = self.find_rows(), ends
         highest, mine, lowest = (int(one[MERIT:]) for one in (first, key, last))
-        rows = self.find_rows()
         if 2 * mine >= highest + lowest:
             return rows.filter(key__gt=key, key__lte=first).count()
         return size - 1 - rows.filter(key__gte=last, key__lt=key).count()
-
-    def _find_ends(self, key: str) -> tuple[str, str]:
-        """Give the first and the last key of a key's figure.
-
-        By hand: Django takes 2 ms to write it. SQLite finds one end by index, of both it reads all
-        that lies between: hence a query in a query for each.
-        """
-        equals = f"""FROM {BoardEntry._meta.db_table} WHERE board_id = %s AND valence = %s
-            AND "key" > %s AND "key" <= %s"""
-        merit = key[:MERIT]
-        where: list[int | str] = [self._board.pk, self._valence, merit, merit + "9" * (KEY - MERIT)]
-        with connection.cursor() as cursor:
-            cursor.execute(
-                f'SELECT (SELECT MAX("key") {equals}), (SELECT MIN("key") {equals})',
-                where * 2,
-            )
-            first, last = cursor.fetchone()
-        return first or key, last or key  # gone meanwhile: it stands alone
 
 
 def make_placed(row: Columns, shared: int, rank: int) -> Placed:

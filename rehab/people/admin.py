@@ -22,7 +22,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people import factors, lockout
 from rehab.people.access import person
-from rehab.people.admin_base import ScopedAdmin, ScopedOptions, TokenAdmin, ToldChanges, rights
+from rehab.people.admin_base import RowAdmin, ScopedAdmin, ScopedOptions, TokenAdmin, rights
 from rehab.people.aliases import say_alias
 from rehab.people.audit import Act, note_safety
 from rehab.people.lockout import client_address
@@ -81,7 +81,7 @@ class NewAccountForm(AdminUserCreationForm):
 
 
 @admin.register(User)
-class AccountAdmin(ScopedOptions, ToldChanges, UserAdmin):
+class AccountAdmin(ScopedOptions, RowAdmin, UserAdmin):
     """Accounts: a lead keeps those of the own clinic, a host all of them."""
 
     list_display = (

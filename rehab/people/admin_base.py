@@ -138,8 +138,12 @@ class ClinicForm(forms.ModelForm):
         return super()._get_validation_exclusions() - {"clinic"}  # type: ignore[misc, no-any-return]
 
 
-class ToldChanges(admin.ModelAdmin):
-    """Pages whose history is ours: each value before and after."""
+class RowAdmin(admin.ModelAdmin):
+    """Pages of a row, whose history is ours: each value before and after."""
+
+    def get_object(self, request: HttpRequest, object_id: str, from_field: Any = None) -> Any:
+        """Find a row; where a form names no field to find it by (Django fails), by its key."""
+        return super().get_object(request, object_id, from_field or None)
 
     def history_view(
         self, request: HttpRequest, object_id: str, extra_context: Any = None
@@ -160,7 +164,7 @@ class ToldChanges(admin.ModelAdmin):
         return TemplateResponse(request, "people/changes.html", context)
 
 
-class ScopedAdmin(ScopedOptions, ToldChanges):
+class ScopedAdmin(ScopedOptions, RowAdmin):
     """A model's pages. New rows belong to the clinic of whoever adds them."""
 
     form = ClinicForm
@@ -168,10 +172,6 @@ class ScopedAdmin(ScopedOptions, ToldChanges):
     show_facets = admin.ShowFacets.NEVER
     row_actions: tuple[str, ...] = ()  # actions that a row's own page offers as well
     for_viewers: tuple[str, ...] = ()  # those of them that alter nothing of the row
-
-    def get_object(self, request: HttpRequest, object_id: str, from_field: Any = None) -> Any:
-        """Find a row; where a form names no field to find it by (Django fails), by its key."""
-        return super().get_object(request, object_id, from_field or None)
 
     def has_module_permission(self, request: HttpRequest) -> bool:
         """Whether the model is on the front page."""

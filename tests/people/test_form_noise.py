@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from django.urls import reverse
 
+from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.protocols import Protocol
 from tests.form_noise import run_noise
@@ -22,9 +23,10 @@ def test_noise_to_every_form_fails_nowhere_and_leaks_nothing(capsys):
 
 @pytest.mark.django_db
 @pytest.mark.parametrize("page", ["change", "delete"])
-def test_a_form_that_names_no_field_to_find_its_row_by(page):
+@pytest.mark.parametrize("model", [Protocol, User])
+def test_a_form_that_names_no_field_to_find_its_row_by(model, page):
     world = build_world("amber")
     browser = client_of(world, Role.LEAD)
-    row = world.rows[Protocol]
-    address = reverse(f"admin:rehab_protocol_{page}", kwargs={"object_id": row.pk})
+    name = f"admin:rehab_{model._meta.model_name}_{page}"
+    address = reverse(name, kwargs={"object_id": world.rows[model].pk})
     assert browser.get(address, {"_to_field": ""}).status_code == 200
