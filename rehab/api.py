@@ -17,7 +17,7 @@ from ninja.errors import AuthenticationError, HttpError, ValidationError
 from rehab.boards import api as boards
 from rehab.people import api as people
 from rehab.people.access import public
-from rehab.people.api_base import Browser, PerPerson, Rejected, Token, check_roles
+from rehab.people.web.api_base import Browser, PerPerson, Rejected, Token, check_roles
 from rehab.sessions import api as sessions
 
 api = NinjaAPI(

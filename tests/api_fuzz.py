@@ -11,7 +11,7 @@ import pytest
 from django.test import Client
 from hypothesis import HealthCheck, Phase, given, settings
 
-from rehab.people import api_base
+from rehab.people.web import api_base
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from tests.api_noise import Noise, make_noise

@@ -9,7 +9,7 @@ import django
 
 def seed(role: str) -> str:
     """Give a new account of the first clinic a token."""
-    from rehab.people.first_start import first_clinic, prepare_database
+    from rehab.people.sign_in.first_start import first_clinic, prepare_database
     from rehab.people.models import User
     from tests.programs import token_of
 

@@ -19,8 +19,8 @@ def seed(count: int) -> list[dict[str, Any]]:
     from django.db import transaction
     from django.utils import timezone
 
-    from rehab.people.entry import BACKEND
-    from rehab.people.first_start import first_clinic, prepare_database
+    from rehab.people.sign_in.flow import BACKEND
+    from rehab.people.sign_in.first_start import first_clinic, prepare_database
     from rehab.people.models import Patient, User
     from rehab.people.roles import Role
     from rehab.sessions.live.actor import SessionActor

@@ -14,14 +14,14 @@ from django.views.decorators.http import require_GET, require_POST, require_safe
 from rehab.exports.archive import ZipResponse
 from rehab.exports.forms import EndingForm, ErasingForm
 from rehab.exports.patient_data import patient_files, session_files
-from rehab.people import audit
+from rehab.people.audit import audit_log
 from rehab.people.access import for_roles, person
-from rehab.people.audit import Act
-from rehab.people.consent import holding
-from rehab.people.lockout import client_address
+from rehab.people.audit.audit_log import Act
+from rehab.people.consent.models import holding
+from rehab.people.sign_in.lockout import client_address
 from rehab.people.models import Ending, Erasing, Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.endings import StillOpen, end_program, erase, reopen_program
+from rehab.patients.closure import StillOpen, end_program, erase, reopen_program
 from rehab.sessions.models import TrainingSession
 
 
@@ -91,7 +91,7 @@ def give_sessions(request: HttpRequest) -> HttpResponse:
 
 def note_export(request: HttpRequest, patient: Patient | None = None) -> None:
     """Tell the audit log. Where it cannot be kept, nothing is given out."""
-    audit.note(
+    audit_log.note(
         Act.EXPORT,
         person(request),
         patient=None if patient is None else patient.pk,

@@ -14,7 +14,8 @@ from django.core.exceptions import PermissionDenied
 from django.http import HttpRequest, HttpResponseBase
 from django.utils.cache import patch_cache_control
 
-from rehab.people import entry, history, sightings
+from rehab.people.sign_in import flow
+from rehab.people.audit import history, access_log
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 
@@ -99,7 +100,7 @@ class AccessMiddleware:
         """Pass the request on; what it changes is its doing, and what it shows is noted."""
         with history.acting(request):
             response = self.get_response(request)
-        sightings.note_request(request, response)
+        access_log.note_request(request, response)
         if _is_guarded(request):
             _forbid_keeping(response)
         return response
@@ -124,7 +125,7 @@ class AccessMiddleware:
             return None
         if getattr(view, "tablets", False) and tablet_of(request) is not None:
             return None
-        if getattr(view, "setting_up", False) and entry.setting_up(request) is not None:
+        if getattr(view, "setting_up", False) and flow.setting_up(request) is not None:
             return None
         if not user.is_authenticated:
             return redirect_to_login(request.get_full_path())

@@ -13,20 +13,7 @@ from django.shortcuts import get_object_or_404
 from ninja import Field, Path, Query, Router, Schema, Status
 
 from rehab.people.access import clinic_of, for_roles
-from rehab.people.api_base import (
-    Given,
-    Key,
-    Page,
-    Paging,
-    Rejected,
-    Words,
-    answers,
-    caller,
-    cut,
-    left_out,
-    say_errors,
-    sees_names,
-)
+from rehab.people.web.api_base import Given, Key, Page, Paging, Rejected, Words, answers, caller, cut, left_out, say_errors, sees_names
 from rehab.people.models import LANGUAGES, Patient, User
 from rehab.people.roles import Role
 from rehab.training.steps import Side

@@ -12,7 +12,7 @@ from django.db import IntegrityError, transaction
 from django.http import HttpRequest
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people import lockout
+from rehab.people.sign_in import lockout
 from rehab.people.models import Patient, User
 
 WRONG = _("Name and password do not fit. Look at capitals, and try again.")

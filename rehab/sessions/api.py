@@ -12,7 +12,7 @@ from ninja.errors import HttpError
 
 from rehab.people.access import for_roles
 from rehab.people.api import Short
-from rehab.people.api_base import Key, Page, Paging, Rejected, answers, caller, cut, say_errors
+from rehab.people.web.api_base import Key, Page, Paging, Rejected, answers, caller, cut, say_errors
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.forms import SessionForm, like_last_time
@@ -34,8 +34,8 @@ from rehab.sessions.schemas import (
     StepPage,
 )
 from rehab.sessions.services import change_session
-from rehab.sessions.trend import with_figures
-from rehab.sessions.words import at_clinic
+from rehab.sessions.reports.trend import with_figures
+from rehab.sessions.formatting import at_clinic
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind, Refused

@@ -17,16 +17,16 @@ from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
-from rehab.people.consent import Purpose, give, join_boards, offered
+from rehab.people.consent.models import Purpose, give, join_boards, offered
 from rehab.people.forms import PatientRowForm
 from rehab.people.models import SIDES, Boards, Patient, User
-from rehab.people.refusals import in_words
+from rehab.people.web.refusals import in_words
 from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocols import Protocol
 from rehab.sessions.services import StationTaken, check_station, create_session
-from rehab.sessions.words import LEVELS, RECORDING, SIMULATED, say_source
+from rehab.sessions.formatting import LEVELS, RECORDING, SIMULATED, say_source
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
 from rehab.sources.synthetic import PROFILES

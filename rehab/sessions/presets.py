@@ -13,12 +13,12 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.refusals import in_words
+from rehab.people.web.refusals import in_words
 from rehab.people.scope import ClinicRow, Scope
 from rehab.sessions.cues import USUAL, name_gestures
 from rehab.sessions.forms import LIVE, SessionForm
 from rehab.sessions.protocols import Protocol
-from rehab.sessions.words import LEVELS, SIMULATED, say_quantity, say_rate
+from rehab.sessions.formatting import LEVELS, SIMULATED, say_quantity, say_rate
 from rehab.sources.synthetic import PROFILES
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting

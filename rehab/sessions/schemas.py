@@ -9,7 +9,7 @@ from ninja import Field, Schema
 from pydantic import AfterValidator
 
 from rehab.people.api import PatientName, Short
-from rehab.people.api_base import Given, Key, Moment, Paging, Whole, Words, left_out, sees_names
+from rehab.people.web.api_base import Given, Key, Moment, Paging, Whole, Words, left_out, sees_names
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ASKED, ChangeKind, State

@@ -2,17 +2,8 @@
 
 from django.urls import path
 
-from rehab.sessions.views import (
-    history,
-    monitor,
-    report,
-    setup,
-    start,
-    tablet,
-    takehome,
-    visits,
-    walk,
-)
+from rehab.sessions.pages import history, monitor, report, setup, tablet, takehome, walk
+from rehab.patients.pages import start, visits
 
 urlpatterns = [
     path("start/", start.choose_patient, name="start"),

@@ -15,7 +15,7 @@ from django.urls import reverse
 from django.utils.translation import override
 
 from rehab.people.models import Clinic, Patient
-from rehab.people.refusals import in_words
+from rehab.people.web.refusals import in_words
 from rehab.people.roles import Role
 from rehab.sessions.protocols import Protocol
 from rehab.stations.models import Station

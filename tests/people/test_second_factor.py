@@ -12,10 +12,10 @@ from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 
-from rehab.people import codes, factors
-from rehab.people.audit import AuditEntry
-from rehab.people.codes import STEP_S, code_of, new_secret, step_of
-from rehab.people.factors import Authenticator, RecoveryCode
+from rehab.people.sign_in import codes, factors
+from rehab.people.audit.audit_log import AuditEntry
+from rehab.people.sign_in.codes import STEP_S, code_of, new_secret, step_of
+from rehab.people.sign_in.factors import Authenticator, RecoveryCode
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 

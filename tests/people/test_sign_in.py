@@ -10,8 +10,8 @@ from django.contrib.sessions.models import Session
 from django.test import Client, RequestFactory
 from django.utils import timezone
 
-from rehab.people.browser_sessions import SEEN_AT, SIGNED_IN_AT
-from rehab.people.lockout import client_address
+from rehab.people.sign_in.browser_sessions import SEEN_AT, SIGNED_IN_AT
+from rehab.people.sign_in.lockout import client_address
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 

@@ -20,7 +20,7 @@ from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.boards.standings import Stored
 from rehab.people import api as people_api
 from rehab.people.access import for_roles, public
-from rehab.people.admin_base import ScopedOptions
+from rehab.people.web.admin_base import ScopedOptions
 from rehab.people.models import Patient
 from rehab.people.roles import Right, Role, rights_of
 from rehab.people.scope import CrossClinic, Scope, ScopedManager, UnscopedQuery

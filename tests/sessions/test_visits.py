@@ -11,7 +11,7 @@ from django.utils import timezone
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.visits import Progress, Visit, plan_visit, read_today, usual_time
+from rehab.patients.visits import Progress, Visit, plan_visit, read_today, usual_time
 from tests.walks import HIT, walk
 from tests.world import NOW, World, build_world, client_of
 

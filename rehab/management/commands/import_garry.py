@@ -12,12 +12,12 @@ from zoneinfo import ZoneInfo
 from django.core.management import BaseCommand, CommandError
 from django.db import transaction
 
-from rehab.people.erased import is_kept_away
-from rehab.people.first_start import first_clinic, prepare_database
+from rehab.people.consent.tombstones import is_kept_away
+from rehab.people.sign_in.first_start import first_clinic, prepare_database
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.original import Damaged, Original, OriginalSession, read_original
+from rehab.legacy.database import Damaged, Original, OriginalSession, read_original
 from rehab.sessions.protocols import Measure
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule

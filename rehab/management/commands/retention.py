@@ -10,7 +10,7 @@ from django.db import transaction
 from django.utils import timezone
 
 from rehab.people.models import Clinic, Erasing
-from rehab.sessions.endings import StillOpen, erase, let_logs_go, overdue
+from rehab.patients.closure import StillOpen, erase, let_logs_go, overdue
 
 
 class Command(BaseCommand):

@@ -9,7 +9,7 @@ from datetime import datetime
 from typing import Any, NamedTuple
 
 from rehab.people.models import User
-from rehab.sessions.facts import MARKED_CHANGES, change_mark
+from rehab.sessions.payloads import MARKED_CHANGES, change_mark
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ENDED, Change, ChangeKind, State, Value

@@ -22,7 +22,7 @@ from rehab.sessions.events import (
     snapshot,
     step_event,
 )
-from rehab.sessions.facts import Message, type_mark
+from rehab.sessions.payloads import Message, type_mark
 from rehab.sessions.live.actor import Row, SessionActor
 from rehab.sessions.live.hub import Channel, Viewer
 from rehab.sessions.live.lateness import Lateness

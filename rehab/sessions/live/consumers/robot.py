@@ -7,7 +7,7 @@ import asyncio
 from django.utils import timezone
 
 from rehab.sessions.events import Audience
-from rehab.sessions.facts import Message, describe_cue
+from rehab.sessions.payloads import Message, describe_cue
 from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.hub import Lagged, Viewer
 from rehab.sessions.live.messages import BadFrame, read_name, read_report
