@@ -8,7 +8,7 @@ import django.utils.timezone
 from django.conf import settings
 from django.db import migrations, models
 
-import rehab.people.history
+import rehab.people.audit.history
 import rehab.people.models
 
 

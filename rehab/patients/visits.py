@@ -14,8 +14,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.scope import ClinicRow, Scope
-from rehab.sessions.models import TrainingSession
 from rehab.sessions.formatting import at_clinic
+from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN, State
 
 SOON_DAYS = (0, 1, 2, 7)  # from today on: what one tap plans

@@ -14,10 +14,10 @@ from django.core.exceptions import PermissionDenied
 from django.http import HttpRequest, HttpResponseBase
 from django.utils.cache import patch_cache_control
 
-from rehab.people.sign_in import flow
-from rehab.people.audit import history, access_log
+from rehab.people.audit import access_log, history
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
+from rehab.people.sign_in import flow
 
 View = Callable[..., HttpResponseBase]
 Open = TypeVar("Open", bound=Callable[..., Any])  # a page, or a call of the API

@@ -11,10 +11,10 @@ from django.http import HttpRequest
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 
-from rehab.people.web.admin_base import ReadOnlyAdmin, rights
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.roles import Role
+from rehab.people.web.admin_base import ReadOnlyAdmin, rights
 
 
 class LogAdmin(ReadOnlyAdmin):

@@ -8,7 +8,17 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Protocol
 
-from rehab.sessions.payloads import Message, change_mark, describe_cue, describe_now, describe_phase, describe_state, describe_types, describe_walked, type_mark
+from rehab.sessions.payloads import (
+    Message,
+    change_mark,
+    describe_cue,
+    describe_now,
+    describe_phase,
+    describe_state,
+    describe_types,
+    describe_walked,
+    type_mark,
+)
 from rehab.training.changes import ChangeKind, Value
 from rehab.training.fold import SessionFold
 from rehab.training.phases import Phase

@@ -7,10 +7,10 @@ import re
 import pytest
 from django.test import Client
 
-from rehab.people.web import api_base
 from rehab.people.access import UndeclaredView
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
+from rehab.people.web import api_base
 from tests.programs import ROOT, Program, program_of, token_of
 from tests.world import World, build_world, client_of
 

@@ -11,11 +11,11 @@ from django.test import Client
 from django.urls import get_resolver, reverse
 from django.utils import timezone
 
-from rehab.people.audit import audit_log, access_log
+from rehab.people.audit import access_log, audit_log
 from rehab.people.audit.audit_log import Act, AppendOnly, AuditEntry, Recent, shorten
-from rehab.people.sign_in.factors import Authenticator
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
+from rehab.people.sign_in.factors import Authenticator
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession

@@ -12,7 +12,18 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.boards.models import BoardEntry
-from rehab.people.consent.models import Consent, ConsentText, FixedText, Purpose, current_text, give, holding, offered, withdraw, write_text
+from rehab.people.consent.models import (
+    Consent,
+    ConsentText,
+    FixedText,
+    Purpose,
+    current_text,
+    give,
+    holding,
+    offered,
+    withdraw,
+    write_text,
+)
 from rehab.people.models import Boards, Clinic, Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent, SessionMetric, Step

@@ -14,17 +14,18 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.boards.models import BoardEntry
+from rehab.patients.closure import StillOpen, end_program, reopen_program
+from rehab.patients.erasure import erase, months_before, overdue
+from rehab.patients.visits import Visit
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.models import Ending, Erasing, Patient
 from rehab.people.roles import Role
 from rehab.sessions.corrections import Part, SessionCorrection, correct_session
-from rehab.patients.closure import StillOpen, end_program, erase, months_before, overdue, reopen_program
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import create_session
-from rehab.patients.visits import Visit
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from tests.world import World, build_world, client_of, mark, scoped_models

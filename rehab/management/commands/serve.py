@@ -13,7 +13,12 @@ from django.conf import settings
 from django.core.management import BaseCommand, CommandError
 
 from rehab.boards.building import builder
-from rehab.people.sign_in.first_start import FIRST_USERNAME, first_clinic, first_password, prepare_database
+from rehab.people.sign_in.first_start import (
+    FIRST_USERNAME,
+    first_clinic,
+    first_password,
+    prepare_database,
+)
 from rehab.sessions.live.runtime import current
 from rehab.sessions.live.sources import local_address
 from rehab.stations.builtin import builtin_token, first_station

@@ -14,13 +14,14 @@ from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
+from rehab.patients.forms import PatientForm, ScreenForm
+from rehab.patients.visits import SOON_DAYS, Visit, read_today, usual_time
 from rehab.people.access import clinic_of, for_roles, person
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.forms import PatientForm, ScreenForm, SessionForm, like_last_time
-from rehab.sessions.models import TrainingSession
-from rehab.patients.visits import SOON_DAYS, Visit, read_today, usual_time
 from rehab.sessions.formatting import at_clinic
+from rehab.sessions.forms import SessionForm, like_last_time
+from rehab.sessions.models import TrainingSession
 from rehab.stations.builtin import first_station
 from rehab.training.changes import OPEN
 

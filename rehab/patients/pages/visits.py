@@ -13,10 +13,10 @@ from django.utils.dateparse import parse_date, parse_time
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST
 
+from rehab.patients.visits import SOON_DAYS, Visit, plan_visit, usual_time
 from rehab.people.access import for_roles, person
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.patients.visits import SOON_DAYS, Visit, plan_visit, usual_time
 from rehab.sessions.formatting import at_clinic
 
 FARTHEST = timedelta(days=366)

@@ -18,8 +18,8 @@ from django.utils import timezone
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.audit.history import HistoryEntry
-from rehab.people.sign_in.lockout import client_address
 from rehab.people.models import Patient
+from rehab.people.networks import client_address
 
 # Parameters of addresses: the model that they name a row of, by what, and its patient.
 SUBJECTS = {

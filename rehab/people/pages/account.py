@@ -11,11 +11,11 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.debug import sensitive_post_parameters
 from django.views.decorators.http import require_http_methods, require_safe
 
-from rehab.people.sign_in import factors, passkeys
 from rehab.people.access import for_roles, person
-from rehab.people.forms import NewPasswordForm
 from rehab.people.models import LANGUAGES
 from rehab.people.roles import Role
+from rehab.people.sign_in import factors, passkeys
+from rehab.people.sign_in.forms import NewPasswordForm
 
 
 @for_roles(*Role, patients=False)

@@ -13,7 +13,18 @@ from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_http_methods
 
 from rehab.people.access import clinic_of, for_roles, person
-from rehab.people.consent.models import Consent, Purpose, current_text, give, holding, join_boards, may_be_cared_for, offered, withdraw, write_text
+from rehab.people.consent.models import (
+    Consent,
+    Purpose,
+    current_text,
+    give,
+    holding,
+    join_boards,
+    may_be_cared_for,
+    offered,
+    withdraw,
+    write_text,
+)
 from rehab.people.forms import ConsentTextForm
 from rehab.people.models import Boards, Patient
 from rehab.people.roles import Role

@@ -12,9 +12,9 @@ from django.views.decorators.http import conditional_page, require_POST, require
 from django.views.i18n import JavaScriptCatalog
 
 from rehab.people.access import for_roles, person, public
-from rehab.people.web.language import language_of
 from rehab.people.models import LANGUAGES
 from rehab.people.roles import Role
+from rehab.people.web.language import language_of
 
 in_scripts = JavaScriptCatalog.as_view(packages=["rehab"])
 

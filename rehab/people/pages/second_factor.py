@@ -14,11 +14,11 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.debug import sensitive_post_parameters
 from django.views.decorators.http import require_http_methods, require_safe
 
-from rehab.people.sign_in import codes, flow, factors, passkeys
 from rehab.people.access import for_roles, person
-from rehab.people.forms import WRONG_FIRST_CODE, AppForm, OwnPasswordForm
 from rehab.people.models import User
 from rehab.people.roles import Role
+from rehab.people.sign_in import factors, flow, passkeys, totp
+from rehab.people.sign_in.forms import WRONG_FIRST_CODE, AppForm, OwnPasswordForm
 
 SECRET = "app_secret"  # noqa: S105 (its name in the browser session, until the app has proven it)
 
@@ -52,7 +52,7 @@ def choose(request: HttpRequest) -> HttpResponse:
 def add_app(request: HttpRequest) -> HttpResponse:
     """Show an app its secret, and keep it once the app shows the right code."""
     user = owner(request)
-    secret: str = request.session.setdefault(SECRET, codes.new_secret())
+    secret: str = request.session.setdefault(SECRET, totp.new_secret())
     form = AppForm(request.POST if request.method == "POST" else None)
     if form.is_valid():
         new = factors.add_app(user, secret, form.cleaned_data["code"], timezone.now())
@@ -60,7 +60,7 @@ def add_app(request: HttpRequest) -> HttpResponse:
             del request.session[SECRET]
             return _added(request, user, new)
         form.add_error("code", WRONG_FIRST_CODE)
-    drawing = segno.make(codes.address(secret, user.username), micro=False)
+    drawing = segno.make(totp.address(secret, user.username), micro=False)
     spaced = " ".join(secret[start : start + 4] for start in range(0, len(secret), 4))
     context = {"form": form, "qr": drawing.svg_inline(omitsize=True, border=2), "secret": spaced}
     return render(request, "people/add_app.html", context)

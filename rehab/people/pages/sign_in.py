@@ -16,11 +16,11 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.debug import sensitive_post_parameters
 from django.views.decorators.http import require_http_methods, require_POST
 
-from rehab.people.sign_in import flow, factors, passkeys
 from rehab.people.access import public
-from rehab.people.forms import CodeForm, SignInForm
 from rehab.people.models import User
 from rehab.people.roles import Role
+from rehab.people.sign_in import factors, flow, passkeys
+from rehab.people.sign_in.forms import CodeForm, SignInForm
 
 
 def first_page(user: User) -> str:

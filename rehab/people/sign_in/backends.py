@@ -8,8 +8,8 @@ from django.contrib.auth.backends import ModelBackend
 from django.http import HttpRequest
 from django.utils import timezone
 
-from rehab.people.sign_in import factors
 from rehab.people.models import User
+from rehab.people.sign_in import factors
 
 
 class PasswordBackend(ModelBackend):

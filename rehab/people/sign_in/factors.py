@@ -13,10 +13,11 @@ from django.db.models import Q
 from django.utils.crypto import salted_hmac
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.sign_in.codes import RECOVERY_CODES, digest_of, new_recovery_code, step_of
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.scope import Scope, ScopedModel
+from rehab.people.sign_in.recovery_codes import RECOVERY_CODES, digest_of, new_recovery_code
+from rehab.people.sign_in.totp import step_of
 
 
 class Authenticator(ScopedModel):

@@ -13,8 +13,8 @@ from django.http import HttpRequest, HttpResponseBase
 from django.utils import timezone
 from django.utils.crypto import constant_time_compare
 
-from rehab.people.sign_in import browser_sessions, factors, lockout
 from rehab.people.models import User
+from rehab.people.sign_in import browser_sessions, factors, lockout
 
 HALFWAY = "halfway"
 HALFWAY_S = 10 * 60

@@ -7,7 +7,6 @@ Codes are counted by name alone: whoever tries those has the password already.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from ipaddress import IPv6Address, ip_address, ip_network
 from typing import Any
 
 from axes.handlers.proxy import AxesProxyHandler
@@ -20,36 +19,11 @@ from django.utils import timezone
 from django.utils.translation import ngettext
 
 from rehab.people.models import User
+from rehab.people.networks import client_address
 
 CODES = " (code)"  # no username has a blank
 
 Credentials = Mapping[str, Any] | None
-
-
-def client_address(request: HttpRequest) -> str:
-    """Give the address that a request comes from."""
-    return find_address(
-        request.META.get("HTTP_X_FORWARDED_FOR", ""), request.META.get("REMOTE_ADDR", "")
-    )
-
-
-def find_address(forwarded: str, remote: str) -> str:
-    """Give the address of a client, as the outermost of our own proxies saw it.
-
-    What stands further left in X-Forwarded-For was written by the client and is not believed.
-    Of an IPv6 address the network counts: whoever has one has 2^64 of them.
-    """
-    seen = [word.strip() for word in forwarded.split(",") if word.strip()]
-    seen.append(remote)
-    try:
-        address = ip_address(seen[max(0, len(seen) - 1 - settings.PROXIES)])
-    except ValueError:
-        return "0.0.0.0"  # noqa: S104  (an address that is none; such clients share one count)
-    if isinstance(address, IPv6Address):
-        if address.ipv4_mapped:
-            return str(address.ipv4_mapped)
-        return str(ip_network((address, 64), strict=False).network_address)
-    return str(address)
 
 
 def counted_name(request: HttpRequest, credentials: Credentials) -> str:

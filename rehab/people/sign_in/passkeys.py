@@ -20,8 +20,8 @@ from fido2.webauthn import (
     UserVerificationRequirement,
 )
 
-from rehab.people.sign_in.factors import Authenticator, add, authenticators_of
 from rehab.people.models import User
+from rehab.people.sign_in.factors import Authenticator, add, authenticators_of
 
 STATE = "passkey"  # in the browser session, until the browser has answered
 VERIFICATION = UserVerificationRequirement.PREFERRED

@@ -22,7 +22,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.access import person
 from rehab.people.audit.audit_log import Act, note_safety
 from rehab.people.audit.history_text import changes_of
-from rehab.people.sign_in.lockout import client_address
+from rehab.people.networks import client_address
 from rehab.people.roles import Right, Role, rights_of
 from rehab.people.scope import ScopedModel, visible
 from rehab.people.sign_in.tokens import TokenRow

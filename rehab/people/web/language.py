@@ -14,9 +14,9 @@ from django.http import HttpRequest, HttpResponseBase
 from django.utils import translation
 from django.utils.cache import patch_vary_headers
 
-from rehab.people.sign_in import flow
 from rehab.people.access import tablet_of
 from rehab.people.models import LANGUAGES, Patient, User
+from rehab.people.sign_in import flow
 
 FOR_PROGRAMS = "/api/"
 

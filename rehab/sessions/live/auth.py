@@ -15,11 +15,11 @@ from django.http.request import split_domain_port, validate_host
 from django.utils import timezone
 from django.utils.module_loading import import_string
 
-from rehab.people.sign_in import browser_sessions
 from rehab.people.consent.models import may_be_watched
-from rehab.people.sign_in.flow import holds
-from rehab.people.sign_in.lockout import find_address
 from rehab.people.models import Patient, User
+from rehab.people.networks import find_address
+from rehab.people.sign_in import browser_sessions
+from rehab.people.sign_in.flow import holds
 from rehab.sessions.models import TrainingSession
 from rehab.stations import tablets
 from rehab.stations.models import Device, find_device

@@ -20,10 +20,10 @@ from rehab.people.access import for_roles, person
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.corrections import CorrectionForm, Part, may_correct, tell_corrections
+from rehab.sessions.formatting import at_clinic, say_day, say_duration, say_number, say_rate
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.review import review_session, sum_up
 from rehab.sessions.reports.trend import draw_trend, figures_of, read_trend, sum_up_all
-from rehab.sessions.formatting import at_clinic, say_day, say_duration, say_number, say_rate
 from rehab.training.changes import OPEN, State
 from rehab.training.valences import VALENCES
 

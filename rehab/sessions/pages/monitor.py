@@ -11,13 +11,13 @@ from django.views.decorators.http import require_safe
 
 from rehab.people.access import for_roles, person
 from rehab.people.consent.models import may_be_watched
-from rehab.people.sign_in.lockout import client_address
 from rehab.people.models import Patient
+from rehab.people.networks import client_address
 from rehab.people.roles import Role
+from rehab.sessions.formatting import LEVELS
 from rehab.sessions.live.messages import BORG_MAX
 from rehab.sessions.log import EVENTS, Remark
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.formatting import LEVELS
 from rehab.training.plans import ROBOT_LEVELS
 
 # What is noted with one tap, with its icon.

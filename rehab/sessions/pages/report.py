@@ -9,9 +9,9 @@ from django.views.decorators.http import require_safe
 
 from rehab.people.access import for_roles, person
 from rehab.people.roles import Role
+from rehab.sessions.formatting import at_clinic
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.report import moment_of, write_report
-from rehab.sessions.formatting import at_clinic
 
 
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)

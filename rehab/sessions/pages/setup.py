@@ -15,7 +15,8 @@ from rehab.people.access import for_roles, person
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.forms import SessionForm, like_last_time, minutes_of
-from rehab.sessions.presets import Preset, keep_preset
+from rehab.sessions.preset_form import keep_preset
+from rehab.sessions.presets import Preset
 from rehab.sessions.protocols import Protocol
 from rehab.stations.builtin import first_station
 

@@ -13,7 +13,7 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_safe
 
 from rehab.people.access import public, tablet_of
-from rehab.people.sign_in.lockout import client_address
+from rehab.people.networks import client_address
 from rehab.sessions.models import TrainingSession
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device

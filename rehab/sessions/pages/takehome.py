@@ -8,12 +8,12 @@ from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from rehab.people.access import for_roles, person
-from rehab.people.web.language import speak_to
 from rehab.people.models import Patient
 from rehab.people.roles import Role
+from rehab.people.web.language import speak_to
+from rehab.sessions.formatting import at_clinic
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.takehome import sum_up_for_home
-from rehab.sessions.formatting import at_clinic
 
 
 @for_roles(Role.LEAD, Role.PT)

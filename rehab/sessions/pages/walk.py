@@ -11,9 +11,9 @@ from django.views.decorators.clickjacking import xframe_options_sameorigin
 
 from rehab.people.access import actor_of, for_roles
 from rehab.people.consent.models import may_be_watched
-from rehab.people.web.language import speak_to
-from rehab.people.sign_in.lockout import client_address
+from rehab.people.networks import client_address
 from rehab.people.roles import Role
+from rehab.people.web.language import speak_to
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.monitor import ask_for_consent
 from rehab.training.changes import ENDED, State

@@ -15,12 +15,12 @@ from django.utils.translation import gettext
 from rehab.people.access import clinic_of
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Right, Role, rights_of
+from rehab.sessions.formatting import at_clinic, say_duration, say_number, say_rate
 from rehab.sessions.live import runtime
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.trend import with_figures
-from rehab.sessions.formatting import at_clinic, say_duration, say_number, say_rate
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import is_overdue, say_state
 from rehab.training.changes import OPEN, State

@@ -12,11 +12,11 @@ from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
 
 from rehab.people.models import User
+from rehab.sessions.formatting import at_clinic, say_duration, say_number, say_quantity, say_rate
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.review import Review, review_session
 from rehab.sessions.reports.trend import Point, read_trend
-from rehab.sessions.formatting import at_clinic, say_duration, say_number, say_quantity, say_rate
 from rehab.training.changes import ChangeKind
 from rehab.training.plans import SessionPlan
 

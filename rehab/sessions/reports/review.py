@@ -11,12 +11,12 @@ from django.utils.translation import gettext, ngettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
-from rehab.sessions.payloads import MARKED_CHANGES
-from rehab.sessions.live.actor import fold_log
+from rehab.sessions.formatting import LEVELS, say_duration, say_number, say_quantity, say_rate
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.payloads import MARKED_CHANGES
+from rehab.sessions.replay import fold_log
 from rehab.sessions.reports.trend import figures_of
-from rehab.sessions.formatting import LEVELS, say_duration, say_number, say_quantity, say_rate
 from rehab.training.changes import ChangeKind, PauseReason
 from rehab.training.figures import describe_session
 from rehab.training.fold import SessionFold

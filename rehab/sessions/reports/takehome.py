@@ -10,10 +10,10 @@ from django.db.models import Count, F, Max, Q, QuerySet, Sum
 from django.utils.translation import gettext as _
 
 from rehab.people.models import User
+from rehab.sessions.formatting import at_clinic, say_day, say_duration, say_number, say_rate
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.trend import Point, read_trend
-from rehab.sessions.formatting import at_clinic, say_day, say_duration, say_number, say_rate
 from rehab.training.measures import A2
 
 SAME = 0.02  # a mean that differs by less is told as the same

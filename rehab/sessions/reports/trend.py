@@ -12,9 +12,9 @@ from typing import Any
 from django.db.models import Avg, Count, F, OuterRef, QuerySet, Subquery
 
 from rehab.people.models import User
+from rehab.sessions.formatting import say_day, say_duration, say_number, say_quantity, say_rate
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.formatting import say_day, say_duration, say_number, say_quantity, say_rate
 from rehab.training.phases import Phase
 
 SESSIONS = 30  # as many as a chart can tell apart

@@ -1,4 +1,4 @@
-"""Codes that are typed: six digits of an authenticator app (RFC 6238), and recovery codes."""
+"""Codes that are typed: six digits of an authenticator app (RFC 6238)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,6 @@ STEP_S = 30
 DIGITS = 6
 DRIFT = 1  # steps that a phone's clock may be off, each way
 ISSUER = "GARRY"
-
-RECOVERY_CODES = 10
-RECOVERY_SIGNS = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
-RECOVERY_LENGTH = 12  # of 31 signs: 59 bits, out of reach even for whoever has the digests
 
 
 def new_secret() -> str:
@@ -50,15 +46,3 @@ def step_of(secret: str, code: str, now_s: float) -> int | None:
         if hmac.compare_digest(code_of(secret, step), typed)
     ]
     return max(steps, default=None)
-
-
-def new_recovery_code() -> str:
-    """Make a code that lets somebody in once, written in groups of four."""
-    signs = [secrets.choice(RECOVERY_SIGNS) for _ in range(RECOVERY_LENGTH)]
-    return "-".join("".join(signs[start : start + 4]) for start in range(0, RECOVERY_LENGTH, 4))
-
-
-def digest_of(code: str) -> str:
-    """Give what is kept of a recovery code; capitals, blanks and hyphens do not matter."""
-    typed = "".join(sign for sign in code.upper() if sign in RECOVERY_SIGNS)
-    return hashlib.sha256(typed.encode()).hexdigest()
