@@ -57,8 +57,12 @@ def test_what_is_no_code_is_refused(code):
 def test_recovery_codes_are_read_as_people_type_them():
     code = recovery_codes.new_recovery_code()
     assert re.fullmatch("([2-9A-Z]{4}-){2}[2-9A-Z]{4}", code)
-    assert recovery_codes.digest_of(f" {code.lower().replace('-', ' ')} ") == recovery_codes.digest_of(code)
-    assert recovery_codes.digest_of(code) != recovery_codes.digest_of(recovery_codes.new_recovery_code())
+    assert recovery_codes.digest_of(
+        f" {code.lower().replace('-', ' ')} "
+    ) == recovery_codes.digest_of(code)
+    assert recovery_codes.digest_of(code) != recovery_codes.digest_of(
+        recovery_codes.new_recovery_code()
+    )
 
 
 def test_an_app_reads_who_and_where_from_the_square():

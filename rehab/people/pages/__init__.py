@@ -1,1 +1,1 @@
-"""Pages about people: the front page, coming in, the own account."""
+"""The pages about people: front page, sign-in, account, consent."""
