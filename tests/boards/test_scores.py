@@ -41,7 +41,7 @@ class Seen:
 @pytest.fixture
 def world() -> World:
     world = build_world("amber")
-    Leaderboard.everywhere.all().delete()  # tests/boards/test_boards.py has those
+    Leaderboard.everywhere.all().delete()  # test_who_is_shown.py has those
     return world
 
 

@@ -26,7 +26,7 @@ from rehab.training.phases import Phase
 from rehab.training.valences import VALENCES, Cue, edit_valence
 from robot.composed import Move, compose
 from robot.gestures import BadGesture
-from tests.feedback.test_feedback_types import form as feedback_form
+from tests.feedback.test_types import form as feedback_form
 from tests.gestures.test_composing import filled as gesture_form
 from tests.sessions.test_two_at_once import choices
 from tests.support.programs import program_of
