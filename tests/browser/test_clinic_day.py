@@ -12,9 +12,9 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from rehab.training.valences import VALENCES
-from tests.browsers import SIZES
-from tests.servers import ROOT, Server, clean_environment
-from tests.walk_seed import feet_of, make_walks
+from tests.support.browsers import SIZES
+from tests.support.servers import ROOT, Server, clean_environment
+from tests.support.walk_seed import feet_of, make_walks
 
 pytestmark = pytest.mark.browser
 
@@ -333,7 +333,7 @@ from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
 from rehab.sessions.log import Remark, SessionEvent
-from tests.walks import visit, walk
+from tests.support.walks import visit, walk
 long = Patient.everywhere.create(
     clinic=first_clinic(), code="C" * 32, nickname="Maximiliana-Konstantina-Schmidt.",
     paretic_side="left",

@@ -13,8 +13,8 @@ from itertools import product
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browsers import SIZES
-from tests.servers import ROOT, Server, clean_environment, serve
+from tests.support.browsers import SIZES
+from tests.support.servers import ROOT, Server, clean_environment, serve
 
 pytestmark = pytest.mark.browser
 

@@ -34,9 +34,9 @@ from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
-from tests.archives import body_of, open_archive, rows_of
-from tests.walks import walk
-from tests.world import World, build_world, client_of, mark
+from tests.support.archives import body_of, open_archive, rows_of
+from tests.support.walks import walk
+from tests.support.world import World, build_world, client_of, mark
 
 NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 NAMED = {Patient, User, Station}

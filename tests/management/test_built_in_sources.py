@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from tests.servers import ROOT, Server, clean_environment, serve
+from tests.support.servers import ROOT, Server, clean_environment, serve
 
 STRIDES = 24
 

@@ -20,8 +20,8 @@ from rehab.people.models import Clinic, Erasing, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from tests.programs import Program, token_of
-from tests.world import NOW, signed_in
+from tests.support.programs import Program, token_of
+from tests.support.world import NOW, signed_in
 
 pytestmark = pytest.mark.django_db
 

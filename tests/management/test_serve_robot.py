@@ -16,7 +16,7 @@ import pytest
 from django.core.management import CommandError, call_command
 from websockets.asyncio.client import connect
 
-from tests.servers import ROOT, clean_environment, serve
+from tests.support.servers import ROOT, clean_environment, serve
 
 pytestmark = pytest.mark.realtime
 

@@ -21,9 +21,9 @@ from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocols import Measure, Protocol
 from rehab.stations.models import Device
-from tests.archives import body_of
-from tests.tenancy import all_routes, walk_patterns
-from tests.world import World, build_world, client_of, mark
+from tests.support.archives import body_of
+from tests.support.tenancy import all_routes, walk_patterns
+from tests.support.world import World, build_world, client_of, mark
 
 pytestmark = pytest.mark.django_db
 NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)

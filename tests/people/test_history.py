@@ -16,7 +16,7 @@ from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.stations.models import Device
 from rehab.stations.pins import set_pin
-from tests.world import World, build_world, client_of, mark
+from tests.support.world import World, build_world, client_of, mark
 
 pytestmark = pytest.mark.django_db
 

@@ -30,7 +30,7 @@ from rehab.sessions.defaults import install_defaults
 from rehab.sessions.services import create_session
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
-from tests.world import NOW, World, build_world, client_of
+from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 SCREEN = {"screen_side": "left", "screen_text": "large"}

@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from tests.browsers import SIZES, chromium
-from tests.servers import ROOT, clean_environment, serve
+from tests.support.browsers import SIZES, chromium
+from tests.support.servers import ROOT, clean_environment, serve
 
 pytestmark = pytest.mark.browser
 
@@ -79,7 +79,7 @@ from rehab.sessions.protocols import Protocol
 from rehab.sessions.presets import Preset
 from rehab.patients.visits import plan_visit
 from rehab.stations.models import Device, Station
-from tests.walks import visit
+from tests.support.walks import visit
 rosa = Patient.everywhere.create(
     clinic=first_clinic(), code="K7-204", nickname="Rosa", paretic_side="left"
 )

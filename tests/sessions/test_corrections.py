@@ -23,8 +23,8 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.dashboard import read_week
 from rehab.sessions.reports.takehome import sum_up_for_home
 from rehab.sessions.reports.trend import read_trend
-from tests.walks import strides, walk
-from tests.world import NOW, World, agreeing, build_world, client_of
+from tests.support.walks import strides, walk
+from tests.support.world import NOW, World, agreeing, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 

@@ -23,8 +23,8 @@ from rehab.stations.models import Device, Station
 from rehab.stations.presence import say_seen
 from rehab.training.changes import ChangeKind, State
 from rehab.training.tallies import Tally
-from tests.walks import RIGHT, strides, walk
-from tests.world import World, build_world, client_of, mark, signed_in
+from tests.support.walks import RIGHT, strides, walk
+from tests.support.world import World, build_world, client_of, mark, signed_in
 
 pytestmark = pytest.mark.django_db
 

@@ -15,8 +15,8 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.report import draw_chart, write_report
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
-from tests.walks import HIT, MISS, RIGHT, Walked, walk
-from tests.world import NOW, World, build_world, client_of
+from tests.support.walks import HIT, MISS, RIGHT, Walked, walk
+from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 

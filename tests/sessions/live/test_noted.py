@@ -12,7 +12,7 @@ from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act, AuditEntry, Recent
 from rehab.sessions.live import audit_queue as notes_module
 from rehab.sessions.live import runtime as runtimes
-from tests.sessions.live.callers import turns
+from tests.support.callers import turns
 
 pytestmark = pytest.mark.django_db(transaction=True)
 

@@ -11,7 +11,7 @@ from django.utils import timezone
 
 from rehab.people.models import Clinic
 from rehab.sessions.live import runtime as runtimes
-from tests.sessions.live.callers import sign_in
+from tests.support.callers import sign_in
 
 pytestmark = pytest.mark.django_db(transaction=True)
 

@@ -36,8 +36,8 @@ from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.fold import SessionFold
 from rehab.training.phases import make_phase
 from rehab.training.steps import Measurement, Side
-from tests.sessions.live import callers
-from tests.sessions.live.callers import (
+from tests.support import callers
+from tests.support.callers import (
     PATIENCE_S,
     Caller,
     Place,

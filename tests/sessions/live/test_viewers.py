@@ -26,7 +26,7 @@ from rehab.sessions.services import change_session, create_session
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
-from tests.sessions.live.callers import (
+from tests.support.callers import (
     Caller,
     Message,
     MonitorPage,

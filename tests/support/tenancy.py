@@ -18,11 +18,11 @@ from rehab.boards.models import Leaderboard
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from tests.archives import words_of
-from tests.world import Actor, World, mark, scoped_models
+from tests.support.archives import words_of
+from tests.support.world import Actor, World, mark, scoped_models
 
-# What a role reads in the pages of its own clinic, by the marks of tests/world.py. Researchers see
-# no patient; a host sees clinics and accounts and nothing else.
+# What a role reads in the pages of its own clinic, by the marks of tests/support/world.py.
+# Researchers see no patient; a host sees clinics and accounts and nothing else.
 HOST_SEES = {"Clinic", "User"}
 
 # Parameters of addresses, the model that they name a row of, and by what.

@@ -12,7 +12,7 @@ from rehab.feedback.valences import valences_of
 from rehab.feedback.wording import words_in
 from rehab.people.roles import Role
 from rehab.training.valences import VALENCES, Cue
-from tests.world import build_world, client_of, mark
+from tests.support.world import build_world, client_of, mark
 
 pytestmark = pytest.mark.django_db
 

@@ -22,8 +22,8 @@ from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions import api as sessions_api
 from rehab.sessions.models import TrainingSession
-from tests.programs import ROOT, program_of
-from tests.world import World, build_world, mark, scoped_models, signed_in
+from tests.support.programs import ROOT, program_of
+from tests.support.world import World, build_world, mark, scoped_models, signed_in
 
 pytestmark = pytest.mark.django_db
 

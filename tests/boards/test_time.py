@@ -14,9 +14,9 @@ from rehab.boards.showing import show_after
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
-from tests.boards.makers import board_of, everything, patient_of, people_of, see, walk_down
-from tests.walks import strides, walk
-from tests.world import NOW
+from tests.support.boards import board_of, everything, patient_of, people_of, see, walk_down
+from tests.support.walks import strides, walk
+from tests.support.world import NOW
 
 pytestmark = pytest.mark.django_db
 

@@ -1,4 +1,4 @@
-"""Fills a server's database with running sessions: `python -m tests.live_seed N` prints them."""
+"""Fill a server's database with running sessions: `python -m tests.support.live_seed COUNT`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def seed(count: int) -> list[dict[str, Any]]:
     from rehab.training.changes import Change, ChangeKind
     from rehab.training.goals import GoalRule
     from rehab.training.phases import make_phase
-    from tests.world import store
+    from tests.support.world import store
 
     prepare_database()
     clinic = first_clinic()

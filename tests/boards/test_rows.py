@@ -20,9 +20,9 @@ from rehab.boards.standings import Listed, Stored
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
-from tests.boards.makers import COMMON, board_of, everything, patient_of, people_of, walk_down
-from tests.walks import strides, walk
-from tests.world import NOW
+from tests.support.boards import COMMON, board_of, everything, patient_of, people_of, walk_down
+from tests.support.walks import strides, walk
+from tests.support.world import NOW
 
 pytestmark = pytest.mark.django_db
 

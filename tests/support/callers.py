@@ -20,7 +20,7 @@ from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.phases import Phase, make_phase
 from rehab.training.valences import Cue
-from tests.world import signed_in
+from tests.support.world import signed_in
 
 PATIENCE_S = 10.0  # only a failing test waits so long
 OWN_PAGE = "http://localhost:8000"

@@ -1,4 +1,4 @@
-"""Puts sessions to walk into a server's database: `python -m tests.walk_seed JSON` prints them.
+"""Put sessions to walk into a server's database: `python -m tests.support.walk_seed JSON`.
 
 JSON is a list of sessions: {"valence", "name", "phases": [{"kind", …}], "goal", "minutes",
 "screen": {"screen_side", …}, "pin"}, where anything may be left out. Each gets a station of its own
@@ -18,7 +18,7 @@ from typing import Any
 import django
 from websockets.sync.client import ClientConnection, connect
 
-from tests.servers import ROOT, Server, clean_environment
+from tests.support.servers import ROOT, Server, clean_environment
 
 GOAL = 4.0
 
@@ -82,7 +82,7 @@ def feet_of(server: Server, walk: Walk, **hello: Any) -> Iterator[Feet]:
 def make_walks(server: Server, *wanted: dict[str, Any]) -> list[Walk]:
     """Make sessions in a running server's database."""
     made = subprocess.run(
-        [sys.executable, "-m", "tests.walk_seed", json.dumps(wanted)],
+        [sys.executable, "-m", "tests.support.walk_seed", json.dumps(wanted)],
         cwd=ROOT,
         env=clean_environment(server.folder, server.port)
         | {"DJANGO_SETTINGS_MODULE": "garry_site.settings"},

@@ -19,9 +19,9 @@ from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device, Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
-from tests.boards.makers import board_of, patient_of, people_of, see, told, walk_down
-from tests.walks import strides, walk
-from tests.world import NOW
+from tests.support.boards import board_of, patient_of, people_of, see, told, walk_down
+from tests.support.walks import strides, walk
+from tests.support.world import NOW
 
 pytestmark = pytest.mark.django_db
 

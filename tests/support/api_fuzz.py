@@ -14,9 +14,9 @@ from hypothesis import HealthCheck, Phase, given, settings
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.people.web import api_base
-from tests.api_noise import Noise, make_noise
-from tests.programs import ROOT, program_of
-from tests.world import build_world, mark, scoped_models
+from tests.support.api_noise import Noise, make_noise
+from tests.support.programs import ROOT, program_of
+from tests.support.world import build_world, mark, scoped_models
 
 SLOWEST_S = 5.0  # no call may hold the server up
 

@@ -10,7 +10,7 @@ from django.test import Client
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
-from tests.world import World
+from tests.support.world import World
 
 ROOT = "/api/v1"
 

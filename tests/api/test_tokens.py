@@ -11,8 +11,8 @@ from rehab.people.access import UndeclaredView
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.people.web import api_base
-from tests.programs import ROOT, Program, program_of, token_of
-from tests.world import World, build_world, client_of
+from tests.support.programs import ROOT, Program, program_of, token_of
+from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 

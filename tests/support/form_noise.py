@@ -19,11 +19,11 @@ from hypothesis import strategies as st
 
 from rehab.people.models import User
 from rehab.people.roles import Role
-from tests.api_noise import JUNK_TEXTS
-from tests.archives import body_of
-from tests.noise import TELLTALES, draw
-from tests.tenancy import Route, all_routes, what_leaks
-from tests.world import Actor, World, build_world, fill_board
+from tests.support.api_noise import JUNK_TEXTS
+from tests.support.archives import body_of
+from tests.support.noise import TELLTALES, draw
+from tests.support.tenancy import Route, all_routes, what_leaks
+from tests.support.world import Actor, World, build_world, fill_board
 
 SLOWEST_S = 5.0  # no answer may hold the server up
 ASKED = (

@@ -1,4 +1,4 @@
-"""Reads sessions' logs back: `python -m tests.live_log 1,2,3` prints what they hold."""
+"""Reads sessions' logs back: `python -m tests.support.live_log 1,2,3` prints what they hold."""
 
 from __future__ import annotations
 

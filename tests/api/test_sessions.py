@@ -18,8 +18,8 @@ from rehab.stations.models import Station
 from rehab.training.goals import GoalRule
 from rehab.training.metrics import METRICS
 from rehab.training.phases import make_phase
-from tests.programs import Program, program_of
-from tests.world import World, build_world, client_of
+from tests.support.programs import Program, program_of
+from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 

@@ -6,8 +6,8 @@ from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.boards.showing import show_after
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.models import TrainingSession
-from tests.walks import strides, walk
-from tests.world import NOW, agreeing
+from tests.support.walks import strides, walk
+from tests.support.world import NOW, agreeing
 
 COMMON = {"among": "clinic", "entry": "best", "min_valid_strides": 1, "period": "all"}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.api_fuzz import run_noise
+from tests.support.api_fuzz import run_noise
 
 CALLS = 300  # tests/bench has 10,000
 

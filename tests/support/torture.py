@@ -20,7 +20,7 @@ from typing import Any
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
-from tests.servers import ROOT, clean_environment, free_port
+from tests.support.servers import ROOT, clean_environment, free_port
 
 GONE = (ConnectionClosed, InvalidHandshake, OSError, EOFError, TimeoutError)
 
@@ -182,7 +182,7 @@ class Torture:
     async def run(self, sessions: int, rounds: int) -> dict[str, Any]:
         """Kill the server so many times; give what the log and the viewers ended with."""
         server = await self.start_server()
-        rows = json.loads(self.run_python("-m", "tests.live_seed", str(sessions)))
+        rows = json.loads(self.run_python("-m", "tests.support.live_seed", str(sessions)))
         self.walks = [Walk(row, self.port, self.rate) for row in rows]
         senders = [asyncio.create_task(walk.send()) for walk in self.walks]
         watchers = [asyncio.create_task(walk.watch()) for walk in self.walks]
@@ -202,7 +202,7 @@ class Torture:
         server.send_signal(signal.SIGTERM)
         status = await asyncio.wait_for(server.wait(), 20)
         ids = ",".join(str(row["session"]) for row in rows)
-        log = json.loads(self.run_python("-m", "tests.live_log", ids))
+        log = json.loads(self.run_python("-m", "tests.support.live_log", ids))
         return {"status": status, "log": log}
 
     async def _until_seen(self) -> None:

@@ -13,8 +13,8 @@ from django.test import Client
 from rehab.people import api as people_api
 from rehab.people.models import User
 from rehab.people.roles import Role
-from tests.programs import ROOT, program_of
-from tests.world import build_world
+from tests.support.programs import ROOT, program_of
+from tests.support.world import build_world
 
 pytestmark = pytest.mark.django_db
 METHODS = ("get", "post", "put", "patch", "delete", "options")

@@ -14,7 +14,7 @@ from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule, Target
 from rehab.training.phases import Phase, make_phase
 from rehab.training.steps import Measurement, Side
-from tests.world import NOW, store
+from tests.support.world import NOW, store
 
 HIT, MISS = 2.5, 1.5  # against the goal of 2 W/kg
 GOAL = 2.0

@@ -19,9 +19,8 @@ from hypothesis import strategies as st
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ENDED, State
-from tests.api_noise import JUNK, JUNK_TEXTS
-from tests.noise import TELLTALES, draw
-from tests.sessions.live.callers import (
+from tests.support.api_noise import JUNK, JUNK_TEXTS
+from tests.support.callers import (
     Caller,
     HungUp,
     Message,
@@ -33,6 +32,7 @@ from tests.sessions.live.callers import (
     change,
     open_session,
 )
+from tests.support.noise import TELLTALES, draw
 
 STEP_S = 2.0  # in which a valid step is scored, stored and shown, whatever others send
 LAST = "{"  # what no socket takes

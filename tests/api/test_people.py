@@ -6,8 +6,8 @@ import pytest
 
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from tests.programs import Program, program_of
-from tests.world import World, build_world
+from tests.support.programs import Program, program_of
+from tests.support.world import World, build_world
 
 pytestmark = pytest.mark.django_db
 
