@@ -100,7 +100,7 @@ MIDDLEWARE = [
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",
     "django.contrib.auth.middleware.AuthenticationMiddleware",
-    "rehab.people.sign_in.flow.EntryMiddleware",
+    "rehab.people.sign_in.flow.SessionValidationMiddleware",
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "rehab.stations.tablets.TabletMiddleware",
@@ -218,10 +218,10 @@ PROXIES = number(
 AXES_FAILURE_LIMIT = 5
 AXES_COOLOFF_TIME = timedelta(minutes=15)
 AXES_RESET_COOL_OFF_ON_FAILURE_DURING_LOCKOUT = False  # so that the wait that we tell is true
-AXES_LOCKOUT_PARAMETERS = "rehab.people.sign_in.lockout.counted_by"
-AXES_USERNAME_CALLABLE = "rehab.people.sign_in.lockout.counted_name"
-AXES_CLIENT_IP_CALLABLE = "rehab.people.sign_in.lockout.client_address"
-AXES_LOCKOUT_CALLABLE = "rehab.people.sign_in.lockout.answer"
+AXES_LOCKOUT_PARAMETERS = "rehab.people.sign_in.lockout.lockout_parameters"
+AXES_USERNAME_CALLABLE = "rehab.people.sign_in.lockout.attempt_username"
+AXES_CLIENT_IP_CALLABLE = "rehab.people.networks.client_address"
+AXES_LOCKOUT_CALLABLE = "rehab.people.sign_in.lockout.lockout_response"
 AXES_SENSITIVE_PARAMETERS = [
     *("username", "ip_address"),
     *("code", "passkey", "old_password", "new_password1", "new_password2", "csrfmiddlewaretoken"),

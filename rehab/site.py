@@ -45,7 +45,7 @@ class GarrySite(AdminSite):
     def get_app_list(
         self, request: HttpRequest, app_label: str | None = None
     ) -> list[dict[str, Any]]:
-        """Give the models by heading instead of by alphabet."""
+        """Return the models by heading instead of by alphabet."""
         found: dict[Any, list[tuple[int, dict[str, Any]]]] = defaultdict(list)
         order = list(HEADINGS)
         for app in super().get_app_list(request, app_label):
@@ -68,14 +68,14 @@ class GarrySite(AdminSite):
 
     def index(self, request: HttpRequest, extra_context: Any = None) -> TemplateResponse:
         """Show the dashboard: a clinic's for its people, the server's for a host."""
-        from rehab.people.access import person
+        from rehab.people.access import user_of
         from rehab.people.roles import Role
-        from rehab.people.server_status import look_at_server
+        from rehab.people.server_status import server_status
         from rehab.sessions.reports.dashboard import look
 
-        user = person(request)
+        user = user_of(request)
         now = timezone.now()
-        told = look_at_server(user) if user.role == Role.HOST else look(user, now)
+        told = server_status(user) if user.role == Role.HOST else look(user, now)
         return super().index(request, {**told, **(extra_context or {})})
 
     def app_index(  # type: ignore[override]

@@ -7,7 +7,7 @@ from datetime import timedelta
 from zoneinfo import ZoneInfo
 
 from rehab.legacy.database import Original, OriginalSession
-from rehab.people.consent.tombstones import is_kept_away
+from rehab.people.consent.tombstones import is_reimport_blocked
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
@@ -41,7 +41,7 @@ class TakeOver:
 
     def run(self) -> None:
         """Take over all that can be; whoever was erased here stays away."""
-        away = {pk for pk in self.original.participants if is_kept_away(self.clinic.pk, pk)}
+        away = {pk for pk in self.original.participants if is_reimport_blocked(self.clinic.pk, pk)}
         self.erased["participants"] = len(away)
         patients = {
             pk: self._take_participant(pk) for pk in self.original.participants if pk not in away
@@ -59,7 +59,7 @@ class TakeOver:
 
     def _take_participant(self, pk: int) -> Patient | None:
         own = Patient.everywhere.filter(clinic=self.clinic)
-        patient = own.filter(original_id=pk).first()
+        patient = own.filter(legacy_id=pk).first()
         if patient is not None:
             self.here["participants"] += 1
             return patient
@@ -74,12 +74,12 @@ class TakeOver:
             code=f"{pk}",
             nickname=f"P{pk}",
             language=self.clinic.language,
-            original_id=pk,
+            legacy_id=pk,
         )
 
     def _take_session(self, found: OriginalSession, patient: Patient) -> None:
-        before = TrainingSession.everywhere.filter(clinic=self.clinic, original_id=found.id).first()
-        if before is not None and before.original == found.row:
+        before = TrainingSession.everywhere.filter(clinic=self.clinic, legacy_id=found.id).first()
+        if before is not None and before.legacy_row == found.row:
             self.here["sessions"] += 1
             return
         if before is not None:
@@ -119,8 +119,8 @@ class TakeOver:
             started_at=start,
             ended_at=start + timedelta(seconds=found.duration_s),
             active_s=found.duration_s,
-            original_id=found.id,
-            original=found.row,
+            legacy_id=found.id,
+            legacy_row=found.row,
         )
         if plan.valence.has_points and found.score is not None:
             SessionMetric.everywhere.create(session=session, slug="score", value=found.score)

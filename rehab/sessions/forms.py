@@ -13,7 +13,7 @@ from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import SIDES, Patient, User
-from rehab.people.web.refusals import in_words
+from rehab.people.web.refusals import format_refusal
 from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
 from rehab.sessions.formatting import LEVELS, say_source
 from rehab.sessions.log import SessionEvent
@@ -86,7 +86,7 @@ class SessionForm(forms.Form):
         try:
             check_station(station)
         except StationTaken as problem:
-            raise ValidationError(in_words(problem)) from problem
+            raise ValidationError(format_refusal(problem)) from problem
         return station
 
     def clean_source(self) -> str:
@@ -145,9 +145,9 @@ class SessionForm(forms.Form):
         try:
             return self.save()
         except StationTaken as problem:  # just now, by somebody else
-            self.add_error("station", in_words(problem))
+            self.add_error("station", format_refusal(problem))
         except InvalidSetting as problem:
-            self.add_error(None, in_words(problem))
+            self.add_error(None, format_refusal(problem))
         return None
 
 

@@ -11,7 +11,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.consent.models import PatientScope
 from rehab.people.models import SIDES, Clinic, Patient, User
-from rehab.people.scope import ClinicRow
+from rehab.people.scope import ClinicModel
 from rehab.sessions.protocols import Measure, Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import State
@@ -27,7 +27,7 @@ STATES = {
 }
 
 
-class TrainingSession(ClinicRow):
+class TrainingSession(ClinicModel):
     """One sitting of one patient, who is the same from its creation to its end.
 
     ``plan`` is what every step is scored with; the columns beside it are there to be found by.
@@ -112,13 +112,13 @@ class TrainingSession(ClinicRow):
         help_text=_("Corrected: in no figure, board or trend."),
     )
     # Its row in the original GARRY's database, where it was imported from there: without steps.
-    original_id = models.BigIntegerField(_("imported session"), null=True, editable=False)
-    original = models.JSONField(null=True, editable=False)
+    legacy_id = models.BigIntegerField(_("imported session"), null=True, editable=False)
+    legacy_row = models.JSONField(null=True, editable=False)
     # Which process writes the log: each taking over raises the epoch and shuts out the one before.
     epoch = models.PositiveIntegerField(default=0, editable=False)
     owner = models.CharField(max_length=200, blank=True, editable=False)
 
-    class Meta(ClinicRow.Meta):
+    class Meta(ClinicModel.Meta):
         verbose_name = _("session")
         verbose_name_plural = _("sessions")
         ordering: ClassVar = ["-created_at", "-pk"]
@@ -128,7 +128,7 @@ class TrainingSession(ClinicRow):
         ]
         constraints: ClassVar = [
             models.UniqueConstraint(
-                fields=["clinic", "original_id"], name="session_imported_once_per_clinic"
+                fields=["clinic", "legacy_id"], name="session_imported_once_per_clinic"
             )
         ]
 

@@ -10,7 +10,7 @@ from django.db import transaction
 from django.utils.translation import gettext
 
 from rehab.feedback.valences import valences_of
-from rehab.people.consent.models import may_be_cared_for
+from rehab.people.consent.services import is_care_allowed
 from rehab.people.models import Patient, User
 from rehab.sessions.cues import find_composed, quiet_cue
 from rehab.sessions.live import runtime
@@ -124,7 +124,7 @@ def create_session(
         goal=goal.value,
     )
     with transaction.atomic():
-        patient.hold()  # nobody is erased meanwhile
+        patient.lock()  # nobody is erased meanwhile
         _check_may_walk(patient)
         if station is not None and station.clinic_id == patient.clinic_id:
             # Two who set up at once: the second waits here, and then sees the first one's session.
@@ -148,7 +148,7 @@ def _check_may_walk(patient: Patient) -> None:
             "%(patient)s's program has ended. Reopen it on the page “Consent and data” first."
         )
         raise InvalidSetting(said % names)
-    if may_be_cared_for(patient):
+    if is_care_allowed(patient):
         return
     said = gettext(
         "%(patient)s has not agreed to care, and this clinic needs that. Note it on the page "

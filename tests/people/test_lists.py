@@ -39,7 +39,7 @@ def is_refused(client: Client, url: str, **asked: str) -> bool:
 
 def test_a_researcher_cannot_ask_letter_by_letter_what_is_hidden(world):
     TrainingSession.everywhere.filter(pk=world.session.pk).update(
-        source="Recording: maria_lopez.csv", original={"participant_id": 7}
+        source="Recording: maria_lopez.csv", legacy_row={"participant_id": 7}
     )
     client, url = client_of(world, Role.RESEARCHER), reverse(SESSIONS)
     assert client.get(url).context["cl"].result_count == 1

@@ -22,7 +22,7 @@ from rehab.people import api as people_api
 from rehab.people.access import for_roles, public
 from rehab.people.models import Patient
 from rehab.people.roles import Right, Role, rights_of
-from rehab.people.scope import CrossClinic, Scope, ScopedManager, UnscopedQuery
+from rehab.people.scope import CrossClinicReference, Scope, ScopedManager, UnscopedQuery
 from rehab.people.web.admin_base import ScopedOptions
 from rehab.stations.models import Device, Station
 from tests.support.tenancy import all_routes, find_leaks, find_offers, may_read, walk_patterns
@@ -110,10 +110,10 @@ def test_rows_of_two_clinics_are_never_tied_together(worlds):
     stray = Device(
         clinic=amber.clinic, station=birch.rows[Station], kind="robot", name="x", token_hash="x"
     )
-    with pytest.raises(CrossClinic, match="same clinic"):
+    with pytest.raises(CrossClinicReference, match="same clinic"):
         stray.save()
     amber.session.patient = birch.patient
-    with pytest.raises(CrossClinic):
+    with pytest.raises(CrossClinicReference):
         amber.session.save()
 
 

@@ -13,8 +13,9 @@ from django.urls import reverse
 from rehab.boards import entries
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.patients.erasure import erase
-from rehab.people.consent.models import Purpose, give
-from rehab.people.models import Erasing, Patient
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import record_consent
+from rehab.people.models import ErasureReason, Patient
 from rehab.people.roles import Role
 from rehab.sessions import corrections
 from rehab.sessions.corrections import Part, SessionCorrection, correct_session
@@ -276,7 +277,7 @@ def test_a_session_that_still_runs_is_ended_first(world, rosa):
 
 def test_a_researcher_reads_corrections_by_pseudonym_and_makes_none(world, rosa, omar):
     for patient in (rosa, omar):
-        give(patient, Purpose.RESEARCH, None, NOW)
+        record_consent(patient, Purpose.RESEARCH, None, NOW)
     session = walk(rosa, "positive", strides(3, 1))
     correct(world, session, patient=omar.pk)
     assert correct(world, session, Role.RESEARCHER, counts="no").status_code == 403
@@ -324,7 +325,7 @@ def test_the_api_says_what_is_left_out(world, rosa):
 
 
 def test_nobody_who_is_erased_is_offered_or_taken_as_who_walked(world, rosa, omar):
-    erase(rosa, Erasing.ASKED, None, NOW)
+    erase(rosa, ErasureReason.ASKED, None, NOW)
     pt, url = client_of(world), reverse("correct", args=[world.session.pk])
     page = pt.get(url).content.decode()
     assert f'value="{omar.pk}"' in page
@@ -333,7 +334,7 @@ def test_nobody_who_is_erased_is_offered_or_taken_as_who_walked(world, rosa, oma
         correct_session(
             world.session, {Part.PATIENT: rosa.pseudonym}, "Why.", world.people[Role.PT], NOW
         )
-    erase(world.patient, Erasing.ASKED, None, NOW)  # who did walk stays chosen
+    erase(world.patient, ErasureReason.ASKED, None, NOW)  # who did walk stays chosen
     assert f'value="{world.patient.pk}" selected' in pt.get(url).content.decode()
     group = pt.get(reverse("admin:rehab_leaderboard_add")).content.decode()
     assert f'name="group" value="{omar.pk}"' in group

@@ -7,7 +7,8 @@ import re
 
 import pytest
 
-from rehab.people.consent.models import Purpose, give
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import record_consent
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent
@@ -93,7 +94,7 @@ def test_of_many_events_the_count_is_right_and_the_list_short(world, patient):
 
 
 def test_a_researcher_reads_a_pseudonym(world, patient):
-    give(patient, Purpose.RESEARCH, None, NOW)
+    record_consent(patient, Purpose.RESEARCH, None, NOW)
     words = read(world, walk(patient, "explicit", [HIT]), Role.RESEARCHER)
     assert patient.pseudonym in words
     assert "Rosa" not in words

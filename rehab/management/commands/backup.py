@@ -20,7 +20,7 @@ SHORTEST = 16
 
 
 def find_passphrase() -> str:
-    """Give the passphrase of the environment. Raises CommandError, with the cure."""
+    """Return the passphrase of the environment. Raises CommandError, with the cure."""
     passphrase = os.environ.get(PASSPHRASE, "")
     if len(passphrase) < SHORTEST:
         raise CommandError(
@@ -56,7 +56,7 @@ class Command(BaseCommand):
         finally:
             new.unlink(missing_ok=True)
         for clinic in Clinic.everywhere.all():
-            audit_log.note(Act.BACKUP, None, clinic=clinic.pk, about="manage.py backup")
+            audit_log.record(Act.BACKUP, None, clinic=clinic.pk, about="manage.py backup")
         size_mb = file.stat().st_size / 1e6
         self.stdout.write(
             f"{file}: {size_mb:.1f} MB, {counts['rehab.patient']} patients, "

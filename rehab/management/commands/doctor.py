@@ -65,7 +65,7 @@ def examine(look: Callable[[], Iterator[Finding]]) -> list[Finding]:
 
 
 def look_at_settings() -> Iterator[Finding]:
-    """Give what the system checks complain of."""
+    """Return what the system checks complain of."""
     complaints = run_checks(include_deployment_checks=settings.HOSTED)
     for complaint in complaints:
         yield Finding(
@@ -76,7 +76,7 @@ def look_at_settings() -> Iterator[Finding]:
 
 
 def look_at_database() -> Iterator[Finding]:
-    """Give the state of database and disk."""
+    """Return the state of database and disk."""
     executor = MigrationExecutor(connection)
     pending = len(executor.migration_plan(executor.loader.graph.leaf_nodes()))
     kind = f"{connection.vendor}, {connection.settings_dict['NAME']}"
@@ -91,7 +91,7 @@ def look_at_database() -> Iterator[Finding]:
 
 
 def fsync_s() -> float:
-    """Give how long a small write takes to reach the disk of the data folder."""
+    """Return how long a small write takes to reach the disk of the data folder."""
     times = []
     with tempfile.TemporaryFile(dir=settings.DATA_DIR) as file:
         for _ in range(20):
@@ -104,7 +104,7 @@ def fsync_s() -> float:
 
 
 def look_at_layer() -> Iterator[Finding]:
-    """Give whether server processes reach each other."""
+    """Return whether server processes reach each other."""
     if not settings.REDIS_URL:
         yield Finding("layer", "in memory: one server process")
         return
@@ -125,7 +125,7 @@ async def ping_layer() -> None:
 
 
 def look_at_files() -> Iterator[Finding]:
-    """Give whether pages find their files."""
+    """Return whether pages find their files."""
     missing = [name for name in ("css/tokens.css", "img/mark.svg") if not finders.find(name)]
     missing += [name for name, folder in settings.BROWSER_LIBRARIES.items() if not folder.is_dir()]
     if missing:
@@ -137,7 +137,7 @@ def look_at_files() -> Iterator[Finding]:
 
 
 def look_at_sessions() -> Iterator[Finding]:
-    """Give the sessions that run, and those that a dead process left running."""
+    """Return the sessions that run, and those that a dead process left running."""
     running = list(TrainingSession.everywhere.filter(state=State.RUNNING.value))
     left = [s.pk for s in running if not s.owner or not owners.is_alive(s.owner)]
     if left:
@@ -154,7 +154,7 @@ def look_at_sessions() -> Iterator[Finding]:
 
 
 def look_at_children() -> Iterator[Finding]:
-    """Give the processes that the server keeps up."""
+    """Return the processes that the server keeps up."""
     report = settings.DATA_DIR / "children.json"
     if not report.exists():
         yield Finding("children", "none")
@@ -170,7 +170,7 @@ def look_at_children() -> Iterator[Finding]:
 
 
 def look_at_tokens() -> Iterator[Finding]:
-    """Give the devices that may dial in."""
+    """Return the devices that may dial in."""
     devices = Device.everywhere.filter(revoked_at__isnull=True)
     for kind, label in Device.Kind.choices:
         of_kind = devices.filter(kind=kind)

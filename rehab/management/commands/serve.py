@@ -21,7 +21,7 @@ from rehab.people.sign_in.first_start import (
 )
 from rehab.sessions.live.runtime import current
 from rehab.sessions.live.sources import local_address
-from rehab.stations.builtin import builtin_token, first_station
+from rehab.stations.builtin import first_station, issue_builtin_token
 from rehab.stations.models import Device
 from robot.bases import BASES
 
@@ -92,12 +92,12 @@ class Command(BaseCommand):
 
 
 def robot_token() -> str | None:
-    """Give the first station's built-in robot a fresh token; None where a robot of its own is."""
+    """Return the first station's built-in robot a fresh token; None where a robot of its own is."""
     station = first_station(first_clinic())
     robots = Device.everywhere.filter(station=station, kind=Device.Kind.ROBOT, builtin=False)
     if robots.filter(revoked_at__isnull=True).exists():
         return None
-    return builtin_token(station, Device.Kind.ROBOT)
+    return issue_builtin_token(station, Device.Kind.ROBOT)
 
 
 def check_port(host: str, port: int) -> None:

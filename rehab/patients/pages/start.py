@@ -16,7 +16,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from rehab.patients.forms import PatientForm, ScreenForm
 from rehab.patients.visits import SOON_DAYS, Visit, read_today, usual_time
-from rehab.people.access import clinic_of, for_roles, person
+from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.formatting import at_clinic
@@ -72,7 +72,7 @@ def list_everybody(user: User, words: str = "") -> dict[str, Any]:
 def choose_patient(request: HttpRequest) -> HttpResponse:
     """List who is expected today, then all patients."""
     words = request.GET.get("q", "").strip()
-    context = list_everybody(person(request), words) | {"q": words}
+    context = list_everybody(user_of(request), words) | {"q": words}
     return render(request, "sessions/start.html", context)
 
 
@@ -81,7 +81,7 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
 @require_safe
 def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Offer a patient the session like last time, another one, the past ones, the next visit."""
-    user = person(request)
+    user = user_of(request)
     patient = get_object_or_404(patients_of(user), pk=patient_id)
     first_station(patient.clinic)
     initial = like_last_time(patient, user)
@@ -108,21 +108,21 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
 @require_http_methods(["GET", "HEAD", "POST"])
 def add_patient(request: HttpRequest) -> HttpResponse:
     """Take a new patient in."""
-    user = person(request)
+    user = user_of(request)
     form = PatientForm(request.POST or None, by=user)
-    if request.method == "POST" and form.keep():
+    if request.method == "POST" and form.save_or_report():
         return redirect("setup", patient_id=form.instance.pk)
     return render(request, "sessions/patient_form.html", {"form": form})
 
 
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
-def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
+def edit_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Mend what was written of a patient."""
-    user = person(request)
+    user = user_of(request)
     patient = get_object_or_404(patients_of(user), pk=patient_id)
     form = PatientForm(request.POST or None, by=user, instance=patient)
-    if request.method == "POST" and form.keep():
+    if request.method == "POST" and form.save_or_report():
         return redirect("patient", patient_id=patient.pk)
     context = {"form": form, "patient": Patient.objects.visible_to(user).get(pk=patient_id)}
     return render(request, "sessions/patient_form.html", context)
@@ -132,9 +132,9 @@ def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
 @require_http_methods(["GET", "HEAD", "POST"])
 def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Fit the patient's page to this patient's eyes and ears."""
-    patient = get_object_or_404(patients_of(person(request)), pk=patient_id)
+    patient = get_object_or_404(patients_of(user_of(request)), pk=patient_id)
     form = ScreenForm(request.POST or None, instance=patient)
-    if request.method == "POST" and form.keep():
+    if request.method == "POST" and form.save_or_report():
         return redirect("patient", patient_id=patient.pk)
     return render(request, "sessions/screen_form.html", {"form": form, "patient": patient})
 
@@ -143,7 +143,7 @@ def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
 @require_POST
 def add_demo(request: HttpRequest) -> HttpResponse:
     """Let somebody who only looks around begin with a simulated patient."""
-    user = person(request)
+    user = user_of(request)
     patient, _made = Patient.objects.visible_to(user).get_or_create(
         clinic=clinic_of(user),
         code=DEMO_CODE,

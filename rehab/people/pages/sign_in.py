@@ -1,4 +1,4 @@
-"""Coming in and going out."""
+"""Pages to sign in and out."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rehab.people.sign_in.forms import CodeForm, SignInForm
 
 
 def first_page(user: User) -> str:
-    """Give where somebody begins who asked for no page."""
+    """Return the page to show after a sign-in that asked for none."""
     return reverse("start" if user.role in {Role.LEAD, Role.PT} else "admin:index")
 
 
@@ -35,11 +35,11 @@ class SignIn(LoginView):
     authentication_form = SignInForm
 
     def form_valid(self, form: Any) -> HttpResponse:
-        """Let somebody in, or go on to the second factor."""
+        """Sign in, or go on to the second factor."""
         user: User = form.get_user()
-        then = self.get_redirect_url() or first_page(user)
-        if flow.begin(self.request, user, then):
-            return HttpResponseRedirect(then)
+        next_url = self.get_redirect_url() or first_page(user)
+        if flow.begin(self.request, user, next_url):
+            return HttpResponseRedirect(next_url)
         has_one = factors.authenticators_of(user).exists()
         return redirect("second-factor" if has_one else "set-up-second-factor")
 
@@ -52,8 +52,8 @@ sign_in = public(SignIn.as_view())
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
 def prove(request: HttpRequest) -> HttpResponse:
-    """Take a code or a passkey of somebody whose password was right. Anyone else starts over."""
-    user = flow.halfway(request)
+    """Take the code or passkey of a pending sign-in. Without one, start over."""
+    user = flow.pending_second_factor(request)
     if user is None:
         return redirect("sign-in")
     answer = request.POST.get("passkey", "")
@@ -61,19 +61,19 @@ def prove(request: HttpRequest) -> HttpResponse:
     problem = ""
     if answer:
         try:
-            passkeys.take(request, user, answer, timezone.now())
-        except passkeys.NotProven:
+            passkeys.verify(request, user, answer, timezone.now())
+        except passkeys.PasskeyRejected:
             problem = _("This passkey was not accepted. Try again, or type a code.")
         else:
-            return HttpResponseRedirect(flow.finish(request, user, proven=True))
+            return HttpResponseRedirect(flow.finish(request, user, second_factor_verified=True))
     elif form.is_valid():
-        return HttpResponseRedirect(flow.finish(request, user, proven=True))
+        return HttpResponseRedirect(flow.finish(request, user, second_factor_verified=True))
     own = factors.authenticators_of(user)
     context = {
         "form": form,
         "problem": problem,
         "has_app": own.filter(kind=factors.Authenticator.Kind.APP).exists(),
-        "passkey": passkeys.ask_to_sign(request, user),
+        "passkey": passkeys.authentication_options(request, user),
     }
     return render(request, "people/second_factor.html", context)
 
@@ -81,7 +81,7 @@ def prove(request: HttpRequest) -> HttpResponse:
 @public
 @require_POST
 def sign_out(request: HttpRequest) -> HttpResponse:
-    """End the sign-in of this browser."""
+    """Sign this browser out."""
     logout(request)
     messages.success(request, _("You are signed out."))
     return redirect("sign-in")

@@ -16,7 +16,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 from django.views.decorators.http import require_http_methods, require_safe
 
-from rehab.people.access import for_roles, person
+from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.corrections import CorrectionForm, Part, may_correct, tell_corrections
@@ -64,7 +64,7 @@ class Chip:
 @require_safe
 def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
     """List a patient's sessions, newest first, with the trend over the last ones."""
-    user = person(request)
+    user = user_of(request)
     patient = get_object_or_404(
         Patient.objects.visible_to(user).select_related("clinic"), pk=patient_id
     )
@@ -125,7 +125,7 @@ def write_line(
         score=say_number(figures.get("score"), 0),
         hit_rate=say_rate(figures.get("hit_rate")),
         state=gettext("imported")
-        if session.original_id is not None
+        if session.legacy_id is not None
         else str(STATES[State(session.state)]),
     )
 
@@ -134,7 +134,7 @@ def write_line(
 @require_safe
 def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
     """Show one session with every stride, phase and event; researchers see a pseudonym."""
-    user = person(request)
+    user = user_of(request)
     session = get_object_or_404(
         TrainingSession.objects.visible_to(user).select_related("patient", "clinic", "measure"),
         pk=session_id,
@@ -181,7 +181,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
 @require_http_methods(["GET", "HEAD", "POST"])
 def correct(request: HttpRequest, session_id: int) -> HttpResponse:
     """Correct an ended session: who walked, whether it counts, a note. The log stays as it is."""
-    user = person(request)
+    user = user_of(request)
     session = get_object_or_404(
         TrainingSession.objects.visible_to(user).select_related("patient", "clinic"), pk=session_id
     )

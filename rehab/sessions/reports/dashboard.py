@@ -22,7 +22,7 @@ from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.trend import with_figures
 from rehab.stations.models import Device, Station
-from rehab.stations.presence import is_overdue, say_state
+from rehab.stations.presence import format_device_state, is_overdue
 from rehab.training.changes import OPEN, State
 from rehab.training.valences import VALENCES
 
@@ -272,7 +272,7 @@ def read_places(user: User, open_now: list[TrainingSession], now: datetime) -> I
         session = at_station.get(station.pk)
         yield Place(
             station,
-            [(device, say_state(device, now)) for device in devices[station.pk]],
+            [(device, format_device_state(device, now)) for device in devices[station.pk]],
             session,
             find_here(session, now) if session else {},
         )

@@ -88,7 +88,7 @@ def review_session(user: User, session: TrainingSession) -> Review:
         for event in events
     )
     figures = describe_session(fold)
-    if session.original_id is not None:  # no log: what the original added up is all there is
+    if session.legacy_id is not None:  # no log: what the original added up is all there is
         stored = figures_of(user, [session]).get(session.pk, {})
         figures |= {"score": stored.get("score"), "active_s": session.active_s}
     return Review(figures, moments, gestures, draw(user, session, fold, moments))
