@@ -45,7 +45,8 @@ HEARTBEAT_S = 0.25  # to robots, which stand still after 0.65 s of silence
 SWEEP = 20  # heartbeats; then pages hear one too, idle sessions go, sign-ins are looked at
 CHECKPOINT = 8  # heartbeats
 HEARTBEAT = to_text({"type": "heartbeat"})
-# Python's full collections take 200 ms with 2,000 sockets (stack.md, T4): make them rare.
+# Python's full collections take 200 ms with 2,000 sockets (docs/reference/stack.md#live-path): make
+# them rare.
 GC_THRESHOLDS = (50_000, 50, 100)
 # How long the event loop may keep the interpreter's lock while the writer wants it (default 5 ms).
 SWITCH_S = 0.002
