@@ -167,16 +167,17 @@ def test_another_measure_of_a_frozen_board_is_another_snapshot(clinic, snapshot)
 
 
 def test_what_left_the_period_before_the_freeze_is_not_in_it(clinic):
-    day = NOW.date()
+    now = timezone.now()  # signals keep the rows up by the clock
+    day = now.date()
     people = people_of(clinic, 6)
     board = board_of(clinic, types="all", display="top", frozen_on=day, names="code")
-    old = walk_down(people[:3], days_ago=20)
-    walk_down(people[3:], days_ago=3)
+    old = walk_down(people[:3], days_ago=20, now=now)
+    walk_down(people[3:], days_ago=3, now=now)
     board.period = "days_30"
     board.save()
     assert BoardEntry.everywhere.count() == 6
     Leaderboard.everywhere.update(frozen_on=day + timedelta(days=12))
-    after = NOW + timedelta(days=40)  # nobody looked meanwhile
+    after = now + timedelta(days=40)  # nobody looked meanwhile
     assert not show_after(old[0], after)[0].shared
     assert set(BoardEntry.everywhere.values_list("patient", flat=True)) == {
         one.pk for one in people[3:]
