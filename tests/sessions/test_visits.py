@@ -10,8 +10,10 @@ from django.utils import timezone
 
 from rehab.people.models import Patient
 from rehab.people.roles import Role
+from rehab.sessions import dashboard
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.visits import Progress, Visit, plan_visit, read_today, usual_time
+from rehab.sessions.words import at_clinic
 from tests.walks import HIT, walk
 from tests.world import NOW, World, build_world, client_of
 
@@ -60,7 +62,7 @@ def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):
 def test_a_day_is_the_clinics_own(world):
     rosa = patient(world, "Rosa")
     plan_visit(rosa, NOW.date(), None)
-    late = datetime(2026, 11, 21, 23, 30, tzinfo=UTC)
+    late = NOW.replace(hour=23, minute=30)
     assert read_today(world.people[Role.PT], late)
     world.clinic.time_zone = "Asia/Tokyo"
     world.clinic.save()
@@ -68,6 +70,18 @@ def test_a_day_is_the_clinics_own(world):
     pt_of(world).post(f"/patients/{rosa.pk}/visits/", {"in": "0"})
     (visit,) = Visit.everywhere.all()
     assert visit.day == (timezone.now() + timedelta(hours=9)).date()
+
+
+def test_the_first_of_two_midnights_begins_the_day(world):
+    """In Havana the hour after midnight comes twice on November 1, 2026: at 4 and at 5 UTC."""
+    world.clinic.time_zone = "America/Havana"
+    world.clinic.save()
+    pt, first = world.people[Role.PT], datetime(2026, 11, 1, 4, 30, tzinfo=UTC)
+    walked = walk(patient(world, "Rosa"), "positive", [HIT] * 9, now=first)
+    now = at_clinic(first + timedelta(hours=1), world.clinic)  # it is half past twelve again
+    assert [row.patient for row in read_today(pt, now)] == [walked.patient]
+    listed = dashboard.read_today(pt, world.clinic, now)
+    assert walked in [line.session for line in listed]
 
 
 def test_the_next_visit_is_one_tap_at_the_usual_time(world):
@@ -96,7 +110,7 @@ def test_the_next_visit_is_one_tap_at_the_usual_time(world):
         ({"day": "2020-01-01"}, "between today and a year"),
         ({"day": "2199-01-01"}, "between today and a year"),
         ({"in": "9999999999"}, "Choose the day"),
-        ({"day": f"{timezone.now().date():%Y-%m-%d}", "at": "25:99"}, "a time such as 10:30"),
+        ({"day": f"{NOW:%Y-%m-%d}", "at": "25:99"}, "a time such as 10:30"),
     ],
 )
 def test_a_day_that_cannot_be_says_what_to_do(world, given, said):
