@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import secrets
+from datetime import datetime
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -12,7 +13,6 @@ from django.conf import settings
 from django.core.exceptions import ValidationError
 from django.db import transaction
 from django.db.models import QuerySet
-from django.utils import timezone
 from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
@@ -54,10 +54,10 @@ class PatientForm(PatientRowForm):
         model = Patient
         fields: ClassVar = ["nickname", "code", "paretic_side", "body_mass_kg"]
 
-    def __init__(self, *args: Any, by: User, **options: Any) -> None:
+    def __init__(self, *args: Any, by: User, now: datetime, **options: Any) -> None:
         super().__init__(*args, **options)
         self.instance.clinic = clinic_of(by)
-        self._by = by
+        self._by, self._now = by, now
         self.fields["paretic_side"].required = True
         self.fields["nickname"].widget.attrs["autofocus"] = True
         if self.instance.is_new:
@@ -86,9 +86,9 @@ class PatientForm(PatientRowForm):
             patient = super().save(commit)
             for purpose in map(Purpose, self.cleaned_data.get("agrees", [])):
                 if purpose is Purpose.BOARDS:
-                    join_boards(patient, Boards.CLINIC, self._by, timezone.now())
+                    join_boards(patient, Boards.CLINIC, self._by, self._now)
                 else:
-                    give(patient, purpose, self._by, timezone.now())
+                    give(patient, purpose, self._by, self._now)
         return patient
 
 

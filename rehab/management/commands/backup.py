@@ -41,11 +41,11 @@ class Command(BaseCommand):
 
     def handle(self, *args: Any, file: Path, **options: Any) -> None:
         """Write it. A file of that name is replaced only by a whole one."""
-        passphrase = find_passphrase()
+        passphrase, now = find_passphrase(), timezone.now()
         new = file.with_name(f".{file.name}.new")
         try:
             with os.fdopen(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "wb") as out:
-                counts = write_backup(out, passphrase, timezone.now())
+                counts = write_backup(out, passphrase, now)
                 out.flush()
                 os.fsync(out.fileno())
             new.replace(file)
@@ -56,7 +56,7 @@ class Command(BaseCommand):
         finally:
             new.unlink(missing_ok=True)
         for clinic in Clinic.everywhere.all():
-            audit.note(Act.BACKUP, None, clinic=clinic.pk, about="manage.py backup")
+            audit.note(Act.BACKUP, None, clinic=clinic.pk, about="manage.py backup", now=now)
         size_mb = file.stat().st_size / 1e6
         self.stdout.write(
             f"{file}: {size_mb:.1f} MB, {counts['rehab.patient']} patients, "
