@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from django.core.management import call_command
@@ -41,11 +41,12 @@ def test_what_leaves_the_period_leaves_the_board_by_itself(clinic):
     [("week", 6, True), ("week", 7, False), ("month", 21, True), ("month", 22, False)],
 )
 def test_weeks_and_months_begin_by_the_clinics_calendar(period, days_ago, counts):
-    """NOW is Saturday, November 21, 10:00 UTC; 14 h further east Sunday has just begun."""
+    """14 h east of Saturday, 10:00 UTC, Sunday has just begun."""
+    saturday = datetime(2026, 11, 21, 10, tzinfo=UTC)
     clinic = Clinic.everywhere.create(name="Kiritimati", time_zone="Pacific/Kiritimati")
     board = board_of(clinic, period=period)
-    walk(patient_of(clinic, "A"), "positive", strides(3, 0), days_ago=days_ago)
-    entries.refresh(board, now=NOW)
+    walk(patient_of(clinic, "A"), "positive", strides(3, 0), days_ago=days_ago, now=saturday)
+    entries.refresh(board, now=saturday)
     assert BoardEntry.everywhere.exists() == counts
 
 

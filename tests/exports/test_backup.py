@@ -233,4 +233,4 @@ def test_now_stands_in_it(file):
         write_backup(out, PASSPHRASE, NOW + timedelta(days=1))
     with file.open("rb") as source:
         header = json.loads(next(read_lines(source, PASSPHRASE)))
-    assert header["made_at"].startswith("2026-11-22")
+    assert header["made_at"].startswith(f"{NOW + timedelta(days=1):%Y-%m-%d}")

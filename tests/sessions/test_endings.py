@@ -34,10 +34,9 @@ from rehab.sessions.services import create_session
 from rehab.sessions.visits import Visit
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
-from tests.world import World, build_world, client_of, mark, scoped_models
+from tests.world import NOW, World, build_world, client_of, mark, scoped_models
 
 pytestmark = pytest.mark.django_db
-NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 
 
 @pytest.fixture

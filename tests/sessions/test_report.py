@@ -15,6 +15,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.report import draw_chart, write_report
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
+from tests.support.clock import HERE
 from tests.walks import HIT, MISS, RIGHT, Walked, walk
 from tests.world import NOW, World, build_world, client_of
 
@@ -54,7 +55,7 @@ def test_it_says_who_walked_what_and_how_well(world, patient):
     session = walk(patient, "positive", [*walked, None, (RIGHT, HIT)], phases=phases, wanted=0.6)
     words = read(world, session)
     assert "Rosa code B-1" in words
-    assert "Saturday 21 November 2026, 10:00" in words
+    assert f"{HERE:%A} {HERE.day} {HERE:%B %Y, %H:%M}" in words
     assert "Positive · left leg" in words
     assert "Hit rate 75 % wanted 60 %" in words
     assert "Mean with feedback 2.25 W/kg baseline 2.00 W/kg, +12 %" in words
