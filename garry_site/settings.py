@@ -105,6 +105,7 @@ MIDDLEWARE = [
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "rehab.stations.tablets.TabletMiddleware",
     "rehab.people.language.LanguageMiddleware",
+    "rehab.people.local_time.LocalTimeMiddleware",
     "rehab.people.access.AccessMiddleware",
     "axes.middleware.AxesMiddleware",
 ]
