@@ -19,6 +19,7 @@ from tests.walks import strides, walk
 from tests.world import NOW
 
 pytestmark = pytest.mark.django_db
+SATURDAY = datetime(2026, 11, 21, 10, tzinfo=UTC)
 
 
 def test_what_leaves_the_period_leaves_the_board_by_itself(clinic):
@@ -42,11 +43,10 @@ def test_what_leaves_the_period_leaves_the_board_by_itself(clinic):
 )
 def test_weeks_and_months_begin_by_the_clinics_calendar(period, days_ago, counts):
     """14 h east of Saturday, 10:00 UTC, Sunday has just begun."""
-    saturday = datetime(2026, 11, 21, 10, tzinfo=UTC)
     clinic = Clinic.everywhere.create(name="Kiritimati", time_zone="Pacific/Kiritimati")
     board = board_of(clinic, period=period)
-    walk(patient_of(clinic, "A"), "positive", strides(3, 0), days_ago=days_ago, now=saturday)
-    entries.refresh(board, now=saturday)
+    walk(patient_of(clinic, "A"), "positive", strides(3, 0), days_ago=days_ago, now=SATURDAY)
+    entries.refresh(board, now=SATURDAY)
     assert BoardEntry.everywhere.exists() == counts
 
 
@@ -69,13 +69,14 @@ def test_dates_and_a_frozen_board_stay_as_they_were(clinic):
 
 @pytest.mark.parametrize("period", ["dates", "all"])
 def test_another_time_zone_is_another_day_at_once(period):
-    clinic = Clinic.everywhere.create(name="Elm", boards_across=True)
-    began = {"period_from": NOW.date(), "period_to": NOW.date()} if period == "dates" else {}
+    clinic = Clinic.everywhere.create(name="Elm", boards_across=True, time_zone="UTC")
+    day = SATURDAY.date()
+    began = {"period_from": day, "period_to": day} if period == "dates" else {}
     how = {"metric": "active_minutes", "entry": "sum", "types": "all"}
     board_of(clinic, period=period, **began, **how)
     person = patient_of(clinic, "A")
     for hours in (8, 8, 1):  # the first two are Friday's in California
-        walk(person, "positive", strides(2400, 0), now=NOW - timedelta(hours=hours))
+        walk(person, "positive", strides(2400, 0), now=SATURDAY - timedelta(hours=hours))
     before = everything()
     assert BoardEntry.everywhere.get().figure == 60
     clinic.time_zone = "America/Los_Angeles"
