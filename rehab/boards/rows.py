@@ -11,8 +11,8 @@ from rehab.boards.choosing import Chosen
 from rehab.boards.figures import SHARES, standing_on
 from rehab.boards.models import Leaderboard
 from rehab.people.aliases import say_alias
+from rehab.sessions.formatting import SPACE, say_day, say_duration, say_number
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.words import SPACE, say_day, say_duration, say_number
 from rehab.training.metrics import METRICS
 
 UNITS = {"%", "min"}  # what is said beside a figure; the board's own name says the others

@@ -16,8 +16,8 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.rows import Row, date_rows, name_rows, say_figure, share, write
 from rehab.boards.standings import Listed, Placed, Standings, Stored
 from rehab.people.models import Clinic, Patient
+from rehab.sessions.formatting import at_clinic
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.words import at_clinic
 
 OWN = gettext_noop("These are your own sessions.")
 BUILT = gettext_noop("This board is being built.")

@@ -13,8 +13,8 @@ from itertools import product
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browsers import SIZES
-from tests.servers import ROOT, Server, clean_environment, serve
+from tests.support.browsers import SIZES
+from tests.support.servers import ROOT, Server, clean_environment, serve
 
 pytestmark = pytest.mark.browser
 
@@ -32,7 +32,7 @@ TAPS = 40  # and looks, from the first page of a story to its last
 LIMIT_S = BEGIN_S + len(STORIES) * (TAPS * TAP_S + 2 * STRIDES * STRIDE_S)
 
 SEED = """
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
 from rehab.stations.models import Station
 clinic = first_clinic()

@@ -11,7 +11,7 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.boards.models import BoardEntry
-from rehab.people.consent import (
+from rehab.people.consent.models import (
     Consent,
     ConsentText,
     FixedText,
@@ -30,7 +30,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import create_session
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
-from tests.world import NOW, World, build_world, client_of
+from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 LOG = (TrainingSession, Step, SessionEvent, SessionMetric)

@@ -10,7 +10,7 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.stations.models import Device, Station, find_device
 from tests.support.clock import HERE
-from tests.world import NOW, World, build_world, client_of, signed_in
+from tests.support.world import NOW, World, build_world, client_of, signed_in
 
 pytestmark = pytest.mark.django_db
 
