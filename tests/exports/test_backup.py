@@ -205,7 +205,7 @@ def test_a_backup_needs_a_public_key(file, settings, keys, said):
     [
         (b"", "no secret key"),
         (b"# nothing but a comment\n", "no secret key"),
-        (PUBLIC.encode(), "begins with AGE-SECRET-KEY-1"),
+        pytest.param(PUBLIC.encode(), "begins with AGE-SECRET-KEY-1", id="public"),
         (b"\xff\xfe", "no text file"),
         (None, "cannot be read"),
     ],
