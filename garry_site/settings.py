@@ -106,6 +106,7 @@ MIDDLEWARE = [
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "rehab.stations.tablets.TabletMiddleware",
     "rehab.people.web.language.LanguageMiddleware",
+    "rehab.people.web.local_time.LocalTimeMiddleware",
     "rehab.people.access.AccessMiddleware",
     "axes.middleware.AxesMiddleware",
 ]

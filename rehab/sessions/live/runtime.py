@@ -263,8 +263,9 @@ class Runtime:
         """
         sockets = [socket for socket in self.sockets if socket.actor is not None]
         running = [one.scope for one in sockets if one.live is not None and one.live.is_running]
-        await keep_signed_in(running)
-        for index in await find_unwelcome([(one.actor, one.scope) for one in sockets]):
+        await keep_signed_in(running, timezone.now())
+        admitted = [(one.actor, one.scope) for one in sockets]
+        for index in await find_unwelcome(admitted, timezone.now()):
             sockets[index].send_off()
 
     async def _close(self, live: LiveSession) -> None:
