@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import PermissionDenied
 from django.http import HttpRequest, HttpResponseBase
+from django.utils import timezone
 from django.utils.cache import patch_cache_control
 
 from rehab.people.audit import access_log, history
@@ -106,7 +107,7 @@ class AccessMiddleware:
         """Pass the request on; attribute its changes and record what it showed."""
         with history.attribute_changes_to(request):
             response = self.get_response(request)
-        access_log.record_request(request, response)
+        access_log.record_request(request, response, timezone.now())
         if _is_guarded(request):
             _forbid_caching(response)
         return response
@@ -131,7 +132,7 @@ class AccessMiddleware:
             return None
         if getattr(view, "tablets", False) and tablet_of(request) is not None:
             return None
-        if getattr(view, "enrolling", False) and flow.pending_enrollment(request) is not None:
+        if getattr(view, "enrolling", False) and flow.pending_enrollment(request, timezone.now()):
             return None
         if not user.is_authenticated:
             return redirect_to_login(request.get_full_path())

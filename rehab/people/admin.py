@@ -16,6 +16,7 @@ from django.db.models import Count, Max, QuerySet
 from django.http import HttpRequest, HttpResponseBase
 from django.shortcuts import redirect
 from django.urls import reverse
+from django.utils import timezone
 from django.utils.html import format_html
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
@@ -112,9 +113,8 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
         """End the lockouts of the chosen accounts."""
         for account in accounts:
             with transaction.atomic():
-                record_security_change(
-                    Act.UNLOCK, user_of(request), account, client_address(request)
-                )
+                by, address = user_of(request), client_address(request)
+                record_security_change(Act.UNLOCK, by, account, address, timezone.now())
                 lockout.reset_attempts(account)
         words = gettext("Accounts that may try again: %(count)s.")
         messages.success(request, words % {"count": accounts.count()})
@@ -126,9 +126,8 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
         """Remove all second factors of the chosen accounts."""
         for account in accounts:
             with transaction.atomic():
-                record_security_change(
-                    Act.FACTORS, user_of(request), account, client_address(request)
-                )
+                by, address = user_of(request), client_address(request)
+                record_security_change(Act.FACTORS, by, account, address, timezone.now())
                 factors.remove_second_factors(account)
         words = gettext(
             "%(count)s account(s) sign in by password alone now, or set up a new second "

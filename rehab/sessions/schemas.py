@@ -71,7 +71,7 @@ class SessionOut(Schema):
     station: str | None = Field(None, alias="station.name")
     source: str | None = Field(description="Null for researchers: files may be named after people.")
     simulated: bool
-    optional: bool = Field(description="Corrected: in no figure, board or trend.")
+    left_out: bool = Field(description="Corrected: in no figure, board or trend.")
     imported: bool = Field(description="From the original GARRY, without steps.")
     created_at: datetime
     started_at: datetime | None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import ClassVar
 
 from django.db import models
@@ -109,6 +110,6 @@ class PinAttempts(ScopedModel):
         return "PIN attempts"
 
 
-def find_device(token: str) -> Device | None:
+def find_device(token: str, now: datetime) -> Device | None:
     """Return the device that this token belongs to; None for an unknown or revoked one."""
-    return find_by_token(Device, token)
+    return find_by_token(Device, token, now)

@@ -277,7 +277,7 @@ def test_unscoped_calls_of_the_api_are_caught(worlds, monkeypatch):
 
 
 def test_a_name_that_the_api_tells_researchers_is_caught(worlds, monkeypatch):
-    monkeypatch.setattr(people_api, "sees_names", lambda context: True)
+    monkeypatch.setattr(people_api, "may_see_names", lambda context: True)
     leaks, _ = find_leaks(worlds, all_actors(*worlds), under="/api/v1/")
     assert "researcher of amber: /api/v1/sessions shows Patient of amber" in leaks
 

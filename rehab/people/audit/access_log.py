@@ -7,6 +7,7 @@ pages are recorded by default.
 
 from __future__ import annotations
 
+from datetime import datetime
 from functools import cache
 from typing import Any
 
@@ -14,7 +15,6 @@ from django.apps import apps
 from django.db.models import Model
 from django.http import HttpRequest, HttpResponseBase
 from django.urls import ResolverMatch
-from django.utils import timezone
 
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
@@ -37,7 +37,7 @@ PAGES_WITHOUT_PATIENTS = {
 }  # of admin
 
 
-def record_request(request: HttpRequest, response: HttpResponseBase) -> None:
+def record_request(request: HttpRequest, response: HttpResponseBase, now: datetime) -> None:
     """Record what was shown or changed; repeated views once in some minutes."""
     match, actor = request.resolver_match, _actor_of(request)
     if (
@@ -52,7 +52,6 @@ def record_request(request: HttpRequest, response: HttpResponseBase) -> None:
         return  # not modified or redirected: nothing was shown
     about = match.route if "code" in match.kwargs else request.path
     who = (type(actor).__name__, actor.pk, getattr(actor, "program", ""))
-    now = timezone.now()
     if is_read and not audit_log.recent_views.is_new((*who, match.view_name, request.path), now):
         return
     entry = audit_log.build_entry(

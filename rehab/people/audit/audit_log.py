@@ -159,7 +159,7 @@ def build_entry(
     about: str = "",
     address: str = "",
     clinic: int | None = None,
-    now: datetime | None = None,
+    now: datetime,
 ) -> AuditEntry:
     """Return an entry, not saved. ``actor`` is a person or a device.
 
@@ -170,7 +170,7 @@ def build_entry(
     home: Any = getattr(actor, "clinic_id", None) or clinic
     return AuditEntry(
         clinic_id=home,
-        at=now or timezone.now(),
+        at=now,
         by=person,
         through=through[:64],
         act=act,
@@ -185,14 +185,14 @@ def record(act: Act, actor: Any, **details: Any) -> None:
     build_entry(act, actor, **details).save()
 
 
-def record_security_change(act: Act, actor: User, row: Any, address: str) -> None:
+def record_security_change(act: Act, actor: User, row: Any, address: str, now: datetime) -> None:
     """Add an entry about a change to who has access: of an account, a device or an API token."""
     clinic = clinic_id_of(row) or actor.clinic_id
     about = f"{row._meta.verbose_name}: {row}"
     if clinic is None:  # a host's own account belongs to no clinic's log
         log.warning("%s, %s, by %s from %s", act.label, about, actor, truncate_address(address))
         return
-    record(act, actor, clinic=clinic, about=about, address=address)
+    record(act, actor, clinic=clinic, about=about, address=address, now=now)
 
 
 def record_after_the_fact(entries: list[AuditEntry]) -> None:

@@ -25,7 +25,9 @@ SECRET = "app_secret"  # noqa: S105 (key of the browser session, until the app h
 
 def owner(request: HttpRequest) -> User:
     """Return the account that enrolls. Raises PermissionDenied for a stranger."""
-    user = request.user if isinstance(request.user, User) else flow.pending_enrollment(request)
+    if isinstance(request.user, User):
+        return request.user
+    user = flow.pending_enrollment(request, timezone.now())
     if user is None:
         raise PermissionDenied
     return user
@@ -93,7 +95,7 @@ def _added(request: HttpRequest, user: User, new: list[str]) -> HttpResponse:
     if request.user.is_authenticated:
         request.session[flow.SECOND_FACTOR_VERIFIED] = True
     else:
-        next_url = flow.finish(request, user, second_factor_verified=True)
+        next_url = flow.finish(request, user, timezone.now(), second_factor_verified=True)
     if not new:
         messages.success(request, _("Added."))
         return redirect(next_url)

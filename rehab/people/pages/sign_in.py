@@ -37,9 +37,9 @@ class SignIn(LoginView):
     def form_valid(self, form: Any) -> HttpResponse:
         """Sign in, or go on to the second factor."""
         user: User = form.get_user()
-        next_url = self.get_redirect_url() or first_page(user)
-        if flow.begin(self.request, user, next_url):
-            return HttpResponseRedirect(next_url)
+        then = self.get_redirect_url() or first_page(user)
+        if flow.begin(self.request, user, then, timezone.now()):
+            return HttpResponseRedirect(then)
         has_one = factors.authenticators_of(user).exists()
         return redirect("second-factor" if has_one else "set-up-second-factor")
 
@@ -53,7 +53,8 @@ sign_in = public(SignIn.as_view())
 @require_http_methods(["GET", "HEAD", "POST"])
 def prove(request: HttpRequest) -> HttpResponse:
     """Take the code or passkey of a pending sign-in. Without one, start over."""
-    user = flow.pending_second_factor(request)
+    now = timezone.now()
+    user = flow.pending_second_factor(request, now)
     if user is None:
         return redirect("sign-in")
     answer = request.POST.get("passkey", "")
@@ -61,13 +62,15 @@ def prove(request: HttpRequest) -> HttpResponse:
     problem = ""
     if answer:
         try:
-            passkeys.verify(request, user, answer, timezone.now())
+            passkeys.verify(request, user, answer, now)
         except passkeys.PasskeyRejected:
             problem = _("This passkey was not accepted. Try again, or type a code.")
         else:
-            return HttpResponseRedirect(flow.finish(request, user, second_factor_verified=True))
+            return HttpResponseRedirect(
+                flow.finish(request, user, now, second_factor_verified=True)
+            )
     elif form.is_valid():
-        return HttpResponseRedirect(flow.finish(request, user, second_factor_verified=True))
+        return HttpResponseRedirect(flow.finish(request, user, now, second_factor_verified=True))
     own = factors.authenticators_of(user)
     context = {
         "form": form,

@@ -52,11 +52,11 @@ class SessionStore(db.SessionStore):
         return row
 
 
-def record_activity(request: HttpRequest) -> None:
+def record_activity(request: HttpRequest, now: datetime) -> None:
     """Extend the session of a request: there is activity."""
-    now = timezone.now().timestamp()
-    if now - request.session.get(LAST_ACTIVITY_AT, 0) >= ACTIVITY_RESOLUTION.total_seconds():
-        request.session[LAST_ACTIVITY_AT] = int(now)  # saves the session, with a new expiry
+    now_s = now.timestamp()
+    if now_s - request.session.get(LAST_ACTIVITY_AT, 0) >= ACTIVITY_RESOLUTION.total_seconds():
+        request.session[LAST_ACTIVITY_AT] = int(now_s)  # saves the session, with a new expiry
 
 
 def extend_sessions(keys: Collection[str], now: datetime) -> None:

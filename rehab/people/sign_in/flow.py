@@ -7,6 +7,7 @@ ask for the second factor or enroll one.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from datetime import datetime
 from typing import Any, cast
 
 from django.contrib.auth import HASH_SESSION_KEY, SESSION_KEY, login, logout
@@ -25,28 +26,28 @@ PENDING_LIFETIME_S = 10 * 60
 BACKEND = "rehab.people.sign_in.backends.PasswordBackend"
 
 
-def begin(request: HttpRequest, user: User, next_url: str) -> bool:
+def begin(request: HttpRequest, user: User, next_url: str, now: datetime) -> bool:
     """Sign in an account that needs its password alone; else wait for its second factor.
 
     ``next_url`` is kept for `finish`. Returns whether the account is signed in now.
     """
     if not factors.is_required(user) and not factors.authenticators_of(user).exists():
-        finish(request, user, second_factor_verified=False)
+        finish(request, user, now, second_factor_verified=False)
         return True
     request.session.cycle_key()  # against session fixation
     request.session[PENDING] = {
         "next_url": next_url,
         "user": user.pk,
         "password": user.get_session_auth_hash(),
-        "at": timezone.now().timestamp(),
+        "at": now.timestamp(),
     }
     return False
 
 
-def pending_second_factor(request: HttpRequest) -> User | None:
+def pending_second_factor(request: HttpRequest, now: datetime) -> User | None:
     """Return the account whose password was right a moment ago; None where there is none."""
     pending = request.session.get(PENDING)
-    if pending is None or timezone.now().timestamp() - pending["at"] > PENDING_LIFETIME_S:
+    if pending is None or now.timestamp() - pending["at"] > PENDING_LIFETIME_S:
         return None
     accounts = User.everywhere.select_related("clinic")
     user = accounts.filter(pk=pending["user"], is_active=True).first()
@@ -55,23 +56,22 @@ def pending_second_factor(request: HttpRequest) -> User | None:
     return None
 
 
-def pending_enrollment(request: HttpRequest) -> User | None:
+def pending_enrollment(request: HttpRequest, now: datetime) -> User | None:
     """Return the pending account that has no second factor yet and may therefore enroll one.
 
     An account that has one must use it: enrolling another would get around it.
     """
-    user = pending_second_factor(request)
+    user = pending_second_factor(request, now)
     return user if user and not factors.authenticators_of(user).exists() else None
 
 
-def finish(request: HttpRequest, user: User, *, second_factor_verified: bool) -> str:
+def finish(request: HttpRequest, user: User, now: datetime, *, second_factor_verified: bool) -> str:
     """Sign an account in. Return the ``next_url`` of `begin`, "" where there was none."""
     pending = request.session.pop(PENDING, {})
     login(request, user, backend=BACKEND)
     request.session[SECOND_FACTOR_VERIFIED] = second_factor_verified
-    now = timezone.now().timestamp()
-    request.session[browser_sessions.SIGNED_IN_AT] = int(now)
-    request.session[browser_sessions.LAST_ACTIVITY_AT] = int(now)
+    request.session[browser_sessions.SIGNED_IN_AT] = int(now.timestamp())
+    request.session[browser_sessions.LAST_ACTIVITY_AT] = int(now.timestamp())
     lockout.reset_attempts(user)
     return str(pending.get("next_url", ""))
 
@@ -101,7 +101,7 @@ class SessionValidationMiddleware:
         if request.user.is_authenticated:
             data = cast(Mapping[str, Any], request.session)
             if is_session_valid(data, request.user):
-                browser_sessions.record_activity(request)
+                browser_sessions.record_activity(request, timezone.now())
             else:
                 logout(request)
         return self.get_response(request)

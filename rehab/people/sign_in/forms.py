@@ -9,6 +9,7 @@ from django.contrib.auth import authenticate
 from django.contrib.auth.forms import AuthenticationForm, PasswordChangeForm
 from django.core.exceptions import ValidationError
 from django.http import HttpRequest
+from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
@@ -27,7 +28,8 @@ class SignInForm(AuthenticationForm):
         """Return the error, which does not reveal whether there is such an account."""
         assert self.request is not None  # noqa: S101  (the view gives it)
         name = str(self.cleaned_data["username"])
-        return ValidationError(lockout.lockout_message(self.request, username=name) or WRONG_LOGIN)
+        locked_out = lockout.lockout_message(self.request, timezone.now(), username=name)
+        return ValidationError(locked_out or WRONG_LOGIN)
 
 
 class CodeField(forms.CharField):
@@ -59,7 +61,10 @@ class CodeForm(forms.Form):
         """Refuse a wrong or used code, and every code during a lockout."""
         code: str = self.cleaned_data["code"]
         if authenticate(self.request, username=self.user.username, code=code) is None:
-            locked_out = lockout.lockout_message(self.request, username=self.user.username, code="")
+            username = self.user.username
+            locked_out = lockout.lockout_message(
+                self.request, timezone.now(), username=username, code=""
+            )
             raise ValidationError(locked_out or WRONG_CODE)
         return code
 
@@ -104,6 +109,6 @@ class NewPasswordForm(PasswordChangeForm):
 def check_own_password(request: HttpRequest, user: User, password: str) -> str:
     """Return the password. Raises ValidationError where it is wrong, and counts the attempt."""
     if authenticate(request, username=user.username, password=password) is None:
-        locked_out = lockout.lockout_message(request, username=user.username)
+        locked_out = lockout.lockout_message(request, timezone.now(), username=user.username)
         raise ValidationError(locked_out or WRONG_PASSWORD)
     return password

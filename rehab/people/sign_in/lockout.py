@@ -7,6 +7,7 @@ elsewhere. Codes are counted by name alone: a person who tries those has the pas
 from __future__ import annotations
 
 from collections.abc import Mapping
+from datetime import datetime
 from typing import Any
 
 from axes.handlers.proxy import AxesProxyHandler
@@ -15,7 +16,6 @@ from axes.utils import reset
 from django.conf import settings
 from django.db.models import Max
 from django.http import HttpRequest, HttpResponse
-from django.utils import timezone
 from django.utils.translation import ngettext
 
 from rehab.people.models import User
@@ -45,7 +45,7 @@ def lockout_response(
     return response
 
 
-def lockout_message(request: HttpRequest, **credentials: str) -> str:
+def lockout_message(request: HttpRequest, now: datetime, **credentials: str) -> str:
     """Return how long to wait, in words, during a lockout; "" where there is none."""
     if AxesProxyHandler.is_allowed(request, credentials):
         return ""
@@ -53,8 +53,8 @@ def lockout_message(request: HttpRequest, **credentials: str) -> str:
     attempts = AccessAttempt.objects.filter(username=name)
     if "code" not in credentials:
         attempts = attempts.filter(ip_address=client_address(request))
-    last = attempts.aggregate(last=Max("attempt_time"))["last"] or timezone.now()
-    left_s = (last + settings.AXES_COOLOFF_TIME - timezone.now()).total_seconds()
+    last = attempts.aggregate(last=Max("attempt_time"))["last"] or now
+    left_s = (last + settings.AXES_COOLOFF_TIME - now).total_seconds()
     minutes = max(1, -int(-left_s // 60))
     return ngettext(
         "Too many wrong tries. Try again in a minute, or ask your clinic’s lead to unlock you.",

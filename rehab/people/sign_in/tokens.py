@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-from datetime import timedelta
+from datetime import datetime, timedelta
 from typing import Any, ClassVar, TypeVar
 
 from django.core.exceptions import ValidationError
 from django.db import models
-from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, User
@@ -55,16 +54,14 @@ class TokenModel(ClinicModel):
 T = TypeVar("T", bound=TokenModel)
 
 
-def find_by_token(model: type[T], token: str) -> T | None:
+def find_by_token(model: type[T], token: str, now: datetime) -> T | None:
     """Return the row that this token belongs to; None for an unknown or revoked one."""
     rows = model.everywhere.filter(token_hash=hash_token(token), revoked_at__isnull=True)
-    holder: T | None = rows.select_related(
-        "clinic"
-    ).first()  # its pages are in the clinic's language
-    if holder is not None:
-        now = timezone.now()
-        if holder.last_seen_at is None or now - holder.last_seen_at > LAST_SEEN_RESOLUTION:
-            model.everywhere.filter(pk=holder.pk).update(last_seen_at=now)
+    holder: T | None = rows.select_related("clinic").first()  # for the language of its pages
+    if holder is None:
+        return None
+    if holder.last_seen_at is None or now - holder.last_seen_at > LAST_SEEN_RESOLUTION:
+        model.everywhere.filter(pk=holder.pk).update(last_seen_at=now)
     return holder
 
 
@@ -114,13 +111,13 @@ class ApiToken(TokenModel):
             )
 
 
-def find_user_by_token(token: str) -> User | None:
-    """Return the person that a program calls as, with the token's role; None for an invalid token.
+def find_user_by_token(token: str, now: datetime) -> User | None:
+    """Give the person that a program calls as, with the token's role; None for a dead token.
 
     A token is valid while its account is active and may delegate the role. The returned object is
     for this call alone and must not be saved.
     """
-    holder = find_by_token(ApiToken, token)
+    holder = find_by_token(ApiToken, token, now)
     if holder is None:
         return None
     user = holder.user

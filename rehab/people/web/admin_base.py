@@ -266,7 +266,8 @@ class TokenAdmin(ScopedAdmin):
         """Replace the tokens of the chosen rows."""
         for holder in holders:
             with transaction.atomic():
-                record_security_change(Act.TOKEN, user_of(request), holder, client_address(request))
+                by, address = user_of(request), client_address(request)
+                record_security_change(Act.TOKEN, by, holder, address, timezone.now())
                 token = holder.new_token()
                 holder.revoked_at = None
                 holder.save()

@@ -18,6 +18,7 @@ from django.core.cache import cache
 from django.core.exceptions import NON_FIELD_ERRORS
 from django.db.models import QuerySet
 from django.http import HttpRequest
+from django.utils import timezone
 from ninja import Field, Schema
 from ninja.errors import HttpError
 from ninja.security import HttpBearer
@@ -71,7 +72,7 @@ class TokenAuth(HttpBearer):
 
     def authenticate(self, request: HttpRequest, token: str) -> User | None:
         """Return the person that the token speaks for."""
-        return find_user_by_token(token.strip())
+        return find_user_by_token(token.strip(), timezone.now())
 
 
 class SessionAuth(APIKeyCookie):
