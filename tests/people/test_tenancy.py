@@ -156,7 +156,7 @@ def test_every_form_offers_rows_of_the_own_clinic_only(worlds):
 class NoScope(Scope):
     """A scope that somebody forgot: rights hold, clinics do not."""
 
-    def of_clinic(self, clinic_id: int) -> Q:
+    def clinic_filter(self, clinic_id: int) -> Q:
         return Q()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from datetime import datetime, timedelta
+from html import unescape
 from types import SimpleNamespace
 from zoneinfo import ZoneInfo
 
@@ -20,6 +21,7 @@ from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports import dashboard
 from rehab.sessions.reports.dashboard import find_matters, look, read_today, read_week
+from rehab.site import HEADINGS
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import format_last_seen
 from rehab.training.changes import ChangeKind, State
@@ -241,18 +243,22 @@ def test_a_host_sees_clinics_and_the_server_and_no_patient(world, rosa):
         assert word not in page
 
 
+def headings_of(page: str) -> list[str]:
+    return [
+        unescape(one) for one in re.findall(r'<section class="heading[^>]*>\s*<h2>(.*?)</h2>', page)
+    ]
+
+
 def test_models_stand_under_headings_with_a_line_each(world):
     page = front(world.people[Role.LEAD])
-    headings = re.findall(r'<section class="heading[^>]*>\s*<h2>(.*?)</h2>', page)
-    assert headings[:5] == [
-        "Patients &amp; sessions",
-        "Feedback &amp; protocols",
-        "Leaderboards",
-        "Places &amp; devices",
-        "People",
-    ]
+    assert headings_of(page) == [str(heading) for heading, _models in HEADINGS]
     assert "Who walks: code, nickname, leg" in page
-    assert "More" not in headings, "rehab/site.py says no heading for a model"
+    for role, user in world.people.items():
+        page = front(user)
+        assert "More" not in headings_of(page), "rehab/site.py has no heading for a model"
+        for log in ("auditentry", "historyentry"):
+            shown = reverse(f"admin:rehab_{log}_changelist") in page
+            assert shown == (role == Role.LEAD), (role, log)
 
 
 def test_the_front_page_costs_the_same_however_much_was_walked(
