@@ -1,16 +1,29 @@
 """What all tests share. No Django up here: the pure packages are also tested without it."""
 
+from __future__ import annotations
+
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import hypothesis
 import pytest
+
+if TYPE_CHECKING:
+    from tests.support.world import World
 
 TESTS = Path(__file__).parent
 DATABASE_FIXTURES = {"db", "transactional_db", "live_server"}
 MARKED_BY_FOLDER = {"bench", "screenshots"}
+KEPT_ROWS = pytest.StashKey["KeptRows"]()
+
+# How many examples a property is tried with that does not say so itself: `make test-all` and CI
+# try the full number. A busy machine is no fault of an example.
+hypothesis.settings.register_profile("quick", max_examples=20, deadline=None)
+hypothesis.settings.register_profile("full", max_examples=100, deadline=None)
+hypothesis.settings.load_profile("quick")
 
 
 @pytest.hookimpl(tryfirst=True)  # before -m looks at the marks
@@ -43,12 +56,23 @@ def django_db_modify_db_settings(tmp_path_factory: pytest.TempPathFactory) -> No
 
 
 @pytest.fixture(scope="session")
-def django_db_setup(django_db_setup: None, django_db_blocker: Any) -> Iterator[None]:
+def django_db_setup(
+    request: pytest.FixtureRequest,
+    django_db_modify_db_settings: None,
+    django_db_blocker: Any,
+    _undurable: None,
+    django_db_setup: None,
+) -> Iterator[None]:
     """Hang up, before the test database goes, whatever a thread or a pool still holds of it:
     PostgreSQL drops no database that somebody is in, and autovacuum may be.
     """
-    yield
     from django.db import connection
+
+    from tests.support.kept import KeptRows
+
+    kept = request.config.stash[KEPT_ROWS] = KeptRows(django_db_blocker.unblock)
+    yield
+    kept.end()
 
     if connection.vendor != "postgresql":
         return
@@ -57,3 +81,60 @@ def django_db_setup(django_db_setup: None, django_db_blocker: Any) -> Iterator[N
             "SELECT pg_terminate_backend(pid) FROM pg_stat_activity "
             "WHERE datname = current_database() AND pid <> pg_backend_pid()"
         )
+
+
+@pytest.fixture(scope="session")
+def _undurable() -> Iterator[None]:
+    """Wait for no disk and hash passwords quickly in this process: its rows need not outlive a
+    power cut. Servers that tests start have the product's own settings.
+    """
+    from django.conf import settings
+    from django.test import override_settings
+
+    options = settings.DATABASES["default"].get("OPTIONS", {})
+    if "init_command" in options:
+        assert "synchronous=FULL" in options["init_command"]
+        options["init_command"] += "PRAGMA synchronous=OFF;"
+    with override_settings(PASSWORD_HASHERS=["django.contrib.auth.hashers.MD5PasswordHasher"]):
+        yield
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Take the rows of the tests before back from a test that does not begin with them."""
+    if KEPT_ROWS in item.config.stash and "keep" not in getattr(item, "fixturenames", ()):
+        item.config.stash[KEPT_ROWS].end()
+
+
+# pytest makes class fixtures anew for each test outside a class, before those of a function: so
+# before pytest-django's savepoint, which must be inside the transaction of the kept rows.
+@pytest.fixture(scope="class")
+def keep(request: pytest.FixtureRequest, django_db_setup: None) -> Callable[[Any], Any]:
+    """A function that stores rows once for all tests in a row that ask for the same: it takes the
+    function that builds them and returns one that copies what was built.
+    """
+    kept = request.config.stash[KEPT_ROWS]
+    mark = request.node.get_closest_marker("django_db")
+    if "transactional_db" in request.fixturenames or (mark and mark.kwargs.get("transaction")):
+        kept.end()
+        return lambda build: build  # such a test's rows are seen by others, and deleted
+    begin: Callable[[Any], Any] = kept.begin
+    return begin
+
+
+@pytest.fixture(scope="class")
+def _amber(keep: Callable[[Any], Any]) -> Callable[[], World]:
+    made: Callable[[], World] = keep(_build_amber)
+    return made
+
+
+def _build_amber() -> World:
+    from tests.support.world import build_world
+
+    return build_world("amber")
+
+
+@pytest.fixture
+def world(_amber: Callable[[], World], db: None) -> World:
+    """A clinic, its people, and a row of every model."""
+    return _amber()

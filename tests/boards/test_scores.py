@@ -39,8 +39,7 @@ class Seen:
 
 
 @pytest.fixture
-def world() -> World:
-    world = build_world("amber")
+def world(world: World) -> World:
     Leaderboard.everywhere.all().delete()  # test_who_is_shown.py has those
     return world
 

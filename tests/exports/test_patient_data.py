@@ -42,11 +42,6 @@ NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 NAMED = {Patient, User, Station}
 
 
-@pytest.fixture
-def world(db) -> World:
-    return build_world("amber")
-
-
 def fetch(world: World, role: Role = Role.LEAD) -> dict[str, str]:
     url = reverse("patient-data", kwargs={"patient_id": world.patient.pk})
     return open_archive(body_of(client_of(world, role).get(url)))

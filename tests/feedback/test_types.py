@@ -12,18 +12,13 @@ from rehab.feedback.valences import valences_of
 from rehab.feedback.wording import words_in
 from rehab.people.roles import Role
 from rehab.training.valences import VALENCES, Cue
-from tests.support.world import build_world, client_of, mark
+from tests.support.world import client_of, mark
 
 pytestmark = pytest.mark.django_db
 
 ADD = reverse("admin:rehab_feedbacktype_add")
 LIST = reverse("admin:rehab_feedbacktype_changelist")
 PREVIEW = reverse("admin:rehab_feedbacktype_preview")
-
-
-@pytest.fixture
-def world():
-    return build_world("amber")
 
 
 def form(slug, **changes):

@@ -19,11 +19,6 @@ ADD = "/admin/rehab/gesture/add/"
 
 
 @pytest.fixture
-def world() -> World:
-    return build_world("amber")
-
-
-@pytest.fixture
 def pt(world: World) -> Client:
     return client_of(world)
 

@@ -23,7 +23,7 @@ from rehab.sessions.protocols import Measure, Protocol
 from rehab.stations.models import Device
 from tests.support.archives import body_of
 from tests.support.tenancy import all_routes, walk_patterns
-from tests.support.world import World, build_world, client_of, mark
+from tests.support.world import client_of, mark
 
 pytestmark = pytest.mark.django_db
 NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
@@ -32,11 +32,6 @@ NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 @pytest.fixture(autouse=True)
 def nothing_noted_yet(monkeypatch):
     monkeypatch.setattr(audit, "recent", Recent())
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 def entries():

@@ -37,11 +37,6 @@ SCREEN = {"screen_side": "left", "screen_text": "large"}
 DETAILS = {"nickname": "Rosa", "code": "R-1", "paretic_side": "left", "body_mass_kg": 70}
 
 
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
-
-
 def save_screen(world: World) -> Any:
     return client_of(world).post(reverse("screen", args=[world.patient.pk]), SCREEN)
 

@@ -30,7 +30,7 @@ from tests.feedback.test_types import form as feedback_form
 from tests.gestures.test_composing import filled as gesture_form
 from tests.sessions.test_two_at_once import choices
 from tests.support.programs import program_of
-from tests.support.world import World, build_world, client_of
+from tests.support.world import World, client_of
 
 CATALOG = Path(__file__).parents[2] / "locale/es/LC_MESSAGES/django.po"
 ENGLISH = re.compile(
@@ -104,8 +104,7 @@ def test_every_translated_refusal_takes_the_values_of_its_source():
 
 
 @pytest.fixture
-def world(db: None) -> World:
-    world = build_world("amber")
+def world(world: World) -> World:
     Clinic.everywhere.filter(pk=world.clinic.pk).update(language="es")
     return world
 

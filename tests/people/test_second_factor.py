@@ -69,11 +69,6 @@ def test_an_app_reads_who_and_where_from_the_square():
 # --- accounts -------------------------------------------------------------------------------------
 
 
-@pytest.fixture(autouse=True)
-def _quick_hashes(settings):
-    settings.PASSWORD_HASHERS = ["django.contrib.auth.hashers.MD5PasswordHasher"]
-
-
 @pytest.fixture
 def pt(db: None) -> User:
     clinic = Clinic.everywhere.create(name="Elm")

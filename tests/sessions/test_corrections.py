@@ -29,11 +29,6 @@ from tests.support.world import NOW, World, agreeing, build_world, client_of
 pytestmark = pytest.mark.django_db
 
 
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
-
-
 def patient_of(world: World, name: str, **fields) -> Patient:
     patient = Patient.everywhere.create(
         clinic=world.clinic, code=f"K-{ord(name[0])}", nickname=name, paretic_side="left", **fields

@@ -40,11 +40,6 @@ pytestmark = pytest.mark.django_db
 NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 
 
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
-
-
 def page_of(world: World, client: Client) -> str:
     url = reverse("patient", kwargs={"patient_id": world.patient.pk})
     return client.get(url).content.decode()

@@ -22,14 +22,9 @@ from rehab.sessions.words import at_clinic, say_day, say_duration, say_number, s
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.walks import GOAL, HIT, MISS, RIGHT, Walked, strides, walk
-from tests.support.world import World, build_world, client_of
+from tests.support.world import build_world, client_of
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 @pytest.fixture
