@@ -7,10 +7,10 @@ import re
 import pytest
 from django.test import Client
 
-from rehab.people import api_base
 from rehab.people.access import UndeclaredView
 from rehab.people.roles import Role
-from rehab.people.tokens import ApiToken
+from rehab.people.sign_in.tokens import ApiToken
+from rehab.people.web import api_base
 from tests.support.programs import ROOT, Program, program_of, token_of
 from tests.support.world import build_world, client_of
 
@@ -99,7 +99,7 @@ def test_a_browser_that_is_signed_in_calls_too_but_changes_nothing_from_a_foreig
 
 def test_too_many_calls_are_asked_to_wait(world, monkeypatch):
     monkeypatch.setattr(api_base, "CALLS_A_MINUTE", 3)
-    monkeypatch.setattr("rehab.people.api_base.time.time", lambda: 6000.0)
+    monkeypatch.setattr("rehab.people.web.api_base.time.time", lambda: 6000.0)
     program = program_of(world, Role.LEAD)
     assert [program.get("/me")[0] for _ in range(4)] == [200, 200, 200, 429]
     response = program.client.get(f"{ROOT}/me")

@@ -43,7 +43,7 @@ def fill(count: int) -> None:
     from django.db import connection
 
     from rehab.boards.models import Leaderboard
-    from rehab.people.consent import Consent
+    from rehab.people.consent.models import Consent
     from rehab.people.models import Clinic, Patient
     from rehab.sessions.models import TrainingSession
     from tests.support.walks import strides, walk

@@ -27,7 +27,7 @@ CHECK = """async ([rules, standards]) => {
 }"""
 WALKED = """
 from django.utils import timezone
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
 from rehab.sessions.protocols import Protocol
 from rehab.stations.models import Station

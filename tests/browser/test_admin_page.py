@@ -16,7 +16,7 @@ pytestmark = pytest.mark.browser
 
 SEED = """
 from django.utils import timezone
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
 from rehab.sessions.protocols import Protocol
 from tests.support.walks import strides, walk

@@ -19,7 +19,7 @@ PATIENCE_MS = 40_000
 
 SEED = """
 from django.utils import timezone
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
 from tests.support.walks import strides, walk
 from tests.support.world import agreeing

@@ -56,9 +56,9 @@ def page_with(
 EXPECTED = """
 from datetime import time
 from django.utils import timezone
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
-from rehab.sessions.visits import plan_visit
+from rehab.patients.visits import plan_visit
 from rehab.stations.models import Station
 amara = Patient.everywhere.create(
     clinic=first_clinic(), code="A-1", nickname="Amara", paretic_side="left"
@@ -330,7 +330,7 @@ def test_a_session_by_keys_alone(server: Server, browser: Browser) -> None:
 
 LONG_DAY = """
 from django.utils import timezone
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
 from rehab.sessions.log import Remark, SessionEvent
 from tests.support.walks import visit, walk

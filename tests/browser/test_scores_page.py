@@ -17,7 +17,7 @@ pytestmark = pytest.mark.browser
 
 SEED = """
 from django.utils import timezone
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
 from tests.support.walks import strides, walk
 rosa = Patient.everywhere.create(

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from rehab.people.codes import STEP_S, code_of
+from rehab.people.sign_in.totp import STEP_S, code_of
 from tests.support.browsers import SIZES
 from tests.support.servers import Server, serve
 

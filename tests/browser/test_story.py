@@ -27,7 +27,7 @@ STRIDES = 10
 PATIENCE_MS = 40_000
 
 SEED = """
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
 from rehab.stations.models import Station
 clinic = first_clinic()

@@ -23,14 +23,14 @@ from hypothesis import strategies as st
 from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.exports.archive import ZipResponse, write_csv, write_zip
 from rehab.exports.tables import PAGE, STEPS, TABLES, Selection, to_cell
-from rehab.people.audit import Act, AuditEntry
-from rehab.people.consent import Purpose, withdraw
+from rehab.patients.visits import plan_visit
+from rehab.people.audit.audit_log import Act, AuditEntry
+from rehab.people.consent.models import Purpose, withdraw
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.corrections import Part, correct_session
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.visits import plan_visit
 from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase

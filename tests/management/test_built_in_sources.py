@@ -14,7 +14,7 @@ from tests.support.servers import ROOT, Server, clean_environment, serve
 STRIDES = 24
 
 SEED = """
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
 from rehab.sessions.services import create_session
 from rehab.stations.builtin import first_station

@@ -14,10 +14,10 @@ from zoneinfo import ZoneInfo
 import pytest
 from django.core.management import CommandError, call_command
 
-from rehab.people.erased import is_kept_away
+from rehab.patients.erasure import erase
+from rehab.people.consent.tombstones import is_kept_away
 from rehab.people.models import Clinic, Erasing, Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.endings import erase
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from tests.support.programs import Program, token_of

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.realtime
 
 PREPARE = """
 import django; django.setup()
-from rehab.people.first_start import first_clinic, first_password, prepare_database
+from rehab.people.sign_in.first_start import first_clinic, first_password, prepare_database
 prepare_database()
 first_password()
 from django.test import Client

@@ -12,7 +12,7 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.boards.models import BoardEntry
-from rehab.people.consent import (
+from rehab.people.consent.models import (
     Consent,
     ConsentText,
     FixedText,

@@ -15,8 +15,8 @@ from django.urls import reverse
 from django.utils.translation import override
 
 from rehab.people.models import Clinic, Patient
-from rehab.people.refusals import in_words
 from rehab.people.roles import Role
+from rehab.people.web.refusals import in_words
 from rehab.sessions.protocols import Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind, Refused, State, next_state

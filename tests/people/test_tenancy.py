@@ -20,10 +20,10 @@ from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.boards.standings import Stored
 from rehab.people import api as people_api
 from rehab.people.access import for_roles, public
-from rehab.people.admin_base import ScopedOptions
 from rehab.people.models import Patient
 from rehab.people.roles import Right, Role, rights_of
 from rehab.people.scope import CrossClinic, Scope, ScopedManager, UnscopedQuery
+from rehab.people.web.admin_base import ScopedOptions
 from rehab.stations.models import Device, Station
 from tests.support.tenancy import all_routes, find_leaks, find_offers, may_read, walk_patterns
 from tests.support.world import (

@@ -15,7 +15,7 @@ from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
 from rehab.boards.models import Leaderboard
-from rehab.people.consent import Purpose, give
+from rehab.people.consent.models import Purpose, give
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection

@@ -12,13 +12,13 @@ import pytest
 from django.urls import reverse
 from django.utils import timezone
 
-from rehab.people.consent import Purpose, give
+from rehab.people.consent.models import Purpose, give
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
-from rehab.sessions import dashboard
-from rehab.sessions.dashboard import find_matters, look, read_today, read_week
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports import dashboard
+from rehab.sessions.reports.dashboard import find_matters, look, read_today, read_week
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import say_seen
 from rehab.training.changes import ChangeKind, State

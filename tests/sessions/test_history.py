@@ -13,12 +13,12 @@ from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 
-from rehab.people.consent import Purpose, give
+from rehab.people.consent.models import Purpose, give
 from rehab.people.models import Patient
 from rehab.people.roles import Role
+from rehab.sessions.formatting import at_clinic, say_day, say_duration, say_number, say_rate
 from rehab.sessions.log import RobotEntry, SessionEvent, Step
-from rehab.sessions.trend import SESSIONS, read_trend
-from rehab.sessions.words import at_clinic, say_day, say_duration, say_number, say_rate
+from rehab.sessions.reports.trend import SESSIONS, read_trend
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.walks import GOAL, HIT, MISS, RIGHT, Walked, strides, walk

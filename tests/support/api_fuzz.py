@@ -11,9 +11,9 @@ import pytest
 from django.test import Client
 from hypothesis import HealthCheck, Phase, given, settings
 
-from rehab.people import api_base
 from rehab.people.models import Patient
 from rehab.people.roles import Role
+from rehab.people.web import api_base
 from tests.support.api_noise import Noise, make_noise
 from tests.support.programs import ROOT, program_of
 from tests.support.world import build_world, mark, scoped_models

@@ -9,8 +9,8 @@ import django
 
 def seed(role: str) -> str:
     """Give a new account of the first clinic a token."""
-    from rehab.people.first_start import first_clinic, prepare_database
     from rehab.people.models import User
+    from rehab.people.sign_in.first_start import first_clinic, prepare_database
     from tests.support.programs import token_of
 
     prepare_database()

@@ -11,9 +11,9 @@ import django
 
 def read(session_id: int) -> dict[str, Any]:
     """Give a session's step numbers, and whether folding its log again gives the same verdicts."""
-    from rehab.sessions.live.actor import read_log
     from rehab.sessions.log import Step
     from rehab.sessions.models import TrainingSession
+    from rehab.sessions.replay import read_log
     from rehab.training.changes import Change
     from rehab.training.fold import SessionFold
 

@@ -19,10 +19,10 @@ def seed(count: int) -> list[dict[str, Any]]:
     from django.db import transaction
     from django.utils import timezone
 
-    from rehab.people.entry import BACKEND
-    from rehab.people.first_start import first_clinic, prepare_database
     from rehab.people.models import Patient, User
     from rehab.people.roles import Role
+    from rehab.people.sign_in.first_start import first_clinic, prepare_database
+    from rehab.people.sign_in.flow import BACKEND
     from rehab.sessions.live.actor import SessionActor
     from rehab.sessions.services import create_session
     from rehab.stations.models import Device, Station

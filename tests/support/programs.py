@@ -9,7 +9,7 @@ from django.test import Client
 
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.tokens import ApiToken
+from rehab.people.sign_in.tokens import ApiToken
 from tests.support.world import World
 
 ROOT = "/api/v1"

@@ -100,10 +100,10 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
     from django.conf import settings
     from django.contrib.auth import BACKEND_SESSION_KEY, HASH_SESSION_KEY, SESSION_KEY
 
-    from rehab.people.entry import BACKEND
-    from rehab.people.first_start import first_clinic
     from rehab.people.models import Patient, User
     from rehab.people.roles import Role
+    from rehab.people.sign_in.first_start import first_clinic
+    from rehab.people.sign_in.flow import BACKEND
     from rehab.sessions.services import create_session
     from rehab.stations.models import Device, Station
     from rehab.stations.pins import set_pin

@@ -14,14 +14,15 @@ from django.test import Client
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
-from rehab.people.audit import AuditEntry
-from rehab.people.consent import Consent, ConsentText, Purpose, give
-from rehab.people.erased import ErasedOriginal
-from rehab.people.factors import Authenticator, RecoveryCode
-from rehab.people.history import HistoryEntry
+from rehab.patients.visits import Visit
+from rehab.people.audit.audit_log import AuditEntry
+from rehab.people.audit.history import HistoryEntry
+from rehab.people.consent.models import Consent, ConsentText, Purpose, give
+from rehab.people.consent.tombstones import ErasedOriginal
 from rehab.people.models import Boards, Clinic, Patient, User
 from rehab.people.roles import Role
-from rehab.people.tokens import ApiToken
+from rehab.people.sign_in.factors import Authenticator, RecoveryCode
+from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.live.actor import Row, SessionActor
 from rehab.sessions.live.writer import Job, commit
@@ -30,7 +31,6 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.presets import Preset
 from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase
 from rehab.sessions.services import create_session
-from rehab.sessions.visits import Visit
 from rehab.stations.models import Device, LeaveTries, Pairing, Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule

@@ -58,7 +58,7 @@ async def test_a_working_day_ends_though_a_training_runs(place, begun, settings)
 
 
 def _signed_in_since(key: str, hours: float, settings) -> str:
-    from rehab.people.browser_sessions import SIGNED_IN_AT, SessionStore
+    from rehab.people.sign_in.browser_sessions import SIGNED_IN_AT, SessionStore
 
     settings.SESSION_MINUTES = 30
     store = SessionStore(key)

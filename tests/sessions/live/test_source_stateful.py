@@ -25,12 +25,13 @@ from hypothesis.stateful import (
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import writer as writers
-from rehab.sessions.live.actor import SessionActor, read_log
+from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.live.consumers import source as source_consumers
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.replay import read_log
 from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.fold import SessionFold
 from rehab.training.phases import make_phase
