@@ -17,18 +17,22 @@ HOSTED = GARRY_HOSTED=1 GARRY_ALLOWED_HOSTS=garry.example \
 # A tool that has nothing to complain of says nothing.
 quiet = out=$$($(1) 2>&1) || { printf '%s\n' "$$out" >&2; exit 1; }
 
-# Tests share the cores, file by file; those of real time (a robot's 20 ms) then run alone. With ARGS
-# one of the two may have nothing to do (5).
-run_tests = { $(1) -m pytest $(2) -m '$(3) and not realtime' \
-	    -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS) || [ $$? = 5 ]; } && \
-	{ $(1) -m pytest $(2) -m '$(3) and realtime' $(ARGS) || [ $$? = 5 ]; }
+# Tests share the cores: a worker that has none left takes half of what another still has. Those of
+# real time (a robot's 20 ms) then run alone, also after a failure. With ARGS there may be none (5).
+# With GARRY_TEST_ALL what is slow comes too, and properties are tried with more examples.
+some = $(1) -m pytest $(2) -m 'not (bench or screenshots$(if $(GARRY_TEST_ALL),, or slow)) $(3)' \
+	$(ARGS) || [ $$? = 5 ]
+shared = { $(call some,$(1),$(2) -n auto --maxprocesses 4 --dist worksteal,and not realtime $(3)); }
+alone = { $(call some,$(1),$(2),and realtime $(3)); }
+run_tests = status=0; $(call shared,$(1),$(2),$(3)) || status=1; \
+	$(call alone,$(1),$(2),$(3)) || status=1; [ $$status = 0 ]
 
 .SILENT:
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help run test test-main test-postgres test-pure check format bench screenshots pictures messages setup \
-	constraints clean
+.PHONY: help run test test-fast test-all test-main test-postgres test-pure check format bench \
+	screenshots pictures messages setup constraints clean
 
 help: ## Say what can be made
 	awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -36,26 +40,34 @@ help: ## Say what can be made
 run: $(VENV)/.server $(VENV)/.twin $(LIBRARIES) ## Serve at 127.0.0.1:8000 (GARRY_PORT=…, GARRY_ROBOT=twin|kinematic|none)
 	exec $(PYTHON) manage.py serve --robot $${GARRY_ROBOT:-twin}
 
-test: test-main test-postgres test-pure ## Run all tests, also on PostgreSQL and a newer Python if there
+test: test-main test-postgres test-pure ## Run the tests of a change (ARGS='-k goal' picks some)
 
-test-main: setup ## Run the tests (ARGS='-k goal' picks some)
-	$(call run_tests,$(PYTHON),,not bench and not screenshots)
+test-fast: setup ## Run the tests without browser, server, PostgreSQL and real time
+	$(call shared,$(PYTHON),,and not (browser or server))
 
+test-all: export GARRY_TEST_ALL = 1
+test-all: test-main test-postgres test-pure ## Run all tests, as CI does
+
+test-main: setup
+	$(call run_tests,$(PYTHON))
+
+# All of the database's tests in `make test-all`, else those that speak its dialect.
 test-postgres: setup
 	url=$${DATABASE_URL:-postgres://postgres@127.0.0.1:5432/postgres}; \
 	if $(PYTHON) -c 'import psycopg, sys; psycopg.connect(sys.argv[1], connect_timeout=3)' \
 	    "$$url" 2>/dev/null; then \
 	    echo "Database tests again, on PostgreSQL at $${url##*@}"; \
 	    GARRY_DATABASE_URL=$$url; export GARRY_DATABASE_URL; \
-	    $(call run_tests,$(PYTHON),,database and not bench and not screenshots); \
+	    $(call run_tests,$(PYTHON),,and $(if $(GARRY_TEST_ALL),database,postgres)); \
 	else echo "Database tests on PostgreSQL: skipped, none answers at $${url##*@} (DATABASE_URL)"; fi
 
-# No Django there: what pytest cannot know of this project is no error.
+# No Django there: what pytest cannot know of this project is no error. What takes real time is for
+# `make test-all`.
 test-pure: $(NEWER)/.test
 	if [ -x $(NEWER)/bin/python ] && [ -n '$(PURE_TESTS)' ]; then \
 	    echo "Pure packages again, on $$($(NEWER)/bin/python -V), without Django"; \
-	    $(call run_tests,$(NEWER)/bin/python,-o strict_config=false -W ignore::pytest.PytestConfigWarning \
-	        $(PURE_TESTS),not bench); fi
+	    $(call $(if $(GARRY_TEST_ALL),run_tests,shared),$(NEWER)/bin/python,-o strict_config=false \
+	        -W ignore::pytest.PytestConfigWarning $(PURE_TESTS),$(if $(GARRY_TEST_ALL),,and not server)); fi
 
 check: setup ## Check format, lint, types, imports, migrations and settings
 	$(VENV)/bin/ruff format --check --quiet --output-format concise

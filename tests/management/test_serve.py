@@ -17,7 +17,7 @@ from tests.support.servers import ROOT, clean_environment, serve
 
 @pytest.fixture
 def server(tmp_path):
-    with serve(tmp_path) as running:
+    with serve(tmp_path, new_machine=True) as running:
         yield running
 
 
