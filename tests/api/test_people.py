@@ -9,7 +9,7 @@ from rehab.people.roles import Role
 from tests.support.programs import Program, program_of
 from tests.support.world import World
 
-pytestmark = pytest.mark.django_db
+pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 
 @pytest.fixture

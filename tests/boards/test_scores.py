@@ -25,7 +25,7 @@ from rehab.training.valences import VALENCES
 from tests.support.walks import HIT, MISS, strides, walk
 from tests.support.world import World, build_world, client_of, signed_in
 
-pytestmark = pytest.mark.django_db
+pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 
 @dataclass(frozen=True)

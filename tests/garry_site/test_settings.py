@@ -38,17 +38,20 @@ def check(tmp_path: Path, *arguments: str, **variables: str) -> tuple[int, str]:
     return result.returncode, result.stdout + result.stderr
 
 
+@pytest.mark.server
 def test_one_machine_needs_no_setting(tmp_path):
     code, said = check(tmp_path, "--fail-level", "ERROR")
     assert code == 0, said
     assert (tmp_path / "secret_key").stat().st_mode & 0o777 == 0o600
 
 
+@pytest.mark.server
 def test_the_hosted_settings_pass_the_deployment_checks(tmp_path):
     code, said = check(tmp_path, "--deploy", "--fail-level", "WARNING", **HOSTED)
     assert code == 0, said
 
 
+@pytest.mark.server
 @pytest.mark.parametrize(
     ("variables", "said"),
     [
@@ -120,6 +123,7 @@ with connection.cursor() as cursor:
 """
 
 
+@pytest.mark.server
 def test_sqlite_writes_each_commit_through_to_the_disk(tmp_path):
     environment = clean_environment(tmp_path, 8000)
     done = subprocess.run(

@@ -14,6 +14,8 @@ import pytest
 
 from tests.support.servers import ROOT, clean_environment, serve
 
+pytestmark = pytest.mark.server
+
 
 @pytest.fixture
 def server(tmp_path):

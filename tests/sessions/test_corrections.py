@@ -26,7 +26,7 @@ from rehab.sessions.reports.trend import read_trend
 from tests.support.walks import strides, walk
 from tests.support.world import NOW, World, agreeing, build_world, client_of
 
-pytestmark = pytest.mark.django_db
+pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 
 def patient_of(world: World, name: str, **fields) -> Patient:

@@ -17,7 +17,7 @@ from rehab.sessions.protocols import Protocol
 from rehab.stations.models import Station
 from tests.support.world import World, build_world, client_of, mark
 
-pytestmark = pytest.mark.django_db
+pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 
 @pytest.fixture
