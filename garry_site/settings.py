@@ -49,6 +49,7 @@ def words(name: str, default: str, about: str) -> list[str]:
 HOSTED = flag("GARRY_HOSTED", False, "many clinics on one server, behind TLS")
 DEBUG = flag("GARRY_DEBUG", False, "Django's debug pages; for developers only")
 DATA_DIR = Path(text("GARRY_DATA_DIR", str(BASE_DIR / "var"), "folder of database and secrets"))
+BACKUP_KEYS = words("GARRY_BACKUP_KEYS", "", "public keys that backups are encrypted to (age1…)")
 HOST = text("GARRY_HOST", "127.0.0.1", "address that the server listens on")
 PORT = number("GARRY_PORT", 8000, "port that the server listens on", low=1, high=65535)
 ALLOWED_HOSTS = words(

@@ -29,7 +29,7 @@ def give_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     patient = find_patient(user, patient_id)
     note_export(request, patient)
     name = f"garry-{patient.pseudonym}-{now:%Y-%m-%d}.zip"
-    return _send(patient_files(user, patient, now), name, now)
+    return _send(patient_files(user, patient, now), name)
 
 
 @for_roles(Role.LEAD, Role.RESEARCHER, patients=False)
@@ -52,7 +52,7 @@ def give_sessions(request: HttpRequest) -> HttpResponse:
     """Give all sessions that somebody may see, by pseudonyms."""
     user, now = person(request), timezone.now()
     note_export(request)
-    return _send(session_files(user, now), f"garry-sessions-{now:%Y-%m-%d}.zip", now)
+    return _send(session_files(user, now), f"garry-sessions-{now:%Y-%m-%d}.zip")
 
 
 def note_export(request: HttpRequest, patient: Patient | None = None) -> None:
@@ -66,5 +66,5 @@ def note_export(request: HttpRequest, patient: Patient | None = None) -> None:
     )
 
 
-def _send(files: Any, name: str, now: Any) -> HttpResponse:
-    return ZipResponse(files, name, now)  # type: ignore[return-value]  # its body comes bit by bit
+def _send(files: Any, name: str) -> HttpResponse:
+    return ZipResponse(files, name)  # type: ignore[return-value]  # its body comes bit by bit

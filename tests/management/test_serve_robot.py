@@ -18,7 +18,6 @@ from websockets.asyncio.client import connect
 
 from tests.support.servers import ROOT, clean_environment, serve
 
-
 PREPARE = """
 import django; django.setup()
 from rehab.people.sign_in.first_start import first_clinic, first_password, prepare_database
