@@ -31,7 +31,7 @@ run_tests = status=0; $(call shared,$(1),$(2),$(3)) || status=1; \
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help run test test-fast test-all test-main test-postgres test-pure check format bench \
+.PHONY: help run test test-fast test-all test-main test-postgres test-pure test-clocks check format bench \
 	screenshots pictures messages setup constraints clean
 
 help: ## Say what can be made
@@ -46,7 +46,7 @@ test-fast: setup ## Run the tests without browser, server, PostgreSQL and real t
 	$(call shared,$(PYTHON),,and not (browser or server))
 
 test-all: export GARRY_TEST_ALL = 1
-test-all: test-main test-postgres test-pure ## Run all tests, as CI does
+test-all: test-main test-postgres test-pure test-clocks ## Run all tests, as CI does
 
 test-main: setup
 	$(call run_tests,$(PYTHON))
@@ -60,6 +60,9 @@ test-postgres: setup
 	    GARRY_DATABASE_URL=$$url; export GARRY_DATABASE_URL; \
 	    $(call run_tests,$(PYTHON),,and $(if $(GARRY_TEST_ALL),database,postgres)); \
 	else echo "Database tests on PostgreSQL: skipped, none answers at $${url##*@} (DATABASE_URL)"; fi
+
+test-clocks: setup ## Run the database tests by other clocks than today's
+	$(PYTHON) -m tests.support.clocks -n auto --maxprocesses 4 --dist worksteal $(ARGS)
 
 # No Django there: what pytest cannot know of this project is no error. What takes real time is for
 # `make test-all`.

@@ -106,6 +106,7 @@ MIDDLEWARE = [
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "rehab.stations.tablets.TabletMiddleware",
     "rehab.people.web.language.LanguageMiddleware",
+    "rehab.people.web.local_time.LocalTimeMiddleware",
     "rehab.people.access.AccessMiddleware",
     "axes.middleware.AxesMiddleware",
 ]
@@ -144,7 +145,8 @@ except ValueError as problem:
     ) from problem
 if DATABASES["default"]["ENGINE"].endswith("sqlite3"):
     DATA_DIR.mkdir(parents=True, exist_ok=True)
-    # FULL keeps acknowledged steps through a power cut, not only through a crash (stack.md, T3).
+    # FULL keeps acknowledged steps through a power cut, not only through a crash
+    # (docs/reference/stack.md#durability).
     DATABASES["default"]["OPTIONS"] = {
         "transaction_mode": "IMMEDIATE",
         "timeout": 20,
@@ -167,7 +169,7 @@ DEFAULT_AUTO_FIELD = "django.db.models.BigAutoField"
 REDIS_URL = text("GARRY_REDIS_URL", "", "channel layer between several server processes")
 CHANNEL_LAYERS = {
     "default": {
-        # Pub/sub, not the core layer: stack.md, T2.
+        # Pub/sub, not the core layer: docs/reference/stack.md#several-processes.
         "BACKEND": "channels_redis.pubsub.RedisPubSubChannelLayer",
         "CONFIG": {"hosts": [REDIS_URL]},
     }

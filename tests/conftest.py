@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import hypothesis
 import pytest
 
+from tests.support import clock
 from tests.support.extent import EVERYTHING
 
 if TYPE_CHECKING:
@@ -59,6 +61,13 @@ def pytest_unconfigure() -> None:
     while SHARED:
         _, (_, end) = SHARED.popitem()
         end()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
+    """Give a database test its clock, its module's fixtures too."""
+    with nullcontext() if clock.has_real_clock(item) else clock.started():
+        return (yield)
 
 
 @pytest.fixture(scope="session")
@@ -125,9 +134,12 @@ def keep(request: pytest.FixtureRequest, _kept_rows: Any) -> Callable[[Any], Any
     function that builds them and returns one that copies what was built.
     """
     mark = request.node.get_closest_marker("django_db")
-    if "transactional_db" in request.fixturenames or (mark and mark.kwargs.get("transaction")):
+    others_see_it = "transactional_db" in request.fixturenames or (
+        mark and mark.kwargs.get("transaction")
+    )
+    if others_see_it or clock.has_real_clock(request.node):
         _kept_rows.end()
-        return lambda build: build  # such a test's rows are seen by others, and deleted
+        return lambda build: build
     SHARED["rows"] = (lambda item: "keep" in getattr(item, "fixturenames", ())), _kept_rows.end
     begin: Callable[[Any], Any] = _kept_rows.begin
     return begin

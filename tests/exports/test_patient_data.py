@@ -7,7 +7,7 @@ import io
 import json
 import secrets
 import tracemalloc
-from datetime import UTC, date, datetime, time
+from datetime import date, datetime, time
 from typing import Any
 
 import pytest
@@ -36,9 +36,8 @@ from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.archives import body_of, open_archive, rows_of
 from tests.support.walks import walk
-from tests.support.world import World, build_world, client_of, mark
+from tests.support.world import NOW, World, build_world, client_of, mark
 
-NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 NAMED = {Patient, User, Station}
 
 

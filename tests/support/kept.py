@@ -9,6 +9,8 @@ from typing import TypeVar
 
 from django.db import transaction
 
+from tests.support import clock
+
 Made = TypeVar("Made")
 
 
@@ -32,7 +34,8 @@ class KeptRows:
             with self._unblock():
                 self._atomic = transaction.atomic()
                 self._atomic.__enter__()
-                self._made, self._build = build(), build
+                with clock.just_before():
+                    self._made, self._build = build(), build
         return lambda: deepcopy(self._made)  # type: ignore[return-value]  # `build` made it
 
     def end(self) -> None:

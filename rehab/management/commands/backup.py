@@ -29,6 +29,7 @@ class Command(BaseCommand):
 
     def handle(self, *args: Any, file: Path, **options: Any) -> None:
         """Write it. A file of that name is replaced only by a whole one."""
+        now = timezone.now()
         try:
             recipients = read_recipients(settings.BACKUP_KEYS)
         except InvalidKey as problem:
@@ -39,7 +40,7 @@ class Command(BaseCommand):
         new = file.with_name(f".{file.name}.new")
         try:
             with os.fdopen(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "wb") as out:
-                counts = write_backup(out, recipients, timezone.now())
+                counts = write_backup(out, recipients, now)
                 out.flush()
                 os.fsync(out.fileno())
             new.replace(file)
@@ -50,7 +51,7 @@ class Command(BaseCommand):
         finally:
             new.unlink(missing_ok=True)
         for clinic in Clinic.everywhere.all():
-            audit_log.note(Act.BACKUP, None, clinic=clinic.pk, about="manage.py backup")
+            audit_log.note(Act.BACKUP, None, clinic=clinic.pk, about="manage.py backup", now=now)
         size_mb = file.stat().st_size / 1e6
         self.stdout.write(
             f"{file}: {size_mb:.1f} MB, {counts['rehab.patient']} patients, "
