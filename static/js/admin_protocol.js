@@ -6,7 +6,8 @@ const rows = document.querySelector("#phases-group tbody");
 if (place) follow();
 
 function follow() {
-  const drawing = place.querySelector("svg"), total = place.querySelector(".total");
+  const drawing = place.querySelector("svg"),
+    total = place.querySelector(".total");
   const stored = JSON.parse(document.getElementById("phases").textContent);
   const stride = Number(place.dataset.stride);
 
@@ -67,19 +68,26 @@ function follow() {
 
   // Widths grow with the square root, so that a block of ten minutes leaves room for one of 13 s.
   function draw() {
-    const phases = read(), lengths = phases.map(length);
+    const phases = read(),
+      lengths = phases.map(length);
     const room = Math.max(place.clientWidth - 42, 200);
-    const widths = share(room, lengths.map((seconds) => Math.sqrt(seconds ?? 300)));
+    const widths = share(
+      room,
+      lengths.map((seconds) => Math.sqrt(seconds ?? 300)),
+    );
     const width = widths.reduce((all, one) => all + one, 0);
-    let left = 0, drawn = "";
+    let left = 0,
+      drawn = "";
     phases.forEach((phase, index) => {
-      const wide = widths[index], letters = Math.floor((wide - 12) / 8.2);
+      const wide = widths[index],
+        letters = Math.floor((wide - 12) / 8.2);
       const name = phase.name.length > letters ? `${phase.name.slice(0, Math.max(1, letters - 1))}…` : phase.name;
-      const high = phase.feedback ? 92 * Math.min(Math.max(phase.gain, 0.5), 1.5) / 1.5 + 8 : 22;
+      const high = phase.feedback ? (92 * Math.min(Math.max(phase.gain, 0.5), 1.5)) / 1.5 + 8 : 22;
       const kind = `${phase.feedback ? "on" : "off"}${lengths[index] === null ? " endless" : ""}`;
       drawn += `<g><title>${safe(phase.name)}</title><rect class="${kind}" x="${left + 2}" y="${130 - high}" width="${wide - 4}" height="${high}" rx="4"/>`;
       drawn += `<text class="name" x="${left + 6}" y="20">${safe(name)}</text>`;
-      if (phase.feedback && phase.gain !== 1) drawn += `<text class="gain" x="${left + wide / 2}" y="${148 - high}">×${phase.gain}</text>`;
+      if (phase.feedback && phase.gain !== 1)
+        drawn += `<text class="gain" x="${left + wide / 2}" y="${148 - high}">×${phase.gain}</text>`;
       const words = say(lengths[index]);
       drawn += `<text class="length" x="${left + 6}" y="150">${words.length > letters ? (lengths[index] === null ? "…" : words) : safe(words)}</text></g>`;
       left += wide;
@@ -119,7 +127,9 @@ function follow() {
   rows?.addEventListener("click", ({ target }) => {
     const pressed = target.closest?.(".move");
     if (!pressed) return;
-    const row = pressed.closest("tr"), all = forms(), at = all.indexOf(row);
+    const row = pressed.closest("tr"),
+      all = forms(),
+      at = all.indexOf(row);
     const other = all[at + (pressed.dataset.way === "up" ? -1 : 1)];
     if (!other) return;
     if (pressed.dataset.way === "up") other.before(row);

@@ -31,8 +31,15 @@ export function createCelebration(canvas) {
     const scale = Math.min(innerWidth, innerHeight) / 800;
     const y = innerHeight > innerWidth ? 0.26 : 0.14;
     const common = {
-      colors: colors.split(" "), shapes: SHAPES, scalar: 2.8 * scale, ticks: LASTS_TICKS, gravity: 0.8 * scale,
-      particleCount: PIECES[amount] / 2, startVelocity: innerWidth / 32, decay: 0.93, spread: 56,
+      colors: colors.split(" "),
+      shapes: SHAPES,
+      scalar: 2.8 * scale,
+      ticks: LASTS_TICKS,
+      gravity: 0.8 * scale,
+      particleCount: PIECES[amount] / 2,
+      startVelocity: innerWidth / 32,
+      decay: 0.93,
+      spread: 56,
     };
     burst({ ...common, origin: { x: -0.02, y }, angle: 14 });
     burst({ ...common, origin: { x: 1.02, y }, angle: 166 });

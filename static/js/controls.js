@@ -32,12 +32,29 @@ export function drawTypes(session, show) {
   const label = (slug) => typeName(slug, session.types.find((type) => type.slug === slug)?.label);
   const next = session.phases.slice(session.phase.index + 1).find(({ feedback }) => feedback);
   const later = session.changed_to.map(label).join(", ");
-  show("types", later ? fill(_("%(first)s, changed to %(others)s"), { first: label(session.began), others: later }) : label(session.began));
-  const choice = document.querySelector("[data-type]"), wanted = session.next_valence || session.valence;
-  if (choice.options.length !== session.types.length) choice.replaceChildren(...session.types.map(({ slug }) => new Option(label(slug), slug)));
+  show(
+    "types",
+    later
+      ? fill(_("%(first)s, changed to %(others)s"), { first: label(session.began), others: later })
+      : label(session.began),
+  );
+  const choice = document.querySelector("[data-type]"),
+    wanted = session.next_valence || session.valence;
+  if (choice.options.length !== session.types.length)
+    choice.replaceChildren(...session.types.map(({ slug }) => new Option(label(slug), slug)));
   if (choice.dataset.of !== wanted) choice.value = choice.dataset.of = wanted; // not while somebody chooses
   choice.disabled = session.types.length < 2 || !next;
-  show("type-when", choice.disabled ? _("no further feedback phase") : session.next_valence ? fill(_("from %(phase)s on; now %(type)s"), { phase: next ? phaseName(next.name) : _("the next phase"), type: label(session.valence) }) : _("of the next phase: as now"));
+  show(
+    "type-when",
+    choice.disabled
+      ? _("no further feedback phase")
+      : session.next_valence
+        ? fill(_("from %(phase)s on; now %(type)s"), {
+            phase: next ? phaseName(next.name) : _("the next phase"),
+            type: label(session.valence),
+          })
+        : _("of the next phase: as now"),
+  );
 }
 
 const MAIN = {
@@ -58,17 +75,24 @@ export function drawControls(session, show) {
   const wanted = [...new Set([...GAINS, session.gain])].sort((a, b) => a - b);
   if (gains.dataset.of !== wanted.join()) {
     gains.dataset.of = wanted.join();
-    gains.replaceChildren(...wanted.map((gain) => Object.assign(document.createElement("button"), { textContent: number(gain, 2), value: gain })));
+    gains.replaceChildren(
+      ...wanted.map((gain) =>
+        Object.assign(document.createElement("button"), { textContent: number(gain, 2), value: gain }),
+      ),
+    );
   }
   press("gains", session.gain);
   const next = session.phases[session.phase.index + 1];
   show("next-phase", next ? fill(_("Go to %(phase)s"), { phase: phaseName(next.name) }) : _("No further phase"));
   document.querySelector("[data-next-phase]").disabled = !next;
-  const main = document.querySelector("[data-main]"), [kind, words, icon] = MAIN[session.state] ?? [];
+  const main = document.querySelector("[data-main]"),
+    [kind, words, icon] = MAIN[session.state] ?? [];
   main.disabled = !kind;
   if (main.value !== (kind ?? "")) {
     main.value = kind ?? "";
-    main.innerHTML = kind ? `<svg class="ic" aria-hidden="true"><use href="${document.body.dataset.icons}#${icon}"></use></svg><span>${words}</span>` : _("Ended");
+    main.innerHTML = kind
+      ? `<svg class="ic" aria-hidden="true"><use href="${document.body.dataset.icons}#${icon}"></use></svg><span>${words}</span>`
+      : _("Ended");
   }
   document.querySelector("[data-end]").disabled = !kind;
 }

@@ -47,10 +47,7 @@ function drawHits(element) {
 
 function drawValues(element) {
   const count = values.days.length;
-  const span = (index) => [
-    values.mean[index] - values.deviation[index],
-    values.mean[index] + values.deviation[index],
-  ];
+  const span = (index) => [values.mean[index] - values.deviation[index], values.mean[index] + values.deviation[index]];
   const seen = values.days.flatMap((_, i) => [
     ...(values.mean[i] === null ? [] : span(i)),
     ...[values.goal[i], values.baseline[i]].filter((value) => value !== null),

@@ -20,7 +20,12 @@ let marks = []; // changes and remarks, each after a stride
 let heardAt = 0; // when presence was told
 let last = null;
 
-const robot = new RobotPanel(document.querySelector(".robot"), show, (order) => live.say({ type: "robot", order }), tell);
+const robot = new RobotPanel(
+  document.querySelector(".robot"),
+  show,
+  (order) => live.say({ type: "robot", order }),
+  tell,
+);
 const live = connect(root.dataset.socket, {
   onSnapshot(snapshot) {
     session = snapshot;
@@ -33,7 +38,9 @@ const live = connect(root.dataset.socket, {
   },
   onSteps(steps) {
     const known = new Set(strides.map(({ number }) => number));
-    strides = [...strides, ...steps.filter(({ number }) => !known.has(number))].sort((a, b) => a.number - b.number).slice(-KEPT);
+    strides = [...strides, ...steps.filter(({ number }) => !known.has(number))]
+      .sort((a, b) => a.number - b.number)
+      .slice(-KEPT);
     draw();
   },
   onEvent(event) {
@@ -43,7 +50,10 @@ const live = connect(root.dataset.socket, {
   onLink(state, why) {
     const note = document.querySelector(".notice.link");
     note.hidden = state === "open";
-    note.textContent = state === "lost" ? _("No connection to the server. What the patient walks is stored; this page comes back by itself.") : why;
+    note.textContent =
+      state === "lost"
+        ? _("No connection to the server. What the patient walks is stored; this page comes back by itself.")
+        : why;
     if (state === "closed" && session && ENDED.has(session.state)) location.assign(root.dataset.details);
   },
 });
@@ -67,7 +77,10 @@ function take(event) {
       Object.assign(session, pick(event, ["state", "pause_reason"]));
       break;
     case "phase":
-      Object.assign(session, pick(event, ["phase", "goal", "gain", "obstacle", "active_s", "phase_s", "phase_strides", ...TYPES]));
+      Object.assign(
+        session,
+        pick(event, ["phase", "goal", "gain", "obstacle", "active_s", "phase_s", "phase_strides", ...TYPES]),
+      );
       break;
     case "valence":
       Object.assign(session, pick(event, TYPES));
@@ -110,7 +123,8 @@ function take(event) {
   }
 }
 
-const waited = (seconds) => (seconds === null || seconds === undefined ? null : seconds + (performance.now() - heardAt) / 1000);
+const waited = (seconds) =>
+  seconds === null || seconds === undefined ? null : seconds + (performance.now() - heardAt) / 1000;
 
 function pick(from, names) {
   return Object.fromEntries(names.filter((name) => from[name] !== undefined).map((name) => [name, from[name]]));
@@ -130,7 +144,10 @@ function draw() {
   const planned = session.target.duration_s;
   show("clock", minutes(session.active_s));
   const over = session.completed || (planned && session.active_s >= planned);
-  show("planned", over ? _("planned time reached") : planned ? fill(_("of %(time)s"), { time: minutes(planned) }) : _("walked"));
+  show(
+    "planned",
+    over ? _("planned time reached") : planned ? fill(_("of %(time)s"), { time: minutes(planned) }) : _("walked"),
+  );
   document.querySelector(".end").classList.toggle("over", Boolean(over));
   drawPhases();
   drawLast();
@@ -138,20 +155,38 @@ function draw() {
   drawControls(session, show);
   if (ENDED.has(session.state)) location.assign(root.dataset.details);
   const judged = strides.filter(({ performance }) => performance !== null).slice(-20);
-  show("of-twenty", judged.length ? fill(_("%(hits)s of %(count)s hit"), { hits: judged.filter(({ hit }) => hit).length, count: judged.length }) : "");
+  show(
+    "of-twenty",
+    judged.length
+      ? fill(_("%(hits)s of %(count)s hit"), { hits: judged.filter(({ hit }) => hit).length, count: judged.length })
+      : "",
+  );
   drawStrip(document.getElementById("strip"), strides, marks, session.phases);
   drawLegend();
   drawTwenty(document.getElementById("twenty"), strides.slice(-20));
   drawRing(document.getElementById("ring"), session.hit_rate, session.target.hit_rate);
-  show("wanted", session.target.hit_rate ? fill(_("Wanted %(rate)s"), { rate: percent(session.target.hit_rate) }) : _("No rate set"));
-  show("judged", session.judged === undefined ? "" : fill(_("%(hits)s of %(count)s strides"), { hits: session.hits, count: session.judged }));
+  show(
+    "wanted",
+    session.target.hit_rate ? fill(_("Wanted %(rate)s"), { rate: percent(session.target.hit_rate) }) : _("No rate set"),
+  );
+  show(
+    "judged",
+    session.judged === undefined
+      ? ""
+      : fill(_("%(hits)s of %(count)s strides"), { hits: session.hits, count: session.judged }),
+  );
   robot.draw();
 }
 
 function drawPhases() {
-  const list = document.querySelector(".phases"), now = session.phase.index;
+  const list = document.querySelector(".phases"),
+    now = session.phase.index;
   if (list.children.length !== session.phases.length) {
-    list.replaceChildren(...session.phases.map(({ name }) => Object.assign(document.createElement("li"), { textContent: phaseName(name) })));
+    list.replaceChildren(
+      ...session.phases.map(({ name }) =>
+        Object.assign(document.createElement("li"), { textContent: phaseName(name) }),
+      ),
+    );
   }
   [...list.children].forEach((item, index) => {
     item.className = index < now ? "was" : index === now ? "is" : "";
@@ -162,7 +197,12 @@ function drawPhases() {
 
 function drawLast() {
   const goal = session.goal === null ? null : number(session.goal, 2);
-  show("goal-line", goal ? fill(_("goal %(goal)s"), { goal: `${goal} ${session.unit}` }) : session.obstacle || _("The goal follows from the baseline."));
+  show(
+    "goal-line",
+    goal
+      ? fill(_("goal %(goal)s"), { goal: `${goal} ${session.unit}` })
+      : session.obstacle || _("The goal follows from the baseline."),
+  );
   if (!last) return;
   const valid = last.performance !== null && last.performance !== undefined;
   const { value, gain } = last;
@@ -171,9 +211,16 @@ function drawLast() {
   // What the patient sees is gain × value, and the goal is compared with that.
   const scaled = gain && gain !== 1 ? ` × ${number(gain, 2)} = ${number(gain * value, 2)}` : "";
   show("value", value === null || value === undefined ? "" : `${number(value, 2)}${scaled} ${session.unit}`);
-  show("extras", Object.entries(last.extra ?? {}).map(([name, value]) => `${name} ${number(+value.toPrecision(3), null)}`).join("\n"));
+  show(
+    "extras",
+    Object.entries(last.extra ?? {})
+      .map(([name, value]) => `${name} ${number(+value.toPrecision(3), null)}`)
+      .join("\n"),
+  );
   const points = last.points ? `, ${last.points > 0 ? "+" : "−"}${Math.abs(last.points)}` : "";
-  const why = last.valid ? fill(_("%(phase)s: no goal yet"), { phase: phaseName(session.phase.name) }) : fill(_("does not count: %(why)s"), { why: (last.reasons ?? []).map(reasonName).join(", ") || _("no value") });
+  const why = last.valid
+    ? fill(_("%(phase)s: no goal yet"), { phase: phaseName(session.phase.name) })
+    : fill(_("does not count: %(why)s"), { why: (last.reasons ?? []).map(reasonName).join(", ") || _("no value") });
   show("verdict", valid ? (last.hit ? _("hit") : _("below")) + points : why);
   const dot = document.querySelector(".verdict .dot");
   dot.hidden = !valid;
@@ -181,7 +228,8 @@ function drawLast() {
 }
 
 function drawLegend() {
-  const list = document.querySelector(".legend"), entries = legend(marks);
+  const list = document.querySelector(".legend"),
+    entries = legend(marks);
   const text = entries.map((entry) => entry.join(" ")).join();
   if (list.dataset.of === text) return;
   list.dataset.of = text;
@@ -201,7 +249,8 @@ function drawPresence() {
     const [sign, words] = found[row.dataset.presence];
     row.classList.toggle("there", sign !== "–");
     row.classList.toggle("low", sign === "!");
-    const text = `${sign} ${words}`, place = row.querySelector("small");
+    const text = `${sign} ${words}`,
+      place = row.querySelector("small");
     if (place.textContent !== text) place.textContent = text;
   }
 }
@@ -243,7 +292,8 @@ document.addEventListener("click", (event) => {
     const step = goalStep(session.goal);
     change("goal", Number((Math.round(session.goal / step + Number(goal)) * step).toFixed(4)));
   } else if (goal !== undefined) setFirstGoal();
-  else if (threshold !== undefined) change("activation_threshold", Number((session.activation_threshold + Number(threshold)).toFixed(2)));
+  else if (threshold !== undefined)
+    change("activation_threshold", Number((session.activation_threshold + Number(threshold)).toFixed(2)));
   else if (nextPhase !== undefined) change("phase", session.phase.index + 1);
   else if (main !== undefined) change(button.value);
   else if (end !== undefined) document.getElementById("sure").showModal();

@@ -86,7 +86,11 @@ function draw() {
   if (now !== "feedback") fitCalm();
   if (now === "feedback") {
     const { last, steps } = session;
-    scene.show({ performance: last?.kind === "missing" ? null : last?.performance, hit: last?.hit ?? false, strides: steps });
+    scene.show({
+      performance: last?.kind === "missing" ? null : last?.performance,
+      hit: last?.hit ?? false,
+      strides: steps,
+    });
     celebrate(confetti);
   } else clear();
   confetti = "none";

@@ -5,7 +5,8 @@ import { number } from "garry/language";
 import { badge, isRemark, say } from "garry/marks";
 import { phaseName } from "garry/names";
 
-const LOW = 0.5, HIGH = 1.5;
+const LOW = 0.5,
+  HIGH = 1.5;
 
 function sizeOf(svg) {
   const { width, height } = svg.getBoundingClientRect();
@@ -15,7 +16,7 @@ function sizeOf(svg) {
 
 export function drawStrip(svg, strides, marks, phases) {
   const [width, height] = sizeOf(svg);
-  const y = (share) => height - 8 - (Math.min(Math.max(share, LOW), HIGH) - LOW) * (height - 34) / (HIGH - LOW);
+  const y = (share) => height - 8 - ((Math.min(Math.max(share, LOW), HIGH) - LOW) * (height - 34)) / (HIGH - LOW);
   const shown = strides.slice(-Math.max(20, Math.floor((width - 60) / 4)));
   const dx = (width - 60) / Math.max(shown.length - 1, 60);
   const x = (index) => 46 + index * dx;
@@ -24,21 +25,28 @@ export function drawStrip(svg, strides, marks, phases) {
   drawing += `<path class="goal" d="M40 ${y(1)}H${width}"/>`;
   shown.forEach(({ performance, hit, valid }, index) => {
     const newest = index === shown.length - 1;
-    if (valid && (performance === null || performance === undefined)) drawing += `<circle class="calm" cx="${x(index)}" cy="${height - 10}" r="3.2"/>`;
-    else if (performance === null || performance === undefined) drawing += `<path class="gap" d="M${x(index)} ${height - 8}v-10"/>`;
-    else drawing += `<circle class="${hit ? "hit" : "miss"}" cx="${x(index)}" cy="${y(performance)}" r="${newest ? 6 : 3.2}"/>`;
+    if (valid && (performance === null || performance === undefined))
+      drawing += `<circle class="calm" cx="${x(index)}" cy="${height - 10}" r="3.2"/>`;
+    else if (performance === null || performance === undefined)
+      drawing += `<path class="gap" d="M${x(index)} ${height - 8}v-10"/>`;
+    else
+      drawing += `<circle class="${hit ? "hit" : "miss"}" cx="${x(index)}" cy="${y(performance)}" r="${newest ? 6 : 3.2}"/>`;
   });
   const parts = []; // names that somebody typed: set as text, never as markup
-  const bounds = shown.flatMap(({ phase }, index) => (index && phase !== undefined && phase !== shown[index - 1].phase ? [index] : []));
+  const bounds = shown.flatMap(({ phase }, index) =>
+    index && phase !== undefined && phase !== shown[index - 1].phase ? [index] : [],
+  );
   bounds.forEach((index, n) => {
-    const at = x(index) - dx / 2, name = phaseName(phases[shown[index].phase]?.name ?? "");
+    const at = x(index) - dx / 2,
+      name = phaseName(phases[shown[index].phase]?.name ?? "");
     drawing += `<path class="bound" d="M${at} 4V${height - 8}"/>`;
     const room = (n + 1 < bounds.length ? x(bounds[n + 1]) : width) - at;
     if (room < 8 * name.length) return;
     drawing += `<text class="part" x="${at + 5}" y="40"></text>`;
     parts.push(name);
   });
-  let level = 0, before = null; // what was noted at the same stride stands above each other
+  let level = 0,
+    before = null; // what was noted at the same stride stands above each other
   let free = 0; // badges and flags stand in a row on top and never cover each other
   for (const mark of marks) {
     const { after, kind, value } = mark;
@@ -69,10 +77,14 @@ export function drawStrip(svg, strides, marks, phases) {
 
 export function drawTwenty(svg, strides) {
   const [width, height] = sizeOf(svg);
-  const middle = height * 0.55, scale = height * 0.95, dx = width / 20;
-  let drawing = '<defs><pattern id="hatch" width="7" height="7" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><path class="gap" d="M0 0V7"/></pattern></defs>';
+  const middle = height * 0.55,
+    scale = height * 0.95,
+    dx = width / 20;
+  let drawing =
+    '<defs><pattern id="hatch" width="7" height="7" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><path class="gap" d="M0 0V7"/></pattern></defs>';
   strides.forEach(({ performance, hit, valid }, index) => {
-    const left = (20 - strides.length + index) * dx + dx * 0.16, wide = dx * 0.68;
+    const left = (20 - strides.length + index) * dx + dx * 0.16,
+      wide = dx * 0.68;
     if (valid && (performance === null || performance === undefined)) {
       drawing += `<circle class="calm" cx="${left + wide / 2}" cy="${middle}" r="5"/>`;
       return;
@@ -83,15 +95,22 @@ export function drawTwenty(svg, strides) {
     }
     const size = Math.min(Math.max(4, Math.abs(performance - 1) * scale), middle - 22);
     if (hit) drawing += `<rect class="hit" x="${left}" y="${middle - size}" width="${wide}" height="${size}" rx="4"/>`;
-    else drawing += `<rect class="miss" x="${left + 1.5}" y="${middle}" width="${wide - 3}" height="${Math.min(size, height - middle - 4)}" rx="4"/>`;
-    if (index === strides.length - 1) drawing += `<text class="newest" x="${left + wide}" y="${hit ? middle - size - 8 : Math.min(middle + size + 17, height - 4)}">${number(100 * performance)}</text>`;
+    else
+      drawing += `<rect class="miss" x="${left + 1.5}" y="${middle}" width="${wide - 3}" height="${Math.min(size, height - middle - 4)}" rx="4"/>`;
+    if (index === strides.length - 1)
+      drawing += `<text class="newest" x="${left + wide}" y="${hit ? middle - size - 8 : Math.min(middle + size + 17, height - 4)}">${number(100 * performance)}</text>`;
   });
   svg.innerHTML = drawing + `<path class="goal" d="M0 ${middle}H${width}"/>`;
 }
 
 export function drawRing(svg, rate, wanted) {
   const around = 2 * Math.PI * 62;
-  const arc = rate === null || rate === undefined ? "" : `<circle class="arc" cx="80" cy="80" r="62" stroke-dasharray="${around * rate} ${around}" transform="rotate(-90 80 80)"/>`;
-  const tick = wanted ? `<g transform="rotate(${wanted * 360} 80 80)"><path class="tick-edge" d="M80 4v28"/><path class="tick" d="M80 2v32"/></g>` : "";
+  const arc =
+    rate === null || rate === undefined
+      ? ""
+      : `<circle class="arc" cx="80" cy="80" r="62" stroke-dasharray="${around * rate} ${around}" transform="rotate(-90 80 80)"/>`;
+  const tick = wanted
+    ? `<g transform="rotate(${wanted * 360} 80 80)"><path class="tick-edge" d="M80 4v28"/><path class="tick" d="M80 2v32"/></g>`
+    : "";
   svg.innerHTML = `<circle class="track" cx="80" cy="80" r="62"/>${arc}${tick}<text class="rate" x="80" y="80" dy=".36em">${arc ? `${number(100 * rate)} %` : "–"}</text>`;
 }

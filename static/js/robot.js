@@ -67,7 +67,23 @@ const CURES = {
   other_driver: _("Stop the other program."),
 };
 // Of the reasons in its status, those that are no matter of course.
-const HOLDS = new Set(["unwatched", "charging", "battery_low", "away_from_home", "base_silent", "firmware_unknown", "firmware_refused", "bump", "cliff", "wheel_drop", "over_current", "button", "nobody_listens", "feeler_missing", "other_driver"]);
+const HOLDS = new Set([
+  "unwatched",
+  "charging",
+  "battery_low",
+  "away_from_home",
+  "base_silent",
+  "firmware_unknown",
+  "firmware_refused",
+  "bump",
+  "cliff",
+  "wheel_drop",
+  "over_current",
+  "button",
+  "nobody_listens",
+  "feeler_missing",
+  "other_driver",
+]);
 const STATES = { idle: _("waiting"), performing: _("moving"), stopped: _("stopped"), disarmed: _("not armed") };
 
 export class RobotPanel {
@@ -102,7 +118,8 @@ export class RobotPanel {
     if (event.kind !== "robot") return;
     if (event.report.kind === "status") this.status = event.report;
     if (event.report.kind === "decision") [this.decision, this.brokenOff] = [event.report, ""];
-    if (event.report.kind === "gesture" && event.report.phase === "ended" && event.report.outcome !== "done") this.brokenOff = event.report.outcome;
+    if (event.report.kind === "gesture" && event.report.phase === "ended" && event.report.outcome !== "done")
+      this.brokenOff = event.report.outcome;
     this.#follow();
   }
 
@@ -113,8 +130,16 @@ export class RobotPanel {
     if (this.send(order)) {
       this.asked = order;
       this.#button(order).classList.add("asked");
-      this.timer = setTimeout(() => this.#miss(order, _("No answer. If the robot moves, use its own switch."), _("No answer. Try again.")), ANSWER_MS);
-    } else this.#miss(order, _("Not sent: no connection. Use the robot’s own switch."), _("There is no connection. Try again in a moment."));
+      this.timer = setTimeout(
+        () => this.#miss(order, _("No answer. If the robot moves, use its own switch."), _("No answer. Try again.")),
+        ANSWER_MS,
+      );
+    } else
+      this.#miss(
+        order,
+        _("Not sent: no connection. Use the robot’s own switch."),
+        _("There is no connection. Try again in a moment."),
+      );
     this.draw();
   }
 
@@ -148,12 +173,44 @@ export class RobotPanel {
 
   draw() {
     const { status, decision, stopped, unheard } = this;
-    const still = stopped || (this.there && (["stopped", "disarmed"].includes(status?.state) || status?.reason === "place_unknown"));
+    const still =
+      stopped ||
+      (this.there && (["stopped", "disarmed"].includes(status?.state) || status?.reason === "place_unknown"));
     this.root.classList.toggle("still", still);
-    this.show("robot-state", !this.there ? _("not connected") : !status ? "" : stopped ? _("stopped") : status.gesture ? `${status.gesture}…` : (STATES[status.state] ?? status.state));
-    this.show("share", decision?.activated_share == null ? "" : fill(_("%(share)s of windows"), { share: percent(decision.activated_share) }));
-    this.show("robot-why", unheard ? unheard : still ? fill(_("It stands: %(why)s."), { why: say((this.there && status?.reason) || "stopped") }) : this.there && HOLDS.has(status?.reason) ? fill(_("It would not move: %(why)s."), { why: say(status.reason) }) : "");
-    this.show("robot-cure", still ? `${CURES[status?.reason] ?? ""} ${_("Put it on its mark, nobody near it, then:")}`.trim() : CURES[status?.reason] ?? "");
+    this.show(
+      "robot-state",
+      !this.there
+        ? _("not connected")
+        : !status
+          ? ""
+          : stopped
+            ? _("stopped")
+            : status.gesture
+              ? `${status.gesture}…`
+              : (STATES[status.state] ?? status.state),
+    );
+    this.show(
+      "share",
+      decision?.activated_share == null
+        ? ""
+        : fill(_("%(share)s of windows"), { share: percent(decision.activated_share) }),
+    );
+    this.show(
+      "robot-why",
+      unheard
+        ? unheard
+        : still
+          ? fill(_("It stands: %(why)s."), { why: say((this.there && status?.reason) || "stopped") })
+          : this.there && HOLDS.has(status?.reason)
+            ? fill(_("It would not move: %(why)s."), { why: say(status.reason) })
+            : "",
+    );
+    this.show(
+      "robot-cure",
+      still
+        ? `${CURES[status?.reason] ?? ""} ${_("Put it on its mark, nobody near it, then:")}`.trim()
+        : (CURES[status?.reason] ?? ""),
+    );
     this.show("robot-last", still || unheard ? "" : this.#last());
     // A real base waits for a person from the start; a stop stays until a person lifts it.
     const [stop, arm] = this.root.querySelectorAll("[data-robot]");
@@ -168,7 +225,11 @@ export class RobotPanel {
     const { mean, threshold, gesture, intensity, reason } = this.decision;
     const size = intensity == null || intensity === 1 ? "" : fill(_(" at %(share)s"), { share: percent(intensity) });
     const broken = this.brokenOff && fill(_(", broken off: %(why)s"), { why: say(this.brokenOff) });
-    return fill(_("Last window %(mean)s, acts from %(threshold)s: %(what)s."), { mean: percent(mean), threshold: percent(threshold), what: gesture ? gesture + size + broken : say(reason) });
+    return fill(_("Last window %(mean)s, acts from %(threshold)s: %(what)s."), {
+      mean: percent(mean),
+      threshold: percent(threshold),
+      what: gesture ? gesture + size + broken : say(reason),
+    });
   }
 
   // What stands beside the robot among those who are there; `low` asks for a charger.
@@ -177,7 +238,10 @@ export class RobotPanel {
     if (!this.there) return { words: _("none"), low: false };
     const lacks = simulated === false ? `${open ? _(", open loop") : ""}${bumpers ? "" : _(", no bumper")}` : "";
     if (share == null) return { words: _("connected") + lacks, low: false };
-    return { words: fill(_("battery %(share)s"), { share: percent(share) }) + (low ? _(": charge it") : "") + lacks, low: Boolean(low) };
+    return {
+      words: fill(_("battery %(share)s"), { share: percent(share) }) + (low ? _(": charge it") : "") + lacks,
+      low: Boolean(low),
+    };
   }
 
   // The robot's own frame: home in the middle, ahead is up; 1.5 m wide.
@@ -185,7 +249,10 @@ export class RobotPanel {
     const svg = this.root.querySelector("svg");
     const at = ({ x_m: x, y_m: y }) => `${(-y).toFixed(3)} ${(-x).toFixed(3)}`;
     const here = this.way.at(-1);
-    let drawing = '<circle class="home-spot" r="0.18"/><path class="scale" d="M-0.7 0.44h0.5M-0.7 0.41v0.06M-0.2 0.41v0.06"/><text class="scale-words" x="-0.45" y="0.39">' + number(0.5, 1) + " m</text>";
+    let drawing =
+      '<circle class="home-spot" r="0.18"/><path class="scale" d="M-0.7 0.44h0.5M-0.7 0.41v0.06M-0.2 0.41v0.06"/><text class="scale-words" x="-0.45" y="0.39">' +
+      number(0.5, 1) +
+      " m</text>";
     if (this.way.length > 1) drawing += `<path class="way" d="M${this.way.map(at).join("L")}"/>`;
     if (here) {
       const degrees = (-here.heading_rad * 180) / Math.PI;

@@ -12,7 +12,10 @@ function pick(wanted) {
 }
 
 function verdict(index) {
-  if (strides.shown[index] === null) return fill(_("does not count (%(why)s)"), { why: strides.why[index] ? strides.why[index].split(", ").map(reasonName).join(", ") : _("no value") });
+  if (strides.shown[index] === null)
+    return fill(_("does not count (%(why)s)"), {
+      why: strides.why[index] ? strides.why[index].split(", ").map(reasonName).join(", ") : _("no value"),
+    });
   if (strides.hit[index] === null) return _("no goal yet");
   return strides.hit[index] ? _("hit") : _("below the goal");
 }
@@ -24,8 +27,11 @@ function figure(value) {
 function readOut(index) {
   if (index === null || index === undefined) return;
   const goal = strides.goal[index] === null ? "" : fill(_(", goal %(goal)s"), { goal: figure(strides.goal[index]) });
-  document.querySelector(".readout").textContent =
-    fill(_("Stride %(number)s: %(value)s, %(verdict)s"), { number: strides.number[index], value: figure(strides.shown[index]) + goal, verdict: verdict(index) });
+  document.querySelector(".readout").textContent = fill(_("Stride %(number)s: %(value)s, %(verdict)s"), {
+    number: strides.number[index],
+    value: figure(strides.shown[index]) + goal,
+    verdict: verdict(index),
+  });
 }
 
 function points(size, width, stroke, fill) {
@@ -139,7 +145,12 @@ function cell(tag, words) {
 function tabulate(place) {
   const table = document.createElement("table");
   const head = table.createTHead().insertRow();
-  for (const name of [_("Stride"), fill(_("Shown, %(unit)s"), { unit }), fill(_("Goal, %(unit)s"), { unit }), _("Verdict")]) {
+  for (const name of [
+    _("Stride"),
+    fill(_("Shown, %(unit)s"), { unit }),
+    fill(_("Goal, %(unit)s"), { unit }),
+    _("Verdict"),
+  ]) {
     const title = cell("th", name);
     title.scope = "col";
     head.append(title);
@@ -149,7 +160,7 @@ function tabulate(place) {
     const row = body.insertRow();
     const title = cell("th", stride);
     title.scope = "row";
-    const value = (column) => strides[column][index] === null ? "–" : number(strides[column][index], 2);
+    const value = (column) => (strides[column][index] === null ? "–" : number(strides[column][index], 2));
     row.append(title, cell("td", value("shown")), cell("td", value("goal")), cell("td", verdict(index)));
   });
   place.append(table);

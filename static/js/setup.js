@@ -2,12 +2,14 @@
 
 for (const step of document.querySelectorAll(".step")) {
   const field = step.querySelector("input");
-  const size = Number(step.dataset.step), places = Number(step.dataset.places);
+  const size = Number(step.dataset.step),
+    places = Number(step.dataset.places);
   step.addEventListener("click", (event) => {
     const button = event.target.closest("button");
     if (!button) return;
     // From one whole step to the next: 3.91 goes to 3.95, not to 3.96.
-    const now = (Number(field.value.replace(",", ".")) || 0) / size, up = button.value === "1";
+    const now = (Number(field.value.replace(",", ".")) || 0) / size,
+      up = button.value === "1";
     const next = up ? Math.floor(now + 1 + 1e-6) : Math.ceil(now - 1 - 1e-6);
     field.value = Math.max(size, next * size).toFixed(places);
   });

@@ -64,7 +64,8 @@ export function createControls(body, live, ask) {
     robot.toggleAttribute("data-said", words !== label);
   }
 
-  const usable = (element) => element.isConnected && !element.disabled && element.checkVisibility({ visibilityProperty: true });
+  const usable = (element) =>
+    element.isConnected && !element.disabled && element.checkVisibility({ visibilityProperty: true });
 
   // Who steers by keys goes on from the button that takes the place of the one that has gone.
   function keepFocus() {

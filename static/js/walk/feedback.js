@@ -64,7 +64,8 @@ export function createFeedback(body) {
     const sign = step?.points ? signed(step.points) : "";
     emblem.dataset.long = Math.min(sign.length, 4);
     for (const element of signs) set(element, sign);
-    if (step && step.number !== drawn && !isStill()) emblem.animate([{ transform: "scale(.92)" }, { transform: "none" }], SWAP);
+    if (step && step.number !== drawn && !isStill())
+      emblem.animate([{ transform: "scale(.92)" }, { transform: "none" }], SWAP);
     drawn = step?.number ?? -1;
     set(said, step ? spoken(step, session) : "");
   }
@@ -80,7 +81,10 @@ export function createFeedback(body) {
     key.dataset.long = Math.min(text.length, 6);
     run.dataset.streak = streak ?? "none";
     beads.forEach((bead, i) => bead.classList.toggle("on", streak > i));
-    set(runWords, streak === null ? fill(_("Step %(number)s"), { number }) : n_("%(count)s in a row", "%(count)s in a row", streak));
+    set(
+      runWords,
+      streak === null ? fill(_("Step %(number)s"), { number }) : n_("%(count)s in a row", "%(count)s in a row", streak),
+    );
   }
 
   function drawPart(session) {

@@ -9,7 +9,10 @@ export function wordsFor(look, session, name, why) {
   const safe = session?.has_points === false ? "" : SAFE;
   switch (look) {
     case "ready":
-      return [fill(_("Hello, %(name)s."), { name }), session.presence.source ? _("The sensor is ready.") : _("Waiting for the sensor.")];
+      return [
+        fill(_("Hello, %(name)s."), { name }),
+        session.presence.source ? _("The sensor is ready.") : _("Waiting for the sensor."),
+      ];
     case "begin":
       return [_("Begin to walk."), _("The sensor is ready.")];
     case "calm":
@@ -50,16 +53,25 @@ export function timeLeft(session) {
   const planned = session.target.duration_s;
   if (session.state === "ready") return planned ? fill(_("%(time)s to walk"), { time: clock(planned) }) : "";
   if (!planned) return fill(_("%(time)s walked"), { time: clock(session.active_s) });
-  return session.active_s < planned ? fill(_("%(time)s left"), { time: clock(planned - session.active_s) }) : _("Time reached");
+  return session.active_s < planned
+    ? fill(_("%(time)s left"), { time: clock(planned - session.active_s) })
+    : _("Time reached");
 }
 
 // How much of the phase is done (0 to 1; null where it has no end) and what is left, in words.
 export function partLeft({ phase, phase_s, phase_strides }) {
   const limits = [];
-  if (phase.seconds) limits.push([phase_s / phase.seconds, fill(_("%(time)s left in this part"), { time: clock(phase.seconds - phase_s) })]);
+  if (phase.seconds)
+    limits.push([
+      phase_s / phase.seconds,
+      fill(_("%(time)s left in this part"), { time: clock(phase.seconds - phase_s) }),
+    ]);
   if (phase.strides) {
     const left = Math.max(0, phase.strides - phase_strides);
-    limits.push([phase_strides / phase.strides, n_("%(count)s step left in this part", "%(count)s steps left in this part", left)]);
+    limits.push([
+      phase_strides / phase.strides,
+      n_("%(count)s step left in this part", "%(count)s steps left in this part", left),
+    ]);
   }
   return limits.sort(([a], [b]) => b - a)[0] ?? [null, ""];
 }
@@ -68,7 +80,12 @@ export function partLeft({ phase, phase_s, phase_strides }) {
 export function spoken(step, session) {
   if (step.kind === "missing") return _("Step not measured.");
   const words = step.words && step.words.replace(/[!.]*$/, ".");
-  if (step.points === null) return [words, step.shown !== null && `${number(step.shown, 2)} ${session.unit}.`].filter(Boolean).join(" ");
-  const change = step.points && fill(step.points > 0 ? _("Plus %(points)s.") : _("Minus %(points)s."), { points: Math.abs(step.points) });
-  return [words, change, n_("%(score)s point.", "%(score)s points.", session.score, { score: count(session.score) })].filter(Boolean).join(" ");
+  if (step.points === null)
+    return [words, step.shown !== null && `${number(step.shown, 2)} ${session.unit}.`].filter(Boolean).join(" ");
+  const change =
+    step.points &&
+    fill(step.points > 0 ? _("Plus %(points)s.") : _("Minus %(points)s."), { points: Math.abs(step.points) });
+  return [words, change, n_("%(score)s point.", "%(score)s points.", session.score, { score: count(session.score) })]
+    .filter(Boolean)
+    .join(" ");
 }
