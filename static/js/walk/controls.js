@@ -1,7 +1,7 @@
 // The page's buttons: start, pause, go on, end (asked twice) and the robot's stop; and where the
 // keyboard's focus goes when a button leaves.
 
-import { _ } from "garry/language";
+import { _ } from "garry/shared/language";
 
 const GUARD_MS = 700; // a question that just appeared takes no answer: a second tap is no yes
 const NOTE_MS = 6_000;

@@ -1,8 +1,8 @@
 // A step in words, emblem and number, and everything else the page says. Draws only what has changed.
 
-import { _, fill, n_, number as decimal } from "garry/language";
-import { isStill } from "garry/walk/motion";
-import { count, partLeft, signed, spoken, timeLeft, wordsFor } from "garry/walk/words";
+import { _, fill, n_, number as decimal } from "garry/shared/language";
+import { isStill } from "garry/walk/reduced_motion";
+import { count, partLeft, signed, spoken, timeLeft, wordsFor } from "garry/walk/text";
 
 const ROLL = { duration: 300, easing: "cubic-bezier(.2, .8, .2, 1)" };
 const SWAP = { duration: 200, easing: "cubic-bezier(.2, .8, .2, 1)" };

@@ -1,6 +1,6 @@
 // Trend of a patient's sessions: hits against what was wanted, mean against goal and baseline.
-import { number } from "garry/language";
-import { color, draw } from "garry/chart";
+import { number } from "garry/shared/language";
+import { color, draw } from "garry/charts/chart";
 
 const LABELED = 14; // more points leave no room for figures
 const read = document.getElementById("trend");

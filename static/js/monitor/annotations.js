@@ -1,7 +1,7 @@
 // What was changed or noted, on the PT's chart: a badge for each kind, and a legend of those that are there.
 
-import { _, number } from "garry/language";
-import { remarkName, typeName } from "garry/names";
+import { _, number } from "garry/shared/language";
+import { remarkName, typeName } from "garry/shared/labels";
 
 const percent = (share) => `${number(100 * share)} %`;
 const LEVELS = { 1: _("normal"), 0.5: _("gentle"), 0: _("off") };

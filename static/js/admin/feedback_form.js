@@ -1,6 +1,6 @@
 // The form of a feedback type: what a patient sees of each band follows every key.
 
-import { showPreview } from "garry/preview";
+import { showPreview } from "garry/admin/form_preview";
 
 const form = document.querySelector("#feedbacktype_form");
 const preview = document.querySelector(".preview");

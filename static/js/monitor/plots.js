@@ -1,9 +1,9 @@
 // Drawings of strides against the goal for the PT: a strip, the last twenty, the share of hits.
 // Shape repeats the meaning of color: hits are solid, misses hollow, missing ones hatched.
 
-import { number } from "garry/language";
-import { badge, isRemark, say } from "garry/marks";
-import { phaseName } from "garry/names";
+import { number } from "garry/shared/language";
+import { badge, isRemark, say } from "garry/monitor/annotations";
+import { phaseName } from "garry/shared/labels";
 
 const LOW = 0.5,
   HIGH = 1.5;

@@ -1,12 +1,12 @@
 // The PT's page: shows what the server says, and asks it for changes. It computes no score.
-import { _, fill, number } from "garry/language";
-import { drawControls, drawTypes } from "garry/controls";
-import { connect } from "garry/live";
-import { legend, say } from "garry/marks";
-import { phaseName, reasonName } from "garry/names";
-import { quality } from "garry/presence";
-import { drawStrip, drawTwenty, drawRing } from "garry/plots";
-import { RobotPanel } from "garry/robot";
+import { _, fill, number } from "garry/shared/language";
+import { drawControls, drawTypes } from "garry/monitor/controls";
+import { connect } from "garry/shared/session_socket";
+import { legend, say } from "garry/monitor/annotations";
+import { phaseName, reasonName } from "garry/shared/labels";
+import { quality } from "garry/monitor/connections";
+import { drawStrip, drawTwenty, drawRing } from "garry/monitor/plots";
+import { RobotPanel } from "garry/monitor/robot";
 
 const root = document.getElementById("monitor");
 const slots = new Map([...document.querySelectorAll("[data-show]")].map((slot) => [slot.dataset.show, slot]));

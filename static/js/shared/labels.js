@@ -1,6 +1,6 @@
 // What the server says by name, in the page's language: feedback types, parts of a session, reasons,
 // what a therapist notes. A name that nobody translated stays as it is.
-import { _ } from "garry/language";
+import { _ } from "garry/shared/language";
 
 const TYPES = { positive: _("Positive"), negative: _("Negative"), binary: _("Binary"), explicit: _("Explicit") };
 const PHASES = {

@@ -9,8 +9,8 @@
 // onLink(state, why): "open", "lost" (it will come back by itself) or "closed" (it will not; why
 //   says so in words).
 
-import { _ } from "garry/language";
-import { refusal } from "garry/names";
+import { _ } from "garry/shared/language";
+import { refusal } from "garry/shared/labels";
 
 const SILENCE_MS = 12_000; // the server says something every 5 s
 const DOUBT_MS = 6_000; // after which an old socket is not trusted when the tablet wakes up

@@ -1,7 +1,7 @@
 // The form that a leaderboard is built in: hides what does not apply, keeps choices that go together
 // together, and shows the board as it would look after each change.
 
-import { showPreview } from "garry/preview";
+import { showPreview } from "garry/admin/form_preview";
 
 const SUMS = ["steps", "score", "active_minutes", "attended", "target_met"];
 const COUNTED = ["attended", "target_met"];

@@ -1,7 +1,7 @@
 // A form that the browser's passkeys fill in: [data-passkey] has what the server asks, data-how says
 // whether one is made ("create") or used ("get").
 
-import { _ } from "garry/language";
+import { _ } from "garry/shared/language";
 
 const READ = {
   create: (asked) => PublicKeyCredential.parseCreationOptionsFromJSON(asked),

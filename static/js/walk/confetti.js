@@ -1,7 +1,7 @@
 // Confetti: one burst at a time, behind everything, so only ever in the sky.
 
 import { create } from "canvas-confetti";
-import { isStill } from "garry/walk/motion";
+import { isStill } from "garry/walk/reduced_motion";
 
 const REST_MS = 3_000;
 const PIECES = { little: 26, much: 44, most: 64 };

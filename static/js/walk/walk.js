@@ -1,14 +1,14 @@
 // The patient's page: what the socket says goes into the session, and once a frame onto the screen.
 
-import { fillScreen, keepAwake } from "garry/walk/awake";
-import { createCelebration } from "garry/celebration";
+import { fillScreen, keepAwake } from "garry/walk/wake_lock";
+import { createCelebration } from "garry/walk/confetti";
 import { createControls } from "garry/walk/controls";
 import { createFeedback } from "garry/walk/feedback";
-import { createFitting } from "garry/walk/fitting";
-import { guardLeaving } from "garry/walk/leaving";
-import { connect } from "garry/live";
-import { createScene } from "garry/scene";
-import { apply, begin, look } from "garry/walk/model";
+import { createFitting } from "garry/walk/fit_text";
+import { guardLeaving } from "garry/walk/leave_guard";
+import { connect } from "garry/shared/session_socket";
+import { createScene } from "garry/walk/scene";
+import { apply, begin, look } from "garry/walk/state";
 import { createSounds } from "garry/walk/sounds";
 
 const PATIENCE_MS = 2_000; // a shorter break of the connection is not worth a word

@@ -1,7 +1,7 @@
 // Nobody leaves a patient's page by accident: going back, leaving the full screen or the way out ask
 // first, for the station's PIN where it has one. The dialog is not modal, so that Pause and End stay.
 
-import { _ } from "garry/language";
+import { _ } from "garry/shared/language";
 
 const PATIENCE_MS = 30_000; // a question that nobody answers goes away
 

@@ -1,7 +1,7 @@
 // One session: every stride against the goal, phases behind it, what was changed above it.
-import { _, fill, number } from "garry/language";
-import { reasonName } from "garry/names";
-import { color, draw, paths } from "garry/chart";
+import { _, fill, number } from "garry/shared/language";
+import { reasonName } from "garry/shared/labels";
+import { color, draw, paths } from "garry/charts/chart";
 
 const read = document.getElementById("session");
 const { strides, phases, marks: changes, unit } = read ? JSON.parse(read.textContent) : {};

@@ -1,6 +1,6 @@
 // The robot on the PT's page: where it is, what it does, why it did or did not move, and its stop.
 
-import { _, fill, number } from "garry/language";
+import { _, fill, number } from "garry/shared/language";
 
 const KEPT = 240; // positions of the trail
 const ANSWER_MS = 2_000; // after which a link that nobody has closed is not believed

@@ -1,7 +1,7 @@
 // The landscape: horizon, thermometer and figures. Everything is drawn once for each orientation and
 // then only moved, so a step costs a handful of attributes.
 
-import { createDots } from "garry/walk/dots";
+import { createDots } from "garry/walk/stride_dots";
 
 const TOP = 1.5; // the scale's end; the goal is always at two thirds of it
 const HALF = 68;

@@ -1,6 +1,6 @@
 // The latest strides on the thermometer's own scale: a disc at or above the goal, a ring below, a gap
 // where nothing was measured. The newest is larger and points to the level.
-import { isStill } from "garry/walk/motion";
+import { isStill } from "garry/walk/reduced_motion";
 
 const SHOWN = 14;
 const FLOOR = 0.5; // lower ones sit here, so that they never run into the number

@@ -1,7 +1,7 @@
 // A tablet that waits shows the clinic's boards, each for a while, as they are at that moment: who no
 // longer agrees is gone with the next look.
 
-import { guardLeaving } from "garry/walk/leaving";
+import { guardLeaving } from "garry/walk/leave_guard";
 
 const EVERY_MS = 5_000;
 const place = document.querySelector("[data-boards]");

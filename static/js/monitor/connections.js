@@ -1,6 +1,6 @@
 // How well sensor, tablet and robot are heard, in words and a sign before them: ✓ well, ! look, – not there.
 
-import { _, fill } from "garry/language";
+import { _, fill } from "garry/shared/language";
 
 const SILENT_S = { stride: 5, tablet: 12 };
 const ENOUGH = 0.8; // valid strides among the last 20; fewer and the goal is met by chance

@@ -1,7 +1,7 @@
 // What a PT steers with, drawn as the session stands: nothing is shown as changed before the server has it.
 
-import { _, fill, number } from "garry/language";
-import { phaseName, typeName } from "garry/names";
+import { _, fill, number } from "garry/shared/language";
+import { phaseName, typeName } from "garry/shared/labels";
 
 const GAINS = [0.85, 0.9, 0.95, 1];
 const percent = (share) => `${number(100 * share)} %`;

@@ -1,6 +1,6 @@
 // The page's own words and number formats. What a step means comes in the server's words.
 
-import { _, fill, n_, number } from "garry/language";
+import { _, fill, n_, number } from "garry/shared/language";
 
 const SAFE = _("Your score is safe.");
 
