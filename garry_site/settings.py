@@ -100,11 +100,11 @@ MIDDLEWARE = [
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",
     "django.contrib.auth.middleware.AuthenticationMiddleware",
-    "rehab.people.entry.EntryMiddleware",
+    "rehab.people.sign_in.flow.EntryMiddleware",
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "rehab.stations.tablets.TabletMiddleware",
-    "rehab.people.language.LanguageMiddleware",
+    "rehab.people.web.language.LanguageMiddleware",
     "rehab.people.access.AccessMiddleware",
     "axes.middleware.AxesMiddleware",
 ]
@@ -192,11 +192,11 @@ AUTH_PASSWORD_VALIDATORS = [
 ]
 AUTHENTICATION_BACKENDS = [
     "axes.backends.AxesStandaloneBackend",  # first: who has guessed too often is not even asked
-    "rehab.people.backends.PasswordBackend",
-    "rehab.people.backends.CodeBackend",
+    "rehab.people.sign_in.backends.PasswordBackend",
+    "rehab.people.sign_in.backends.CodeBackend",
 ]
 LOGIN_URL = "sign-in"
-SESSION_ENGINE = "rehab.people.browser_sessions"
+SESSION_ENGINE = "rehab.people.sign_in.browser_sessions"
 SESSION_COOKIE_AGE = 12 * 3600  # one working day, however busy
 SESSION_COOKIE_SAMESITE = "Lax"
 SESSION_MINUTES = number(
@@ -214,14 +214,14 @@ PROXIES = number(
     high=9,
 )
 
-# Wrong passwords and codes: rehab.people.lockout says what counts together.
+# Wrong passwords and codes: rehab.people.sign_in.lockout says what counts together.
 AXES_FAILURE_LIMIT = 5
 AXES_COOLOFF_TIME = timedelta(minutes=15)
 AXES_RESET_COOL_OFF_ON_FAILURE_DURING_LOCKOUT = False  # so that the wait that we tell is true
-AXES_LOCKOUT_PARAMETERS = "rehab.people.lockout.counted_by"
-AXES_USERNAME_CALLABLE = "rehab.people.lockout.counted_name"
-AXES_CLIENT_IP_CALLABLE = "rehab.people.lockout.client_address"
-AXES_LOCKOUT_CALLABLE = "rehab.people.lockout.answer"
+AXES_LOCKOUT_PARAMETERS = "rehab.people.sign_in.lockout.counted_by"
+AXES_USERNAME_CALLABLE = "rehab.people.sign_in.lockout.counted_name"
+AXES_CLIENT_IP_CALLABLE = "rehab.people.sign_in.lockout.client_address"
+AXES_LOCKOUT_CALLABLE = "rehab.people.sign_in.lockout.answer"
 AXES_SENSITIVE_PARAMETERS = [
     *("username", "ip_address"),
     *("code", "passkey", "old_password", "new_password1", "new_password2", "csrfmiddlewaretoken"),

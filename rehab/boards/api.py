@@ -12,8 +12,8 @@ from ninja import Path, Query, Router, Schema
 from rehab.boards.models import Leaderboard
 from rehab.boards.showing import Shown, Viewer, show_after
 from rehab.people.access import for_roles
-from rehab.people.api_base import Key, Page, Paging, answers, caller, cut
 from rehab.people.roles import Role
+from rehab.people.web.api_base import Key, Page, Paging, answers, caller, cut
 from rehab.sessions.models import TrainingSession
 
 router = Router(tags=["Boards"])

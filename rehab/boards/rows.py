@@ -14,8 +14,8 @@ from rehab.boards.figures import SHARES, standing_on
 from rehab.boards.models import Leaderboard
 from rehab.people.aliases import say_alias
 from rehab.people.models import Clinic
+from rehab.sessions.formatting import SPACE, at_clinic, say_day, say_duration, say_number
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.words import SPACE, at_clinic, say_day, say_duration, say_number
 from rehab.training.metrics import METRICS
 
 UNITS = {"%", "min"}  # what is said beside a figure; the board's own name says the others

@@ -16,12 +16,12 @@ from rehab.boards.ranking import By, Entry, cut, rank, ranking_of, read_figures
 from rehab.boards.rows import Row, date_rows, share
 from rehab.boards.showing import Shown, show_after, show_waiting
 from rehab.people.access import actor_of, for_roles
-from rehab.people.consent import Purpose, withdraw
-from rehab.people.language import speak_to
+from rehab.people.consent.models import Purpose, withdraw
 from rehab.people.models import User
 from rehab.people.roles import Role
+from rehab.people.web.language import speak_to
+from rehab.sessions.formatting import SPACE, say_number
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.words import SPACE, say_number
 from rehab.training.changes import OPEN, State
 
 SHOWN_S = 20  # a board on a tablet that waits, before the next one

@@ -20,16 +20,16 @@ from django.utils.html import format_html
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people import factors, lockout
 from rehab.people.access import person
-from rehab.people.admin_base import RowAdmin, ScopedAdmin, ScopedOptions, TokenAdmin, rights
 from rehab.people.aliases import say_alias
-from rehab.people.audit import Act, note_safety
-from rehab.people.lockout import client_address
+from rehab.people.audit.audit_log import Act, note_safety
 from rehab.people.models import Clinic, Patient, User
+from rehab.people.networks import client_address
+from rehab.people.pages.sign_in import sign_out
 from rehab.people.roles import Role
-from rehab.people.tokens import ApiToken
-from rehab.people.views.sign_in import sign_out
+from rehab.people.sign_in import factors, lockout
+from rehab.people.sign_in.tokens import ApiToken
+from rehab.people.web.admin_base import RowAdmin, ScopedAdmin, ScopedOptions, TokenAdmin, rights
 
 admin.site.site_header = "GARRY"
 admin.site.site_title = "GARRY"

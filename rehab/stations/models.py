@@ -9,7 +9,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
-from rehab.people.tokens import TokenRow, find_holder
+from rehab.people.sign_in.tokens import TokenRow, find_holder
 
 
 class Station(ClinicRow):

@@ -43,11 +43,11 @@ def fill(count: int) -> None:
     from django.db import connection
 
     from rehab.boards.models import Leaderboard
-    from rehab.people.consent import Consent
+    from rehab.people.consent.models import Consent
     from rehab.people.models import Clinic, Patient
     from rehab.sessions.models import TrainingSession
-    from tests.walks import strides, walk
-    from tests.world import agreeing
+    from tests.support.walks import strides, walk
+    from tests.support.world import agreeing
 
     clinic = Clinic.everywhere.create(name="Large")
     first = agreeing(
@@ -189,7 +189,7 @@ def walk_while_one_is_built(patients: int) -> dict[str, float]:
     from rehab.training.goals import GoalRule
     from rehab.training.phases import make_phase
     from rehab.training.steps import Measurement, Side
-    from tests.world import store
+    from tests.support.world import store
 
     walker = Patient.everywhere.order_by("pk")[0]
     phases = (make_phase("training"),)

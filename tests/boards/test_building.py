@@ -20,8 +20,8 @@ from rehab.boards.showing import show_after, show_waiting
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from tests.walks import strides, walk
-from tests.world import NOW, agreeing
+from tests.support.walks import strides, walk
+from tests.support.world import NOW, agreeing
 
 PEOPLE = 9
 

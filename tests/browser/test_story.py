@@ -13,8 +13,8 @@ from itertools import product
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browsers import SIZES
-from tests.servers import ROOT, Server, clean_environment, serve
+from tests.support.browsers import SIZES
+from tests.support.servers import ROOT, Server, clean_environment, serve
 
 pytestmark = pytest.mark.browser
 
@@ -27,7 +27,7 @@ STRIDES = 10
 PATIENCE_MS = 40_000
 
 SEED = """
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
 from rehab.stations.models import Station
 clinic = first_clinic()

@@ -24,9 +24,9 @@ from rehab.exports import backup, sealed
 from rehab.exports.backup import LEFT_OUT, backed_up, read_lines, write_backup
 from rehab.people.models import Clinic, Patient, User
 from rehab.sessions.log import Step
-from tests.servers import ROOT, clean_environment
-from tests.walks import HIT, MISS, walk
-from tests.world import NOW, build_world
+from tests.support.servers import ROOT, clean_environment
+from tests.support.walks import HIT, MISS, walk
+from tests.support.world import NOW, build_world
 
 pytestmark = pytest.mark.django_db
 
@@ -216,7 +216,7 @@ def test_from_one_machine_to_another(file, tmp_path):
     prepare = (
         "from django.core.management import call_command; call_command('migrate', verbosity=0)"
     )
-    fill = "from tests.world import build_world; build_world('amber')"
+    fill = "from tests.support.world import build_world; build_world('amber')"
     run("old", "shell", "-v0", "-c", f"{prepare}; {fill}")
     assert "1 patients" in run("old", "backup", os.fspath(file))
     assert "1 patients" in run("new", "restore", os.fspath(file))

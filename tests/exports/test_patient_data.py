@@ -23,20 +23,20 @@ from hypothesis import strategies as st
 from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.exports.archive import ZipResponse, write_csv, write_zip
 from rehab.exports.tables import PAGE, STEPS, TABLES, Selection, to_cell
-from rehab.people.audit import Act, AuditEntry
-from rehab.people.consent import Purpose, withdraw
+from rehab.patients.visits import plan_visit
+from rehab.people.audit.audit_log import Act, AuditEntry
+from rehab.people.consent.models import Purpose, withdraw
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.corrections import Part, correct_session
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.visits import plan_visit
 from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
-from tests.archives import body_of, open_archive, rows_of
-from tests.walks import walk
-from tests.world import World, build_world, client_of, mark
+from tests.support.archives import body_of, open_archive, rows_of
+from tests.support.walks import walk
+from tests.support.world import World, build_world, client_of, mark
 
 NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 NAMED = {Patient, User, Station}

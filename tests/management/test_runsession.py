@@ -18,8 +18,8 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import create_session
 from rehab.sources.recording import read_recording
 from rehab.training.goals import GoalRule
-from tests.data import recording
-from tests.world import build_world
+from tests.support.data import recording
+from tests.support.world import build_world
 
 pytestmark = pytest.mark.django_db(transaction=True)  # the writer has its own connection
 

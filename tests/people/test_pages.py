@@ -8,7 +8,7 @@ from django.urls import reverse
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.stations.models import Device, Station, find_device
-from tests.world import World, build_world, client_of, signed_in
+from tests.support.world import World, build_world, client_of, signed_in
 
 pytestmark = pytest.mark.django_db
 

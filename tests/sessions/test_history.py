@@ -13,16 +13,16 @@ from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 
-from rehab.people.consent import Purpose, give
+from rehab.people.consent.models import Purpose, give
 from rehab.people.models import Patient
 from rehab.people.roles import Role
+from rehab.sessions.formatting import at_clinic, say_day, say_duration, say_number, say_rate
 from rehab.sessions.log import RobotEntry, SessionEvent, Step
-from rehab.sessions.trend import SESSIONS, read_trend
-from rehab.sessions.words import at_clinic, say_day, say_duration, say_number, say_rate
+from rehab.sessions.reports.trend import SESSIONS, read_trend
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
-from tests.walks import GOAL, HIT, MISS, RIGHT, Walked, strides, walk
-from tests.world import World, build_world, client_of
+from tests.support.walks import GOAL, HIT, MISS, RIGHT, Walked, strides, walk
+from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -227,7 +227,7 @@ def test_strides_before_the_goal_is_known_are_drawn_unjudged(client, world, pati
     from rehab.sessions.services import create_session
     from rehab.training.goals import GoalRule
     from rehab.training.steps import Measurement, Side
-    from tests.world import NOW, store
+    from tests.support.world import NOW, store
 
     session = create_session(
         patient,

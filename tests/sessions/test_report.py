@@ -7,16 +7,16 @@ import re
 
 import pytest
 
-from rehab.people.consent import Purpose, give
+from rehab.people.consent.models import Purpose, give
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.report import draw_chart, write_report
+from rehab.sessions.reports.report import draw_chart, write_report
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
-from tests.walks import HIT, MISS, RIGHT, Walked, walk
-from tests.world import NOW, World, build_world, client_of
+from tests.support.walks import HIT, MISS, RIGHT, Walked, walk
+from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 

@@ -8,12 +8,12 @@ import pytest
 from django.test import Client
 from django.utils import timezone
 
+from rehab.patients.visits import Progress, Visit, plan_visit, read_today, usual_time
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.visits import Progress, Visit, plan_visit, read_today, usual_time
-from tests.walks import HIT, walk
-from tests.world import NOW, World, build_world, client_of
+from tests.support.walks import HIT, walk
+from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 

@@ -13,8 +13,8 @@ from rehab.sources.recording import read_recording
 from rehab.sources.synthetic import GOOD, walk
 from rehab.training.phases import make_phase
 from rehab.training.steps import Measurement
-from tests.data import recording
 from tests.sources.test_synthetic_walker import SESSION_1, usable
+from tests.support.data import recording
 
 SEEDS = range(20)
 GOAL = GOOD.baseline_w_kg

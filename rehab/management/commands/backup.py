@@ -11,8 +11,8 @@ from django.core.management import BaseCommand, CommandError
 from django.utils import timezone
 
 from rehab.exports.backup import write_backup
-from rehab.people import audit
-from rehab.people.audit import Act
+from rehab.people.audit import audit_log
+from rehab.people.audit.audit_log import Act
 from rehab.people.models import Clinic
 
 PASSPHRASE = "GARRY_BACKUP_PASSPHRASE"  # noqa: S105 (the variable's name)
@@ -56,7 +56,7 @@ class Command(BaseCommand):
         finally:
             new.unlink(missing_ok=True)
         for clinic in Clinic.everywhere.all():
-            audit.note(Act.BACKUP, None, clinic=clinic.pk, about="manage.py backup")
+            audit_log.note(Act.BACKUP, None, clinic=clinic.pk, about="manage.py backup")
         size_mb = file.stat().st_size / 1e6
         self.stdout.write(
             f"{file}: {size_mb:.1f} MB, {counts['rehab.patient']} patients, "

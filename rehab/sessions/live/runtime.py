@@ -21,11 +21,11 @@ from django.utils import timezone
 from rehab.people.models import User
 from rehab.sessions.events import Audience, to_text
 from rehab.sessions.live import owners, sources
-from rehab.sessions.live.admission import find_unwelcome, keep_signed_in
-from rehab.sessions.live.children import Children
+from rehab.sessions.live.audit_queue import Notes
+from rehab.sessions.live.auth import find_unwelcome, keep_signed_in
 from rehab.sessions.live.loading import find_newest_open, load
-from rehab.sessions.live.notes import Notes
 from rehab.sessions.live.session import LiveSession, Stop
+from rehab.sessions.live.supervisor import Children
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Remark
 from rehab.training.changes import (

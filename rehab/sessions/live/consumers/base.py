@@ -12,11 +12,11 @@ from channels.exceptions import StopConsumer
 from channels.generic.websocket import AsyncWebsocketConsumer
 
 from rehab.sessions.events import to_text
-from rehab.sessions.facts import Message
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.admission import Actor
+from rehab.sessions.live.auth import Actor
 from rehab.sessions.live.messages import BadFrame, read_object
 from rehab.sessions.live.session import LiveSession, NotStored
+from rehab.sessions.payloads import Message
 
 log = logging.getLogger(__name__)
 

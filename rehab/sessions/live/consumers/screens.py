@@ -13,14 +13,14 @@ from django.conf import settings
 from django.utils import timezone
 from django.utils.translation import override
 
-from rehab.people.audit import Act
-from rehab.people.language import language_of
+from rehab.people.audit.audit_log import Act
 from rehab.people.models import User
-from rehab.people.refusals import in_words
 from rehab.people.roles import Role
+from rehab.people.web.language import language_of
+from rehab.people.web.refusals import in_words
 from rehab.sessions.events import Audience, history_entry, to_text
-from rehab.sessions.facts import Message
-from rehab.sessions.live.admission import Actor, find_actor, may_open, may_watch
+from rehab.sessions.live.auth import Actor, find_actor, may_open, may_watch
+from rehab.sessions.live.backlog import read_steps
 from rehab.sessions.live.consumers.base import Closing, Socket
 from rehab.sessions.live.hub import Lagged, Unseen, Viewer
 from rehab.sessions.live.messages import (
@@ -33,8 +33,8 @@ from rehab.sessions.live.messages import (
     read_whole,
 )
 from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.past import read_steps
 from rehab.sessions.live.session import LiveSession, NotStored
+from rehab.sessions.payloads import Message
 from rehab.stations.models import Device
 from rehab.training.changes import ChangeKind, PauseReason
 from rehab.training.measures import InvalidSetting
