@@ -1,5 +1,5 @@
-// The form that a leaderboard is built in: hides what does not apply, keeps choices that go together
-// together, and shows the board as it would look after each change.
+// The form of a leaderboard: hides what does not apply, keeps choices consistent, and shows the board as it
+// would be after each change.
 
 import { showPreview } from "garry/admin/form_preview";
 

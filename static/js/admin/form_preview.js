@@ -3,7 +3,7 @@
 const PAUSE_MS = 250; // after the last key, before the frame is drawn again
 const CHANGES = ["input", "change", "formset:added", "formset:removed"]; // Django tells the rows
 
-// `preview` holds the frame, the address that draws it, and how it is looked at (a select).
+// `preview` holds the frame, the address that draws it, and as whom it is seen (a select).
 export function showPreview(form, preview, drawn = () => {}) {
   const frame = preview.querySelector("iframe");
   const eyes = preview.querySelector("select");

@@ -1,4 +1,4 @@
-// The admin's light and dark for the house's colors. No module: it must run before the first paint.
+// The admin's light and dark theme for our colors. Not a module: it must run before the first paint.
 {
   const page = document.documentElement;
   const dark = matchMedia("(prefers-color-scheme: dark)");

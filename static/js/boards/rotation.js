@@ -1,26 +1,26 @@
-// A tablet that waits shows the clinic's boards, each for a while, as they are at that moment: who no
-// longer agrees is gone with the next look.
+// A waiting tablet shows the clinic's boards, each for a while, as they are at that moment: patients who no
+// longer agree are gone with the next request.
 
 import { guardLeaving } from "garry/walk/leave_guard";
 
 const EVERY_MS = 5_000;
-const place = document.querySelector("[data-boards]");
-const calm = document.querySelector(".waits");
+const container = document.querySelector("[data-boards]");
+const idleText = document.querySelector(".waits");
 let shown = "";
 
-async function look() {
+async function showNext() {
   try {
-    const answer = await fetch(place.dataset.boards, { cache: "no-store" });
+    const answer = await fetch(container.dataset.boards, { cache: "no-store" });
     const board = answer.ok ? await answer.text() : "";
-    if (board !== shown) place.innerHTML = board;
+    if (board !== shown) container.innerHTML = board;
     shown = board;
-    place.hidden = !board;
-    calm.hidden = Boolean(board);
+    container.hidden = !board;
+    idleText.hidden = Boolean(board);
   } catch {
-    // tablet.js says that the server cannot be reached
+    // poll.js shows that the server cannot be reached
   }
-  setTimeout(look, EVERY_MS);
+  setTimeout(showNext, EVERY_MS);
 }
 
-if (place) look();
+if (container) showNext();
 guardLeaving(document.querySelector("dialog.leave"));

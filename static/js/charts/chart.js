@@ -1,4 +1,4 @@
-// Charts of the PT's pages: uPlot for axes, scales and cursor, the house's own marks on top of it.
+// Charts of the PT's pages: uPlot for axes, scales and cursor, our own marks on top of it.
 import uPlot from "uplot";
 
 export const paths = uPlot.paths;
@@ -35,7 +35,7 @@ export function draw(element, { data, series, xAxis, yAxis, under, paint, onCurs
   return chart;
 }
 
-// Shapes at places of a chart, in its own values. Shape repeats what color says.
+// Shapes at places of a chart, in its own values. Shape repeats the meaning of color.
 export class Marks {
   constructor(chart) {
     this.chart = chart;
@@ -88,18 +88,18 @@ export class Marks {
     ctx.restore();
   }
 
-  // Text at device pixels; gives its width.
-  text(words, x, y, { size = 14, weight = 500, fill = color("muted"), align = "center" } = {}) {
+  // Draw text at device pixels; return its width.
+  text(content, x, y, { size = 14, weight = 500, fill = color("muted"), align = "center" } = {}) {
     this.ctx.font = `${weight} ${size * this.unit}px ${getComputedStyle(document.body).fontFamily}`;
     this.ctx.fillStyle = fill;
     this.ctx.textAlign = align;
     this.ctx.textBaseline = "alphabetic";
-    this.ctx.fillText(words, x, y);
-    return this.ctx.measureText(words).width;
+    this.ctx.fillText(content, x, y);
+    return this.ctx.measureText(content).width;
   }
 
-  widthOf(words, size = 14) {
+  widthOf(content, size = 14) {
     this.ctx.font = `700 ${size * this.unit}px ${getComputedStyle(document.body).fontFamily}`;
-    return this.ctx.measureText(words).width;
+    return this.ctx.measureText(content).width;
   }
 }

@@ -3,15 +3,15 @@ import { _, fill, number } from "garry/shared/language";
 import { reasonName } from "garry/shared/labels";
 import { color, draw, paths } from "garry/charts/chart";
 
-const read = document.getElementById("session");
-const { strides, phases, marks: changes, unit } = read ? JSON.parse(read.textContent) : {};
-const ROOM_PX = 2; // a stride; with less they are drawn smaller
+const data = document.getElementById("session");
+const { strides, phases, marks: changes, unit } = data ? JSON.parse(data.textContent) : {};
+const DENSE_PX = 2; // a stride; with less they are drawn smaller
 
-function pick(wanted) {
+function valuesOf(wanted) {
   return strides.shown.map((shown, i) => (shown !== null && wanted(strides.hit[i]) ? shown : null));
 }
 
-function verdict(index) {
+function describeVerdict(index) {
   if (strides.shown[index] === null)
     return fill(_("does not count (%(why)s)"), {
       why: strides.why[index] ? strides.why[index].split(", ").map(reasonName).join(", ") : _("no value"),
@@ -20,21 +20,22 @@ function verdict(index) {
   return strides.hit[index] ? _("hit") : _("below the goal");
 }
 
-function figure(value) {
+function formatValue(value) {
   return value === null ? "–" : `${number(value, 2)} ${unit}`;
 }
 
-function readOut(index) {
+function showReadout(index) {
   if (index === null || index === undefined) return;
-  const goal = strides.goal[index] === null ? "" : fill(_(", goal %(goal)s"), { goal: figure(strides.goal[index]) });
+  const goal =
+    strides.goal[index] === null ? "" : fill(_(", goal %(goal)s"), { goal: formatValue(strides.goal[index]) });
   document.querySelector(".readout").textContent = fill(_("Stride %(number)s: %(value)s, %(verdict)s"), {
     number: strides.number[index],
-    value: figure(strides.shown[index]) + goal,
-    verdict: verdict(index),
+    value: formatValue(strides.shown[index]) + goal,
+    verdict: describeVerdict(index),
   });
 }
 
-function points(size, width, stroke, fill) {
+function pointSeries(size, width, stroke, fill) {
   return { paths: () => null, points: { show: true, size, width, stroke, fill, space: 0 } };
 }
 
@@ -55,8 +56,8 @@ function drawPhases(marks) {
   }
 }
 
-// What was changed after one stride stands in one label.
-function together() {
+// Return one label for all that was changed after a stride.
+function groupChanges() {
   const groups = new Map();
   for (const { after, kind, words } of changes) {
     const group = groups.get(after) ?? { after, isGoal: false, words: [] };
@@ -70,7 +71,7 @@ function together() {
 function drawChanges(marks) {
   const { box, unit: pixel } = marks;
   let free = box.left; // labels never run into each other
-  for (const change of together()) {
+  for (const change of groupChanges()) {
     const x = marks.x(change.after + 0.5);
     if (x < box.left || x > box.left + box.width) continue;
     const { isGoal } = change;
@@ -98,20 +99,20 @@ function drawGaps(marks) {
 function drawStrides(element) {
   const seen = [...strides.shown, ...strides.goal].filter((value) => value !== null);
   const top = Math.max(...seen, 0.001) * 1.06;
-  const isDense = element.clientWidth / strides.number.length < ROOM_PX;
+  const isDense = element.clientWidth / strides.number.length < DENSE_PX;
   const [size, width] = isDense ? [5, 1.5] : [8, 2];
   draw(element, {
     data: [
       strides.number,
-      pick((hit) => hit === null),
-      pick((hit) => hit === false),
-      pick((hit) => hit === true),
+      valuesOf((hit) => hit === null),
+      valuesOf((hit) => hit === false),
+      valuesOf((hit) => hit === true),
       strides.goal,
     ],
     series: [
       { paths: () => null, points: { show: false } },
-      points(size, width, color("c-miss"), color("card")),
-      points(size, width, color("c-hit"), color("c-hit")),
+      pointSeries(size, width, color("c-miss"), color("card")),
+      pointSeries(size, width, color("c-hit"), color("c-hit")),
       { stroke: color("c-goal"), width: 2.5, paths: paths.stepped({ align: 1 }), points: { show: false } },
     ],
     scales: { x: { time: false }, y: { range: () => [0, top] } },
@@ -129,20 +130,20 @@ function drawStrides(element) {
       drawGaps(marks);
       drawChanges(marks);
     },
-    onCursor: readOut,
+    onCursor: showReadout,
     yAxis: { values: (_, ticks) => ticks.map((tick) => number(tick, 1)), label: unit, labelSize: 22, space: 44 },
     xAxis: { space: 70 },
   });
 }
 
-function cell(tag, words) {
+function cell(tag, text) {
   const made = document.createElement(tag);
-  made.textContent = words;
+  made.textContent = text;
   return made;
 }
 
-// Thousands of rows are only made for whoever opens them.
-function tabulate(place) {
+// Thousands of rows are only made when somebody opens them.
+function fillTable(place) {
   const table = document.createElement("table");
   const head = table.createTHead().insertRow();
   for (const name of [
@@ -161,7 +162,7 @@ function tabulate(place) {
     const title = cell("th", stride);
     title.scope = "row";
     const value = (column) => (strides[column][index] === null ? "–" : number(strides[column][index], 2));
-    row.append(title, cell("td", value("shown")), cell("td", value("goal")), cell("td", verdict(index)));
+    row.append(title, cell("td", value("shown")), cell("td", value("goal")), cell("td", describeVerdict(index)));
   });
   place.append(table);
 }
@@ -171,6 +172,6 @@ if (strides) {
   const details = document.querySelector("details");
   const place = details.querySelector(".strides");
   details.addEventListener("toggle", () => {
-    if (details.open && !place.hasChildNodes()) tabulate(place);
+    if (details.open && !place.hasChildNodes()) fillTable(place);
   });
 }

@@ -3,8 +3,8 @@ import { number } from "garry/shared/language";
 import { color, draw } from "garry/charts/chart";
 
 const LABELED = 14; // more points leave no room for figures
-const read = document.getElementById("trend");
-const { hits, values } = read ? JSON.parse(read.textContent) : {};
+const data = document.getElementById("trend");
+const { hits, values } = data ? JSON.parse(data.textContent) : {};
 
 function days(labels) {
   return {

@@ -1,5 +1,5 @@
-// What the server says by name, in the page's language: feedback types, parts of a session, reasons,
-// what a therapist notes. A name that nobody translated stays as it is.
+// Labels, in the page's language, of what the server sends by name: feedback types, phases, reasons, remarks.
+// A name without a label stays as it is.
 import { _ } from "garry/shared/language";
 
 const TYPES = { positive: _("Positive"), negative: _("Negative"), binary: _("Binary"), explicit: _("Explicit") };
@@ -55,7 +55,7 @@ const REASONS = {
   no_push_off: _("no push-off"),
 };
 
-// What ends a page's connection or refuses an order, by its code; others come with words of their own.
+// What ends a page's connection or refuses an order, by its code; others come with a text of their own.
 const REFUSALS = {
   sign_in: _("Sign in again, or pair the tablet again."),
   no_session: _("There is no such session for you."),

@@ -1,5 +1,5 @@
-// The page's language: words from its catalog (templates/base.html loads it before any module), and
-// numbers as they are written there. Without the catalog the words are English.
+// The page's language: texts from its catalog (templates/base.html loads it before any module), and
+// numbers as that language writes them. Without the catalog the texts are English.
 //
 //   _("Goal")    n_("%(count)s step", "%(count)s steps", count)    fill(_("Hello, %(name)s."), { name })
 
@@ -9,18 +9,18 @@ const { django } = globalThis;
 
 export const _ = (text) => django?.gettext?.(text) ?? text;
 
-// Picks the form that goes with a count, and puts the count (and `values`) into it.
+// Return the form that goes with a count, with the count (and `values`) in it.
 export const n_ = (one, many, count, values = {}) =>
   fill(django?.ngettext?.(one, many, count) ?? (count === 1 ? one : many), { count, ...values });
 
-// Puts values into the places that a text has for them: %(name)s.
+// Replace the placeholders of a text, %(name)s, by values.
 export function fill(text, values) {
   return text.replace(/%\((\w+)\)s/g, (place, name) => values[name] ?? place);
 }
 
 const formats = new Map();
 
-// Writes a number with so many decimal places (null: those that it has); its minus is a true one.
+// Format a number with so many decimal places (null: those that it has) and a true minus sign.
 export function number(value, places = 0) {
   if (!formats.has(places)) {
     const digits = { minimumFractionDigits: places ?? 0, maximumFractionDigits: places ?? 6 };

@@ -1,18 +1,18 @@
-// The socket of a session's page: keeps itself connected, gives everything once and in order.
+// The socket of a session's page: stays connected, passes everything on once and in order.
 //
-//   const live = connect("/ws/session/7/patient/", { onSnapshot, onSteps, onEvent, onLink });
+//   const socket = connect("/ws/session/7/patient/", { onSnapshot, onSteps, onEvent, onLink });
 //
 // onSnapshot(snapshot): all that the page shows, as of now; after each connection. It replaces what
 //   the page knew: totals come from here and from events, never from counting.
-// onSteps(steps): past steps that this page has not had, oldest first, after a break.
+// onSteps(steps): past steps that this page does not have, oldest first, after a break.
 // onEvent(event): what has just happened.
-// onLink(state, why): "open", "lost" (it will come back by itself) or "closed" (it will not; why
-//   says so in words).
+// onLink(state, reason): "open", "lost" (it comes back by itself) or "closed" (it does not; `reason`
+//   is a text for people).
 
 import { _ } from "garry/shared/language";
 import { refusal } from "garry/shared/labels";
 
-const SILENCE_MS = 12_000; // the server says something every 5 s
+const SILENCE_MS = 12_000; // the server sends something every 5 s
 const DOUBT_MS = 6_000; // after which an old socket is not trusted when the tablet wakes up
 const CONFIRM_MS = 50;
 const ANSWER_MS = 8_000;
@@ -22,43 +22,43 @@ const FINAL = new Set([4001, 4004, 4009, 4400, 4410]); // docs/protocol.md: do n
 const STEPS = new Set(["step", "missing", "calm"]);
 
 export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
-  const waiting = new Map(); // changes that have not been answered
-  let socket, retry, watch, confirming, why;
+  const pending = new Map(); // changes that have not been answered
+  let socket, retryTimer, watchdog, confirmation, closeReason;
   let state = "";
-  let pause = FIRST_PAUSE_MS;
-  let heardAt = 0;
-  let had = null; // the last step that this page was given
-  let until = null; // steps up to here are being given after a break
-  let mark = 0;
+  let retryPause = FIRST_PAUSE_MS;
+  let receivedAt = 0;
+  let lastNumber = null; // the last step that this page has
+  let catchUpTo = null; // steps up to this one are being sent after a break
+  let requests = 0;
 
   function open() {
-    clearTimeout(retry);
+    clearTimeout(retryTimer);
     const url = new URL(path, location.href);
     url.protocol = url.protocol.replace("http", "ws");
-    if (had !== null) url.searchParams.set("after", had);
-    why = null;
-    heardAt = performance.now();
-    const mine = (socket = new WebSocket(url));
-    mine.onmessage = ({ data }) => mine === socket && hear(JSON.parse(data));
-    mine.onclose = ({ code }) => mine === socket && lose(code);
-    clearInterval(watch);
-    watch = setInterval(() => performance.now() - heardAt > SILENCE_MS && drop(), 1_000);
+    if (lastNumber !== null) url.searchParams.set("after", lastNumber);
+    closeReason = null;
+    receivedAt = performance.now();
+    const own = (socket = new WebSocket(url));
+    own.onmessage = ({ data }) => own === socket && receive(JSON.parse(data));
+    own.onclose = ({ code }) => own === socket && handleClose(code);
+    clearInterval(watchdog);
+    watchdog = setInterval(() => performance.now() - receivedAt > SILENCE_MS && drop(), 1_000);
   }
 
-  function hear(message) {
-    heardAt = performance.now();
+  function receive(message) {
+    receivedAt = performance.now();
     switch (message.type) {
       case "snapshot":
-        pause = FIRST_PAUSE_MS;
-        until = message.number;
-        if (had === null || had > until) had = until;
-        link("open");
+        retryPause = FIRST_PAUSE_MS;
+        catchUpTo = message.number;
+        if (lastNumber === null || lastNumber > catchUpTo) lastNumber = catchUpTo;
+        setLink("open");
         onSnapshot?.(message);
         break;
       case "steps": {
-        const missed = message.steps.filter(({ number }) => number > had);
+        const missed = message.steps.filter(({ number }) => number > lastNumber);
         if (missed.length) {
-          had = missed.at(-1).number;
+          lastNumber = missed.at(-1).number;
           onSteps?.(missed);
         }
         break;
@@ -67,39 +67,39 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
         caughtUp();
         for (const event of message.events) {
           if (STEPS.has(event.kind)) {
-            if (event.number <= had) continue;
-            had = event.number;
+            if (event.number <= lastNumber) continue;
+            lastNumber = event.number;
           }
           onEvent?.(event);
         }
         break;
       case "heartbeat":
         caughtUp();
-        confirm(0); // there is a page behind this socket, though it shows nothing new
+        confirm(0); // there is a page behind this socket, though it has nothing new to show
         if (message.presence) onEvent?.({ kind: "presence", presence: message.presence });
         break;
       case "done":
-        answer(message.id);
+        settle(message.id);
         break;
       case "error":
-        why = refusal(message);
-        if (message.id) answer(message.id, new Error(why));
+        closeReason = refusal(message);
+        if (message.id) settle(message.id, new Error(closeReason));
     }
     if (message.frame) confirm(message.frame);
   }
 
   function caughtUp() {
-    had = Math.max(had, until);
+    lastNumber = Math.max(lastNumber, catchUpTo);
   }
 
-  // Confirms the newest frame, at most 20 times a second.
+  // Confirm the newest frame, at most 20 times a second.
   function confirm(frame) {
-    if (confirming) confirming.frame = Math.max(confirming.frame, frame);
+    if (confirmation) confirmation.frame = Math.max(confirmation.frame, frame);
     else {
-      const mine = (confirming = { frame, socket });
+      const own = (confirmation = { frame, socket });
       setTimeout(() => {
-        confirming = null;
-        if (mine.socket === socket) send({ type: "seen", frame: mine.frame });
+        confirmation = null;
+        if (own.socket === socket) send({ type: "seen", frame: own.frame });
       }, CONFIRM_MS);
     }
   }
@@ -110,44 +110,47 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
     return true;
   }
 
-  function answer(id, problem) {
-    const { resolve, reject, timer } = waiting.get(id) ?? {};
-    waiting.delete(id);
+  function settle(id, problem) {
+    const { resolve, reject, timer } = pending.get(id) ?? {};
+    pending.delete(id);
     clearTimeout(timer);
     if (problem) reject?.(problem);
     else resolve?.();
   }
 
-  function lose(code) {
+  function handleClose(code) {
     socket = null;
-    confirming = null;
-    clearInterval(watch);
-    for (const id of [...waiting.keys()]) answer(id, new Error(_("The connection was lost. Try again.")));
+    confirmation = null;
+    clearInterval(watchdog);
+    for (const id of [...pending.keys()]) settle(id, new Error(_("The connection was lost. Try again.")));
     if (FINAL.has(code)) {
-      link("closed", why ?? _("The connection has ended."));
+      setLink("closed", closeReason ?? _("The connection has ended."));
       return;
     }
-    link("lost", why);
-    retry = setTimeout(open, pause * (0.75 + Math.random() / 2));
-    pause = Math.min(2 * pause, LONGEST_PAUSE_MS);
+    setLink("lost", closeReason);
+    retryTimer = setTimeout(open, retryPause * (0.75 + Math.random() / 2));
+    retryPause = Math.min(2 * retryPause, LONGEST_PAUSE_MS);
   }
 
-  // Gives up a socket that may be dead; its own goodbye would take too long.
+  // Give up a socket that may be dead; closing it properly would take too long.
   function drop() {
     const old = socket;
-    lose(1006);
+    handleClose(1006);
     old?.close();
   }
 
-  function link(next, reason) {
-    if (next !== state || next === "closed") onLink?.((state = next), reason);
+  function setLink(next, reason) {
+    if (next !== state || next === "closed") {
+      state = next;
+      onLink?.(state, reason);
+    }
   }
 
-  function wake() {
+  function reconnectIfStale() {
     if (state === "closed" || document.hidden) return;
-    if (socket && performance.now() - heardAt < DOUBT_MS) return;
+    if (socket && performance.now() - receivedAt < DOUBT_MS) return;
     if (socket) drop();
-    pause = FIRST_PAUSE_MS;
+    retryPause = FIRST_PAUSE_MS;
     open();
   }
 
@@ -155,32 +158,32 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
     const old = socket;
     socket = null;
     state = "closed";
-    clearTimeout(retry);
-    clearInterval(watch);
-    removeEventListener("online", wake);
-    document.removeEventListener("visibilitychange", wake);
+    clearTimeout(retryTimer);
+    clearInterval(watchdog);
+    removeEventListener("online", reconnectIfStale);
+    document.removeEventListener("visibilitychange", reconnectIfStale);
     old?.close();
   }
 
-  // Asks for a change; done when the server has stored it, rejected with its reason where not.
+  // Ask for a change; resolves when the server has stored it, rejects with the reason otherwise.
   const change = (kind, value) => ask({ type: "change", kind, ...(value === undefined ? {} : { value }) });
 
-  // Asks for anything that is answered.
+  // Send a message that the server answers.
   function ask(message) {
     return new Promise((resolve, reject) => {
-      const id = `c${++mark}`;
+      const id = `c${++requests}`;
       const request = { ...message, id };
       if (!send(request)) {
         reject(new Error(_("There is no connection. Try again in a moment.")));
         return;
       }
-      const late = () => answer(id, new Error(_("No answer. Try again.")));
-      waiting.set(id, { resolve, reject, timer: setTimeout(late, ANSWER_MS) });
+      const late = () => settle(id, new Error(_("No answer. Try again.")));
+      pending.set(id, { resolve, reject, timer: setTimeout(late, ANSWER_MS) });
     });
   }
 
-  addEventListener("online", wake);
-  document.addEventListener("visibilitychange", wake);
+  addEventListener("online", reconnectIfStale);
+  document.addEventListener("visibilitychange", reconnectIfStale);
   open();
-  return { change, ask, say: send, close };
+  return { change, ask, send, close };
 }

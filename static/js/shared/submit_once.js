@@ -1,4 +1,4 @@
-// A form is sent once: a second tap on a slow network does nothing. Going back makes it new.
+// A form is sent once: a second tap on a slow network does nothing. Going back allows it again.
 
 document.addEventListener("submit", (event) => {
   const form = event.target;

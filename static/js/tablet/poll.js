@@ -1,4 +1,4 @@
-// A tablet asks where to go: to its code's approval, to its station's next session.
+// A waiting tablet asks the server where to go: on once its code is approved, to its station's next session.
 
 const EVERY_MS = 2_000;
 const note = document.querySelector(".note");

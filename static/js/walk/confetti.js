@@ -20,8 +20,8 @@ export function createCelebration(canvas) {
 
   const clear = () => burst.reset();
 
-  // Sets as much free as the step's band says, in the theme's colors, but nothing within 3 s of the
-  // last. Says whether it did.
+  // Start a burst of the amount that the step's band has, in the theme's colors, but not within 3 s of the
+  // last one. Return whether it did.
   function celebrate(amount) {
     const now = performance.now();
     if (!PIECES[amount] || isStill() || document.hidden || now - last < REST_MS) return false;

@@ -1,11 +1,11 @@
-// On a calm page large words take the room above the figure, and shrink where they need more.
+// On a calm screen large text takes the room above the figure, and shrinks where it needs more.
 
-const SIZES = 4; // as patient.css has them for data-fit
+const SIZES = 4; // as walk.css has them for data-fit
 
 export function createFitting(body) {
   const phrase = body.querySelector(".phrase");
   const [words, sub] = [phrase.querySelector(".words"), phrase.querySelector(".sub")];
-  const sizes = new Map(); // of words that were measured before
+  const sizes = new Map(); // of texts that were fitted before
   addEventListener("resize", () => sizes.clear());
 
   const overflows = () => phrase.scrollHeight > phrase.clientHeight + 2 || phrase.scrollWidth > phrase.clientWidth + 2;

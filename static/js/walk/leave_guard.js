@@ -1,40 +1,40 @@
-// Nobody leaves a patient's page by accident: going back, leaving the full screen or the way out ask
+// Nobody leaves a patient's page by accident: going back, leaving the full screen and the Leave button ask
 // first, for the station's PIN where it has one. The dialog is not modal, so that Pause and End stay.
 
 import { _ } from "garry/shared/language";
 
-const PATIENCE_MS = 30_000; // a question that nobody answers goes away
+const OPEN_MS = 30_000; // after which an unanswered question closes
 
 export function guardLeaving(dialog) {
   const form = dialog.querySelector("form");
   const wrong = dialog.querySelector(".wrong");
   const pin = form.elements.pin;
-  let timer, left, before;
+  let timer, hasLeft, focusedBefore;
 
   // An entry of the history to go back to; browsers pass over those that were made before a touch.
-  const trap = () => history.pushState({ stays: true }, "");
+  const addHistoryEntry = () => history.pushState({ stays: true }, "");
 
   function ask() {
-    if (left) return;
+    if (hasLeft) return;
     if (!dialog.open) {
-      before = document.activeElement;
+      focusedBefore = document.activeElement;
       form.reset();
       wrong.textContent = "";
       dialog.show();
     }
     (pin ?? dialog.querySelector("[data-stay]")).focus();
-    wait();
+    restartTimer();
   }
 
   function stay() {
     clearTimeout(timer);
     dialog.close();
-    if (before?.checkVisibility()) before.focus();
+    if (focusedBefore?.checkVisibility()) focusedBefore.focus();
   }
 
-  function wait() {
+  function restartTimer() {
     clearTimeout(timer);
-    timer = setTimeout(stay, PATIENCE_MS);
+    timer = setTimeout(stay, OPEN_MS);
   }
 
   async function answer(event) {
@@ -45,9 +45,9 @@ export function guardLeaving(dialog) {
     const given = new FormData(form, event.submitter);
     try {
       const response = await fetch(form.action, { method: "POST", body: given });
-      const said = await response.json();
-      if (response.ok) return leave(unpairs || !go ? said.go : go);
-      wrong.textContent = said.message;
+      const answered = await response.json();
+      if (response.ok) return leave(unpairs || !go ? answered.go : go);
+      wrong.textContent = answered.message;
     } catch {
       wrong.textContent = _("No connection. Try again.");
     }
@@ -55,26 +55,26 @@ export function guardLeaving(dialog) {
       pin.value = "";
       pin.focus();
     }
-    wait();
+    restartTimer();
   }
 
   async function leave(go) {
-    left = true;
+    hasLeft = true;
     if (document.fullscreenElement) await document.exitFullscreen().catch(() => {});
     location.replace(go);
   }
 
-  trap();
-  for (const touch of ["pointerup", "keydown"]) document.addEventListener(touch, trap, { once: true });
+  addHistoryEntry();
+  for (const touch of ["pointerup", "keydown"]) document.addEventListener(touch, addHistoryEntry, { once: true });
   addEventListener("popstate", () => {
-    if (left) return;
-    trap();
+    if (hasLeft) return;
+    addHistoryEntry();
     ask();
   });
   document.addEventListener("fullscreenchange", () => document.fullscreenElement || ask());
   document.addEventListener("click", ({ target }) => target.closest("[data-leave]") && ask());
   dialog.querySelector("[data-stay]").addEventListener("click", stay);
   dialog.addEventListener("keydown", (event) => event.key === "Escape" && stay());
-  dialog.addEventListener("input", wait);
+  dialog.addEventListener("input", restartTimer);
   form.addEventListener("submit", answer);
 }

@@ -1,4 +1,4 @@
-// Whether nothing may move: the device says so, or the patient's own settings.
+// Whether nothing may move: by the device's setting, or by the patient's own.
 
 const reduced = matchMedia("(prefers-reduced-motion: reduce)");
 

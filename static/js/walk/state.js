@@ -1,20 +1,19 @@
-// What the patient's page knows: the server's snapshot, kept current by its events. Nothing is counted
-// here. `look` says which of the page's pictures that is.
+// What the patient's page knows: the server's snapshot, kept current by its events. Nothing is counted here.
 
-const KEPT = 60; // strides, as many as a snapshot has
+const KEPT_STRIDES = 60; // as many as a snapshot has
 const TOTALS = ["number", "score", "streak", "active_s", "phase_s", "phase_strides", "has_points", "chart"];
 
-export function begin(snapshot) {
+export function fromSnapshot(snapshot) {
   const last = snapshot.last?.kind === "calm" ? null : snapshot.last;
   return { ...snapshot, last };
 }
 
-export function apply(session, event) {
+export function applyEvent(session, event) {
   for (const name of TOTALS) if (name in event) session[name] = event[name];
   switch (event.kind) {
     case "step":
     case "missing":
-      session.steps = [...session.steps, { performance: null, ...event }].slice(-KEPT);
+      session.steps = [...session.steps, { performance: null, ...event }].slice(-KEPT_STRIDES);
       // What came late alters totals and strides, nothing else. Steps of a pause are not shown at all.
       if (event.live && session.state === "running") session.last = event;
       break;
@@ -37,9 +36,9 @@ export function apply(session, event) {
   }
 }
 
-// `page` is what only the page knows: its link ("open", "lost", "closed"), whether it is `asking`
-// if the session shall end, and whether no step has come for a while (`still`).
-export function look(session, page) {
+// Return which screen to show. `page` is what only the page knows: its link ("open", "lost", "closed"),
+// whether it is `asking` to end the session, and whether no step has come for a while (`still`).
+export function screenOf(session, page) {
   if (page.link === "closed") return "closed";
   if (!session) return page.link === "lost" ? "offline" : "connecting";
   if (session.state === "finished" || session.state === "aborted") return "ended";

@@ -1,27 +1,28 @@
 // The latest strides on the thermometer's own scale: a disc at or above the goal, a ring below, a gap
 // where nothing was measured. The newest is larger and points to the level.
+import { append } from "garry/shared/svg";
 import { isStill } from "garry/walk/reduced_motion";
 
 const SHOWN = 14;
-const FLOOR = 0.5; // lower ones sit here, so that they never run into the number
+const LOWEST = 0.5; // lower ones sit here, so that they never run into the number
 const SHIFT = { duration: 260, easing: "cubic-bezier(.2, .8, .2, 1)" };
 
 export function createDots(svg) {
   const [trace, halo, lead, group] = [".trace", ".halo", ".lead", ".dots"].map((name) => svg.querySelector(name));
   const strides = svg.querySelector(".strides");
   const dots = Array.from({ length: SHOWN }, (_, i) => {
-    const dot = group.appendChild(document.createElementNS(svg.namespaceURI, "circle"));
+    const dot = append(group, "circle");
     dot.setAttribute("r", i === SHOWN - 1 ? 17 : 11);
     return dot;
   });
-  let place, newest;
+  let layout, newest;
 
-  function lay({ chart: [left, right], end, y }) {
-    place = { left, right, end, y, step: (right - left) / (SHOWN - 1) };
-    dots.forEach((dot, i) => dot.setAttribute("cx", left + i * place.step));
+  function layOut({ chart: [left, right], end, y }) {
+    layout = { left, right, end, y, step: (right - left) / (SHOWN - 1) };
+    dots.forEach((dot, i) => dot.setAttribute("cx", left + i * layout.step));
   }
 
-  // Draws entries { number, performance, hit }, oldest first.
+  // Draw strides { number, performance, hit }, oldest first.
   function draw(entries) {
     const recent = entries.slice(-SHOWN);
     const first = SHOWN - recent.length;
@@ -32,11 +33,11 @@ export function createDots(svg) {
       const gap = performance === null;
       dot.classList.toggle("gap", gap);
       if (!gap) {
-        const y = place.y(Math.max(performance, FLOOR)).toFixed(1);
+        const y = layout.y(Math.max(performance, LOWEST)).toFixed(1);
         dot.setAttribute("cy", y);
         dot.classList.toggle("hit", hit);
-        line += `${joined ? "L" : "M"}${place.left + i * place.step} ${y}`;
-        if (i === SHOWN - 1) lead.setAttribute("d", `M${place.right + 20} ${y}H${place.end}`);
+        line += `${joined ? "L" : "M"}${layout.left + i * layout.step} ${y}`;
+        if (i === SHOWN - 1) lead.setAttribute("d", `M${layout.right + 20} ${y}H${layout.end}`);
       }
       joined = !gap;
     });
@@ -45,10 +46,10 @@ export function createDots(svg) {
     const last = recent.at(-1);
     if ((last?.performance ?? null) === null) lead.setAttribute("d", "");
     if (newest !== undefined && last && last.number > newest && !isStill()) {
-      strides.animate([{ transform: `translateX(${place.step}px)` }, { transform: "none" }], SHIFT);
+      strides.animate([{ transform: `translateX(${layout.step}px)` }, { transform: "none" }], SHIFT);
     }
     newest = last?.number ?? 0;
   }
 
-  return { lay, draw };
+  return { layOut, draw };
 }

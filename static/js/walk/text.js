@@ -1,13 +1,14 @@
-// The page's own words and number formats. What a step means comes in the server's words.
+// The page's own texts. What a step means comes as text from the server.
 
+import { clock } from "garry/shared/format";
 import { _, fill, n_, number } from "garry/shared/language";
 
 const SAFE = _("Your score is safe.");
 
-// Words for everything that is not a step: [the phrase, the line below it].
-export function wordsFor(look, session, name, why) {
+// Return what a screen without a step says: [the phrase, the line below it]. `reason`: why the connection ended.
+export function messageFor(screen, session, name, reason) {
   const safe = session?.has_points === false ? "" : SAFE;
-  switch (look) {
+  switch (screen) {
     case "ready":
       return [
         fill(_("Hello, %(name)s."), { name }),
@@ -34,37 +35,29 @@ export function wordsFor(look, session, name, why) {
     case "ended":
       return [_("This session has ended."), _("Your scores come next.")];
     case "closed":
-      return [_("This screen has stopped."), why];
+      return [_("This screen has stopped."), reason];
   }
   return ["", ""];
 }
 
-export const signed = (points) => (points < 0 ? `−${-points}` : `+${points}`);
-
-// "−34"; an en dash in place of a hyphen would be narrower than the figures.
-export const count = (points) => number(points);
-
-export const clock = (seconds) => {
-  const whole = Math.max(0, Math.ceil(seconds));
-  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
-};
+const timer = (seconds) => clock(Math.max(0, Math.ceil(seconds)));
 
 export function timeLeft(session) {
   const planned = session.target.duration_s;
-  if (session.state === "ready") return planned ? fill(_("%(time)s to walk"), { time: clock(planned) }) : "";
-  if (!planned) return fill(_("%(time)s walked"), { time: clock(session.active_s) });
+  if (session.state === "ready") return planned ? fill(_("%(time)s to walk"), { time: timer(planned) }) : "";
+  if (!planned) return fill(_("%(time)s walked"), { time: timer(session.active_s) });
   return session.active_s < planned
-    ? fill(_("%(time)s left"), { time: clock(planned - session.active_s) })
+    ? fill(_("%(time)s left"), { time: timer(planned - session.active_s) })
     : _("Time reached");
 }
 
-// How much of the phase is done (0 to 1; null where it has no end) and what is left, in words.
-export function partLeft({ phase, phase_s, phase_strides }) {
+// Return how much of the phase is done (0 to 1; null where it has no end), and a text of what is left.
+export function phaseLeft({ phase, phase_s, phase_strides }) {
   const limits = [];
   if (phase.seconds)
     limits.push([
       phase_s / phase.seconds,
-      fill(_("%(time)s left in this part"), { time: clock(phase.seconds - phase_s) }),
+      fill(_("%(time)s left in this part"), { time: timer(phase.seconds - phase_s) }),
     ]);
   if (phase.strides) {
     const left = Math.max(0, phase.strides - phase_strides);
@@ -76,8 +69,8 @@ export function partLeft({ phase, phase_s, phase_strides }) {
   return limits.sort(([a], [b]) => b - a)[0] ?? [null, ""];
 }
 
-// One line for screen readers: "Strong push. Plus 2. 128 points."
-export function spoken(step, session) {
+// Return one line for screen readers: "Strong push. Plus 2. 128 points."
+export function describeStep(step, session) {
   if (step.kind === "missing") return _("Step not measured.");
   const words = step.words && step.words.replace(/[!.]*$/, ".");
   if (step.points === null)
@@ -85,7 +78,7 @@ export function spoken(step, session) {
   const change =
     step.points &&
     fill(step.points > 0 ? _("Plus %(points)s.") : _("Minus %(points)s."), { points: Math.abs(step.points) });
-  return [words, change, n_("%(score)s point.", "%(score)s points.", session.score, { score: count(session.score) })]
+  return [words, change, n_("%(score)s point.", "%(score)s points.", session.score, { score: number(session.score) })]
     .filter(Boolean)
     .join(" ");
 }

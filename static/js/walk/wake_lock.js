@@ -1,4 +1,4 @@
-// Keeps the tablet's screen on while the page is looked at, where the browser can.
+// Keep the tablet's screen on while the page is visible, where the browser can.
 
 export async function keepAwake() {
   const hold = () => !document.hidden && navigator.wakeLock?.request("screen").catch(() => {});

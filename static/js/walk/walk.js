@@ -1,4 +1,4 @@
-// The patient's page: what the socket says goes into the session, and once a frame onto the screen.
+// The patient's page: what the socket sends goes into the session, and once a frame onto the screen.
 
 import { fillScreen, keepAwake } from "garry/walk/wake_lock";
 import { createCelebration } from "garry/walk/confetti";
@@ -8,60 +8,60 @@ import { createFitting } from "garry/walk/fit_text";
 import { guardLeaving } from "garry/walk/leave_guard";
 import { connect } from "garry/shared/session_socket";
 import { createScene } from "garry/walk/scene";
-import { apply, begin, look } from "garry/walk/state";
+import { applyEvent, fromSnapshot, screenOf } from "garry/walk/state";
 import { createSounds } from "garry/walk/sounds";
 
-const PATIENCE_MS = 2_000; // a shorter break of the connection is not worth a word
-const STILL_MS = 10_000; // after so long without a step the last one is no longer shown as now
+const PATIENCE_MS = 2_000; // a shorter break of the connection is not shown
+const STILL_MS = 10_000; // after so long without a step the last one is no longer shown as current
 const LEAVE_MS = 1_500;
-const RESTLESS = new Set(["presence", "robot_stopped"]); // events that say nothing of walking
+const NOT_WALKING = new Set(["presence", "robot_stopped"]); // events that are no sign of walking
 
 const { body } = document;
-const mirrored = body.classList.contains("mirrored"); // in a frame on the therapist's page
+const isMirror = body.classList.contains("mirrored"); // in a frame on the therapist's page
 const scene = createScene(body.querySelector(".scene"));
 const { celebrate, clear } = createCelebration(body.querySelector(".confetti"));
-const sound = mirrored ? () => {} : createSounds(body.querySelector(".sound"));
+const sound = isMirror ? () => {} : createSounds(body.querySelector(".sound"));
 const drawFeedback = createFeedback(body);
 const fitCalm = createFitting(body);
 const page = { link: "", asking: false, still: false };
-let session, why, waiting, breaking, drawing, leaving;
+let session, closeReason, stillTimer, linkTimer, frame, leaveTimer;
 let confetti = "none";
 
-const live = connect(body.dataset.socket, {
+const socket = connect(body.dataset.socket, {
   onSnapshot(snapshot) {
-    session = begin(snapshot);
-    rest();
+    session = fromSnapshot(snapshot);
+    awaitStep();
   },
   onEvent(event) {
-    apply(session, event);
+    applyEvent(session, event);
     if (event.kind === "step" && event.live && !document.hidden) {
       confetti = event.confetti;
       sound(event);
     }
-    if (RESTLESS.has(event.kind)) redraw();
-    else rest();
+    if (NOT_WALKING.has(event.kind)) redraw();
+    else awaitStep();
   },
   onLink(state, reason) {
-    clearTimeout(breaking);
+    clearTimeout(linkTimer);
     const note = () => {
       page.link = state;
-      why = reason;
+      closeReason = reason;
       redraw();
     };
-    if (state === "lost") breaking = setTimeout(note, PATIENCE_MS);
+    if (state === "lost") linkTimer = setTimeout(note, PATIENCE_MS);
     else note();
   },
 });
-const { showRobot, keepFocus } = createControls(body, live, (asking) => {
+const { showRobot, keepFocus } = createControls(body, socket, (asking) => {
   page.asking = asking;
   redraw();
 });
 
-// Starts to wait for the next step.
-function rest() {
+// Begin to wait for the next step.
+function awaitStep() {
   page.still = false;
-  clearTimeout(waiting);
-  waiting = setTimeout(() => {
+  clearTimeout(stillTimer);
+  stillTimer = setTimeout(() => {
     page.still = true;
     redraw();
   }, STILL_MS);
@@ -69,22 +69,22 @@ function rest() {
 }
 
 function redraw() {
-  drawing ??= requestAnimationFrame(draw);
+  frame ??= requestAnimationFrame(draw);
 }
 
 function draw() {
-  drawing = undefined;
-  const now = look(session, page);
-  const theme = now === "feedback" ? session.phase.theme : "calm";
+  frame = undefined;
+  const screen = screenOf(session, page);
+  const theme = screen === "feedback" ? session.phase.theme : "calm";
   if (body.dataset.theme !== theme) body.dataset.theme = theme;
-  const changed = body.dataset.look !== now;
-  if (changed) body.dataset.look = now;
-  if (now !== "paused" && now !== "ask") page.asking = false;
-  drawFeedback(now, session, why);
+  const hasChanged = body.dataset.look !== screen;
+  if (hasChanged) body.dataset.look = screen;
+  if (screen !== "paused" && screen !== "ask") page.asking = false;
+  drawFeedback(screen, session, closeReason);
   if (session) showRobot(session);
-  if (changed) keepFocus();
-  if (now !== "feedback") fitCalm();
-  if (now === "feedback") {
+  if (hasChanged) keepFocus();
+  if (screen !== "feedback") fitCalm();
+  if (screen === "feedback") {
     const { last, steps } = session;
     scene.show({
       performance: last?.kind === "missing" ? null : last?.performance,
@@ -95,11 +95,11 @@ function draw() {
   } else clear();
   confetti = "none";
   if (session) body.dataset.step = session.number;
-  if (now === "ended" && !mirrored) leaving ??= setTimeout(() => location.replace(body.dataset.scores), LEAVE_MS);
+  if (screen === "ended" && !isMirror) leaveTimer ??= setTimeout(() => location.replace(body.dataset.scores), LEAVE_MS);
 }
 
 redraw();
-if (!mirrored) {
+if (!isMirror) {
   keepAwake();
   guardLeaving(body.querySelector("dialog.leave"));
 }

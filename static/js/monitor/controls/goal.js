@@ -36,7 +36,7 @@ export function createGoal({ state, show, announce, onPress, change }) {
       goal(session, event) {
         session.goal = event.goal;
       },
-      source_goal(session, event) {
+      source_goal(_session, event) {
         announce(fill(_("The sensor’s own goal is %(goal)s; yours counts."), { goal: number(event.goal, 2) }));
       },
     },

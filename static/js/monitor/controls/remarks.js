@@ -17,7 +17,7 @@ export function createRemarks({ state, announce, onPress, remark }) {
 
   return {
     events: {
-      remark(session, { number, what, value }) {
+      remark(_session, { number, what, value }) {
         const annotation = { after: number, kind: what, value };
         state.annotations.push(annotation);
         announce(fill(_("Noted: %(what)s"), { what: describe(annotation) }));
