@@ -14,7 +14,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.scope import ClinicRow, Scope
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import at_clinic, midnight_of
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN, State
 
@@ -109,10 +109,9 @@ def read_today(user: User, now: datetime) -> list[Today]:
     patients = patients.annotate(count=Count("sessions", distinct=True))
     visits = Visit.objects.visible_to(user).filter(day=now.date())
     expected = dict(visits.values_list("patient_id", "at"))
-    midnight = now.replace(hour=0, minute=0, second=0, microsecond=0)
     sessions = TrainingSession.objects.visible_to(user).defer("plan")
     here: dict[int, list[TrainingSession]] = {}
-    for session in _of_today(sessions, midnight):
+    for session in _of_today(sessions, midnight_of(now)):
         here.setdefault(session.patient_id, []).append(session)
     rows = [
         _tell(patient, expected.get(patient.pk), here.get(patient.pk, ()), now)

@@ -70,3 +70,11 @@ def say_source(source: str) -> str:
 def at_clinic(moment: datetime, clinic: Clinic) -> datetime:
     """Give a moment by the clinic's own clock."""
     return moment.astimezone(ZoneInfo(clinic.time_zone))
+
+
+def midnight_of(moment: datetime) -> datetime:
+    """Return the moment at which a local moment's day began.
+
+    Where clocks go back at midnight's hour (Havana), there are two midnights: the first counts.
+    """
+    return moment.replace(hour=0, minute=0, second=0, microsecond=0, fold=0)

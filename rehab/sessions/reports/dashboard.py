@@ -15,7 +15,7 @@ from django.utils.translation import gettext
 from rehab.people.access import clinic_of
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Right, Role, rights_of
-from rehab.sessions.formatting import at_clinic, say_duration, say_number, say_rate
+from rehab.sessions.formatting import at_clinic, midnight_of, say_duration, say_number, say_rate
 from rehab.sessions.live import runtime
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.log import SessionMetric, Step
@@ -142,7 +142,7 @@ def _sees(user: User, model: type) -> bool:
 
 def read_today(user: User, clinic: Clinic, now: datetime) -> list[Today]:
     """Give today's sessions by the clinic's clock, and every open one, those that run on top."""
-    midnight = at_clinic(now, clinic).replace(hour=0, minute=0, second=0, microsecond=0)
+    midnight = midnight_of(at_clinic(now, clinic))
     is_open = Q(state__in=[state.value for state in OPEN])
     begun = Q(created_at__gte=midnight) | Q(started_at__gte=midnight)
     sessions = TrainingSession.objects.visible_to(user).filter(is_open | begun).defer("plan")
@@ -190,9 +190,7 @@ def _say_time(moment: datetime, midnight: datetime) -> str:
 def read_week(user: User, clinic: Clinic, now: datetime) -> Week:
     """Give the figures of the clinic's week so far: of what people walked, corrections heeded."""
     here = at_clinic(now, clinic)
-    monday = (here - timedelta(days=here.weekday())).replace(
-        hour=0, minute=0, second=0, microsecond=0
-    )
+    monday = midnight_of(here - timedelta(days=here.weekday()))
     begun = TrainingSession.objects.visible_to(user).filter(
         started_at__gte=monday, started_at__lte=now
     )
