@@ -22,7 +22,7 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.words import SPACE, say_number
-from rehab.training.changes import OPEN, State
+from rehab.training.changes import OPEN_STATES, State
 
 SHOWN_S = 20  # a board on a tablet that waits, before the next one
 TITLES = {
@@ -42,7 +42,7 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
     """
     session = find_session(request, session_id)
     speak_to(session.patient)
-    if State(session.state) in OPEN:
+    if State(session.state) in OPEN_STATES:
         return redirect("walk", session_id=session.pk)
     boards = (
         [] if session.patient.blinded else [*show_after(session), *own_boards(request, session)]

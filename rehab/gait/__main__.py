@@ -17,11 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rehab.gait.columns import CHANNELS
-from rehab.gait.files import find_mass, find_rate, read_signals
 from rehab.gait.offline import measure_both_legs, measure_strides
-from rehab.gait.plot import load_pyplot, plot_strides
-from rehab.gait.selfcheck import check_signals
+from rehab.gait.recordings.columns import CHANNELS
+from rehab.gait.recordings.csv_files import estimate_rate, read_mass, read_signals
+from rehab.gait.recordings.plot import load_pyplot, plot_strides
+from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.strides import GaitInputError, Stride
 
 LOOK_AHEAD_S = 0.05
@@ -65,8 +65,8 @@ def _read_options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 def _measure_file(path: Path, options: argparse.Namespace) -> None:
     time, legs = read_signals(path, options.columns)
-    rate_hz = find_rate(time, path) if options.rate is None else options.rate
-    mass_kg = find_mass(path) if options.mass is None else options.mass
+    rate_hz = estimate_rate(time, path) if options.rate is None else options.rate
+    mass_kg = read_mass(path) if options.mass is None else options.mass
     if len(legs) == 2:
         strides = measure_both_legs(
             time,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from rehab.gait.legs import LegSamples, TwoLegDetector
 from rehab.gait.online import StrideDetector
+from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import Stride
+from rehab.gait.two_legs import TwoLegDetector
 
 
 def measure_strides(

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from rehab.gait.contacts import CONTACT_N, RELEASE_N
-from rehab.gait.detector import KEEP_S, Beside, Draft, LegDetector
-from rehab.gait.kinetics import CUTOFF_HZ
-from rehab.gait.plausibility import check_load
-from rehab.gait.samples import NAMES, SampleBuffer, cut, read_chunk
-from rehab.gait.settings import Settings
-from rehab.gait.strides import Reason, Stride
+from rehab.gait.contacts.force_plate import CONTACT_N, RELEASE_N
+from rehab.gait.one_leg import KEEP_S, LegDetector, OneLegStride, OtherLeg
+from rehab.gait.settings import DetectorSettings
+from rehab.gait.signals.buffer import SampleBuffer
+from rehab.gait.signals.samples import CHANNEL_NAMES, read_chunk, split_chunk
+from rehab.gait.stances.kinetics import CUTOFF_HZ
+from rehab.gait.stances.plausibility import check_load
+from rehab.gait.strides import RejectionReason, Stride
 
 
 class StrideDetector:
@@ -56,7 +57,7 @@ class StrideDetector:
         is_velocity: bool = False,
         side: str | None = None,
     ) -> None:
-        settings = Settings(
+        settings = DetectorSettings(
             rate_hz=rate_hz,
             mass_kg=mass_kg,
             look_ahead_s=look_ahead_s,
@@ -98,23 +99,25 @@ class StrideDetector:
         """
         channels = (t_s, force_n, moment_nm, angle_rad, forward_n, position_m)
         strides: list[Stride] = []
-        for piece, count in cut(read_chunk(("t_s", *NAMES), channels), self._leg.piece):
+        for piece, count in split_chunk(
+            read_chunk(("t_s", *CHANNEL_NAMES), channels), self._leg.piece
+        ):
             first = self._samples.end
             self._samples.append(piece, count)
             found = self._leg.advance(first, self._samples.end)
             if found:
-                strides += [self._tell(draft) for draft in found]
+                strides += [self._complete(stride) for stride in found]
         return strides
 
     def finish(self) -> list[Stride]:
         """Give what still waits, and the stance that the end of the samples cuts off, invalid."""
-        return [self._tell(draft) for draft in self._leg.finish()]
+        return [self._complete(stride) for stride in self._leg.finish()]
 
-    def _tell(self, draft: Draft) -> Stride:
+    def _complete(self, stride: OneLegStride) -> Stride:
         """Give a stride with what one plate alone can say of the weight."""
-        contact, begin = draft.contact, draft.cycle_index
-        reasons: list[Reason] = []
+        contact, begin = stride.contact, stride.cycle_index
+        reasons: list[RejectionReason] = []
         if begin is not None:
-            load = self._leg.find_load(begin, contact.begin_index, contact.offset_n)
+            load = self._leg.compute_mean_load(begin, contact.begin_index, contact.offset_n)
             reasons = check_load(load)
-        return self._leg.tell(draft, Beside(reasons, []))
+        return self._leg.complete(stride, OtherLeg(reasons, []))

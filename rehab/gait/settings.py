@@ -12,7 +12,7 @@ LOOK_AHEAD_MAX_S = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
+class DetectorSettings:
     """How strides are found and measured; parameters are those of ``StrideDetector``.
 
     Raises GaitInputError, with the cure, for settings that nothing can be measured with.

@@ -10,7 +10,7 @@ class GaitInputError(ValueError):
     """Input that nothing can be measured from; the message says the cure."""
 
 
-class Reason(StrEnum):
+class RejectionReason(StrEnum):
     """Why a stride does not count. A stride without one is valid."""
 
     TIME_BACKWARDS = "time_backwards"  # the clock stood still or jumped back
@@ -93,7 +93,7 @@ class Stride:
     a2_w_kg: float | None
     a2_time_s: float | None
     valid: bool
-    reasons: tuple[Reason, ...]
+    reasons: tuple[RejectionReason, ...]
     flags: tuple[Flag, ...]
     stance_s: float
     stride_s: float | None

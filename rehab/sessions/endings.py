@@ -27,7 +27,7 @@ from rehab.sessions.log import Remark, SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.visits import Visit
 from rehab.sessions.words import at_clinic
-from rehab.training.changes import OPEN
+from rehab.training.changes import OPEN_STATES
 
 
 class StillOpen(ValueError):
@@ -94,7 +94,7 @@ def _hold_closed(patient: Patient) -> None:
     """Hold the patient's row. Raises StillOpen where a session could still go on."""
     patient.hold()
     sessions = TrainingSession.everywhere.filter(
-        patient=patient, state__in=[state.value for state in OPEN]
+        patient=patient, state__in=[state.value for state in OPEN_STATES]
     )
     if sessions.exists():
         said = _("%(patient)s still has an open session. End it first.")

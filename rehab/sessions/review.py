@@ -18,9 +18,9 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.trend import figures_of
 from rehab.sessions.words import LEVELS, say_duration, say_number, say_quantity, say_rate
 from rehab.training.changes import ChangeKind, PauseReason
-from rehab.training.figures import describe_session
 from rehab.training.fold import SessionFold
 from rehab.training.plans import SessionPlan, name_robot_level
+from rehab.training.summary import summarize_session
 from rehab.training.valences import VALENCES
 
 # What a robot did is counted; in the list it would hide what people did.
@@ -87,7 +87,7 @@ def review_session(user: User, session: TrainingSession) -> Review:
         event.kind == RobotEntry.GESTURE.value and event.data.get("phase") == "started"
         for event in events
     )
-    figures = describe_session(fold)
+    figures = summarize_session(fold)
     if session.original_id is not None:  # no log: what the original added up is all there is
         stored = figures_of(user, [session]).get(session.pk, {})
         figures |= {"score": stored.get("score"), "active_s": session.active_s}

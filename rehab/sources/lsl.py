@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rehab.sources.intake import Intake, IntakeSettings, add_signal_arguments
-from rehab.sources.source import LiveSource, Say, Unusable
+from rehab.sources.reporting import Notify, SourceError
+from rehab.sources.source import LiveSource
 
-LOOK_S = 1.0  # for streams; one on the same network answers within 0.7 s (gait.md 5)
+RESOLVE_S = 1.0  # for streams; one on the same network answers within 0.7 s (gait.md 5)
 PULL_S = 0.2
 SILENT_S = 1.0
 CORRECT_EVERY_S = 5.0
@@ -89,12 +90,12 @@ class Lsl(LiveSource):
         )
         add_signal_arguments(parser)
 
-    def __init__(self, options: Namespace, say: Say, pylsl: Any = None) -> None:
+    def __init__(self, options: Namespace, notify: Notify, pylsl: Any = None) -> None:
         """Look at the command line."""
         self.settings = IntakeSettings.read(options)
         self._wanted: list[str] = options.stream
         self._dejitter: bool = options.dejitter
-        self._say = say
+        self._notify = notify
         self._pylsl = pylsl or load_pylsl()
 
     async def read(self, intake: Intake) -> None:
@@ -103,7 +104,7 @@ class Lsl(LiveSource):
         loop = asyncio.get_running_loop()
         stopped = threading.Event()
         for stream in streams:
-            self._say(f"Reading LSL stream {stream.name}: {', '.join(stream.labels)}.")
+            self._notify(f"Reading LSL stream {stream.name}: {', '.join(stream.labels)}.")
             if stream.rate_hz > 0 and any(label in intake.forces for label in stream.labels):
                 intake.expect_rate(stream.rate_hz)
 
@@ -130,7 +131,7 @@ class Lsl(LiveSource):
         """Find and open the streams, however long it takes until they are there."""
         said = ""
         while True:
-            found = await asyncio.to_thread(self._pylsl.resolve_streams, LOOK_S)
+            found = await asyncio.to_thread(self._pylsl.resolve_streams, RESOLVE_S)
             chosen, missing = choose_streams(found, self._wanted)
             if not missing:
                 try:
@@ -142,7 +143,7 @@ class Lsl(LiveSource):
                         check_labels(stream, intake)
                     return opened
             if missing != said:
-                self._say(missing)
+                self._notify(missing)
             said = missing
 
     def _open(self, info: Any) -> Stream:
@@ -175,10 +176,10 @@ class Lsl(LiveSource):
                     text = (
                         f"LSL stream {stream.name} is silent. Start its sender; it is heard anew."
                     )
-                    tell(self._say, text)
+                    tell(self._notify, text)
                 continue
             if is_silent:
-                tell(self._say, f"LSL stream {stream.name} is heard again.")
+                tell(self._notify, f"LSL stream {stream.name} is heard again.")
             silent_s, is_silent = now_s, False
             samples, stamps = inlet.pull_chunk(timeout=0.0, max_samples=CHUNK)
             if now_s >= next_s:
@@ -186,7 +187,7 @@ class Lsl(LiveSource):
                 correction = self._correct(inlet, correction)
             stamped = np.array([stamp, *stamps])
             t_s = stamped if correction is None else correction.correct(stamped)
-            tell(take_samples, intake, stream, [sample, *samples], t_s)
+            tell(add_samples, intake, stream, [sample, *samples], t_s)
         inlet.close_stream()
 
     def _correct(self, inlet: Any, correction: ClockCorrection | None) -> ClockCorrection | None:
@@ -202,47 +203,47 @@ class Lsl(LiveSource):
 
 
 def check_labels(stream: Stream, intake: Intake) -> None:
-    """Raise Unusable for a stream whose channels mean nothing here."""
-    if not intake.knows(stream.labels):
-        raise Unusable(
+    """Raise SourceError for a stream whose channels mean nothing here."""
+    if not intake.accepts(stream.labels):
+        raise SourceError(
             f"LSL stream {stream.name} has other channels: {', '.join(stream.labels)}. Say which "
             "is which: --columns time=stamp left.force=… left.moment=… left.angle=…"
         )
 
 
-def take_samples(
+def add_samples(
     intake: Intake, stream: Stream, samples: Sequence[Sequence[Any]], t_s: NDArray[np.float64]
 ) -> None:
     """Hand in samples: rows where they are strides, a table where they are signals."""
     if "value" in stream.labels:
         times = [{"time_s": float(t)} for t in t_s]
         cells = (dict(zip(stream.labels, sample, strict=True)) for sample in samples)
-        intake.take([row | time for row, time in zip(cells, times, strict=True)])
+        intake.add_rows([row | time for row, time in zip(cells, times, strict=True)])
     else:
         try:
             table = np.array(samples, dtype=np.float64)
         except ValueError:
-            intake.complain(f"LSL stream {stream.name} sends text. Let it send numbers.")
+            intake.reject_row(f"LSL stream {stream.name} sends text. Let it send numbers.")
             return
-        intake.take_table(stream.name, stream.labels, t_s, table)
+        intake.add_table(stream.name, stream.labels, t_s, table)
 
 
 def choose_streams(found: Sequence[Any], wanted: Sequence[str]) -> tuple[list[Any], str]:
-    """Give the streams that are wanted, and what is missing. Raises Unusable for doubts."""
+    """Give the streams that are wanted, and what is missing. Raises SourceError for doubts."""
     there = ", ".join(
         f"{s.name()} ({s.channel_count()} channels, {s.nominal_srate():g} Hz, {s.hostname()})"
         for s in found
     )
     if not wanted:
         if len(found) > 1:
-            raise Unusable(f"Several LSL streams are here: {there}. Choose with --stream NAME.")
+            raise SourceError(f"Several LSL streams are here: {there}. Choose with --stream NAME.")
         missing = "" if found else "No LSL stream is here yet. Start its sender in this network."
         return list(found), missing
     chosen = []
     for name in wanted:
         fitting = [s for s in found if name in (s.name(), s.type(), s.source_id())]
         if len(fitting) > 1:
-            raise Unusable(
+            raise SourceError(
                 f"Several LSL streams are called {name}: {there}. Stop one, or choose by source id."
             )
         if not fitting:
@@ -252,12 +253,12 @@ def choose_streams(found: Sequence[Any], wanted: Sequence[str]) -> tuple[list[An
 
 
 def load_pylsl() -> Any:
-    """Give pylsl. Raises Unusable where it is not there."""
+    """Give pylsl. Raises SourceError where it is not there."""
     try:
         pylsl = importlib.import_module("pylsl")
         pylsl.StreamInlet  # noqa: B018 (a folder of that name has none)
     except (AttributeError, ImportError, OSError, RuntimeError) as problem:
-        raise Unusable(
+        raise SourceError(
             f"LSL cannot be used here ({str(problem).splitlines()[0][:120]}). Install it beside "
             "GARRY: pip install pylsl (on Linux without its own wheel, also the package liblsl)."
         ) from None

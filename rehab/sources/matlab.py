@@ -14,10 +14,11 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from rehab.sources.intake import Intake, IntakeSettings, parse_address
 from rehab.sources.intake.rows import Cell
-from rehab.sources.source import LiveSource, Say
+from rehab.sources.reporting import Notify
+from rehab.sources.source import LiveSource
 from rehab.training.steps import Side
 
-AGAIN_S = 1.0
+RETRY_S = 1.0
 KEYWORDS = ("start", "one", "two", "three", "four", "five")
 
 
@@ -40,12 +41,12 @@ class Matlab(LiveSource):
             help=f"which data to ask for; the original knows {', '.join(KEYWORDS)} (default one)",
         )
 
-    def __init__(self, options: Namespace, say: Say) -> None:
+    def __init__(self, options: Namespace, notify: Notify) -> None:
         """Look at the command line."""
         self.settings = IntakeSettings(side=Side(options.side) if options.side else None)
         self.address = parse_address(options.connect, ("ws",))
         self._keyword: str = options.keyword
-        self._say = say
+        self._notify = notify
         self._goal: float | None = None
 
     async def read(self, intake: Intake) -> None:
@@ -56,34 +57,36 @@ class Matlab(LiveSource):
             try:
                 async with connect(str(self.address), proxy=None, compression=None) as socket:
                     said = ""
-                    if await self._take_all(socket, intake):
-                        self._say("MATLAB has sent all.")
+                    if await self._receive_all(socket, intake):
+                        self._notify("MATLAB has sent all.")
                         return
             except (OSError, WebSocketException) as problem:
                 text = f"No MATLAB server at {self.address} ({problem})"
                 if text != said:
-                    self._say(f"{text}. Start GarryMatlabServer there; trying every {AGAIN_S:g} s.")
+                    self._notify(
+                        f"{text}. Start GarryMatlabServer there; trying every {RETRY_S:g} s."
+                    )
                 said = text
-            await asyncio.sleep(AGAIN_S)
+            await asyncio.sleep(RETRY_S)
 
-    async def _take_all(self, socket: ClientConnection, intake: Intake) -> bool:
+    async def _receive_all(self, socket: ClientConnection, intake: Intake) -> bool:
         """Take what comes; give whether that was all."""
         await socket.send(self._keyword)
-        self._say(f"Asked MATLAB for {self._keyword!r}.")
+        self._notify(f"Asked MATLAB for {self._keyword!r}.")
         try:
             async for message in socket:
                 if message == "end":
                     return True
                 row = self._read(message)
                 if row is None:
-                    intake.complain(
+                    intake.reject_row(
                         f"MATLAB sent {message[:40]!r}. Let it send sprintf('%f, %f', a2, goal)."
                     )
                 else:
-                    intake.take([row])
+                    intake.add_rows([row])
         except ConnectionClosed:
             pass
-        self._say(f"MATLAB hung up before the end. Asking for {self._keyword!r} anew.")
+        self._notify(f"MATLAB hung up before the end. Asking for {self._keyword!r} anew.")
         return False
 
     def _read(self, message: str | bytes) -> dict[str, Cell] | None:
@@ -97,7 +100,7 @@ class Matlab(LiveSource):
         if math.isfinite(goal):
             row["matlab_goal"] = goal
             if goal != self._goal:
-                self._say(f"MATLAB's goal is {goal:g}; the session's own is what counts.")
+                self._notify(f"MATLAB's goal is {goal:g}; the session's own is what counts.")
             self._goal = goal
         return row
 

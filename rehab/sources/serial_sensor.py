@@ -20,10 +20,11 @@ from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from rehab.sources.intake import BadRow, Cell, Intake, IntakeSettings, add_signal_arguments
-from rehab.sources.source import LiveSource, Say, Unusable
+from rehab.sources.reporting import Notify, SourceError
+from rehab.sources.source import LiveSource
 
 BAUD = 921_600
-AGAIN_S = 1.0
+RETRY_S = 1.0
 READ_S = 0.05
 WRAP_US = 2**32
 MAX_FRAME = 1024  # bytes
@@ -46,7 +47,7 @@ class FrameReader:
 
     def __init__(self) -> None:
         self.damaged = 0
-        self._cut = b""
+        self._partial = b""
         self._names: list[str] = []
         self._last_us: int | None = None
         self._turns = 0
@@ -57,9 +58,9 @@ class FrameReader:
         Damaged frames are counted and left out: their samples are missing, and strides that need
         them say so. Frames before the first names are left out silently.
         """
-        *lines, self._cut = (self._cut + data).split(b"\n")
-        if len(self._cut) > MAX_FRAME:
-            self._cut = b""
+        *lines, self._partial = (self._partial + data).split(b"\n")
+        if len(self._partial) > MAX_FRAME:
+            self._partial = b""
             self.damaged += 1
         rows = []
         for line in lines:
@@ -118,13 +119,16 @@ class SerialSensor(LiveSource):
         add_signal_arguments(parser)
 
     def __init__(
-        self, options: Namespace, say: Say, open_port: Callable[[str, int], Port] | None = None
+        self,
+        options: Namespace,
+        notify: Notify,
+        open_port: Callable[[str, int], Port] | None = None,
     ) -> None:
         """Look at the command line."""
         self.settings = IntakeSettings.read(options)
         self.port: str = options.port or find_port()
         self._baud: int = options.baud
-        self._say = say
+        self._notify = notify
         self._open_port = open_port or open_serial
 
     async def read(self, intake: Intake) -> None:
@@ -134,11 +138,11 @@ class SerialSensor(LiveSource):
 
         def take(rows: list[Mapping[str, Cell]], damaged: int) -> None:
             for _ in range(damaged):
-                intake.complain(
+                intake.reject_row(
                     f"A frame of {self.port} was damaged. Use a shorter cable, another USB port or "
                     "the sketch's baud rate (--baud)."
                 )
-            intake.take(rows)
+            intake.add_rows(rows)
 
         def tell(function: Callable[..., object], *arguments: object) -> None:
             if not stopped.is_set():
@@ -167,12 +171,12 @@ class SerialSensor(LiveSource):
             except (OSError, ValueError) as problem:  # SerialException is an OSError
                 text = f"{self.port} cannot be opened ({problem})"
                 if text != said:
-                    tell(self._say, f"{text}. Plug the sensor in, or close what uses it.")
+                    tell(self._notify, f"{text}. Plug the sensor in, or close what uses it.")
                 said = text
-                stopped.wait(AGAIN_S)
+                stopped.wait(RETRY_S)
                 continue
             said = ""
-            tell(self._say, f"Reading {self.port}.")
+            tell(self._notify, f"Reading {self.port}.")
             frames = FrameReader()
             try:
                 while not stopped.is_set():
@@ -182,8 +186,11 @@ class SerialSensor(LiveSource):
                     if rows or frames.damaged > before:
                         tell(take, rows, frames.damaged - before)
             except OSError as problem:
-                tell(self._say, f"The sensor at {self.port} is gone ({problem}). Plug it in again.")
-                stopped.wait(AGAIN_S)
+                tell(
+                    self._notify,
+                    f"The sensor at {self.port} is gone ({problem}). Plug it in again.",
+                )
+                stopped.wait(RETRY_S)
             finally:
                 port.close()
 
@@ -197,14 +204,14 @@ def open_serial(port: str, baud: int) -> Port:
 
 
 def find_port() -> str:
-    """Give the only serial port there is. Raises Unusable."""
+    """Give the only serial port there is. Raises SourceError."""
     from serial.tools.list_ports import comports
 
     ports = [found for found in comports() if found.vid is not None]
     if len(ports) == 1:
         return str(ports[0].device)
     there = "; ".join(f"{found.device} ({found.description})" for found in ports)
-    raise Unusable(
+    raise SourceError(
         f"Several serial ports are here: {there}. Choose one with --port."
         if ports
         else "No sensor is plugged in by USB. Plug it in, or name its port with --port."

@@ -4,20 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from rehab.sources.client import WINDOW, Walk
+from rehab.sources.client import WINDOW, NextStride
+from rehab.sources.reporting import Notify
 from rehab.training.steps import Side
 
 if TYPE_CHECKING:
     from rehab.sources.intake import Intake, IntakeSettings
-
-Say = Callable[[str], None]
-
-
-class Unusable(ValueError):
-    """What was asked for cannot be done; the message says what could be."""
 
 
 class Source(ABC):
@@ -27,12 +21,12 @@ class Source(ABC):
     ----------
     options
         The command line, with what ``add_arguments`` added.
-    say
+    notify
         Called with what somebody who looks on should know.
 
     Raises
     ------
-    Unusable
+    SourceError
         Or another ValueError, with the cure, before anything is sent.
     """
 
@@ -42,7 +36,7 @@ class Source(ABC):
         """Say what its command line can hold."""
 
     @abstractmethod
-    def __init__(self, options: Namespace, say: Say) -> None:
+    def __init__(self, options: Namespace, notify: Notify) -> None:
         """Look at the command line."""
 
 
@@ -55,7 +49,7 @@ class PlayedSource(Source):
     ahead = WINDOW
 
     @abstractmethod
-    def open_walk(self, trained_side: Side) -> Walk:
+    def open_walk(self, trained_side: Side) -> NextStride:
         """Begin to walk, in a session that trains this leg."""
 
 
@@ -72,5 +66,5 @@ class LiveSource(Source):
         """Hand in all that comes; return when no more can come.
 
         It waits for senders that are not there yet and takes them up again when they come back.
-        Raises Unusable for what only somebody at the machine can put right.
+        Raises SourceError for what only somebody at the machine can put right.
         """

@@ -41,7 +41,7 @@ class ChangeKind(StrEnum):
 
 
 # What pages and programs ask for. Words are edited with their feedback type, for all open sessions.
-ASKED = tuple(kind for kind in ChangeKind if kind is not ChangeKind.WORDS)
+REQUESTABLE = tuple(kind for kind in ChangeKind if kind is not ChangeKind.WORDS)
 
 
 class PauseReason(StrEnum):
@@ -52,7 +52,7 @@ class PauseReason(StrEnum):
     RESTART = "restart"  # of the server
 
 
-Value = float | str | Mapping[str, Any] | None
+ChangeValue = float | str | Mapping[str, Any] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,15 +65,15 @@ class Change:
     """
 
     kind: ChangeKind
-    value: Value = None
+    value: ChangeValue = None
 
 
-class Refused(InvalidSetting):
+class NotAllowed(InvalidSetting):
     """A change that the session's state does not allow; the message says what would be needed."""
 
 
-OPEN = frozenset({State.READY, State.RUNNING, State.PAUSED})
-ENDED = frozenset({State.FINISHED, State.ABORTED})
+OPEN_STATES = frozenset({State.READY, State.RUNNING, State.PAUSED})
+ENDED_STATES = frozenset({State.FINISHED, State.ABORTED})
 
 # kind: (states it may come in, state it leads to; None where the state stays)
 TRANSITIONS: dict[ChangeKind, tuple[frozenset[State], State | None]] = {
@@ -81,28 +81,28 @@ TRANSITIONS: dict[ChangeKind, tuple[frozenset[State], State | None]] = {
     ChangeKind.PAUSE: (frozenset({State.RUNNING}), State.PAUSED),
     ChangeKind.RESUME: (frozenset({State.PAUSED}), State.RUNNING),
     ChangeKind.FINISH: (frozenset({State.RUNNING, State.PAUSED}), State.FINISHED),
-    ChangeKind.ABORT: (OPEN, State.ABORTED),
-    ChangeKind.GOAL: (OPEN, None),
-    ChangeKind.GAIN: (OPEN, None),
-    ChangeKind.PHASE: (OPEN, None),
-    ChangeKind.ACTIVATION_THRESHOLD: (OPEN, None),
-    ChangeKind.ROBOT_INTENSITY: (OPEN, None),
-    ChangeKind.VALENCE: (OPEN, None),
-    ChangeKind.WORDS: (OPEN, None),
-    ChangeKind.WORDS_SHOWN: (OPEN, None),
-    ChangeKind.CHART_STYLE: (OPEN, None),
+    ChangeKind.ABORT: (OPEN_STATES, State.ABORTED),
+    ChangeKind.GOAL: (OPEN_STATES, None),
+    ChangeKind.GAIN: (OPEN_STATES, None),
+    ChangeKind.PHASE: (OPEN_STATES, None),
+    ChangeKind.ACTIVATION_THRESHOLD: (OPEN_STATES, None),
+    ChangeKind.ROBOT_INTENSITY: (OPEN_STATES, None),
+    ChangeKind.VALENCE: (OPEN_STATES, None),
+    ChangeKind.WORDS: (OPEN_STATES, None),
+    ChangeKind.WORDS_SHOWN: (OPEN_STATES, None),
+    ChangeKind.CHART_STYLE: (OPEN_STATES, None),
 }
 
 
 # How refusals name them: programs know these words, and pages have them translated.
-STATE_WORDS = {
+STATE_LABELS = {
     State.READY: gettext_noop("ready"),
     State.RUNNING: gettext_noop("running"),
     State.PAUSED: gettext_noop("paused"),
     State.FINISHED: gettext_noop("finished"),
     State.ABORTED: gettext_noop("aborted"),
 }
-KIND_WORDS = {
+CHANGE_LABELS = {
     ChangeKind.START: gettext_noop("start"),
     ChangeKind.PAUSE: gettext_noop("pause"),
     ChangeKind.RESUME: gettext_noop("resume"),
@@ -121,13 +121,13 @@ KIND_WORDS = {
 
 
 def next_state(state: State, kind: ChangeKind) -> State:
-    """Give the state after a change. Raises Refused, saying when it would be allowed."""
+    """Give the state after a change. Raises NotAllowed, saying when it would be allowed."""
     allowed, leads_to = TRANSITIONS[kind]
     if state not in allowed:
-        raise Refused(
+        raise NotAllowed(
             "A session that is {state} cannot take the change '{kind}'; it must be {allowed}.",
-            state=Marked(STATE_WORDS[state]),
-            kind=Marked(KIND_WORDS[kind]),
-            allowed=AnyOf(sorted(STATE_WORDS[each] for each in allowed)),
+            state=Marked(STATE_LABELS[state]),
+            kind=Marked(CHANGE_LABELS[kind]),
+            allowed=AnyOf(sorted(STATE_LABELS[each] for each in allowed)),
         )
     return leads_to or state

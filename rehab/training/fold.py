@@ -8,12 +8,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from rehab.training.changes import (
-    KIND_WORDS,
-    STATE_WORDS,
+    CHANGE_LABELS,
+    STATE_LABELS,
     Change,
     ChangeKind,
+    NotAllowed,
     PauseReason,
-    Refused,
     State,
     next_state,
 )
@@ -29,11 +29,11 @@ from rehab.training.plans import (
 from rehab.training.scoring import RULES_VERSION, judge
 from rehab.training.steps import (
     InvalidMeasurement,
+    InvalidReason,
     Measurement,
-    Reason,
     ScoredStep,
     add_reason,
-    find_reasons,
+    find_invalid_reasons,
 )
 from rehab.training.tallies import Tally
 from rehab.training.valences import Valence, bands_from_json
@@ -124,15 +124,15 @@ class SessionFold:
         return baseline.mean_value if baseline.valid >= MIN_BASELINE_STRIDES else None
 
     def step(self, measurement: Measurement) -> ScoredStep:
-        """Score one stride. Raises Refused where the session has not begun or is over.
+        """Score one stride. Raises NotAllowed where the session has not begun or is over.
 
         Raises InvalidMeasurement for a number that is not the next one.
         """
         running = self.state is State.RUNNING
         if not running and self.state is not State.PAUSED:
-            raise Refused(
+            raise NotAllowed(
                 "A session that is {state} takes no steps; it must be running.",
-                state=Marked(STATE_WORDS[self.state]),
+                state=Marked(STATE_LABELS[self.state]),
             )
         if measurement.number != self.last_number + 1:
             raise InvalidMeasurement(
@@ -142,11 +142,11 @@ class SessionFold:
         time_s = measurement.time_s
         elapsed_s = 0.0 if self.last_time_s is None else time_s - self.last_time_s
         backwards = elapsed_s < 0
-        reasons = find_reasons(measurement, self.plan.measure)
+        reasons = find_invalid_reasons(measurement, self.plan.measure)
         if backwards:
-            reasons = add_reason(reasons, Reason.TIME_BACKWARDS)
+            reasons = add_reason(reasons, InvalidReason.TIME_BACKWARDS)
         if not running:
-            reasons = add_reason(reasons, Reason.PAUSED)
+            reasons = add_reason(reasons, InvalidReason.PAUSED)
         scored = self._score(measurement, reasons)
         self.last_number = scored.number
         if scored.side == self.plan.trained_side:
@@ -233,7 +233,7 @@ class SessionFold:
 
     def _goal_from_baseline(self) -> float | None:
         if self.baseline_mean is None:
-            raise Refused(
+            raise NotAllowed(
                 "The goal needs {needed} valid baseline strides and has {had}. Walk on, or set the "
                 "goal as a value.",
                 needed=MIN_BASELINE_STRIDES,
@@ -244,7 +244,7 @@ class SessionFold:
     def change(self, change: Change) -> None:
         """Apply a change from the next step on.
 
-        Raises Refused where the state does not allow it and InvalidSetting for a value out of
+        Raises NotAllowed where the state does not allow it and InvalidSetting for a value out of
         bounds; the session is then as it was.
         """
         state = next_state(self.state, change.kind)
@@ -289,7 +289,7 @@ class SessionFold:
         elif any(phase.feedback for phase in self.plan.phases[self.phase_index + 1 :]):
             self.next_valence = slug
         else:
-            raise Refused(
+            raise NotAllowed(
                 "The feedback type changes with a phase, and no phase with feedback follows. "
                 "End this session and set up another one."
             )
@@ -320,7 +320,7 @@ def _needed(change: Change) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InvalidSetting(
             "The change '{kind}' needs a value, and that is a number.",
-            kind=Marked(KIND_WORDS[change.kind]),
+            kind=Marked(CHANGE_LABELS[change.kind]),
         )
     return value
 

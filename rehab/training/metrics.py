@@ -128,7 +128,7 @@ METRICS: dict[str, Metric] = {
 }
 
 
-def measure_session(fold: SessionFold) -> dict[str, float]:
+def compute_metrics(fold: SessionFold) -> dict[str, float]:
     """Give every metric that the session has."""
     figures = {slug: metric.compute(fold) for slug, metric in METRICS.items()}
     return {slug: figure for slug, figure in figures.items() if figure is not None}

@@ -10,7 +10,7 @@ from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import InvalidSetting, Measure
 from rehab.training.phases import Phase
 from rehab.training.steps import Side
-from rehab.training.valences import Cue, Valence, bands_from_json
+from rehab.training.valences import CueGestures, Valence, bands_from_json
 
 # The paper's default (P 3.4.1): the robot answers windows of at least 90 % of the goal.
 DEFAULT_ACTIVATION_THRESHOLD = 0.90
@@ -108,5 +108,5 @@ class SessionPlan:
 
 
 def _read_valence(data: dict[str, Any]) -> Valence:
-    parts = {"bands": bands_from_json(data["bands"]), "cue": Cue(**data["cue"])}
+    parts = {"bands": bands_from_json(data["bands"]), "cue": CueGestures(**data["cue"])}
     return Valence(**data | parts)

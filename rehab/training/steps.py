@@ -17,7 +17,7 @@ class Side(StrEnum):
     RIGHT = "right"
 
 
-class Reason(StrEnum):
+class InvalidReason(StrEnum):
     """Why a step does not count. Sources may add codes of their own."""
 
     MISSING = "missing"
@@ -95,7 +95,7 @@ class ScoredStep:
     rules_version: int
 
 
-def find_reasons(measurement: Measurement, measure: Measure) -> tuple[str, ...]:
+def find_invalid_reasons(measurement: Measurement, measure: Measure) -> tuple[str, ...]:
     """Give the reasons why this measurement cannot count; none for a good one.
 
     The source's own reasons come first; then at most one of ours, about the value. A stored step
@@ -104,10 +104,16 @@ def find_reasons(measurement: Measurement, measure: Measure) -> tuple[str, ...]:
     value, reasons = measurement.value, measurement.reasons
     if value is None:
         # A value that is not finite is stored as None; it was not missing.
-        return reasons if Reason.NOT_FINITE in reasons else add_reason(reasons, Reason.MISSING)
+        return (
+            reasons
+            if InvalidReason.NOT_FINITE in reasons
+            else add_reason(reasons, InvalidReason.MISSING)
+        )
     if measure.value_min <= value <= measure.value_max:
         return reasons
-    return add_reason(reasons, Reason.OUT_OF_BOUNDS if math.isfinite(value) else Reason.NOT_FINITE)
+    return add_reason(
+        reasons, InvalidReason.OUT_OF_BOUNDS if math.isfinite(value) else InvalidReason.NOT_FINITE
+    )
 
 
 def add_reason(reasons: tuple[str, ...], reason: str) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rehab.training.steps import Reason, ScoredStep
+from rehab.training.steps import InvalidReason, ScoredStep
 
 
 @dataclass(slots=True)
@@ -33,7 +33,7 @@ class Tally:
         """Take one more step into account. An invalid one only adds to the counts of strides."""
         self.strides += 1
         if not step.valid:
-            if step.reasons == (Reason.MISSING,):
+            if step.reasons == (InvalidReason.MISSING,):
                 self.missing += 1
             else:
                 self.invalid += 1

@@ -18,7 +18,7 @@ from rehab.training.measures import InvalidSetting
 # More would say no more, and overflow where points are stored.
 POINTS_MAX = 1000
 BANDS_MAX = 12
-WORDS_MAX = 60  # characters; longer ones fit no tablet in a size that is read from a treadmill
+TEXT_MAX = 60  # characters; longer ones fit no tablet in a size that is read from a treadmill
 
 
 class Emblem(StrEnum):
@@ -48,7 +48,7 @@ class Band:
 
 
 @dataclass(frozen=True, slots=True)
-class Cue:
+class CueGestures:
     """Which gesture a robot performs after a window above or below its threshold; None for none."""
 
     above: str | None = None
@@ -70,7 +70,7 @@ class Valence:
     hit_points: int | None
     miss_points: int | None
     bands: tuple[Band, ...]
-    cue: Cue
+    cue: CueGestures
 
     def __post_init__(self) -> None:
         label = Marked(self.label)
@@ -96,9 +96,9 @@ class Valence:
             raise InvalidSetting("{type}: one band must begin at 1, the goal.", type=label)
         if len(self.bands) > BANDS_MAX:
             raise InvalidSetting("{type}: at most {most} bands.", type=label, most=BANDS_MAX)
-        if any(len(band.words) > WORDS_MAX for band in self.bands):
+        if any(len(band.words) > TEXT_MAX for band in self.bands):
             raise InvalidSetting(
-                "{type}: words have at most {most} characters.", type=label, most=WORDS_MAX
+                "{type}: words have at most {most} characters.", type=label, most=TEXT_MAX
             )
 
     @property
@@ -155,7 +155,7 @@ POSITIVE = Valence(
         Band(1.1, gettext_noop("Strong push!"), Confetti.MUCH),
         Band(1.25, gettext_noop("What a push!"), Confetti.MOST),
     ),
-    cue=Cue(above="celebrate"),
+    cue=CueGestures(above="celebrate"),
 )
 NEGATIVE = Valence(
     slug="negative",
@@ -168,7 +168,7 @@ NEGATIVE = Valence(
         Band(0.75, gettext_noop("Below the goal.")),
         Band(1, gettext_noop("No points lost.")),
     ),
-    cue=Cue(below="droop"),
+    cue=CueGestures(below="droop"),
 )
 BINARY = Valence(
     slug="binary",
@@ -183,7 +183,7 @@ BINARY = Valence(
         Band(1.1, gettext_noop("Strong push!"), Confetti.MUCH),
         Band(1.25, gettext_noop("What a push!"), Confetti.MOST),
     ),
-    cue=Cue(above="celebrate", below="droop"),
+    cue=CueGestures(above="celebrate", below="droop"),
 )
 EXPLICIT = Valence(
     slug="explicit",
@@ -192,7 +192,7 @@ EXPLICIT = Valence(
     hit_points=None,
     miss_points=None,
     bands=(Band(0, gettext_noop("Your push, this step.")),),
-    cue=Cue(),
+    cue=CueGestures(),
 )
 
 VALENCES: dict[str, Valence] = {
@@ -218,7 +218,7 @@ def edit_valence(
     hit_points: int | None,
     miss_points: int | None,
     bands: Sequence[Band],
-    cue: Cue,
+    cue: CueGestures,
 ) -> Valence:
     """Give a valence as somebody made it anew. Raises InvalidSetting where it would be no such."""
     usual = find_valence(slug)
@@ -238,7 +238,7 @@ def edit_valence(
             hit=hit,
             miss=miss,
         )
-    if not usual.has_points and cue != Cue():
+    if not usual.has_points and cue != CueGestures():
         raise InvalidSetting("{type} feedback only informs: its robot stands still.", type=label)
     return replace(
         usual, hit_points=hit_points, miss_points=miss_points, bands=tuple(bands), cue=cue

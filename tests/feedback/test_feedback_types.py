@@ -11,7 +11,7 @@ from rehab.feedback.picture import show_bands
 from rehab.feedback.valences import valences_of
 from rehab.feedback.wording import words_in
 from rehab.people.roles import Role
-from rehab.training.valences import VALENCES, Cue
+from rehab.training.valences import VALENCES, CueGestures
 from tests.world import build_world, client_of, mark
 
 pytestmark = pytest.mark.django_db
@@ -108,7 +108,7 @@ def test_explicit_has_neither_points_nor_gestures_to_edit(world):
     assert 'name="cue_above"' not in page
     client.post(f"{ADD}?slug=explicit", form("explicit", hit_points="5", cue_above="celebrate"))
     mine = valences_of(world.clinic.pk)["explicit"]
-    assert (mine.has_points, mine.cue) == (False, Cue())
+    assert (mine.has_points, mine.cue) == (False, CueGestures())
 
 
 def test_the_preview_shows_each_band_and_stores_nothing(world):

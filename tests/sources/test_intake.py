@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rehab.gait import LegSamples, measure_both_legs
-from rehab.gait.columns import LAYOUTS, read_column_map
-from rehab.gait.files import read_signals
+from rehab.gait.recordings.columns import SIGNAL_LAYOUTS, read_column_map
+from rehab.gait.recordings.csv_files import read_signals
 from rehab.sources.client import LiveFeed
 from rehab.sources.intake import Intake, IntakeSettings
 from rehab.sources.synthetic.signals import Sensors, make_signals
@@ -17,7 +17,9 @@ from rehab.sources.synthetic.walker import walk
 from rehab.training.steps import Side
 
 MASS = 75.0
-NAMES = [column.name for leg in LAYOUTS["garry"].legs.values() for column in leg.values()][:3]
+NAMES = [column.name for leg in SIGNAL_LAYOUTS["garry"].legs.values() for column in leg.values()][
+    :3
+]
 NAMES += [name.replace("left", "right") for name in NAMES]
 
 
@@ -35,14 +37,14 @@ class Desk:
         self.time = Time()
         self.said: list[str] = []
         self.feed = LiveFeed(self.time)
-        self.feed.begin(Side.LEFT)
-        self.feed.walk()
+        self.feed.start_session(Side.LEFT)
+        self.feed.resume()
         how = IntakeSettings(**{"mass_kg": MASS} | settings)
         self.intake = Intake(self.feed, how, self.said.append, self.time)
 
     def send(self, rows, chunk=20):
         for start in range(0, len(rows), chunk):
-            self.intake.take(rows[start : start + chunk])
+            self.intake.add_rows(rows[start : start + chunk])
 
     def strides(self):
         found = []
@@ -116,11 +118,11 @@ def test_a_channel_that_falls_silent_is_waited_for_and_then_missing(made, table)
     for start in range(0, len(table), 20):
         part = table[start : start + 20]
         desk.time.now_s += 0.1
-        desk.intake.take(rows_of(part[:, [0, 1, 4]], [NAMES[0], NAMES[3]]))
+        desk.intake.add_rows(rows_of(part[:, [0, 1, 4]], [NAMES[0], NAMES[3]]))
         names = NAMES[1:3] + NAMES[4:]
         kept = [0, 2, 3, 5, 6]
         if not 10 < start / 200 < 15:
-            desk.intake.take(rows_of(part[:, kept], names))
+            desk.intake.add_rows(rows_of(part[:, kept], names))
     desk.intake.finish()
     found = desk.strides()
 
@@ -190,9 +192,9 @@ def test_nothing_that_comes_stops_it(batches, rate_hz):
     desk = Desk(rate_hz=rate_hz)
     for number in range(20):  # of samples, so that the rate and the legs are known
         times = [0.01 * (10 * number + k) for k in range(10)]
-        desk.intake.take([{"time_s": t, **dict.fromkeys(NAMES, 500.0)} for t in times])
+        desk.intake.add_rows([{"time_s": t, **dict.fromkeys(NAMES, 500.0)} for t in times])
     for batch in batches:
-        desk.intake.take(batch)
+        desk.intake.add_rows(batch)
     desk.intake.finish()
 
 
@@ -357,9 +359,9 @@ def test_the_clock_that_is_told_follows_a_slow_sensor_and_one_that_begins_anew(b
     for _ in range(2000):  # an hour, by a clock that is 0.5 % slow
         desk.time.now_s += 1.8
         device_s += 1.8 * 0.995
-        desk.intake.take([{"time_s": device_s, "value": 4.0}])
+        desk.intake.add_rows([{"time_s": device_s, "value": 4.0}])
     if begins_anew:
         desk.time.now_s += 20.0
         device_s = 1.0
-        desk.intake.take([{"time_s": device_s, "value": 4.0}])
+        desk.intake.add_rows([{"time_s": device_s, "value": 4.0}])
     assert desk.feed.clock_s == pytest.approx(device_s, abs=0.1)

@@ -10,7 +10,7 @@ import pytest
 
 from rehab.sources.intake import Intake
 from rehab.sources.lsl import ClockCorrection, choose_streams, load_pylsl
-from rehab.sources.source import Unusable
+from rehab.sources.reporting import SourceError
 from rehab.sources.synthetic import walk
 from rehab.sources.synthetic.signals import make_signals
 from tests.sources.fake_lsl import FakeLsl
@@ -45,24 +45,24 @@ def test_streams_are_chosen_or_listed():
     one = lsl.add("Treadmill", NAMES, 1000)
     assert choose_streams(lsl.outlets, []) == ([one], "")
     other = lsl.add("Mocap", NAMES, 100)
-    with pytest.raises(Unusable, match="Treadmill .6 channels, 1000 Hz, lab., Mocap"):
+    with pytest.raises(SourceError, match="Treadmill .6 channels, 1000 Hz, lab., Mocap"):
         choose_streams(lsl.outlets, [])
     assert choose_streams(lsl.outlets, ["Mocap", "Treadmill-1"]) == ([other, one], "")
     assert "No LSL stream EMG is here yet" in choose_streams(lsl.outlets, ["EMG"])[1]
     lsl.add("Mocap", NAMES, 100)
-    with pytest.raises(Unusable, match="Several LSL streams are called Mocap"):
+    with pytest.raises(SourceError, match="Several LSL streams are called Mocap"):
         choose_streams(lsl.outlets, ["Mocap"])
 
 
 def test_without_pylsl_the_cure_is_said(monkeypatch):
     monkeypatch.setitem(sys.modules, "pylsl", None)
-    with pytest.raises(Unusable, match="pip install pylsl"):
+    with pytest.raises(SourceError, match="pip install pylsl"):
         load_pylsl()
 
 
 def test_a_folder_of_that_name_is_no_pylsl(monkeypatch):
     monkeypatch.setitem(sys.modules, "pylsl", ModuleType("pylsl"))
-    with pytest.raises(Unusable, match="pip install pylsl"):
+    with pytest.raises(SourceError, match="pip install pylsl"):
         load_pylsl()
 
 
@@ -86,7 +86,7 @@ def test_without_liblsl_the_cure_is_said(monkeypatch):
 
     monkeypatch.delitem(sys.modules, "pylsl", raising=False)
     monkeypatch.setattr("importlib.import_module", fail)
-    with pytest.raises(Unusable, match="library file was not found.*liblsl"):
+    with pytest.raises(SourceError, match="library file was not found.*liblsl"):
         load_pylsl()
 
 
@@ -131,14 +131,14 @@ async def test_channels_without_a_meaning_are_refused_with_the_cure(tmp_path):
     lab = LslLab(tmp_path)
     lab.lsl.add("EEG", ("Fz", "Cz"), 250)
     lab.typed = ["--stream", "EEG"]
-    with pytest.raises(Unusable, match=r"Fz, Cz.*--columns"):
+    with pytest.raises(SourceError, match=r"Fz, Cz.*--columns"):
         await asyncio.wait_for(lab.make().read(Intake(Desk().feed, lab.make().settings, print)), 5)
 
 
 async def test_real_streams_are_heard(tmp_path):
     try:
         pylsl = load_pylsl()
-    except Unusable as problem:
+    except SourceError as problem:
         pytest.skip(str(problem))
     name = f"GARRY test {tmp_path.name}"
     info = pylsl.StreamInfo(name, "Gait", 2, 0, "double64", tmp_path.name)

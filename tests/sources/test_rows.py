@@ -10,7 +10,7 @@ from websockets.asyncio.server import serve
 
 from rehab.sources.intake import Intake, LineReader, parse_address
 from rehab.sources.intake.lines import MAX_LINE
-from rehab.sources.source import Unusable
+from rehab.sources.reporting import SourceError
 from rehab.training.steps import Measurement
 from tests.sources.labs import RowsLab, json_line
 from tests.sources.test_intake import Desk
@@ -143,13 +143,13 @@ async def test_a_port_that_is_taken_is_said_with_the_cure(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as other:
         lab.typed = ["--listen", f"tcp://127.0.0.1:{other.getsockname()[1]}"]
         async with reading(lab) as (_, _, task):
-            with pytest.raises(Unusable, match="take another port"):
+            with pytest.raises(SourceError, match="take another port"):
                 await task
 
 
 @pytest.mark.parametrize("text", ["9101", "http://x:1", "tcp://x", "udp://:9", "tcp://x:99999"])
 def test_what_is_no_address_is_said_with_the_cure(text):
-    with pytest.raises(Unusable, match=r"Write one like tcp://127\.0\.0\.1:9101"):
+    with pytest.raises(SourceError, match=r"Write one like tcp://127\.0\.0\.1:9101"):
         parse_address(text)
 
 
@@ -168,7 +168,7 @@ def test_a_line_without_end_is_told_once_and_takes_no_memory():
     for _ in range(50):
         wrong += reader.read_bytes(b"x" * 20_000)[1]
     assert len(wrong) == 1
-    assert len(reader._cut) <= MAX_LINE + 20_000
+    assert len(reader._partial) <= MAX_LINE + 20_000
     assert reader.read_bytes(b'\n{"value": 1}\n')[0] == [{"value": 1.0}]
 
 

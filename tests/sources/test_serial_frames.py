@@ -58,7 +58,7 @@ def test_endless_noise_takes_no_memory():
     reader = FrameReader()
     for _ in range(1000):
         assert reader.read(b"\xff" * 1000) == []
-    assert len(reader._cut) <= 1024
+    assert len(reader._partial) <= 1024
     assert reader.read(b"\n" + NAMES + frame("D", 0, 1, 1))[0]["left_force_n"] == 1
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 
-class SourceClock:
+class PlaybackClock:
     """Source time [s] that runs ``speed`` times as fast as ours and stands still when told to.
 
     With ``speed`` None strides come as fast as they are taken: nothing is waited for, and the clock
@@ -36,12 +36,12 @@ class SourceClock:
         if self._since_s is not None:
             self._since_s = self._monotonic()
 
-    def run(self) -> None:
+    def start(self) -> None:
         """Let it run on from what it shows."""
         if self._since_s is None:
             self._since_s = self._monotonic()
 
-    def stand(self) -> None:
+    def pause(self) -> None:
         """Let it stand still at what it shows."""
         self._time_s, self._since_s = self.now_s, None
 

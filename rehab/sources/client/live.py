@@ -8,11 +8,11 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 
-from rehab.sources.client.outbox import add_ours
-from rehab.sources.client.player import KEPT_MAX
-from rehab.training.clocks import HeardClock
+from rehab.sources.client.playback import KEPT_MAX
+from rehab.sources.client.step_queue import add_own_reason
+from rehab.training.clocks import RemoteClock
 from rehab.training.phases import make_phase
-from rehab.training.steps import Measurement, Reason, Side
+from rehab.training.steps import InvalidReason, Measurement, Side
 
 
 class LiveFeed:
@@ -28,7 +28,7 @@ class LiveFeed:
         The one that the session is in, as far as is known.
     trained_side
         The leg that the session trains, None before there was one.
-    left_out
+    excluded
         How many strides belonged to no session.
     on_change
         Called when there is something to send, or nothing more will come.
@@ -39,7 +39,7 @@ class LiveFeed:
     def __init__(self, monotonic: Callable[[], float] = time.monotonic) -> None:
         self.phase = make_phase("training")
         self.trained_side: Side | None = None
-        self.left_out = 0
+        self.excluded = 0
         self.on_change: Callable[[], None] = lambda: None
         self._monotonic = monotonic
         self._waiting: deque[Measurement] = deque()
@@ -47,7 +47,7 @@ class LiveFeed:
         self._has_walked = False  # it has begun
         self._runs = False
         self._is_finished = False
-        self._clock = HeardClock()
+        self._clock = RemoteClock()
 
     @property
     def clock_s(self) -> float | None:
@@ -67,33 +67,33 @@ class LiveFeed:
         """Whether the last stride has been given."""
         return self._is_finished and not self._waiting
 
-    def begin(self, trained_side: Side, walked: int = 0) -> None:
+    def start_session(self, trained_side: Side, walked: int = 0) -> None:
         """Join a session."""
-        self.end()
+        self.end_session()
         self.trained_side = trained_side
         self._is_open = True
 
-    def end(self) -> None:
+    def end_session(self) -> None:
         """Leave the session."""
         self._waiting.clear()
         self._is_open = self._has_walked = self._runs = False
 
-    def walk(self) -> None:
+    def resume(self) -> None:
         """The session runs."""
         self._has_walked = self._runs = True
 
-    def stand(self) -> None:
+    def pause(self) -> None:
         """The session is paused, or has not begun."""
         self._runs = False
 
     def put(self, stride: Measurement) -> None:
         """Take a stride that was measured just now."""
-        self._clock.is_late(stride.time_s, self._monotonic())
+        self._clock.observe(stride.time_s, self._monotonic())
         if not (self._is_open and self._has_walked) or len(self._waiting) >= KEPT_MAX:
-            self.left_out += 1
+            self.excluded += 1
             return
         if not self._runs:
-            stride = replace(stride, reasons=add_ours(stride.reasons, Reason.PAUSED))
+            stride = replace(stride, reasons=add_own_reason(stride.reasons, InvalidReason.PAUSED))
         self._waiting.append(stride)
         self.on_change()
 

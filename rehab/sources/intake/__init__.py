@@ -9,10 +9,10 @@ is the door to all of it. ``lines`` and ``addresses`` are for those who get thei
 from rehab.sources.intake.addresses import Address, parse_address
 from rehab.sources.intake.intake import Intake
 from rehab.sources.intake.lines import LineReader
+from rehab.sources.intake.measurements import to_measurement
+from rehab.sources.intake.pipeline import SignalPipeline
 from rehab.sources.intake.rows import BadRow, Cell
 from rehab.sources.intake.settings import IntakeSettings, add_signal_arguments
-from rehab.sources.intake.signals import SignalPath
-from rehab.sources.intake.strides import name_stride
 
 __all__ = [
     "Address",
@@ -21,8 +21,8 @@ __all__ = [
     "Intake",
     "IntakeSettings",
     "LineReader",
-    "SignalPath",
+    "SignalPipeline",
     "add_signal_arguments",
-    "name_stride",
     "parse_address",
+    "to_measurement",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
-from rehab.sources.source import Unusable
+from rehab.sources.reporting import SourceError
 
 KINDS = ("tcp", "udp", "ws")
 
@@ -24,7 +24,7 @@ class Address(NamedTuple):
 
 
 def parse_address(text: str, kinds: tuple[str, ...] = KINDS) -> Address:
-    """Read an address. Raises Unusable."""
+    """Read an address. Raises SourceError."""
     try:
         parts = urlsplit(text)
         port = parts.port
@@ -32,5 +32,5 @@ def parse_address(text: str, kinds: tuple[str, ...] = KINDS) -> Address:
         parts, port = urlsplit(""), None
     if parts.scheme not in kinds or not parts.hostname or port is None:
         examples = ", ".join(f"{kind}://127.0.0.1:9101" for kind in kinds)
-        raise Unusable(f"{text!r} is no address. Write one like {examples}.")
+        raise SourceError(f"{text!r} is no address. Write one like {examples}.")
     return Address(parts.scheme, parts.hostname, port)

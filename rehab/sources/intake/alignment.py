@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from rehab.gait.columns import REQUIRED
+from rehab.gait.recordings.columns import REQUIRED
 
 Floats = NDArray[np.float64]
-Channel = tuple[str, str]  # side, and one of rehab.gait.columns.CHANNELS
+Channel = tuple[str, str]  # side, and one of rehab.gait.recordings.columns.CHANNELS
 Samples = tuple[Floats, dict[Channel, Floats]]  # times, and as many values of each channel
 
 HOLD_S = 0.05  # between two samples nothing is known over more (gait.md 2.1)

@@ -6,8 +6,8 @@ import math
 import re
 from collections.abc import Mapping
 
-from rehab.sources.client.outbox import MAX_EXTRA, MAX_REASONS
-from rehab.training.steps import TIME_MAX_S, Measurement, Reason, Side
+from rehab.sources.client.step_queue import MAX_EXTRA, MAX_REASONS
+from rehab.training.steps import TIME_MAX_S, InvalidReason, Measurement, Side
 
 Cell = float | str | None
 
@@ -66,13 +66,13 @@ def read_stride(
     value = read_number(cells, VALUE)
     time_name = next((name for name in TIMES if name in cells), None)
     reasons = _read_reasons(cells)
-    left_out = []
+    excluded = []
     extra: dict[str, float] = {}
     for name, cell in cells.items():
         if name in _KNOWN or cell is None:
             continue
         if not NAME.fullmatch(name) or isinstance(cell, str) or len(extra) >= MAX_EXTRA:
-            left_out.append(name)
+            excluded.append(name)
         elif math.isfinite(cell):
             extra[name] = cell
     stride = Measurement(
@@ -83,7 +83,7 @@ def read_stride(
         reasons=reasons,
         extra=extra,
     )
-    return stride, left_out
+    return stride, excluded
 
 
 def _read_side(cell: Cell, side: Side) -> Side:
@@ -102,5 +102,5 @@ def _read_reasons(cells: Mapping[str, Cell]) -> tuple[str, ...]:
         raise BadRow("A reason is a word of letters, digits or _, with blanks between several.")
     is_doubted = str(cells.get("valid", "")).lower() in _NO
     if is_doubted and not reasons:
-        return (Reason.FLAGGED,)
+        return (InvalidReason.FLAGGED,)
     return reasons[:MAX_REASONS]

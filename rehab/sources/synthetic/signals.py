@@ -102,7 +102,7 @@ class Sensors:
 
 
 @dataclass(slots=True)
-class LegUnderWay:
+class LegBuilder:
     """The channels of one leg without sensors, on the samples' times."""
 
     t_s: Floats
@@ -178,7 +178,7 @@ def make_signals(
     t_s = t_s + np.clip(jitter, -0.4 / sensors.rate_hz, 0.4 / sensors.rate_hz)
     trained = strides[0].side.value
     other = "right" if trained == "left" else "left"
-    legs = {side: LegUnderWay(t_s, mass_kg, side) for side in (trained, other)}
+    legs = {side: LegBuilder(t_s, mass_kg, side) for side in (trained, other)}
     begin_s = 1.0
     legs[other].walk(
         begin_s - lengths[0] / 2, lengths[0], other_a2_w_kg, None, sensors.angle_delay_s
@@ -203,7 +203,7 @@ def make_signals(
     return Recording(t_s, signals["left"], signals["right"], sensors.rate_hz, mass_kg, tuple(truth))
 
 
-def add_sensors(leg: LegUnderWay, sensors: Sensors, rng: np.random.Generator) -> LegSignals:
+def add_sensors(leg: LegBuilder, sensors: Sensors, rng: np.random.Generator) -> LegSignals:
     """Add what the sensors add."""
 
     def add(values: Floats, noise: float) -> Floats:

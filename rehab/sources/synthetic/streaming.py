@@ -10,11 +10,11 @@ import numpy as np
 
 from rehab.gait import LegSamples, TwoLegDetector
 from rehab.sources.intake.alignment import Channel, Floats
-from rehab.sources.intake.strides import name_stride
+from rehab.sources.intake.measurements import to_measurement
 from rehab.sources.synthetic.signals import (
     A2_DEFAULT_W_KG,
+    LegBuilder,
     LegSignals,
-    LegUnderWay,
     Sensors,
     add_sensors,
 )
@@ -49,7 +49,7 @@ class SignalMaker:
         t_s = np.arange(self._index, stop) / sensors.rate_hz
         most_s = 0.4 / sensors.rate_hz
         t_s += np.clip(self._random.normal(0, sensors.jitter_s, len(t_s)), -most_s, most_s)
-        legs = {side: LegUnderWay(t_s, self._mass_kg, side) for side in (self._side, self._other)}
+        legs = {side: LegBuilder(t_s, self._mass_kg, side) for side in (self._side, self._other)}
         delay_s = sensors.angle_delay_s
         value = A2_DEFAULT_W_KG if stride.value is None else stride.value
         legs[self._side].walk(begin_s, stride_s, value, stride, delay_s)
@@ -113,7 +113,7 @@ class SignalWalker:
         )
         found = self._detector.feed(t_s, *(LegSamples(*_channels(legs[s])) for s in Side))
         for measured in found:
-            named = name_stride(measured, self._number + 1, stride.side)
+            named = to_measurement(measured, self._number + 1, stride.side)
             if named is not None:
                 self._number += 1
                 self._ready.append(named)

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 
 from rehab.sources.synthetic.profiles import GOOD, WalkerProfile
 from rehab.training.phases import Phase, make_phase
-from rehab.training.steps import Measurement, Reason, Side
+from rehab.training.steps import InvalidReason, Measurement, Side
 
 # The lab recorded trials of at most two minutes, with 3.2-5.2 s between them (gait.md 1.3).
 TRIAL_S = 120.0
@@ -73,7 +73,7 @@ class SyntheticWalker:
             time_s=round(self._time_s, 3),
             side=self.side,
             value=None if is_missing else round(value, 4),
-            reasons=(Reason.FLAGGED,) if self._is_bad else (),
+            reasons=(InvalidReason.FLAGGED,) if self._is_bad else (),
         )
 
     def _begin_trial(self, phase: Phase, rest: float) -> None:

@@ -14,7 +14,7 @@ from rehab.sessions.live import session as sessions
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.phases import make_phase
-from rehab.training.valences import Cue
+from rehab.training.valences import CueGestures
 from tests.sessions.live.callers import turns
 from tests.sessions.live.test_robots import restart
 from tests.world import NOW
@@ -76,15 +76,15 @@ async def test_the_next_phase_has_the_other_feedback_type_for_everyone(place, be
 
 
 async def test_a_robot_that_was_silenced_stays_so_in_every_type(place, ready):
-    session = await ready(place, *TWO, valence="positive", cue=Cue())
+    session = await ready(place, *TWO, valence="positive", cue=CueGestures())
     plan = session.to_plan()
     assert [one.cue.above for one in plan.alternatives] == [None] * 3
     other = await ready(place, *TWO, valence="positive", at_station=False)
     cues = {one.slug: one.cue for one in other.to_plan().alternatives}
     assert cues == {
-        "negative": Cue(below="droop"),
-        "binary": Cue("celebrate", "droop"),
-        "explicit": Cue(),
+        "negative": CueGestures(below="droop"),
+        "binary": CueGestures("celebrate", "droop"),
+        "explicit": CueGestures(),
     }
 
 

@@ -1,0 +1,221 @@
+"""One leg: its stances found and measured as they end, in samples that others put down."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from rehab.gait.contacts.force_plate import Contact, ContactFinder
+from rehab.gait.settings import DetectorSettings
+from rehab.gait.signals.buffer import LegBuffer
+from rehab.gait.signals.filters import find_maximum, find_minimum
+from rehab.gait.signals.samples import FORCE, TIME
+from rehab.gait.stances.analysis import Stance, StanceAnalyzer
+from rehab.gait.stances.plausibility import STANCE_MAX_S, STANCE_MIN_S
+from rehab.gait.strides import Flag, RejectionReason, Stride
+
+GRAVITY_M_S2 = 9.81
+KEEP_S = 8.0  # the longest cycle, the longest stance after it, and the piece they came in
+PIECE_S = 1.0  # of a long chunk is taken at a time
+STRIDE_MAX_S = 4.0
+LONGEST_GAP_S = 0.25  # in a cycle; longer ones may hide a contact
+OFFSET_N = 15.0
+# A leg that never bears 80 % of the weight has help: even slow walking reaches 95 %.
+FULL_LOAD = 0.8
+USUAL_STANCES = 9
+USUAL_MIN, USUAL_MAX = 0.6, 1.5  # of the median of the last stances
+
+
+@dataclass(frozen=True, slots=True)
+class OtherLeg:
+    """What the other leg and its plate tell of a stride; the figures are those of ``Stride``."""
+
+    reasons: list[RejectionReason]
+    flags: list[Flag]
+    step_s: float | None = None
+    step_length_m: float | None = None
+    step_symmetry: float | None = None
+    first_double_support_s: float | None = None
+    second_double_support_s: float | None = None
+    weight_ratio: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class OneLegStride:
+    """A stride before the other leg was looked at.
+
+    ``index`` is the sample that completed it, ``reasons`` are those of its own leg, and
+    ``cycle_index`` is where the cycle before it began, None where that was not seen whole.
+    """
+
+    index: int
+    contact: Contact
+    stance: Stance
+    reasons: list[RejectionReason]
+    cycle_index: int | None
+    stride_s: float | None
+    swing_s: float | None
+
+
+class LegDetector:
+    """Finds and measures the strides of one leg in a buffer that others fill.
+
+    Parameters
+    ----------
+    buffer
+        The leg's samples.
+    settings
+        How they are measured.
+    side
+        Which leg it is, if that is known.
+    """
+
+    def __init__(self, buffer: LegBuffer, settings: DetectorSettings, side: str | None) -> None:
+        rate_hz = settings.rate_hz
+        self.buffer = buffer
+        self.mass_kg = float(settings.mass_kg)
+        self.weight_n = self.mass_kg * GRAVITY_M_S2
+        self.side = side
+        self.contacts = ContactFinder(
+            buffer, rate_hz, self.weight_n, settings.contact_n, settings.release_n
+        )
+        self._samples = buffer.samples
+        self.piece = int(PIECE_S * rate_hz)
+        # Contacts of so many samples are there, whatever the rest of a piece and the wait brought.
+        self.memory = self._samples.keep - 2 * self.piece
+        self._cycle_max = STRIDE_MAX_S * rate_hz
+        self._analyzer = StanceAnalyzer(
+            buffer,
+            float(rate_hz),
+            self.mass_kg,
+            self.weight_n,
+            settings.cutoff_hz,
+            settings.is_velocity,
+        )
+        self._wait = math.ceil(settings.look_ahead_s * rate_hz - 1e-9)
+        self._pending: deque[Contact] = deque()
+        self._previous: Contact | None = None  # the stance before, with its bounces
+        self._left: tuple[int, float] | None = None  # where it really ended
+        self._stances: deque[float] = deque(maxlen=USUAL_STANCES)
+        self._number = 0
+
+    def advance(self, start: int, stop: int) -> list[OneLegStride]:
+        """Go through new samples ``start:stop``, a second at most; give what they complete."""
+        ended = self.contacts.advance(start, stop)
+        if not ended and not self._pending:
+            return []
+        self._pending.extend(ended)
+        strides = []
+        while self._pending:
+            due = (self._pending[0].end_index or 0) + self._wait
+            if due >= stop:
+                break
+            contact = self._pending.popleft()
+            if self._is_measurable(contact):
+                strides.append(self._measure(contact, due))
+        return strides
+
+    def finish(self) -> list[OneLegStride]:
+        """Give what still waits for samples, and the stance that the record's end cuts off."""
+        last = self._samples.end - 1
+        strides = [self._measure(one, last) for one in self._pending if self._is_measurable(one)]
+        self._pending.clear()
+        current = self.contacts.truncate()
+        if current is not None and (current.end_s or 0.0) - current.begin_s <= STANCE_MAX_S:
+            cycle = self._find_cycle(current)
+            stance = self._analyzer.locate(current)
+            strides.append(OneLegStride(last, current, stance, [RejectionReason.CUT_OFF], *cycle))
+        return strides
+
+    def complete(self, stride: OneLegStride, other_leg: OtherLeg) -> Stride:
+        """Give the stride of a stride."""
+        contact, stance, push_off = stride.contact, stride.stance, stride.stance.push_off
+        reasons, flags = stride.reasons + other_leg.reasons, other_leg.flags
+        if abs(contact.offset_n) > OFFSET_N:
+            flags = [Flag.OFFSET, *flags]
+        if contact.peak_n < FULL_LOAD * self.weight_n and Flag.SUPPORTED not in flags:
+            flags = [*flags, Flag.SUPPORTED]
+        begin_s, end_s = contact.begin_s, contact.end_s or 0.0
+        self._number += 1
+        return Stride(
+            number=self._number,
+            initial_contact_s=begin_s,
+            terminal_contact_s=end_s,
+            a2_w_kg=push_off.a2_w_kg if push_off else None,
+            a2_time_s=push_off.a2_time_s if push_off else None,
+            valid=not reasons,
+            reasons=tuple(reasons),
+            flags=tuple(flags),
+            stance_s=end_s - begin_s,
+            stride_s=stride.stride_s,
+            swing_s=stride.swing_s,
+            force_peak_n_kg=contact.peak_n / self.mass_kg,
+            moment_peak_nm_kg=push_off.moment_peak_nm_kg if push_off else None,
+            a2_moment_nm_kg=push_off.a2_moment_nm_kg if push_off else None,
+            a2_velocity_rad_s=push_off.a2_velocity_rad_s if push_off else None,
+            propulsion_n_kg=stance.propulsion_n_kg,
+            position_m=stance.position_m,
+            offset_n=contact.offset_n,
+            side=self.side,
+            step_s=other_leg.step_s,
+            step_length_m=other_leg.step_length_m,
+            step_symmetry=other_leg.step_symmetry,
+            first_double_support_s=other_leg.first_double_support_s,
+            second_double_support_s=other_leg.second_double_support_s,
+            weight_ratio=other_leg.weight_ratio,
+        )
+
+    def compute_mean_load(self, begin: int, end: int, offset_n: float) -> float:
+        """Give the mean force above its zero between two samples, by body weight.
+
+        NaN where samples have no force, or are no longer there.
+        """
+        if begin < self._samples.first or not 0 < end - begin <= self._cycle_max:
+            return math.nan
+        force = self.buffer.channel(FORCE, begin, end)
+        return (float(force.sum()) / (end - begin) - offset_n) / self.weight_n
+
+    def _is_measurable(self, contact: Contact) -> bool:
+        """Say whether a contact is a stance to be told; remember it if not."""
+        is_cut = contact.begin_index == 0  # the record began in the middle of it
+        if is_cut or contact.bounce:
+            self._previous = None if is_cut else self._previous
+            self._left = (contact.end_index or 0, contact.end_s or 0.0)
+        return not is_cut and not contact.bounce
+
+    def _measure(self, contact: Contact, due: int) -> OneLegStride:
+        """Measure a stance that sample ``due`` completes."""
+        end_s = contact.end_s or 0.0
+        stance = self._analyzer.measure(contact, due + 1)
+        cycle = self._find_cycle(contact)
+        reasons = stance.reasons
+        if self._is_unusual(end_s - contact.begin_s):
+            reasons = [*reasons, RejectionReason.IRREGULAR]
+        self._previous, self._left = contact, (contact.end_index or 0, end_s)
+        return OneLegStride(due, contact, stance, reasons, *cycle)
+
+    def _find_cycle(self, contact: Contact) -> tuple[int | None, float | None, float | None]:
+        """Give begin, stride and swing time of the cycle that ended at a contact, if seen whole."""
+        if self._previous is None or self._left is None or not contact.seen:
+            return None, None, None
+        left_index, left_s = self._left
+        begin = self._previous.begin_index
+        stride_s = contact.begin_s - self._previous.begin_s
+        if contact.begin_index - begin > self._cycle_max or stride_s > STRIDE_MAX_S:
+            return None, None, None
+        if left_index - 1 < self._samples.first:
+            return None, None, None
+        times = self.buffer.channel(TIME, left_index - 1, contact.begin_index + 1)
+        steps = times[1:] - times[:-1]
+        shortest, longest = find_minimum(steps), find_maximum(steps)
+        if not (stride_s > 0 and shortest > 0 and longest <= LONGEST_GAP_S):
+            return None, None, None
+        return begin, stride_s, contact.begin_s - left_s
+
+    def _is_unusual(self, stance_s: float) -> bool:
+        """Compare a stance with the last ones, of whatever kind, and remember it."""
+        usual = sorted(self._stances)[len(self._stances) // 2] if len(self._stances) > 1 else None
+        if STANCE_MIN_S <= stance_s <= STANCE_MAX_S:
+            self._stances.append(stance_s)
+        return usual is not None and not USUAL_MIN < stance_s / usual < USUAL_MAX
