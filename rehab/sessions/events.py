@@ -228,7 +228,7 @@ def change_event(fold: SessionFold, kind: ChangeKind, value: ChangeValue = None)
             value, told = fold.robot_intensity, {"value": fold.robot_intensity}
         case ChangeKind.VALENCE:
             told = describe_types(fold)
-        case ChangeKind.WORDS:
+        case ChangeKind.FEEDBACK_TEXT:
             told = {}
         case ChangeKind.WORDS_SHOWN:
             value, told = float(fold.words_shown), {"value": fold.words_shown}

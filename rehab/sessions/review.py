@@ -43,7 +43,7 @@ NAMES = {
     ChangeKind.ACTIVATION_THRESHOLD: _("Robot threshold"),
     ChangeKind.ROBOT_INTENSITY: _("Robot"),
     ChangeKind.VALENCE: _("Next feedback type"),
-    ChangeKind.WORDS: _("Words edited"),
+    ChangeKind.FEEDBACK_TEXT: _("Words edited"),
     ChangeKind.WORDS_SHOWN: _("Words"),
     ChangeKind.CHART_STYLE: _("Chart"),
     RobotEntry.STOP: _("Robot stopped"),
@@ -114,7 +114,7 @@ def say_event(event: SessionEvent, plan: SessionPlan) -> str:
             return f"{name}: {gettext(plan.phases[int(event.value or 0)].name)}"
         case ChangeKind.VALENCE:
             return f"{name}: {_name_type(event.data.get('value'))}"
-        case ChangeKind.WORDS:
+        case ChangeKind.FEEDBACK_TEXT:
             return f"{name}: {_name_type(event.data.get('value', {}).get('valence'))}"
         case ChangeKind.WORDS_SHOWN:
             return f"{name}: {gettext('on') if event.value else gettext('off')}"

@@ -64,7 +64,7 @@ async def _reword(session_id: int, worded: Valence, by: User) -> None:
         if known is None or known.bands == worded.bands:
             return
         value = {"valence": worded.slug, "bands": bands_to_json(worded.bands)}
-        await here.change(session_id, ChangeKind.WORDS, value, by)
+        await here.change(session_id, ChangeKind.FEEDBACK_TEXT, value, by)
     finally:
         if not serves:
             await here.drain()

@@ -35,13 +35,13 @@ class ChangeKind(StrEnum):
     ACTIVATION_THRESHOLD = "activation_threshold"
     ROBOT_INTENSITY = "robot_intensity"
     VALENCE = "valence"  # of the next phase with feedback
-    WORDS = "words"  # the bands of a valence, as the clinic edited them
+    FEEDBACK_TEXT = "feedback_text"  # the bands of a valence, as the clinic edited them
     WORDS_SHOWN = "words_shown"
     CHART_STYLE = "chart_style"
 
 
 # What pages and programs ask for. Words are edited with their feedback type, for all open sessions.
-REQUESTABLE = tuple(kind for kind in ChangeKind if kind is not ChangeKind.WORDS)
+REQUESTABLE = tuple(kind for kind in ChangeKind if kind is not ChangeKind.FEEDBACK_TEXT)
 
 
 class PauseReason(StrEnum):
@@ -88,7 +88,7 @@ TRANSITIONS: dict[ChangeKind, tuple[frozenset[State], State | None]] = {
     ChangeKind.ACTIVATION_THRESHOLD: (OPEN_STATES, None),
     ChangeKind.ROBOT_INTENSITY: (OPEN_STATES, None),
     ChangeKind.VALENCE: (OPEN_STATES, None),
-    ChangeKind.WORDS: (OPEN_STATES, None),
+    ChangeKind.FEEDBACK_TEXT: (OPEN_STATES, None),
     ChangeKind.WORDS_SHOWN: (OPEN_STATES, None),
     ChangeKind.CHART_STYLE: (OPEN_STATES, None),
 }
@@ -114,7 +114,7 @@ CHANGE_LABELS = {
     ChangeKind.ACTIVATION_THRESHOLD: gettext_noop("activation_threshold"),
     ChangeKind.ROBOT_INTENSITY: gettext_noop("robot_intensity"),
     ChangeKind.VALENCE: gettext_noop("valence"),
-    ChangeKind.WORDS: gettext_noop("words"),
+    ChangeKind.FEEDBACK_TEXT: gettext_noop("feedback_text"),
     ChangeKind.WORDS_SHOWN: gettext_noop("words_shown"),
     ChangeKind.CHART_STYLE: gettext_noop("chart_style"),
 }

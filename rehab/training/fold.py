@@ -268,7 +268,7 @@ class SessionFold:
                 self.pause_reason = None
             case ChangeKind.VALENCE:
                 self._plan_valence(change.value)
-            case ChangeKind.WORDS:
+            case ChangeKind.FEEDBACK_TEXT:
                 self._reword(change.value)
             case ChangeKind.WORDS_SHOWN:
                 self.words_shown = _switch(_needed(change))

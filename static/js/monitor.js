@@ -78,7 +78,7 @@ function take(event) {
     case "chart_style":
       session.chart = event.value;
       break;
-    case "words":
+    case "feedback_text":
       tell(_("The clinic’s words were edited; the patient reads them from the next step."));
       break;
     case "goal":

@@ -55,8 +55,8 @@ changes = st.builds(
     lambda slug: st.sampled_from(
         [
             Change(ChangeKind.VALENCE, slug),
-            Change(ChangeKind.WORDS, {"valence": slug, "bands": bands_to_json(ONE_BAND)}),
-            Change(ChangeKind.WORDS, {"valence": slug, "bands": bands_to_json(TWO_BANDS)}),
+            Change(ChangeKind.FEEDBACK_TEXT, {"valence": slug, "bands": bands_to_json(ONE_BAND)}),
+            Change(ChangeKind.FEEDBACK_TEXT, {"valence": slug, "bands": bands_to_json(TWO_BANDS)}),
         ]
     )
 )
@@ -244,7 +244,7 @@ def test_the_feedback_type_changes_with_a_phase_of_feedback_alone(
 @given(sessions())
 def test_words_and_drawing_alter_no_score(session: tuple[SessionPlan, Log]) -> None:
     plan, log = session
-    spoken = (ChangeKind.WORDS, ChangeKind.WORDS_SHOWN, ChangeKind.CHART_STYLE)
+    spoken = (ChangeKind.FEEDBACK_TEXT, ChangeKind.WORDS_SHOWN, ChangeKind.CHART_STYLE)
     quiet = [e for e in log if not (isinstance(e, Change) and e.kind in spoken)]
     one, other = SessionFold(plan), SessionFold(plan)
     assert walk_log(one, log) == walk_log(other, quiet)

@@ -58,7 +58,7 @@ VALUES: dict[ChangeKind, ChangeValue] = {
     **NUMBERS,
     K.VALENCE: "negative",
     K.CHART_STYLE: "line",
-    K.WORDS: {"valence": "binary", "bands": bands_to_json(BINARY.bands)},
+    K.FEEDBACK_TEXT: {"valence": "binary", "bands": bands_to_json(BINARY.bands)},
 }
 
 
@@ -135,9 +135,9 @@ def test_a_pause_has_a_reason_until_the_session_goes_on() -> None:
         (K.WORDS_SHOWN, 0.5, "shown"),
         (K.CHART_STYLE, "bars", "points, line"),
         (K.VALENCE, "happy", "binary, negative"),
-        (K.WORDS, {"valence": "positive", "bands": []}, "one of the session's"),
-        (K.WORDS, {"valence": "binary", "bands": []}, "begins at 0"),
-        (K.WORDS, {"valence": "binary", "bands": [{"words": "Go"}]}, "from_performance"),
+        (K.FEEDBACK_TEXT, {"valence": "positive", "bands": []}, "one of the session's"),
+        (K.FEEDBACK_TEXT, {"valence": "binary", "bands": []}, "begins at 0"),
+        (K.FEEDBACK_TEXT, {"valence": "binary", "bands": [{"words": "Go"}]}, "from_performance"),
         *((K.PHASE, value, "0 to 1") for value in (-1, 0.5, 2, 1e308, math.nan, math.inf)),
     ],
 )
