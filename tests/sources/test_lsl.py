@@ -14,9 +14,8 @@ from rehab.sources.reporting import SourceError
 from rehab.sources.synthetic import walk
 from rehab.sources.synthetic.signals import make_signals
 from tests.sources.fake_lsl import FakeLsl
-from tests.sources.labs import LslLab
-from tests.sources.test_intake import MASS, NAMES, Desk, measure
-from tests.sources.test_rows import until_strides
+from tests.sources.intake_harness import MASS, NAMES, IntakeHarness, measure
+from tests.sources.labs import LslLab, until_strides
 
 
 def test_a_correction_that_wanders_never_turns_the_stamps_around():
@@ -70,7 +69,7 @@ async def test_a_stream_that_goes_away_while_it_is_opened_is_tried_again(tmp_pat
     lab = LslLab(tmp_path)
     lab.outlet.vanishes = True
     lab.outlet.push([3.0, 0.7], step_s=1.0)
-    found = await read_streams(lab, Desk(), 1)
+    found = await read_streams(lab, IntakeHarness(), 1)
 
     assert found[0].value == 3.0
     assert any("went away" in text for text in lab.said)
@@ -90,12 +89,12 @@ def test_without_liblsl_the_cure_is_said(monkeypatch):
         load_pylsl()
 
 
-async def read_streams(lab, desk, count):
+async def read_streams(lab, harness, count):
     source = lab.make("--mass", str(MASS))
-    intake = Intake(desk.feed, source.settings, lab.said.append, desk.time)
+    intake = Intake(harness.feed, source.settings, lab.said.append, harness.time)
     task = asyncio.create_task(source.read(intake))
     try:
-        return await until_strides(desk, count)
+        return await until_strides(harness, count)
     finally:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
@@ -115,7 +114,7 @@ async def test_two_streams_of_two_clocks_and_rates_become_one_walk(tmp_path):
         if number % 2 == 0:
             mocap.samples.put((list(row), time_s + 3.0))
     expected = measure(made, 100.0)
-    found = await read_streams(lab, Desk(), len(expected) - 2)
+    found = await read_streams(lab, IntakeHarness(), len(expected) - 2)
 
     assert sum(not m.reasons for m in found) >= 0.7 * len(found)
     by_time = {s.terminal_contact_s: s for s in expected}
@@ -132,7 +131,9 @@ async def test_channels_without_a_meaning_are_refused_with_the_cure(tmp_path):
     lab.lsl.add("EEG", ("Fz", "Cz"), 250)
     lab.typed = ["--stream", "EEG"]
     with pytest.raises(SourceError, match=r"Fz, Cz.*--columns"):
-        await asyncio.wait_for(lab.make().read(Intake(Desk().feed, lab.make().settings, print)), 5)
+        await asyncio.wait_for(
+            lab.make().read(Intake(IntakeHarness().feed, lab.make().settings, print)), 5
+        )
 
 
 async def test_real_streams_are_heard(tmp_path):
@@ -156,7 +157,7 @@ async def test_real_streams_are_heard(tmp_path):
             outlet.push_sample([3.0 + number, 0.7])
 
     pushing = asyncio.create_task(push())
-    found = await read_streams(lab, Desk(), 5)
+    found = await read_streams(lab, IntakeHarness(), 5)
     await pushing
 
     assert [m.value for m in found] == [3.0, 4.0, 5.0, 6.0, 7.0]

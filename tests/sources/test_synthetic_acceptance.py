@@ -14,7 +14,7 @@ from rehab.sources.synthetic import GOOD, walk
 from rehab.training.phases import make_phase
 from rehab.training.steps import Measurement
 from tests.data import recording
-from tests.sources.test_synthetic_walker import SESSION_1, usable
+from tests.sources.protocols import SESSION_1, usable
 
 SEEDS = range(20)
 GOAL = GOOD.baseline_w_kg

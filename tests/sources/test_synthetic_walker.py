@@ -20,22 +20,11 @@ from rehab.training.phases import make_phase
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES
+from tests.sources.protocols import SESSION_1, usable
 
 BASELINE = make_phase("baseline")
 TRAINING = make_phase("training")
 WASHOUT = make_phase("washout")
-
-# The protocol of HEBB_03, session 1 (gait.md 1.3): kind, percent shown, strides.
-SESSION_1 = [
-    make_phase(kind, f"{kind} {percent}", gain=percent / 100, strides=strides)
-    for kind, percent, strides in (
-        *(("baseline", 100, 54), ("catch", 100, 34), ("familiarization", 100, 30)),
-        *(("catch", 100, 7), ("training", 100, 51), ("catch", 100, 12), ("training", 95, 48)),
-        *(("catch", 100, 12), ("training", 90, 101), ("catch", 100, 12), ("training", 85, 107)),
-        *(("catch", 100, 12), ("training", 85, 168), ("catch", 100, 13), ("training", 85, 230)),
-        *(("catch", 100, 13), ("training", 85, 174), ("washout", 100, 552)),
-    )
-]
 
 
 def steady(profile=GOOD, **changes):
@@ -43,10 +32,6 @@ def steady(profile=GOOD, **changes):
     return replace(
         profile, trained_level=1.5, exploration_level=1.5, fatigue_per_100_strides=0, **changes
     )
-
-
-def usable(strides):
-    return [m.value for m in strides if m.value is not None and not m.reasons]
 
 
 # --- The same seed, the same walk ----------------------------------------------------------------

@@ -156,7 +156,8 @@ async def test_words_and_chart_hold_from_the_next_step_and_are_in_the_log(place,
 
 
 @pytest.mark.parametrize(
-    ("kind", "value"), [("feedback_text", "Go!"), ("valence", None), ("valence", 3), ("chart_style", {})]
+    ("kind", "value"),
+    [("feedback_text", "Go!"), ("valence", None), ("valence", 3), ("chart_style", {})],
 )
 async def test_what_is_no_change_of_a_page_is_not_the_protocol(place, begun, kind, value):
     monitor = place.monitor(await begun(place))
