@@ -1,4 +1,9 @@
-"""From raw signals to strides with A2, while somebody walks. Pure: no Django, no clock."""
+"""Strides with A2 from raw signals, while somebody walks. Pure: no Django, no clock.
+
+``StrideDetector`` and ``TwoLegDetector`` take samples as they come, ``measure_strides`` and
+``measure_both_legs`` whole recordings with the same code. gait.md (docs/reference) holds the
+measurements and sources that thresholds cite.
+"""
 
 from rehab.gait.contacts.gyroscope import ContactKind, GyroscopeContact, GyroscopeDetector
 from rehab.gait.offline import measure_both_legs, measure_strides

@@ -28,7 +28,17 @@ LOOK_AHEAD_S = 0.05
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure each file and print what was found; 2 after an input that cannot be measured."""
+    """Measure each file and print its strides.
+
+    Parameters
+    ----------
+    arguments
+        The command line without the program's name; None for that of the process.
+
+    Returns
+    -------
+    The exit status: 0, or 2 after input that cannot be measured.
+    """
     options = _read_options(arguments)
     try:
         if options.plot:

@@ -1,4 +1,4 @@
-"""One leg: its stances found and measured as they end, in samples that others put down."""
+"""Strides of one leg, detected and measured as they end, in a buffer that others fill."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rehab.gait.strides import Flag, RejectionReason, Stride
 
 GRAVITY_M_S2 = 9.81
 KEEP_S = 8.0  # the longest cycle, the longest stance after it, and the piece they came in
-PIECE_S = 1.0  # of a long chunk is taken at a time
+LONGEST_CHUNK_S = 1.0  # of a long chunk is taken at a time
 STRIDE_MAX_S = 4.0
 LONGEST_GAP_S = 0.25  # in a cycle; longer ones may hide a contact
 OFFSET_N = 15.0
@@ -29,7 +29,17 @@ USUAL_MIN, USUAL_MAX = 0.6, 1.5  # of the median of the last stances
 
 @dataclass(frozen=True, slots=True)
 class OtherLeg:
-    """What the other leg and its plate tell of a stride; the figures are those of ``Stride``."""
+    """What the other leg and its plate add to a stride.
+
+    Attributes
+    ----------
+    reasons, flags
+        Why the stride is invalid, and what is worth knowing of it.
+    step_s, step_length_m, step_symmetry
+        As in ``Stride``.
+    first_double_support_s, second_double_support_s, weight_ratio
+        As in ``Stride``.
+    """
 
     reasons: list[RejectionReason]
     flags: list[Flag]
@@ -43,10 +53,20 @@ class OtherLeg:
 
 @dataclass(frozen=True, slots=True)
 class OneLegStride:
-    """A stride before the other leg was looked at.
+    """A stride as its own leg gives it, before the other leg is considered.
 
-    ``index`` is the sample that completed it, ``reasons`` are those of its own leg, and
-    ``cycle_index`` is where the cycle before it began, None where that was not seen whole.
+    Attributes
+    ----------
+    index
+        The sample that completed it.
+    contact, stance
+        Its contact with the plate, and what was measured of the stance.
+    reasons
+        Those of its own leg.
+    cycle_index
+        Where the cycle before it began; None where that was not observed whole.
+    stride_s, swing_s
+        Of that cycle [s].
     """
 
     index: int
@@ -59,7 +79,7 @@ class OneLegStride:
 
 
 class LegDetector:
-    """Finds and measures the strides of one leg in a buffer that others fill.
+    """Detects and measures the strides of one leg in a buffer that others fill.
 
     Parameters
     ----------
@@ -81,9 +101,9 @@ class LegDetector:
             buffer, rate_hz, self.weight_n, settings.contact_n, settings.release_n
         )
         self._samples = buffer.samples
-        self.piece = int(PIECE_S * rate_hz)
+        self.longest_chunk = int(LONGEST_CHUNK_S * rate_hz)
         # Contacts of so many samples are there, whatever the rest of a piece and the wait brought.
-        self.memory = self._samples.keep - 2 * self.piece
+        self.reliable_samples = self._samples.keep - 2 * self.longest_chunk
         self._cycle_max = STRIDE_MAX_S * rate_hz
         self._analyzer = StanceAnalyzer(
             buffer,
@@ -96,12 +116,12 @@ class LegDetector:
         self._wait = math.ceil(settings.look_ahead_s * rate_hz - 1e-9)
         self._pending: deque[Contact] = deque()
         self._previous: Contact | None = None  # the stance before, with its bounces
-        self._left: tuple[int, float] | None = None  # where it really ended
+        self._last_terminal: tuple[int, float] | None = None  # where it really ended
         self._stances: deque[float] = deque(maxlen=USUAL_STANCES)
         self._number = 0
 
     def advance(self, start: int, stop: int) -> list[OneLegStride]:
-        """Go through new samples ``start:stop``, a second at most; give what they complete."""
+        """Process samples ``start:stop``, a second at most; return the strides they complete."""
         ended = self.contacts.advance(start, stop)
         if not ended and not self._pending:
             return []
@@ -117,7 +137,7 @@ class LegDetector:
         return strides
 
     def finish(self) -> list[OneLegStride]:
-        """Give what still waits for samples, and the stance that the record's end cuts off."""
+        """Return the strides that still wait, and the one that the record's end cuts off."""
         last = self._samples.end - 1
         strides = [self._measure(one, last) for one in self._pending if self._is_measurable(one)]
         self._pending.clear()
@@ -129,7 +149,7 @@ class LegDetector:
         return strides
 
     def complete(self, stride: OneLegStride, other_leg: OtherLeg) -> Stride:
-        """Give the stride of a stride."""
+        """Return the whole stride, from its own leg's part and the other leg's."""
         contact, stance, push_off = stride.contact, stride.stance, stride.stance.push_off
         reasons, flags = stride.reasons + other_leg.reasons, other_leg.flags
         if abs(contact.offset_n) > OFFSET_N:
@@ -167,9 +187,18 @@ class LegDetector:
         )
 
     def compute_mean_load(self, begin: int, end: int, offset_n: float) -> float:
-        """Give the mean force above its zero between two samples, by body weight.
+        """Return the mean force above the plate's zero between two samples, by body weight.
 
-        NaN where samples have no force, or are no longer there.
+        Parameters
+        ----------
+        begin, end
+            Indices of the first sample and of the one behind the last.
+        offset_n
+            The plate's zero [N].
+
+        Returns
+        -------
+        NaN where samples have no force, are no longer buffered or are more than a cycle's.
         """
         if begin < self._samples.first or not 0 < end - begin <= self._cycle_max:
             return math.nan
@@ -177,11 +206,11 @@ class LegDetector:
         return (float(force.sum()) / (end - begin) - offset_n) / self.weight_n
 
     def _is_measurable(self, contact: Contact) -> bool:
-        """Say whether a contact is a stance to be told; remember it if not."""
+        """Return whether a contact is a stance to be measured; remember where it ended if not."""
         is_cut = contact.begin_index == 0  # the record began in the middle of it
         if is_cut or contact.bounce:
             self._previous = None if is_cut else self._previous
-            self._left = (contact.end_index or 0, contact.end_s or 0.0)
+            self._last_terminal = (contact.end_index or 0, contact.end_s or 0.0)
         return not is_cut and not contact.bounce
 
     def _measure(self, contact: Contact, due: int) -> OneLegStride:
@@ -192,14 +221,14 @@ class LegDetector:
         reasons = stance.reasons
         if self._is_unusual(end_s - contact.begin_s):
             reasons = [*reasons, RejectionReason.IRREGULAR]
-        self._previous, self._left = contact, (contact.end_index or 0, end_s)
+        self._previous, self._last_terminal = contact, (contact.end_index or 0, end_s)
         return OneLegStride(due, contact, stance, reasons, *cycle)
 
     def _find_cycle(self, contact: Contact) -> tuple[int | None, float | None, float | None]:
-        """Give begin, stride and swing time of the cycle that ended at a contact, if seen whole."""
-        if self._previous is None or self._left is None or not contact.seen:
+        """Return begin, stride and swing time of the cycle before a contact, if observed whole."""
+        if self._previous is None or self._last_terminal is None or not contact.seen:
             return None, None, None
-        left_index, left_s = self._left
+        left_index, left_s = self._last_terminal
         begin = self._previous.begin_index
         stride_s = contact.begin_s - self._previous.begin_s
         if contact.begin_index - begin > self._cycle_max or stride_s > STRIDE_MAX_S:
@@ -214,7 +243,7 @@ class LegDetector:
         return begin, stride_s, contact.begin_s - left_s
 
     def _is_unusual(self, stance_s: float) -> bool:
-        """Compare a stance with the last ones, of whatever kind, and remember it."""
+        """Compare a stance time with the last ones, valid or not, and remember it."""
         usual = sorted(self._stances)[len(self._stances) // 2] if len(self._stances) > 1 else None
         if STANCE_MIN_S <= stance_s <= STANCE_MAX_S:
             self._stances.append(stance_s)

@@ -1,4 +1,4 @@
-"""Strides of both legs, each looked at beside the other one."""
+"""Strides of both legs, each checked and completed with what the other leg did."""
 
 from __future__ import annotations
 
@@ -35,11 +35,20 @@ ALONE_MAX = 0.8  # of stance; 0.5-0.72 from slow to fast walking, 1 at its chang
 
 
 class TwoLegDetector:
-    """Finds the strides of both legs on a split treadmill, in the order in which they are known.
+    """Detects the strides of both legs on a split treadmill, in order of their completion.
 
-    Adds to each stride what takes two: step time, length and symmetry, double support, the share of
-    body weight on the plates, and whether both feet were where a walker has them. Chunks, memory
-    and settings are as in ``StrideDetector``.
+    Adds to each stride what takes two legs: step time, length and symmetry, double support, the
+    share of body weight on the plates, and whether the feet alternated as in walking.
+
+    Parameters
+    ----------
+    rate_hz, mass_kg, look_ahead_s, cutoff_hz, contact_n, release_n, is_velocity
+        As in ``StrideDetector``; chunks and memory, too.
+
+    Raises
+    ------
+    GaitInputError
+        For settings that nothing can be measured with.
     """
 
     def __init__(
@@ -75,7 +84,14 @@ class TwoLegDetector:
         left: LegSamples | Sequence[ArrayLike],
         right: LegSamples | Sequence[ArrayLike],
     ) -> list[Stride]:
-        """Take the next samples of both legs; give the strides that they complete.
+        """Add the next samples of both legs and return the strides that they complete.
+
+        Parameters
+        ----------
+        t_s
+            Times [s] of the sensors' clock, shape (n,).
+        left, right
+            The channels of each leg, shape (n,) each, as in ``StrideDetector.feed``.
 
         Raises
         ------
@@ -84,7 +100,7 @@ class TwoLegDetector:
         """
         chunk = read_chunk(CHUNK_NAMES, (t_s, *_pad_channels(left), *_pad_channels(right)))
         strides: list[Stride] = []
-        for piece, count in split_chunk(chunk, self._left.piece):
+        for piece, count in split_chunk(chunk, self._left.longest_chunk):
             first = self._samples.end
             self._samples.append(piece, count)
             stop = self._samples.end
@@ -95,11 +111,14 @@ class TwoLegDetector:
         return strides
 
     def finish(self) -> list[Stride]:
-        """Give what still waits, and the stances that the end of the samples cuts off, invalid."""
+        """Return the strides that still wait for samples.
+
+        Stances that the end of the samples cuts off are among them, invalid.
+        """
         return self._complete(self._left.finish(), self._right.finish())
 
     def _complete(self, left: list[OneLegStride], right: list[OneLegStride]) -> list[Stride]:
-        """Give the strides of both legs, in the order in which they were complete."""
+        """Return the strides of both legs, in the order in which they were complete."""
         found = [(stride, self._left, self._right) for stride in left]
         found += [(stride, self._right, self._left) for stride in right]
         found.sort(key=lambda one: (one[0].index, one[0].contact.end_index))
@@ -111,12 +130,12 @@ class TwoLegDetector:
     def _compare_with_other_leg(
         self, stride: OneLegStride, leg: LegDetector, other: LegDetector
     ) -> OtherLeg:
-        """Give what the other leg did until the sample that completed a stride."""
+        """Return what the other leg did until the sample that completed a stride."""
         this, is_whole = stride.contact, RejectionReason.CUT_OFF not in stride.reasons
         reasons: list[RejectionReason] = []
         flags: list[Flag] = []
         known = _find_contacts(other, stride.index)
-        since = max(this.begin_index, stride.index - leg.memory)
+        since = max(this.begin_index, stride.index - leg.reliable_samples)
         others = [c for c in known if c.begin_index < _end(this) and _end(c) > since]
         first = others[0] if others else None
         second = others[1] if len(others) == 2 else None
@@ -160,7 +179,7 @@ def _find_weight_ratio(
     plates: tuple[LegDetector, LegDetector],
     zeros_n: tuple[float, float],
 ) -> float | None:
-    """Give the mean force of both plates between two samples, by body weight, if it is known."""
+    """Return the mean force of both plates between two samples, by body weight, if it is known."""
     if begin is None:
         return None
     load = sum(
@@ -171,9 +190,9 @@ def _find_weight_ratio(
 
 
 def _is_alternating(first: Contact, this: Contact, second: Contact) -> bool:
-    """Say whether the other foot left after this one came and came before it left, as in walking.
+    """Return whether the other foot left after this one came, and came before it left.
 
-    A foot that stands alone for longer than a walker's has another one on its plate.
+    A foot that is alone on the floor for longer than in walking has the other one on its plate.
     """
     alone = second.begin_index - _end(first)
     stance = _end(this) - this.begin_index
@@ -185,14 +204,14 @@ def _end(contact: Contact) -> float:
 
 
 def _find_contacts(leg: LegDetector, index: int) -> list[Contact]:
-    """Give a leg's contacts as they were known at sample ``index``, whatever came later."""
+    """Return a leg's contacts as they were known at sample ``index``, whatever came later."""
     contacts = []
     for contact in leg.contacts.recent:
         end = contact.end_index
         if contact.begin_index > index:
             break
         if end is None or end > index:
-            begin = max(contact.begin_index, index - leg.piece)
+            begin = max(contact.begin_index, index - leg.longest_chunk)
             peak_n = find_maximum(leg.buffer.channel(FORCE, begin, index + 1)) - contact.offset_n
             if not peak_n >= STEP_PEAK * leg.weight_n:
                 continue
@@ -203,14 +222,14 @@ def _find_contacts(leg: LegDetector, index: int) -> list[Contact]:
 
 
 def _find_time(begin_s: float, end_s: float | None) -> float | None:
-    """Give the time between two moments, if both are known."""
+    """Return the time between two moments [s], if both are known."""
     if end_s is None or not math.isfinite(end_s - begin_s):
         return None
     return end_s - begin_s
 
 
 def _find_length(stance: Stance, other: LegDetector, index: int) -> float | None:
-    """Give how far the foot landed ahead of the other one."""
+    """Return how far ahead of the other foot this one landed [m], if positions are known."""
     if stance.position_m is None:
         return None
     position = float(other.buffer.channel(POSITION, index, index + 1)[0])

@@ -22,7 +22,7 @@ class State(StrEnum):
 
 
 class ChangeKind(StrEnum):
-    """What can change the way that later steps are scored."""
+    """What can change the way that later steps are scored or shown."""
 
     START = "start"
     PAUSE = "pause"
@@ -57,19 +57,42 @@ ChangeValue = float | str | Mapping[str, Any] | None
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One change.
+    """One change of a session.
 
-    ``value``: the new goal, gain, threshold, intensity, phase index, 1 or 0 for words shown or not;
-    a valence's slug, a chart style or a reason to pause by name; the valence and bands of words.
-    None for the others.
+    Attributes
+    ----------
+    kind
+        What changes.
+    value
+        The new goal, gain, threshold, intensity or phase index; 1 or 0 for words shown or not; the
+        slug of a valence, a chart style or the reason of a pause; for feedback text, the valence
+        and its bands. None for the others.
     """
 
     kind: ChangeKind
     value: ChangeValue = None
 
+    @property
+    def number(self) -> float:
+        """The value as a number. Raises InvalidSetting where it is none."""
+        value: object = self.value  # JSON knows true and false beside numbers
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InvalidSetting(
+                "The change '{kind}' needs a value, and that is a number.",
+                kind=Marked(CHANGE_LABELS[self.kind]),
+            )
+        return value
+
+    @property
+    def switch(self) -> bool:
+        """The value as on (1) or off (0). Raises InvalidSetting where it is neither."""
+        if self.number not in (0, 1):
+            raise InvalidSetting("Words are shown (1) or not (0).")
+        return self.number == 1
+
 
 class NotAllowed(InvalidSetting):
-    """A change that the session's state does not allow; the message says what would be needed."""
+    """A change or step that the session's state does not allow; the message says what would be."""
 
 
 OPEN_STATES = frozenset({State.READY, State.RUNNING, State.PAUSED})
@@ -121,7 +144,13 @@ CHANGE_LABELS = {
 
 
 def next_state(state: State, kind: ChangeKind) -> State:
-    """Give the state after a change. Raises NotAllowed, saying when it would be allowed."""
+    """Return the state after a change.
+
+    Raises
+    ------
+    NotAllowed
+        Naming the states in which the change would be allowed.
+    """
     allowed, leads_to = TRANSITIONS[kind]
     if state not in allowed:
         raise NotAllowed(

@@ -1,7 +1,6 @@
-"""What another clock shows, told by nothing but the times of what happened there.
+"""Another machine's clock, estimated from nothing but the times that arrive from it.
 
-One that is heard over a network: each time arrives some delay after it was true, and the shortest
-delay tells most.
+Each time arrives some delay after it was true, and the shortest delay says most.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ class RemoteClock:
     speed
         Seconds of that clock in one of ours.
     time_s, now_s
-        What it shows while ours shows ``now_s``, where it was told [s].
+        What it shows while ours shows ``now_s`` [s], where the device said so; else None.
     """
 
     def __init__(self, speed: float = 1.0, time_s: float | None = None, now_s: float = 0.0) -> None:
@@ -40,16 +39,24 @@ class RemoteClock:
 
     @property
     def is_known(self) -> bool:
-        """Whether anything is known of it."""
+        """Whether there is an estimate."""
         return self._offset is not None
 
     def read_s(self, now_s: float) -> float | None:
-        """Give what it shows now [s], if anything is known of it."""
+        """Return what it shows now [s], None without an estimate."""
         decayed = self._decayed_offset(now_s)
         return None if decayed is None else decayed + now_s * self._speed
 
     def observe(self, time_s: float, now_s: float) -> bool:
-        """Hear a time that arrives now; say whether it was held up."""
+        """Update the estimate with a time that arrives now, and return whether that time is late.
+
+        Parameters
+        ----------
+        time_s
+            The time on the remote clock [s].
+        now_s
+            Ours [s].
+        """
         slack_s = LATE_S * max(1.0, self._speed)
         offset = time_s - now_s * self._speed
         known, last_s, self._last_s = self._decayed_offset(now_s), self._last_s, time_s
@@ -61,7 +68,7 @@ class RemoteClock:
         return False
 
     def allow_standstill(self, now_s: float) -> None:
-        """Allow that it stood still while nothing fresh was heard. What comes next tells."""
+        """Lower the estimate as if the clock had stood still since its last fresh time."""
         if self._offset is not None:
             self._offset -= (now_s - self._seen_s) * self._speed
             self._seen_s = now_s

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
 from rehab.training.changes import (
-    CHANGE_LABELS,
     STATE_LABELS,
     Change,
     ChangeKind,
@@ -24,9 +21,10 @@ from rehab.training.plans import (
     ChartStyle,
     SessionPlan,
     check_activation_threshold,
+    check_chart_style,
     check_robot_intensity,
 )
-from rehab.training.scoring import RULES_VERSION, judge
+from rehab.training.scoring import score_measurement
 from rehab.training.steps import (
     InvalidMeasurement,
     InvalidReason,
@@ -35,7 +33,7 @@ from rehab.training.steps import (
     add_reason,
     find_invalid_reasons,
 )
-from rehab.training.tallies import Tally
+from rehab.training.tallies import Block, Tally
 from rehab.training.valences import Valence, bands_from_json
 
 # Strides further apart than this were not walked without a break, or a clock jumped: no more than
@@ -44,19 +42,16 @@ from rehab.training.valences import Valence, bands_from_json
 MAX_GAP_S = 10.0
 
 
-class Block(NamedTuple):
-    """What was alike while some strides of a phase were walked; no valence without feedback."""
-
-    phase: int
-    gain: float
-    valence: str
-
-
 class SessionFold:
-    """Where a session stands after the steps and changes it was given, in constant memory.
+    """State of a session after the steps and changes of its log so far, in constant memory.
 
-    ``step`` scores a measurement and moves on through the phases; ``change`` applies what a person
-    decided, effective from the next step. Neither looks at a clock.
+    ``step`` scores a measurement and advances through the phases; ``change`` applies what a person
+    decided, effective from the next step. Neither reads a clock.
+
+    Parameters
+    ----------
+    plan
+        What the session is scored with.
     """
 
     def __init__(self, plan: SessionPlan) -> None:
@@ -86,7 +81,13 @@ class SessionFold:
 
     @classmethod
     def replay(cls, plan: SessionPlan, log: Iterable[Measurement | Change]) -> SessionFold:
-        """Give the fold of a whole log."""
+        """Return the fold of a whole log.
+
+        Raises
+        ------
+        NotAllowed, InvalidMeasurement, InvalidSetting
+            For a log that no session can have written.
+        """
         fold = cls(plan)
         for entry in log:
             if isinstance(entry, Change):
@@ -104,13 +105,13 @@ class SessionFold:
 
     @property
     def changed_to(self) -> tuple[str, ...]:
-        """The valences that it was changed to on its way, in their order, each once."""
+        """The valences that the session was changed to, in that order, each once."""
         others = dict.fromkeys(slug for _, slug in self.switches)
         others.pop(self.plan.valence.slug, None)
         return tuple(others)
 
     def tally_of(self, kind: str) -> Tally:
-        """Give the sums over all phases of one kind."""
+        """Return the sums over all phases of one kind."""
         total = Tally()
         for phase, tally in zip(self.plan.phases, self.phases, strict=True):
             if phase.kind == kind:
@@ -119,14 +120,19 @@ class SessionFold:
 
     @property
     def baseline_mean(self) -> float | None:
-        """Mean of the valid baseline values; None before there are enough of them."""
+        """Mean of the valid baseline values; None before there are enough of them (gait.md 1.2)."""
         baseline = self.tally_of("baseline")
         return baseline.mean_value if baseline.valid >= MIN_BASELINE_STRIDES else None
 
     def step(self, measurement: Measurement) -> ScoredStep:
-        """Score one stride. Raises NotAllowed where the session has not begun or is over.
+        """Score one stride and count it.
 
-        Raises InvalidMeasurement for a number that is not the next one.
+        Raises
+        ------
+        NotAllowed
+            Where the session has not begun or is over.
+        InvalidMeasurement
+            For a number that does not follow the last one.
         """
         running = self.state is State.RUNNING
         if not running and self.state is not State.PAUSED:
@@ -147,7 +153,16 @@ class SessionFold:
             reasons = add_reason(reasons, InvalidReason.TIME_BACKWARDS)
         if not running:
             reasons = add_reason(reasons, InvalidReason.PAUSED)
-        scored = self._score(measurement, reasons)
+        scored = score_measurement(
+            measurement,
+            reasons,
+            measure=self.plan.measure,
+            trained_side=self.plan.trained_side,
+            phase=self.phase_index,
+            gain=self.gain,
+            goal=self.goal,
+            valence=self.valence if self.phase.feedback else None,
+        )
         self.last_number = scored.number
         if scored.side == self.plan.trained_side:
             self._count(scored, running)
@@ -162,34 +177,6 @@ class SessionFold:
             self._move_on()
         return scored
 
-    def _score(self, measurement: Measurement, reasons: tuple[str, ...]) -> ScoredStep:
-        plan, goal, value = self.plan, self.goal, measurement.value
-        shown = performance = hit = points = None
-        if reasons:
-            if value is not None and not math.isfinite(value):
-                value = None
-        elif value is not None and goal is not None and measurement.side == plan.trained_side:
-            shown, performance, hit = judge(plan.measure, value, self.gain, goal)
-            if self.phase.feedback:
-                points = self.valence.points(hit)
-        return ScoredStep(
-            number=measurement.number,
-            time_s=measurement.time_s,
-            side=measurement.side,
-            value=value,
-            gain=self.gain,
-            shown=shown,
-            goal=goal,
-            performance=performance,
-            hit=hit,
-            points=points,
-            valid=not reasons,
-            reasons=reasons,
-            phase=self.phase_index,
-            extra=measurement.extra,
-            rules_version=RULES_VERSION,
-        )
-
     def _count(self, step: ScoredStep, running: bool) -> None:
         self.trained.add(step)
         if running:
@@ -202,7 +189,7 @@ class SessionFold:
             self.phase_strides += 1
 
     def _move_on(self) -> None:
-        """Go to the next phase, or note why that cannot be."""
+        """Begin the next phase, or note why that cannot be."""
         if self.phase_index + 1 == len(self.plan.phases):
             self.completed = True
             return
@@ -244,22 +231,26 @@ class SessionFold:
     def change(self, change: Change) -> None:
         """Apply a change from the next step on.
 
-        Raises NotAllowed where the state does not allow it and InvalidSetting for a value out of
-        bounds; the session is then as it was.
+        Raises
+        ------
+        NotAllowed
+            Where the state does not allow it; the session is then as it was.
+        InvalidSetting
+            For a value out of bounds; likewise.
         """
         state = next_state(self.state, change.kind)
         match change.kind:
             case ChangeKind.GOAL:
-                self.goal = self.plan.measure.check_goal(_needed(change))
+                self.goal = self.plan.measure.check_goal(change.number)
                 self.obstacle = ""
             case ChangeKind.GAIN:
-                self.gain = check_gain(_needed(change))
+                self.gain = check_gain(change.number)
             case ChangeKind.ACTIVATION_THRESHOLD:
-                self.activation_threshold = check_activation_threshold(_needed(change))
+                self.activation_threshold = check_activation_threshold(change.number)
             case ChangeKind.ROBOT_INTENSITY:
-                self.robot_intensity = check_robot_intensity(_needed(change))
+                self.robot_intensity = check_robot_intensity(change.number)
             case ChangeKind.PHASE:
-                self._enter(self._phase_index(_needed(change)))
+                self._enter(self.plan.check_phase(change.number))
             case ChangeKind.PAUSE:
                 self._joined = False
                 known = [reason for reason in PauseReason if reason == change.value]
@@ -271,13 +262,13 @@ class SessionFold:
             case ChangeKind.FEEDBACK_TEXT:
                 self._reword(change.value)
             case ChangeKind.WORDS_SHOWN:
-                self.words_shown = _switch(_needed(change))
+                self.words_shown = change.switch
             case ChangeKind.CHART_STYLE:
-                self.chart_style = _style(change.value)
+                self.chart_style = check_chart_style(change.value)
         self.state = state
 
     def _plan_valence(self, slug: object) -> None:
-        """Note the valence of the next phase with feedback; the one in force undoes that."""
+        """Schedule the valence of the next phase with feedback; the current one cancels that."""
         if not isinstance(slug, str) or slug not in self.valences:
             known = ", ".join(self.valences)
             raise InvalidSetting(
@@ -295,7 +286,7 @@ class SessionFold:
             )
 
     def _reword(self, value: object) -> None:
-        """Take other bands for a valence. What a step earns stays as it was planned."""
+        """Replace the bands of a valence. What a step earns stays as it was planned."""
         given = value if isinstance(value, Mapping) else {}
         slug = given.get("valence")
         if not isinstance(slug, str) or slug not in self.valences:
@@ -304,37 +295,3 @@ class SessionFold:
         self.valences[slug] = worded
         if self.valence.slug == slug:
             self.valence = worded
-
-    def _phase_index(self, value: float) -> int:
-        if not 0 <= value < len(self.plan.phases) or value != int(value):
-            raise InvalidSetting(
-                "This session has no phase {value:g}; its phases are numbered 0 to {last}.",
-                value=value,
-                last=len(self.plan.phases) - 1,
-            )
-        return int(value)
-
-
-def _needed(change: Change) -> float:
-    value: object = change.value  # JSON knows true and false beside numbers
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InvalidSetting(
-            "The change '{kind}' needs a value, and that is a number.",
-            kind=Marked(CHANGE_LABELS[change.kind]),
-        )
-    return value
-
-
-def _switch(value: float) -> bool:
-    if value not in (0, 1):
-        raise InvalidSetting("Words are shown (1) or not (0).")
-    return value == 1
-
-
-def _style(value: object) -> ChartStyle:
-    try:
-        return ChartStyle(value)  # type: ignore[arg-type]  # whatever it is, it is looked up
-    except ValueError:
-        raise InvalidSetting(
-            "A chart's style is one of: {known}.", known=", ".join(ChartStyle)
-        ) from None

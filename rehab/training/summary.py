@@ -1,16 +1,16 @@
-"""A session in figures, as plain data for reports."""
+"""The figures of a session as plain data, for reports."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from rehab.training.fold import Block, SessionFold
+from rehab.training.fold import SessionFold
 from rehab.training.metrics import compute_metrics
-from rehab.training.tallies import Tally
+from rehab.training.tallies import Block, Tally
 
 
 def summarize_tally(tally: Tally) -> dict[str, Any]:
-    """Give the counts and means of some steps."""
+    """Return the counts and means of some steps."""
     return {
         "strides": tally.strides,
         "valid": tally.valid,
@@ -24,7 +24,7 @@ def summarize_tally(tally: Tally) -> dict[str, Any]:
 
 
 def summarize_session(fold: SessionFold) -> dict[str, Any]:
-    """Give the figures of a session.
+    """Return the figures of a session.
 
     ``strides``, ``valid``, ``invalid`` and ``missing`` count the trained leg in every phase;
     ``hits``, ``hit_rate`` and ``score`` only feedback phases (DESIGN.md section 5). ``phases`` has
@@ -46,7 +46,7 @@ def summarize_session(fold: SessionFold) -> dict[str, Any]:
 
 
 def summarize_phases(fold: SessionFold) -> list[dict[str, Any]]:
-    """Give the figures of phases, those alike together, in the plan's order."""
+    """Return the figures of phases, those alike together, in the plan's order."""
     entries: dict[tuple[Any, ...], tuple[dict[str, Any], Tally, list[dict[str, Any]]]] = {}
     for index, phase in enumerate(fold.plan.phases):
         for block, tally in _blocks_of(fold, index):
@@ -67,7 +67,7 @@ def summarize_phases(fold: SessionFold) -> list[dict[str, Any]]:
 
 
 def _blocks_of(fold: SessionFold, index: int) -> list[tuple[Block, Tally]]:
-    """Give a phase's blocks in the order in which they were walked, or one as it was planned."""
+    """Return a phase's blocks in the order in which they were walked, or one as it was planned."""
     walked = [(block, tally) for block, tally in fold.blocks.items() if block.phase == index]
     phase = fold.plan.phases[index]
     planned = Block(index, phase.gain, fold.plan.valence.slug if phase.feedback else "")

@@ -1,6 +1,6 @@
-"""Feedback valences: what a hit or a miss earns, and what is said and shown about it.
+"""Valences (for people: feedback types): what a hit or a miss earns, and what is said about it.
 
-All of it is data. Pages and robots know no valence: they draw and do what these rows say.
+All of it is data. Pages and robots know no valence: they show and do what these rows say.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ TEXT_MAX = 60  # characters; longer ones fit no tablet in a size that is read fr
 
 
 class Emblem(StrEnum):
-    """The drawing that says what a step meant, told apart by shape alone."""
+    """The drawing that says what a step meant, recognizable by shape alone."""
 
     GAIN = "gain"
     LOSS = "loss"
@@ -30,7 +30,7 @@ class Emblem(StrEnum):
 
 
 class Confetti(StrEnum):
-    """How much confetti a band sets free."""
+    """How much confetti a band releases."""
 
     NONE = "none"
     LITTLE = "little"
@@ -40,7 +40,17 @@ class Confetti(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """What is said from this performance upwards, until the next band."""
+    """What is said from this performance upwards, until the next band.
+
+    Attributes
+    ----------
+    from_performance
+        Where it begins (ratio to the goal).
+    words
+        For the patient, at most TEXT_MAX characters.
+    confetti
+        How much of it is released.
+    """
 
     from_performance: float
     words: str
@@ -59,9 +69,21 @@ class CueGestures:
 class Valence:
     """A rule set of feedback.
 
-    ``hit_points`` and ``miss_points`` are added to the score; None for both means that points do
-    not exist. ``bands`` rise from 0; where points exist one begins at 1, so that no words straddle
-    the goal. Raises InvalidSetting for data that breaks these rules.
+    Attributes
+    ----------
+    slug, label, hue
+        For programs, for people (translated by pages), and the color of its pages.
+    hit_points, miss_points
+        Added to the score; None for both means that points do not exist.
+    bands
+        They rise from 0; where points exist one begins at 1, so that no text straddles the goal.
+    cue
+        The robot's gestures.
+
+    Raises
+    ------
+    InvalidSetting
+        For data that breaks these rules.
     """
 
     slug: str
@@ -112,11 +134,11 @@ class Valence:
         return (self.hit_points or 0) > 0
 
     def points(self, hit: bool) -> int | None:
-        """Give what a hit or a miss adds to the score."""
+        """Return what a hit or a miss adds to the score."""
         return self.hit_points if hit else self.miss_points
 
     def band(self, performance: float) -> Band:
-        """Give the band that a performance falls in."""
+        """Return the band that a performance falls in."""
         found = self.bands[0]
         for band in self.bands:
             if performance >= band.from_performance:
@@ -124,14 +146,14 @@ class Valence:
         return found
 
     def emblem(self, hit: bool) -> Emblem:
-        """Give the drawing for a hit or a miss: it follows the points, not the performance."""
+        """Return the drawing for a hit or a miss: it follows the points, not the performance."""
         points = self.points(hit) or 0
         return Emblem.GAIN if points > 0 else Emblem.LOSS if points < 0 else Emblem.NEUTRAL
 
-    def keeps_character(self, hit_points: int | None, miss_points: int | None) -> bool:
-        """Say whether these points would leave it the rule set that it is.
+    def keeps_rule_set(self, hit_points: int | None, miss_points: int | None) -> bool:
+        """Return whether these points would leave it the rule set that it is.
 
-        Who names a type in a study must be able to trust it: what rewards hits goes on to do so,
+        A study that names a type must be able to rely on it: what rewards hits goes on to do so,
         what takes nothing never does, and what has no points gets none.
         """
         if not self.has_points or hit_points is None or miss_points is None:
@@ -201,7 +223,7 @@ VALENCES: dict[str, Valence] = {
 
 
 def find_valence(slug: str) -> Valence:
-    """Give the valence of that name. Raises InvalidSetting, naming the known ones."""
+    """Return the valence of that slug. Raises InvalidSetting, naming the known ones."""
     try:
         return VALENCES[slug]
     except KeyError:
@@ -220,10 +242,16 @@ def edit_valence(
     bands: Sequence[Band],
     cue: CueGestures,
 ) -> Valence:
-    """Give a valence as somebody made it anew. Raises InvalidSetting where it would be no such."""
+    """Return a valence with points, bands and gestures that a clinic chose.
+
+    Raises
+    ------
+    InvalidSetting
+        Where it would be another rule set, or break the rules of ``Valence``.
+    """
     usual = find_valence(slug)
     label = Marked(usual.label)
-    if not usual.keeps_character(hit_points, miss_points):
+    if not usual.keeps_rule_set(hit_points, miss_points):
         if not usual.has_points:
             raise InvalidSetting(
                 "{type} feedback has no points. Choose another type for other rules.", type=label
@@ -246,7 +274,7 @@ def edit_valence(
 
 
 def bands_to_json(bands: Sequence[Band]) -> list[dict[str, Any]]:
-    """Give bands as plain JSON data."""
+    """Return bands as plain JSON data."""
     return [
         {"from_performance": b.from_performance, "words": b.words, "confetti": b.confetti.value}
         for b in bands
@@ -254,7 +282,7 @@ def bands_to_json(bands: Sequence[Band]) -> list[dict[str, Any]]:
 
 
 def bands_from_json(data: Any) -> tuple[Band, ...]:
-    """Rebuild bands from ``bands_to_json``'s data. Raises InvalidSetting for anything else."""
+    """Return the bands of ``bands_to_json``'s data. Raises InvalidSetting for anything else."""
     try:
         return tuple(_band_from_json(entry) for entry in data)
     except (KeyError, TypeError, ValueError):

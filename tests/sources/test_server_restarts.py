@@ -8,6 +8,7 @@ import pytest
 pytest.importorskip("django")
 
 
+@pytest.mark.realtime  # walks twelve seconds in real time
 def test_restarts_lose_no_stride(tmp_path):
     from tests.support.server_restarts import walk_with_restarts
 

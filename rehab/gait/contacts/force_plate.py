@@ -1,4 +1,4 @@
-"""When the foot meets and leaves the floor, from the vertical force under it."""
+"""Contacts of a foot with the floor, from the vertical force under it."""
 
 from __future__ import annotations
 
@@ -28,8 +28,18 @@ BLOCK_S = 0.1
 class Contact:
     """One contact of a foot with its plate. Indices count samples since the start.
 
-    ``seen`` says whether its beginning was (not so at the start of the record or after a loss),
-    ``bounce`` whether it only goes on with the stance before it.
+    Attributes
+    ----------
+    begin_index, begin_s, end_index, end_s
+        When the foot met and left the floor; None until it left.
+    offset_n
+        What the plate read in the swing before [N].
+    seen
+        Whether its beginning was observed (not so at the start of the record or after a loss).
+    bounce
+        Whether it only continues the stance before it.
+    peak_n
+        Largest force above the offset [N], once the contact has ended.
     """
 
     begin_index: int
@@ -43,19 +53,19 @@ class Contact:
 
 
 class ContactFinder:
-    """Finds contacts by hysteresis and follows the plate's zero in swing.
+    """Finds contacts by hysteresis and tracks the plate's zero in swing.
 
-    A contact is sure at ``contact_n``; it is timed, as its end is, where the force crosses
+    A contact is certain at ``contact_n``; its beginning and end are timed where the force crosses
     ``release_n``, by linear interpolation between samples.
 
     Parameters
     ----------
     buffer
-        Where the samples are.
+        The leg's samples.
     rate_hz, weight_n
-        Nominal rate, and body weight.
+        Nominal rate of the samples, and body weight [N].
     contact_n, release_n
-        Thresholds above the plate's zero [N].
+        Thresholds above the plate's zero [N] (gait.md 2.1).
     """
 
     def __init__(
@@ -81,7 +91,7 @@ class ContactFinder:
         self._stuck_index = 0
 
     def advance(self, start: int, stop: int) -> list[Contact]:
-        """Go through new samples ``start:stop``; give the steps that ended there."""
+        """Process new samples ``start:stop`` and return the steps that ended in them."""
         ended: list[Contact] = []
         force = self._buffer.channel(FORCE, start, stop)
         done = 0
@@ -115,7 +125,7 @@ class ContactFinder:
         return ended
 
     def truncate(self) -> Contact | None:
-        """Give the step that is under way, once no more samples come, as if it ended there."""
+        """Return the step under way, as if it ended with the last sample, if there is one."""
         contact, self._current = self._current, None
         stop = self._buffer.samples.end
         if contact is None or not contact.seen or contact.bounce:
@@ -163,13 +173,13 @@ class ContactFinder:
             ended.append(contact)
 
     def _is_step(self, contact: Contact, stop: int) -> bool:
-        """Find the peak of a contact until ``stop``; say whether so much is a step."""
+        """Find the peak of a contact until ``stop``; return whether it is that of a step."""
         begin = max(contact.begin_index, stop - self._buffer.samples.keep // 2)
         contact.peak_n = _find_peak(self._buffer.channel(FORCE, begin, stop)) - contact.offset_n
         return contact.peak_n >= STEP_PEAK * self._weight_n
 
     def _interpolate_crossing(self, index: int, level: float) -> float:
-        """Give when the force crossed a level between the sample before ``index`` and this one."""
+        """Return when the force crossed a level between samples ``index - 1`` and ``index`` [s]."""
         if index == 0:
             return float(self._buffer.channel(TIME, index, index + 1)[0])
         (t0, t1), (f0, f1) = self._buffer.view(index - 1, index + 1)[:2].tolist()
@@ -178,7 +188,7 @@ class ContactFinder:
         return crossed
 
     def _update_offset(self, index: int) -> None:
-        """Take the zero from the swing that ends at ``index``: the median of its middle."""
+        """Learn the plate's zero from the median of the swing that ends at ``index``."""
         last = self._last
         begin = self._zero_index if last is None or last.end_index is None else last.end_index
         begin = max(begin, self._zero_index, index - self._buffer.samples.keep // 2)
@@ -192,7 +202,7 @@ class ContactFinder:
             self.offset_n = sorted(self._offsets)[len(self._offsets) // 2]
 
     def _recover_from_drift(self, index: int) -> None:
-        """After long contact, look whether the plate's zero, not the foot, holds it.
+        """Check after a long contact whether it is the plate's zero that has moved, not the foot.
 
         The lowest tenth of a second is taken for a swing if it lies near enough to zero.
         """
@@ -216,7 +226,7 @@ class ContactFinder:
 
 
 def _find_peak(force: Floats) -> float:
-    """Give the largest finite value, 0 without one."""
+    """Return the largest finite value, 0 without one."""
     peak = find_maximum(force) if len(force) else 0.0
     if math.isfinite(peak):
         return peak
@@ -225,7 +235,7 @@ def _find_peak(force: Floats) -> float:
 
 
 def _find_finite_median(values: Floats) -> float:
-    """Give the middle value of the finite ones, infinity without one."""
+    """Return the median of the finite values, infinity without one."""
     if np.isfinite(values).all():
         return find_upper_median(values)
     finite = values[np.isfinite(values)]

@@ -1,6 +1,6 @@
-"""When the foot meets and leaves the floor, from a gyroscope on foot or shank.
+"""Contacts of a foot with the floor, from a gyroscope on foot or shank.
 
-While a leg swings, foot and shank turn toes-up; both contacts lie where that turning begins and
+While a leg swings, foot and shank rotate toes-up; both contacts lie where that rotation begins and
 ends (Catalfamo 2010, Jasiewicz 2006; gait.md 2.2). After a stroke a foot sensor finds more of them
 than one on the shank.
 """
@@ -30,7 +30,7 @@ GAP_S = 0.1
 
 
 class ContactKind(Enum):
-    """Which end of a stance."""
+    """Which end of a stance a contact is."""
 
     INITIAL = "initial"
     TERMINAL = "terminal"
@@ -45,11 +45,12 @@ class GyroscopeContact:
 
 
 class GyroscopeDetector:
-    """Finds the contacts of one leg in chunks of any length, with the same result.
+    """Detects the contacts of one leg in chunks of any length, with the same result for all.
 
-    Foot: contacts are the zero crossings around the swing. Shank: its fastest turning back before
-    and after the swing. A terminal contact is told when the swing is sure of itself, some 50 ms
-    later, an initial contact as soon as the sensor turns back.
+    Foot: contacts are the zero crossings around the swing. Shank: they are its fastest backward
+    rotation before and after the swing. A terminal contact is returned once the swing exceeds its
+    threshold, about 50 ms later, an initial contact as soon as the sensor rotates back (gait.md
+    2.2).
 
     Parameters
     ----------
@@ -75,15 +76,20 @@ class GyroscopeDetector:
         self._reset()
 
     def feed(self, t_s: ArrayLike, rate_rad_s: ArrayLike) -> list[GyroscopeContact]:
-        """Take the next samples; give the contacts that they settle.
+        """Add the next samples and return the contacts that they confirm.
 
         Parameters
         ----------
         t_s
             Times [s], shape (n,).
         rate_rad_s
-            Angular velocity [rad/s] about the axis to the walker's left: toes that go down count
-            positive, the swing negative. NaN where missing.
+            Angular velocity [rad/s] about the axis to the walker's left, shape (n,): positive where
+            the toes go down, negative in swing. NaN where missing.
+
+        Raises
+        ------
+        GaitInputError
+            For arrays of different lengths.
         """
         time, rate = read_chunk(("t_s", "rate_rad_s"), (t_s, rate_rad_s))
         found: list[GyroscopeContact] = []
@@ -92,7 +98,7 @@ class GyroscopeDetector:
         return found
 
     def _reset(self) -> None:
-        """Begin anew, as after a gap."""
+        """Wait for a new swing, as after a gap."""
         self._swing_s: float | None = None  # when the swing began
         self._terminal_s: float | None = None
         self._fastest = 0.0
@@ -132,7 +138,7 @@ class GyroscopeDetector:
             self._reset()
 
     def _finish(self, time: float, rate: float, found: list[GyroscopeContact]) -> None:
-        """Look whether the swing is over, and was one."""
+        """Check whether the swing is over, and was one."""
         end_s, swing_s = self._end_s or 0.0, self._swing_s or 0.0
         if self._is_foot or not self._is_told:
             is_over = rate > NOISE_RAD_S or time - end_s > SWING_MIN_S
@@ -153,11 +159,11 @@ class GyroscopeDetector:
         return max(SWING_RAD_S, SWING_SHARE * usual)
 
     def _find_push(self) -> float | None:
-        """Give when the shank turned back fastest before its swing."""
+        """Return when the shank rotated back fastest before its swing [s]."""
         return max(self._backward)[1] if self._backward else None
 
 
 def _interpolate_crossing(before: tuple[float, float], after: tuple[float, float]) -> float:
-    """Give when the rate was zero between two samples (time, rate)."""
+    """Return when the rate was zero between two samples (time, rate) [s]."""
     share = before[1] / (before[1] - after[1]) if before[1] != after[1] else 1.0
     return before[0] + share * (after[0] - before[0])

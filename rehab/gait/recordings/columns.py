@@ -15,7 +15,7 @@ SIDES = ("left", "right")
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column by name, and what its numbers are multiplied with for SI units and signs."""
+    """A column by name, and the factor that its numbers take to SI units and our signs."""
 
     name: str
     factor: float = 1.0
@@ -23,7 +23,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class ColumnMap:
-    """The time column [s], and for each measured side its channels' columns."""
+    """The time column [s], and for each measured side the columns of its channels."""
 
     time: Column
     legs: dict[str, dict[str, Column]] = field(default_factory=dict)
@@ -34,7 +34,7 @@ class ColumnMap:
         return [self.time, *(column for leg in self.legs.values() for column in leg.values())]
 
     def find_in(self, header: Sequence[str]) -> ColumnMap | None:
-        """Give the part of this map that a header has: the time and whole legs, or None.
+        """Return the part of this map that a header has: the time and whole legs, or None.
 
         A leg is whole without forward force and position.
         """
@@ -74,10 +74,17 @@ SIGNAL_LAYOUTS = {
 
 
 def read_column_map(pairs: Sequence[str]) -> ColumnMap:
-    """Read ``time=t left.force=Fz1 left.angle=ANK_L*0.01745 …``.
+    """Return the map that command-line pairs such as ``left.angle=ANK_L*0.01745`` describe.
 
-    Raises GaitInputError, with the cure, for what is not of that form or not enough to measure a
-    leg with.
+    Parameters
+    ----------
+    pairs
+        ``time=COLUMN`` and ``SIDE.CHANNEL=COLUMN``; ``COLUMN*FACTOR`` changes unit or sign.
+
+    Raises
+    ------
+    GaitInputError
+        With the cure, for pairs of another form and for too few to measure a leg with.
     """
     time: Column | None = None
     legs: dict[str, dict[str, Column]] = {}
@@ -107,9 +114,12 @@ def read_column_map(pairs: Sequence[str]) -> ColumnMap:
 
 
 def find_layout(header: Sequence[str]) -> ColumnMap:
-    """Give the ready-made map whose time and whole legs a header has.
+    """Return the known layout whose time and whole legs a header has.
 
-    Raises GaitInputError naming the known layouts.
+    Raises
+    ------
+    GaitInputError
+        Naming the known layouts, where none fits.
     """
     for layout in SIGNAL_LAYOUTS.values():
         columns = layout.find_in(header)

@@ -18,7 +18,15 @@ MAX_HEADER = 64 * 1024
 
 
 def read_header(path: Path) -> tuple[list[str], str]:
-    """Give a file's column names and what separates them. Raises GaitInputError and OSError."""
+    """Return a file's column names and its delimiter.
+
+    Raises
+    ------
+    GaitInputError
+        For a file that is not text.
+    OSError
+        For a file that cannot be read.
+    """
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             first = file.readline(MAX_HEADER)
@@ -31,10 +39,25 @@ def read_header(path: Path) -> tuple[list[str], str]:
 def read_signals(
     path: Path, pairs: Sequence[str] | None = None
 ) -> tuple[Floats, dict[str, LegSamples]]:
-    """Give times [s] and each leg's channels of a CSV file; what is no number is NaN: missing.
+    """Return times [s] and each leg's channels of a CSV file.
 
-    ``pairs`` map its columns as ``read_column_map`` has it; else its header decides. Raises
-    GaitInputError, with the cure, and OSError.
+    Parameters
+    ----------
+    path
+        The file. A cell that is not a number is a missing sample: NaN.
+    pairs
+        Which column is which channel, as for ``read_column_map``; None to decide by the header.
+
+    Returns
+    -------
+    Times, shape (n,), and ``LegSamples`` of shape (n,) by side, in SI units with our signs.
+
+    Raises
+    ------
+    GaitInputError
+        With the cure, for columns that are missing or empty and for a file without samples.
+    OSError
+        For a file that cannot be read.
     """
     header, delimiter = read_header(path)
     columns: ColumnMap = read_column_map(pairs) if pairs else find_layout(header)
@@ -76,7 +99,20 @@ def read_signals(
 
 
 def estimate_rate(time: Floats, path: Path) -> float:
-    """Give the samples' rate [Hz] by the median of their times. Raises GaitInputError."""
+    """Return the rate of samples [Hz], from the median of the steps between their times.
+
+    Parameters
+    ----------
+    time
+        Times [s], shape (n,).
+    path
+        The file that messages name.
+
+    Raises
+    ------
+    GaitInputError
+        Where the times do not increase.
+    """
     steps = np.diff(time[np.isfinite(time)])
     step = float(np.median(steps)) if len(steps) else 0.0
     if not step > 0:
@@ -85,7 +121,13 @@ def estimate_rate(time: Floats, path: Path) -> float:
 
 
 def read_mass(path: Path) -> float:
-    """Give the mass [kg] that moore2013 keeps beside its recordings. Raises GaitInputError."""
+    """Return the body mass [kg] that moore2013 keeps in ``SubjectInfo.csv`` beside a recording.
+
+    Raises
+    ------
+    GaitInputError
+        Where there is no such file, or no mass in it.
+    """
     beside = path.with_name("SubjectInfo.csv")
     if beside.is_file():
         with beside.open(newline="", encoding="utf-8-sig") as file:

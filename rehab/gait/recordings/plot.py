@@ -1,4 +1,4 @@
-"""A picture of each leg's push-offs. Needs matplotlib, which GARRY does not install."""
+"""A plot of each leg's force, contacts and A2. Needs matplotlib, which GARRY does not install."""
 
 from __future__ import annotations
 
@@ -14,7 +14,13 @@ from rehab.gait.strides import GaitInputError, Stride
 
 
 def load_pyplot() -> Any:
-    """Give matplotlib.pyplot, drawing to files only; raise GaitInputError where it is missing."""
+    """Return matplotlib.pyplot with a backend that draws to files only.
+
+    Raises
+    ------
+    GaitInputError
+        Where matplotlib is not installed.
+    """
     try:
         importlib.import_module("matplotlib").use("Agg")
         return importlib.import_module("matplotlib.pyplot")
@@ -27,7 +33,24 @@ def load_pyplot() -> Any:
 def plot_strides(
     path: Path, t_s: Floats, forces_n: Mapping[str, Floats], strides: Sequence[Stride]
 ) -> None:
-    """Draw force with contacts, and A2 of each stride, one row a leg, to an image file."""
+    """Draw force with contacts, and A2 of each stride, to an image file, two rows a leg.
+
+    Parameters
+    ----------
+    path
+        The file to write; its name's end says the format.
+    t_s
+        Times [s], shape (n,).
+    forces_n
+        Vertical force by side [N], shape (n,) each.
+    strides
+        Of all sides.
+
+    Raises
+    ------
+    GaitInputError
+        Where matplotlib is not installed.
+    """
     pyplot = load_pyplot()
     figure, rows = pyplot.subplots(
         2 * len(forces_n), 1, figsize=(12, 5 * len(forces_n)), sharex=True, squeeze=False

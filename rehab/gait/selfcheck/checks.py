@@ -30,7 +30,15 @@ USUAL_A2 = (0.3, 7.0)  # W/kg (gait.md 6)
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Something to put right before training; ``side`` is None where it concerns both legs."""
+    """Something to put right before training.
+
+    Attributes
+    ----------
+    code, message
+        What it is, for programs, and the cure, for people.
+    side
+        None where it concerns both legs.
+    """
 
     code: str
     message: str
@@ -39,23 +47,24 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class SignalCheck:
-    """What a self-check found.
+    """Result of a self-check.
 
     Attributes
     ----------
     findings
-        Nothing to put right if empty.
+        What to put right; empty if nothing.
     strides, valid
-        How many strides were seen, and how many of them count.
+        How many strides were seen, and how many of them are valid.
     rate_hz
         Median rate of the samples.
     weight_ratio
         Median force of both plates by body weight; None with one leg.
     lag_s, deceleration_s
-        By how much the angles come later than the forces (mean of the legs), and the marks it was
-        told from (``lag.find_deceleration_peak``), by side. Keep ``deceleration_s`` of a session
-        whose synchronization was measured: as ``own_deceleration_s`` it makes later checks of the
-        same person sure to 3 ms instead of 8.
+        By how much the angles come later than the forces [s] (mean of the legs), and when each
+        ankle brakes hardest after terminal contact [s] (``find_deceleration_peak``), by side. Keep
+        ``deceleration_s`` of a session whose synchronization was measured: given as
+        ``own_deceleration_s``, it reduces the uncertainty of later checks of that person from 8 to
+        3 ms.
     """
 
     findings: tuple[Finding, ...]
@@ -81,14 +90,16 @@ def check_signals(
     mass_kg: float,
     own_deceleration_s: dict[str, float] | None = None,
 ) -> SignalCheck:
-    """Check sign, unit, weight and force–kinematics lag on half a minute of walking or more.
+    """Return the check of signs, units, weight and force–kinematics lag of half a minute or more.
 
     Parameters
     ----------
     t_s, left, right
-        As for ``TwoLegDetector``; a leg that is not measured is None.
+        As for ``TwoLegDetector.feed``; a leg that is not measured is None.
+    rate_hz, mass_kg
+        As for ``TwoLegDetector``.
     own_deceleration_s
-        ``deceleration_s`` of this person's earlier check, by side.
+        ``deceleration_s`` of an earlier check of this person, by side.
 
     Raises
     ------
@@ -157,7 +168,7 @@ def _round(rate_hz: float) -> str:
 
 
 def _check_force(force: Floats, strides: list[Stride], weight_n: float) -> list[tuple[str, str]]:
-    """Look at the force itself where no strides, or none worth the name, come of it."""
+    """Check the force itself, where no strides or no usable ones come of it."""
     finite = force[np.isfinite(force)]
     if not len(finite):
         return [("force_lost", "No vertical force arrives. Look at the plate and its channel.")]
@@ -211,7 +222,7 @@ def _check_weight(ratio: float | None, mass_kg: float) -> list[Finding]:
 
 
 def _compute_mean_load(time: Floats, leg: LegSamples, strides: list[Stride]) -> float:
-    """Give the median of a plate's mean force over whole strides [N], NaN without one."""
+    """Return the median of a plate's mean force over whole strides [N], NaN without one."""
     force = np.asarray(leg.force_n, dtype=np.float64)
     means = []
     for stride in strides:
@@ -223,7 +234,7 @@ def _compute_mean_load(time: Floats, leg: LegSamples, strides: list[Stride]) -> 
 
 
 def _check_load(load_kg: float, mass_kg: float, side: str) -> list[Finding]:
-    """With one leg, all that is known of the weight is that a leg carries half of it."""
+    """Check the load of one leg: of the weight it should carry about half."""
     share = load_kg / mass_kg
     if not (share < USUAL_LOAD[0] or share > USUAL_LOAD[1]):
         return []
@@ -235,7 +246,7 @@ def _check_load(load_kg: float, mass_kg: float, side: str) -> list[Finding]:
 
 
 def _find_lag(decelerations: dict[str, float | None], own: dict[str, float] | None) -> float | None:
-    """Give the mean lag of the legs: both plates have one clock, both ankles another."""
+    """Return the mean lag of the legs [s]: both plates have one clock, both ankles another."""
     lags = [
         deceleration_s - (DECELERATION_S if own is None else own[side])
         for side, deceleration_s in decelerations.items()

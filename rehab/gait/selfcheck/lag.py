@@ -1,4 +1,4 @@
-"""By how much the kinematics come later than the force, from a walk itself."""
+"""By how much the kinematics come later than the force, estimated from walking itself."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ STRIDES_MIN = 10
 def find_deceleration_peak(
     t_s: ArrayLike, angle_rad: ArrayLike, strides: Sequence[Stride]
 ) -> float | None:
-    """Give when the ankle brakes hardest, in seconds after terminal contact.
+    """Return when the ankle's plantarflexion brakes hardest, in seconds after terminal contact.
 
-    From the median of the angle around all terminal contacts, smoothed at 8 Hz without delay.
+    From the median of the angle around all terminal contacts, filtered at 8 Hz without delay.
 
     Parameters
     ----------
     t_s, angle_rad
-        Shape (n,); samples that are not finite are left out.
+        Times [s] and ankle angles [rad], shape (n,); samples that are not finite are left out.
     strides
-        Of this leg. Only where the contacts lie counts, not whether A2 could be measured.
+        Of this leg. Only their terminal contacts are used, whether or not A2 could be measured.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The last seconds of samples, in memory that never grows."""
+"""The last seconds of samples, in constant memory."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class SampleBuffer:
     Parameters
     ----------
     keep
-        How many samples are certain to be there still; no more than these may be appended at once.
+        How many of the newest samples are certain to be kept; no more may be appended at once.
     legs
-        One or two. ``legs`` of the buffer then are what each of them sees.
+        How many legs, one or two; ``legs`` of the buffer then are the views of each.
     """
 
     def __init__(self, keep: int, legs: int = 1) -> None:
@@ -38,7 +38,7 @@ class SampleBuffer:
         self._sent = [False] * len(self._rows)  # what never is, stays NaN
 
     def append(self, chunk: Sequence[Floats | None], count: int) -> None:
-        """Take ``count`` samples of each channel: times, then those of each leg."""
+        """Append ``count`` samples of each channel: times, then those of each leg; None for NaN."""
         begin = self.end - self.first
         end = begin + count
         if end > self._table.shape[1]:
@@ -55,7 +55,7 @@ class SampleBuffer:
 
 
 class LegBuffer:
-    """One leg's channels in a buffer."""
+    """One leg's channels in a ``SampleBuffer``."""
 
     def __init__(self, samples: SampleBuffer, table: Floats) -> None:
         self.samples = samples
@@ -63,13 +63,13 @@ class LegBuffer:
         self._rows = list(table)
 
     def view(self, start: int, stop: int) -> Floats:
-        """Give samples ``start:stop`` of all channels, shape (6, samples), without copying."""
+        """Return samples ``start:stop`` of all channels, shape (6, samples), without copying."""
         first = self.samples.first
         part: Floats = self._table[:, start - first : stop - first]
         return part
 
     def channel(self, row: int, start: int, stop: int) -> Floats:
-        """Give samples ``start:stop`` of one channel, without copying."""
+        """Return samples ``start:stop`` of one channel, shape (samples,), without copying."""
         first = self.samples.first
         part: Floats = self._rows[row][start - first : stop - first]
         return part

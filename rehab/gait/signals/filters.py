@@ -1,4 +1,4 @@
-"""Zero-phase smoothing of short stretches of signal, slopes, peaks and medians."""
+"""Zero-phase filter for short stretches of signal, derivatives, peaks and order statistics."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ Floats = NDArray[np.float64]
 class ZeroPhaseFilter:
     """A Butterworth low-pass of second order, run forward and backward.
 
-    Both runs together have no delay, and damp by 6 dB at the cut-off (as scipy's ``filtfilt``,
+    Both runs together have no delay, and attenuate by 6 dB at the cut-off (as scipy's ``filtfilt``,
     with which the published references of A2 are made).
 
     Parameters
     ----------
     cutoff_hz
-        Of one run. 6 Hz is the custom for ankle power of walking (Winter 1991; gait.md 2.1).
+        Cut-off of one run. 6 Hz is usual for ankle power in walking (Winter 1991; gait.md 2.1).
     rate_hz
         Of the samples.
     """
@@ -30,7 +30,7 @@ class ZeroPhaseFilter:
         self.padding = max(3, round(4 * rate_hz / (2 * np.pi * cutoff_hz * np.sqrt(0.5))))
 
     def smooth(self, signals: Floats) -> Floats:
-        """Smooth each row; beyond its ends, a row goes on point-symmetrically.
+        """Return each row filtered, extended point-symmetrically beyond its ends for the purpose.
 
         Parameters
         ----------
@@ -44,7 +44,7 @@ class ZeroPhaseFilter:
         return self.smooth_extended(np.concatenate((before, signals, after), axis=1), n)
 
     def smooth_extended(self, signals: Floats, padding: int) -> Floats:
-        """Smooth rows that bring ``padding`` samples beyond both ends; give them without these."""
+        """Return rows filtered that bring ``padding`` samples beyond each end, without these."""
         forward, _ = lfilter(self._b, self._a, signals, zi=signals[:, :1] * self._settled)
         turned = forward[:, ::-1]
         backward, _ = lfilter(self._b, self._a, turned, zi=turned[:, :1] * self._settled)
@@ -53,11 +53,18 @@ class ZeroPhaseFilter:
 
 
 def differentiate(values: Floats, rate_hz: float) -> Floats:
-    """Give the derivative by time, of the same length.
+    """Return the derivative by time, of the same length.
 
-    Five-point central difference: at 100 Hz it damps a motion of 5 Hz by 0.02 %, where the
-    three-point one damps it by 1.6 % (so that rates agree). The two samples at each end get
+    Five-point central difference: at 100 Hz it attenuates a motion of 5 Hz by 0.02 %, where the
+    three-point one attenuates it by 1.6 % (so that rates agree). The two samples at each end get
     shorter differences.
+
+    Parameters
+    ----------
+    values
+        Shape (n,) with n >= 5, evenly spaced.
+    rate_hz
+        Of the samples.
     """
     slope = np.empty_like(values)
     slope[2:-2] = (8 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])) * (rate_hz / 12)
@@ -69,7 +76,15 @@ def differentiate(values: Floats, rate_hz: float) -> Floats:
 
 
 def interpolate_peak(values: Floats, index: int) -> tuple[float, float]:
-    """Give place (in samples) and height of the parabola through a peak and its neighbors."""
+    """Return place (in samples) and height of the parabola through a peak and its neighbors.
+
+    Parameters
+    ----------
+    values
+        Shape (n,).
+    index
+        Of the highest sample, with a neighbor on each side.
+    """
     left, top, right = (float(v) for v in values[index - 1 : index + 2])
     bend = left - 2 * top + right
     if bend >= 0:
@@ -82,16 +97,16 @@ def interpolate_peak(values: Floats, index: int) -> tuple[float, float]:
 
 
 def find_maximum(values: Floats) -> float:
-    """Give the largest value, NaN if there is any."""
+    """Return the largest value, NaN if there is a NaN."""
     return float(values[values.argmax()])
 
 
 def find_minimum(values: Floats) -> float:
-    """Give the smallest value, NaN if there is any."""
+    """Return the smallest value, NaN if there is a NaN."""
     return float(values[values.argmin()])
 
 
 def find_upper_median(values: Floats) -> float:
-    """Give the middle value, of two the larger."""
+    """Return the median, of an even number of values the upper one of the middle two."""
     place = len(values) // 2
     return float(np.partition(values, place)[place])

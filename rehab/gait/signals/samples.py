@@ -17,7 +17,7 @@ CHANNEL_NAMES = ("force_n", "moment_nm", "angle_rad", "forward_n", "position_m")
 
 
 class LegSamples(NamedTuple):
-    """One leg's channels of a chunk, as ``StrideDetector.feed`` takes them."""
+    """One leg's channels of a chunk, shape (n,) each, as ``StrideDetector.feed`` takes them."""
 
     force_n: ArrayLike
     moment_nm: ArrayLike
@@ -27,9 +27,19 @@ class LegSamples(NamedTuple):
 
 
 def read_chunk(names: Sequence[str], channels: Sequence[ArrayLike | None]) -> list[Floats | None]:
-    """Give the channels as float arrays of one length; a single number is one sample.
+    """Return the channels as float arrays of one length; a single number is one sample.
 
-    Raises GaitInputError for channels of different lengths or with more than one dimension.
+    Parameters
+    ----------
+    names
+        What each channel is called in messages.
+    channels
+        Arrays of shape (n,) or numbers; None for a channel that is not sent.
+
+    Raises
+    ------
+    GaitInputError
+        For channels of different lengths or with more than one dimension.
     """
     chunk = [None if values is None else np.asarray(values, np.float64) for values in channels]
     shapes = {array.shape for array in chunk if array is not None}
@@ -51,7 +61,10 @@ def read_chunk(names: Sequence[str], channels: Sequence[ArrayLike | None]) -> li
 
 
 def split_chunk(chunk: list[Floats | None], longest: int) -> list[tuple[list[Floats | None], int]]:
-    """Give a chunk, whose first channel is there, in pieces of no more than so many samples."""
+    """Return a chunk in pieces of at most ``longest`` samples, each with its number of samples.
+
+    The first channel must be there.
+    """
     length = 0 if chunk[0] is None else len(chunk[0])
     if length <= longest:
         return [(chunk, length)]

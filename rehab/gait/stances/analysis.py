@@ -33,7 +33,19 @@ FORWARD_HZ = 20.0
 
 @dataclass(frozen=True, slots=True)
 class Stance:
-    """What a stance gave. Without a push-off there is a reason."""
+    """What was measured of a stance. Without a push-off there is a reason.
+
+    Attributes
+    ----------
+    reasons
+        Why it is invalid.
+    push_off
+        Of its end.
+    propulsion_n_kg
+        Largest forward force of the second half of stance.
+    position_m
+        Of the foot at initial contact [m, forward].
+    """
 
     reasons: list[RejectionReason]
     push_off: PushOff | None
@@ -46,8 +58,10 @@ class StanceAnalyzer:
 
     Parameters
     ----------
-    buffer, rate_hz, mass_kg, weight_n
-        Samples with their nominal rate, and the walker.
+    buffer, rate_hz
+        The samples with their nominal rate.
+    mass_kg, weight_n
+        Body mass, and weight [N].
     cutoff_hz, is_velocity
         As in ``StrideDetector``.
     """
@@ -73,7 +87,7 @@ class StanceAnalyzer:
         self._before = int(BEFORE_S * rate_hz)
 
     def measure(self, contact: Contact, stop: int) -> Stance:
-        """Measure the stance of a contact that has ended, from the samples before ``stop``."""
+        """Return the stance of a contact that has ended, from the samples before ``stop``."""
         begin, end = contact.begin_index, contact.end_index or 0
         begin_s, end_s = contact.begin_s, contact.end_s or 0.0
         if end - begin > 1.2 * STANCE_MAX_S * self._rate_hz:
@@ -105,13 +119,13 @@ class StanceAnalyzer:
         )
 
     def locate(self, contact: Contact) -> Stance:
-        """Give what is known of the stance of a contact that has not ended."""
+        """Return what is known of the stance of a contact that has not ended: its position."""
         return Stance([], None, None, self._find_position(contact))
 
     def _measure_push_off(
         self, contact: Contact, clean: Floats, gap_s: float, reasons: list[RejectionReason]
     ) -> PushOff | None:
-        """Measure push-off from samples whose holes are bridged; add what is wrong with it."""
+        """Return the push-off of samples whose gaps are bridged; append what is wrong with it."""
         stance = resample_stance(clean, self._even_hz, contact.begin_s, contact.end_s or 0.0)
         push_off = None if stance is None else self._analyzer.measure(stance)
         if stance is not None and push_off is not None:
@@ -121,7 +135,7 @@ class StanceAnalyzer:
         return push_off
 
     def _find_before(self, begin: int) -> int:
-        """Give how many samples before a stance follow each other well enough to use them."""
+        """Return how many samples before a stance follow each other closely enough to be used."""
         before = min(self._before, begin)
         times = self._buffer.channel(TIME, begin - before, begin + 1)
         steps = times[1:] - times[:-1]
@@ -147,10 +161,11 @@ class StanceAnalyzer:
 
 
 def _bridge_gaps(window: Floats, stance: int) -> tuple[Floats | None, float]:
-    """Give a stance's samples with holes in moment and angle bridged; None where there is nothing.
+    """Return a stance's samples with gaps in moment and angle bridged, and the longest bridge [s].
 
-    And the longest time [s] from sample ``stance`` on over which a straight line stands. Holes too
-    long for it have their reason already; nobody is shown what is measured across them.
+    The samples are None where nothing is known to bridge between. The time is the longest from
+    sample ``stance`` on over which a straight line stands. Gaps too long for it have their reason
+    already; what is measured across them is shown to nobody.
     """
     time = window[TIME]
     steps = time[stance + 1 :] - time[stance:-1]
@@ -168,7 +183,7 @@ def _bridge_gaps(window: Floats, stance: int) -> tuple[Floats | None, float]:
 
 
 def _decimate(window: Floats, factor: int) -> Floats | None:
-    """Average each ``factor`` neighbors, aligned to the end."""
+    """Return the means of each ``factor`` neighbors, aligned to the end, if there are two."""
     if factor == 1:
         return window
     count = window.shape[1] // factor

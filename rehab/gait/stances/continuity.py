@@ -1,7 +1,7 @@
-"""Whether the samples of a stance follow each other: gaps, holes, freezes, jumps, spikes and steps.
+"""Whether the samples of a stance are continuous: gaps, frozen values, jumps, spikes and steps.
 
-What is looked for here are faults of sensors and of the way from them; what a walker cannot do
-stands in ``plausibility``.
+These are faults of sensors and of the way from them; what a person cannot walk is checked in
+``plausibility``. gait.md is in docs/reference.
 """
 
 from __future__ import annotations
@@ -42,12 +42,18 @@ MOMENT_TO_S = 0.02  # before its end; a moment that labs make from the force end
 def check_samples(
     window: Floats, stance: int, rate_hz: float, mass_kg: float, is_velocity: bool
 ) -> list[RejectionReason]:
-    """Give what is wrong with the samples of a stance, before anything is measured from them.
+    """Return what is wrong with the samples of a stance, before anything is measured from them.
 
     Parameters
     ----------
     window
-        Shape (channels, n): time, force, moment, angle, …; the stance begins at sample ``stance``.
+        Shape (channels, n): time, force, moment, angle, …
+    stance
+        The sample at which the stance begins.
+    rate_hz, mass_kg
+        Nominal rate, and body mass.
+    is_velocity
+        Whether the angle is a velocity [rad/s].
     """
     rows = slice(TIME, ANGLE + 1)
     steps = window[rows, stance + 1 :] - window[rows, stance:-1]
@@ -87,14 +93,18 @@ def check_samples(
 def check_steps(
     stance: ResampledStance, push_off: PushOff, gap_s: float, is_velocity: bool
 ) -> list[RejectionReason]:
-    """Give which channels of a stance have a spike or a step in the part that counts.
+    """Return which channels of a stance have a spike or a step where it changes push-off.
 
     Parameters
     ----------
+    stance
+        With moment and angle.
     push_off
-        What was measured from the stance.
+        What was measured of the stance.
     gap_s
         Longest time between two samples: over it, a straight line stands for the walker's curve.
+    is_velocity
+        Whether the angle is a velocity [rad/s]; it is not checked then.
     """
     apart = max(1, round(APART_S * stance.rate_hz))
     apart_s = apart / stance.rate_hz
@@ -124,12 +134,13 @@ def check_steps(
 def _is_discontinuous(
     found: Floats, walking: float, by_walking: float, at_once: float, by_noise: float
 ) -> bool:
+    """Return whether the largest change exceeds what walking and noise can make."""
     highest, limit = find_maximum(found), by_walking * walking + at_once
     return highest > limit and highest > limit + by_noise * find_upper_median(found)
 
 
 def _has_gap(time_s: Floats, known: NDArray[np.intp]) -> bool:
-    """Say whether more is missing than may be bridged, given the indices of what is known."""
+    """Return whether more is missing than may be bridged, given the indices of what is known."""
     if len(known) < 2 or known[-1] < len(time_s) - 1:
         return True
     holes = np.diff(time_s[known]).max()
@@ -137,7 +148,7 @@ def _has_gap(time_s: Floats, known: NDArray[np.intp]) -> bool:
 
 
 def _is_frozen(values: Floats, steps: Floats, longest: float) -> bool:
-    """Say whether a channel repeats one value, not zero, for more than so many samples."""
+    """Return whether a channel repeats one value, not zero, for more than ``longest`` samples."""
     still = steps == 0
     if not still.any():
         return False

@@ -38,9 +38,9 @@ def compute_ankle_moment(
     ankle_forward_m: ArrayLike,
     ankle_up_m: ArrayLike,
 ) -> Floats:
-    """Give the ankle moment of the force under the foot [Nm, plantarflexion positive].
+    """Return the ankle moment of the force under the foot [Nm, plantarflexion positive].
 
-    ``M = (cop − ankle) × F`` in the sagittal plane; the foot's own weight and inertia are left out
+    ``M = (cop − ankle) × F`` in the sagittal plane; the foot's own weight and inertia are neglected
     (quasi-static; against full inverse dynamics of one walker r = .99, 5.5 Nm rms, gait.md 2.1).
 
     Parameters
@@ -52,7 +52,7 @@ def compute_ankle_moment(
 
     Returns
     -------
-    Shape (n,). Zero where the vertical force is below 40 N, NaN where it is not and the center of
+    Shape (n,). Zero where the vertical force is below 40 N; NaN where it is not and the center of
     pressure lies more than 0.35 m from the ankle or anything is not finite.
     """
     up = np.asarray(up_n, dtype=np.float64)
@@ -64,9 +64,12 @@ def compute_ankle_moment(
 
 
 def compute_ankle_velocity(foot_rad_s: ArrayLike, shank_rad_s: ArrayLike) -> Floats:
-    """Give the ankle's angular velocity [rad/s] from gyroscopes on foot and shank.
+    """Return the ankle's angular velocity [rad/s] from gyroscopes on foot and shank.
 
-    Both about the axis to the walker's left, so that toes that go down count positive.
+    Parameters
+    ----------
+    foot_rad_s, shank_rad_s
+        Shape (n,), both about the axis to the walker's left: positive where the toes go down.
     """
     foot: Floats = np.asarray(foot_rad_s, dtype=np.float64)
     return foot - np.asarray(shank_rad_s, dtype=np.float64)
@@ -74,11 +77,21 @@ def compute_ankle_velocity(foot_rad_s: ArrayLike, shank_rad_s: ArrayLike) -> Flo
 
 @dataclass(frozen=True, slots=True)
 class PushOff:
-    """Ankle moment, angle, velocity and power of a stance, smoothed, and the peak of power.
+    """Ankle moment, angle, velocity and power of a stance, filtered, and the peak of power.
 
-    Shapes (n,), as the even stance that they come from: ``moment_nm_kg``, ``angle_rad`` (the
-    velocity again where velocities are sent), ``velocity_rad_s``, ``power_w_kg``; ``peak`` is the
-    highest sample.
+    Attributes
+    ----------
+    moment_nm_kg, angle_rad, velocity_rad_s, power_w_kg
+        Shape (n,), as the resampled stance. ``angle_rad`` is the velocity where velocities are
+        sent.
+    peak
+        The sample of highest power.
+    a2_w_kg, a2_time_s
+        The peak's height [W/kg] and time [s], interpolated between samples.
+    moment_peak_nm_kg
+        Largest moment until terminal contact.
+    mass_kg
+        Body mass.
     """
 
     moment_nm_kg: Floats
@@ -105,14 +118,17 @@ class PushOff:
 class PushOffAnalyzer:
     """Measures push-off of one buffered stance at a time: ``power = moment × velocity / mass``.
 
+    A2 is the peak of ankle power in late stance (Winter 1991), here of the sagittal plane: 5-8 %
+    below a lab's three-plane power (gait.md 1.2, 6).
+
     Parameters
     ----------
     rate_hz
-        Of the even stances.
+        Of the resampled stances.
     mass_kg
-        Of the walker.
+        Body mass of the walker.
     cutoff_hz
-        Of the zero-phase low-pass on moment and angle.
+        Cut-off of the zero-phase low-pass on moment and angle.
     is_velocity
         Whether velocities [rad/s] are sent instead of angles [rad].
     """
@@ -133,7 +149,7 @@ class PushOffAnalyzer:
         self._slope = (back - back.mean()) / ((back - back.mean()) ** 2).sum()  # least squares
 
     def measure(self, stance: ResampledStance) -> PushOff | None:
-        """Measure a stance; None where too little of it is there."""
+        """Return the push-off of a stance, None where too few of its samples are known."""
         signals, end = stance.signals[1:], stance.end
         count = signals.shape[1]
         begin = stance.index(PUSH_OFF_FROM)
@@ -162,7 +178,7 @@ class PushOffAnalyzer:
         )
 
     def _smooth(self, signals: Floats, known_s: float) -> Floats:
-        """Smooth moment and angle, known until ``known_s`` after the foot left the floor."""
+        """Return moment and angle filtered, known until ``known_s`` after terminal contact."""
         n = len(self._beyond_s)
         moment, angle = signals
         extended = np.empty((2, len(angle) + 2 * n))
@@ -182,7 +198,7 @@ class PushOffAnalyzer:
         return self._filter.smooth_extended(extended, n)
 
     def _find_velocity(self, motion: Floats) -> float:
-        """Give the ankle's velocity at the end of a stretch of motion, 0 if it turns back."""
+        """Return the ankle's velocity at the end of a stretch of motion, 0 if it dorsiflexes."""
         if self._is_velocity:
             return max(0.0, float(motion[-1]))
         return max(0.0, float(motion[-len(self._slope) :].dot(self._slope)))

@@ -1,4 +1,7 @@
-"""Whether a stance can have been one: the limits of people, and what fits to what."""
+"""Whether a person can have walked a stance: physiological limits, and channels that must agree.
+
+The sources of the limits stand beside them; gait.md is in docs/reference.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +53,17 @@ SWING_S = 0.03  # before initial contact; later, the filter has some of the stan
 def check_force(
     force_n: Floats, peak_n: float, weight_n: float, rate_hz: float
 ) -> list[RejectionReason]:
-    """Give what is wrong with the vertical force of a stance, shape (n,), contact to contact."""
+    """Return what is wrong with the vertical force of a stance.
+
+    Parameters
+    ----------
+    force_n
+        Above the plate's zero [N], from contact to contact, shape (n,).
+    peak_n, weight_n
+        Its peak, and body weight [N].
+    rate_hz
+        Of the samples.
+    """
     reasons = []
     tail = force_n[-max(2, round(CUT_S * rate_hz) + 1) : -1]
     if not np.isfinite(force_n).all() or (len(tail) and tail[0] > CUT_SHARE * weight_n):
@@ -61,12 +74,20 @@ def check_force(
 
 
 def check_load(load: float) -> list[RejectionReason]:
-    """Give what is wrong with the mean force of one plate over a cycle, by body weight."""
+    """Return what is wrong with the mean force of one plate over a cycle, by body weight."""
     return [RejectionReason.WEIGHT] if load < LOAD_MIN or load > LOAD_MAX else []  # neither, if NaN
 
 
 def check_lever(stance: ResampledStance, offset_n: float, weight_n: float) -> list[RejectionReason]:
-    """Give what is wrong with a moment beside the force that it should come from."""
+    """Return what is wrong with a moment, given the force that it should come from.
+
+    Parameters
+    ----------
+    stance
+        With force and moment.
+    offset_n, weight_n
+        The plate's zero, and body weight [N].
+    """
     half = stance.index(0.5)
     late = slice(half, stance.end + 1)
     force, moment = stance.signals[0, late] - offset_n, stance.signals[1, late]
@@ -87,7 +108,7 @@ def check_lever(stance: ResampledStance, offset_n: float, weight_n: float) -> li
 
 
 def _find_lever(force_n: Floats, moment_nm: Floats, at: int) -> float:
-    """Give the lever of the force about the ankle at a sample and its neighbors [m]."""
+    """Return the lever of the force about the ankle at a sample and its neighbors [m]."""
     part = slice(max(0, at - 1), at + 2)
     moment: float = sum(moment_nm[part].tolist())
     force: float = sum(force_n[part].tolist())
@@ -97,7 +118,17 @@ def _find_lever(force_n: Floats, moment_nm: Floats, at: int) -> float:
 def check_push_off(
     push_off: PushOff, stance: ResampledStance, is_velocity: bool
 ) -> list[RejectionReason]:
-    """Give what is wrong with the push-off of a stance."""
+    """Return what is wrong with the push-off of a stance.
+
+    Parameters
+    ----------
+    push_off
+        What was measured of the stance.
+    stance
+        The stance itself.
+    is_velocity
+        Whether its angle is a velocity [rad/s].
+    """
     reasons = []
     begin, end = stance.begin, stance.end
     highest, lowest = (

@@ -1,4 +1,4 @@
-"""A stance at even times, as filters need it."""
+"""A stance at evenly spaced times, as filters need it."""
 
 from __future__ import annotations
 
@@ -15,10 +15,20 @@ MIN_STANCE_SAMPLES = 8  # of a stance; 0.16 s at 50 Hz
 
 @dataclass(frozen=True, slots=True)
 class ResampledStance:
-    """Force [N], moment [Nm] and angle [rad] around a stance at even times: shape (3, n).
+    """Force [N], moment [Nm] and angle [rad] around a stance at evenly spaced times.
 
-    The first sample is of ``first_s``. Samples ``begin`` to ``end`` lie within the stance, which
-    lasts from ``begin_s`` to ``end_s``.
+    Attributes
+    ----------
+    signals
+        Shape (3, n): force, moment, angle.
+    rate_hz
+        Of the samples.
+    first_s
+        Time of the first sample [s].
+    begin_s, end_s
+        Initial and terminal contact [s].
+    begin, end
+        First and last sample within the stance.
     """
 
     signals: Floats
@@ -30,7 +40,7 @@ class ResampledStance:
     end: int
 
     def index(self, share: float) -> int:
-        """Give the first sample after a share of the stance, the last one if there is none."""
+        """Return the first sample after a share of the stance; its last one if there is none."""
         time_s = self.begin_s + share * (self.end_s - self.begin_s)
         return min(max(0, math.ceil((time_s - self.first_s) * self.rate_hz)), self.end)
 
@@ -38,12 +48,20 @@ class ResampledStance:
 def resample_stance(
     window: Floats, rate_hz: float, begin_s: float, end_s: float
 ) -> ResampledStance | None:
-    """Give a stance at even times, the last of which is the last sample's; None if it is too short.
+    """Return a stance at evenly spaced times that end with the last sample's time.
 
     Parameters
     ----------
     window
         Shape (4 or more, n): time, force, moment, angle; time increasing.
+    rate_hz
+        Of the result.
+    begin_s, end_s
+        Initial and terminal contact [s].
+
+    Returns
+    -------
+    None for a stance of fewer than nine samples.
     """
     time_s = window[TIME]
     first, last = float(time_s[0]), float(time_s[-1])
