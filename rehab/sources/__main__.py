@@ -44,7 +44,7 @@ EXIT_DONE, EXIT_UNUSABLE, EXIT_REFUSED, EXIT_INTERRUPTED = 0, 2, 3, 130
 
 
 def parse_speed(text: str) -> float | None:
-    """Read `max` as None and a finite number above 0 as itself."""
+    """Return None for `max` and the speed for a finite number above 0."""
     if text == "max":
         return None
     try:
@@ -57,14 +57,14 @@ def parse_speed(text: str) -> float | None:
 
 
 def parse_count(text: str) -> int:
-    """Read a whole number above 0."""
+    """Return a whole number above 0."""
     if not (text.isascii() and text.isdecimal() and int(text) > 0):
         raise ArgumentTypeError("give a whole number above 0")
     return int(text)
 
 
 def make_parser(name: str, source: type[Source]) -> ArgumentParser:
-    """Give the command line of a source."""
+    """Return the command-line parser of a source."""
     parser = ArgumentParser(
         prog=f"python -m rehab.sources {name}",
         description=sys.modules[source.__module__].__doc__,
@@ -104,7 +104,7 @@ def make_parser(name: str, source: type[Source]) -> ArgumentParser:
 
 
 def make_top_parser() -> ArgumentParser:
-    """Give what answers to anything but the name of a source."""
+    """Return the parser that answers to anything but the name of a source."""
     names = "\n".join(f"  {name:14}{summary}" for name, (_, summary) in SOURCES.items())
     parser = ArgumentParser(
         prog="python -m rehab.sources",
@@ -116,7 +116,7 @@ def make_top_parser() -> ArgumentParser:
 
 
 def open_log(path: Path) -> TextIO:
-    """Open a file to append to. Raises SourceError."""
+    """Open a file to append to. Raises SourceError where that is not possible."""
     try:
         return path.open("a", encoding="utf-8")
     except OSError as problem:
@@ -124,23 +124,23 @@ def open_log(path: Path) -> TextIO:
 
 
 def exit_with_parent() -> None:
-    """Wait until standard input closes, as it does when the server dies, and end with it."""
+    """Wait until standard input closes, as it does when the server dies, and exit."""
     while os.read(0, 4096):  # not sys.stdin: Python aborts where a thread holds its lock at the end
         pass
     os._exit(EXIT_INTERRUPTED)
 
 
 def print_status(text: str) -> None:
-    """Print a line for whoever looks on."""
+    """Print a line for the person who runs the source."""
     print(text, file=sys.stderr, flush=True)
 
 
 async def run_client(
     client: SourceClient, describe: Callable[[], str], *others: Coroutine[None, None, None]
 ) -> None:
-    """Walk until that is over, with others beside, and say every few seconds how it goes.
+    """Run a client and other work until the client is done, and print its status now and then.
 
-    An other that ends by itself changes nothing; one that fails ends the walk.
+    Other work that ends changes nothing; other work that fails ends the client.
     """
 
     async def tell() -> None:
@@ -163,7 +163,7 @@ async def run_client(
 
 
 async def run_live_source(source: LiveSource, intake: Intake, client: SourceClient) -> None:
-    """Walk by what a live source hands in."""
+    """Run a client with the strides of a live source."""
 
     async def read() -> None:
         await source.read(intake)
@@ -176,7 +176,7 @@ async def run_live_source(source: LiveSource, intake: Intake, client: SourceClie
 
 
 def run(name: str, options: Namespace, stack: ExitStack) -> int:
-    """Run a source to its end and give the exit status. Raises what cannot be used."""
+    """Run a source until it is done and return the exit status. Raises what makes it unusable."""
     if options.stay and options.session is not None:
         raise SourceError("--stay goes on with later sessions, --session names one: give only one.")
     url = websocket_url(options.server, SOURCE_PATH)
@@ -215,7 +215,9 @@ def run(name: str, options: Namespace, stack: ExitStack) -> int:
         doing = run_live_source(source, intake, client)
     else:
         client = make_client(
-            StridePlayback(source.open_walk, options.speed, source.ahead, resumes=options.resume)
+            StridePlayback(
+                source.open_walk, options.speed, source.max_unacknowledged, resumes=options.resume
+            )
         )
         doing = run_client(client, client.describe)
     try:
@@ -234,7 +236,7 @@ def run(name: str, options: Namespace, stack: ExitStack) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the source that the command line names and give the exit status."""
+    """Run the source that the command line names and return the exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     if not words or words[0] not in SOURCES:
         make_top_parser().parse_args(words[:1])

@@ -22,16 +22,16 @@ RETRY_S = 1.0
 KEYWORDS = ("start", "one", "two", "three", "four", "five")
 
 
-class Matlab(LiveSource):
+class MatlabSource(LiveSource):
     """Sends the keyword when the session starts, as the original's tablet did, and reads strides.
 
-    MATLAB sends no times: a stride's time is when it comes. Its goal travels as ``matlab_goal``;
-    what counts is the one that the therapist set.
+    MATLAB sends no times: a stride's time is when it comes. Its goal is sent on as ``matlab_goal``;
+    the goal that counts is the therapist's.
     """
 
     @classmethod
     def add_arguments(cls, parser: ArgumentParser) -> None:
-        """Say what its command line can hold."""
+        """Add the options of this source to a command line."""
         parser.add_argument(
             "--connect", default="ws://127.0.0.1:4000", metavar="URL", help="default: %(default)s"
         )
@@ -42,7 +42,7 @@ class Matlab(LiveSource):
         )
 
     def __init__(self, options: Namespace, notify: Notify) -> None:
-        """Look at the command line."""
+        """Read the command line. Raises SourceError for an address of no use."""
         self.settings = IntakeSettings(side=Side(options.side) if options.side else None)
         self.address = parse_address(options.connect, ("ws",))
         self._keyword: str = options.keyword
@@ -50,7 +50,7 @@ class Matlab(LiveSource):
         self._goal: float | None = None
 
     async def read(self, intake: Intake) -> None:
-        """Take strides until MATLAB says ``end``; begin anew where the connection breaks."""
+        """Read strides until MATLAB sends ``end``; start anew where the connection breaks."""
         said = ""
         while True:
             await intake.wait_for_start()
@@ -70,7 +70,7 @@ class Matlab(LiveSource):
             await asyncio.sleep(RETRY_S)
 
     async def _receive_all(self, socket: ClientConnection, intake: Intake) -> bool:
-        """Take what comes; give whether that was all."""
+        """Read what comes; return whether that was all."""
         await socket.send(self._keyword)
         self._notify(f"Asked MATLAB for {self._keyword!r}.")
         try:
@@ -90,7 +90,7 @@ class Matlab(LiveSource):
         return False
 
     def _read(self, message: str | bytes) -> dict[str, Cell] | None:
-        """Give the stride that a message tells, None for what tells none."""
+        """Return the stride in a message, None where there is none."""
         words = message.split(",") if isinstance(message, str) else []
         try:
             a2, goal = (float(word) for word in words)
@@ -105,4 +105,4 @@ class Matlab(LiveSource):
         return row
 
 
-SOURCE = Matlab
+SOURCE = MatlabSource

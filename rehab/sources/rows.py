@@ -26,12 +26,12 @@ READ_BYTES = 64 * 1024
 TAKEN = "Another program already sends here. Stop it first."
 
 
-class Rows(LiveSource):
+class RowsSource(LiveSource):
     """Listens for one sender of rows, or connects to one."""
 
     @classmethod
     def add_arguments(cls, parser: ArgumentParser) -> None:
-        """Say what its command line can hold."""
+        """Add the options of this source to a command line."""
         where = parser.add_mutually_exclusive_group(required=True)
         where.add_argument(
             "--listen", metavar="URL", help="tcp://, udp:// or ws://127.0.0.1:9101 (0.0.0.0: all)"
@@ -43,7 +43,7 @@ class Rows(LiveSource):
         add_signal_arguments(parser)
 
     def __init__(self, options: Namespace, notify: Notify) -> None:
-        """Look at the command line."""
+        """Read the command line. Raises SourceError for an address of no use."""
         self.settings = IntakeSettings.read(options)
         self.address = (
             parse_address(options.listen)
@@ -58,7 +58,7 @@ class Rows(LiveSource):
         self._sender = ""
 
     async def read(self, intake: Intake) -> None:
-        """Take rows from one sender at a time, for as long as this runs."""
+        """Read rows from one sender at a time, for as long as this runs."""
         if not self._listens:
             await self._keep_connecting(intake)
         async with AsyncExitStack() as stack:
@@ -73,7 +73,7 @@ class Rows(LiveSource):
             await asyncio.Event().wait()
 
     async def _open(self, intake: Intake, stack: AsyncExitStack) -> Address:
-        """Begin to listen; give where, with a port that was 0 filled in."""
+        """Start listening; return where, with a port that was 0 filled in."""
         kind, host, port = self.address
         if kind == "udp":
             loop = asyncio.get_running_loop()
@@ -147,7 +147,7 @@ class Rows(LiveSource):
         return LineReader(self._header)
 
     def _claim_sender(self, peer: str) -> bool:
-        """Give whether this sender is the only one."""
+        """Return whether this sender is the only one, and remember it."""
         if self._sender:
             self._notify(
                 f"{peer} wants to send as well and was turned away: {self._sender} already does. "
@@ -158,7 +158,7 @@ class Rows(LiveSource):
         return True
 
     async def _receive_all(self, stream: AsyncIterator[bytes], intake: Intake, peer: str) -> None:
-        """Take all that one sender sends."""
+        """Read everything that one sender sends."""
         self._sender = peer
         self._notify(f"{peer} sends.")
         lines = self._make_reader()
@@ -172,7 +172,7 @@ class Rows(LiveSource):
 
 
 class _Datagrams(asyncio.DatagramProtocol):
-    """Takes datagrams of whole lines from one sender, until it has been silent for a while."""
+    """Reads datagrams of whole lines from one sender, until it has been silent for a while."""
 
     def __init__(self, lines: LineReader, intake: Intake, notify: Notify) -> None:
         self._lines, self._intake, self._notify = lines, intake, notify
@@ -208,7 +208,7 @@ async def _read_tcp(reader: asyncio.StreamReader) -> AsyncIterator[bytes]:
 
 
 async def _read_ws(socket: object) -> AsyncIterator[bytes]:
-    """Give messages as whole lines."""
+    """Yield messages as whole lines."""
     with suppress(ConnectionClosed):
         async for message in socket:  # type: ignore[attr-defined]
             yield (message.encode() if isinstance(message, str) else message) + b"\n"
@@ -218,4 +218,4 @@ def _name(peer: object) -> str:
     return f"{peer[0]}:{peer[1]}" if isinstance(peer, tuple) else str(peer)
 
 
-SOURCE = Rows
+SOURCE = RowsSource

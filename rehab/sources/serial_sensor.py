@@ -32,7 +32,7 @@ _FRAME = re.compile(rb"\$([HD]),([^*$]*)\*([0-9A-Fa-f]{2})\s*")
 
 
 class Port(Protocol):
-    """What is used of a pyserial port."""
+    """The part of a pyserial port that is used here."""
 
     @property
     def in_waiting(self) -> int: ...
@@ -53,10 +53,10 @@ class FrameReader:
         self._turns = 0
 
     def read(self, data: bytes) -> list[Mapping[str, Cell]]:
-        """Give the rows of all frames that these bytes complete.
+        """Return the rows of all frames that these bytes complete.
 
-        Damaged frames are counted and left out: their samples are missing, and strides that need
-        them say so. Frames before the first names are left out silently.
+        Damaged frames are counted and skipped: their samples are missing, and strides that need
+        them have a reason. Frames before the first names are skipped silently.
         """
         *lines, self._partial = (self._partial + data).split(b"\n")
         if len(self._partial) > MAX_FRAME:
@@ -75,7 +75,7 @@ class FrameReader:
 
     def _read_frame(self, line: bytes) -> Mapping[str, Cell] | None:
         frame = _FRAME.fullmatch(line)
-        if frame is None or find_checksum(line[1 : frame.start(3) - 1]) != int(frame[3], 16):
+        if frame is None or compute_checksum(line[1 : frame.start(3) - 1]) != int(frame[3], 16):
             raise BadRow("damaged")
         cells = frame[2].decode("ascii", "replace").split(",")
         if frame[1] == b"H":
@@ -93,27 +93,27 @@ class FrameReader:
         return {"time_s": time_s} | dict(zip(self._names, numbers, strict=True))
 
     def _unwrap(self, now_us: int) -> int:
-        """Give microseconds that go on where the device's count begins again."""
+        """Return microseconds that go on where the device's counter wraps around."""
         if self._last_us is not None and self._last_us - now_us > WRAP_US // 2:
             self._turns += 1
         self._last_us = now_us
         return self._turns * WRAP_US + now_us
 
 
-def find_checksum(data: bytes) -> int:
-    """Give the exclusive or of all bytes."""
+def compute_checksum(data: bytes) -> int:
+    """Return the exclusive or of all bytes."""
     result = 0
     for byte in data:
         result ^= byte
     return result
 
 
-class SerialSensor(LiveSource):
-    """Reads a serial port in a thread of its own, and opens it anew where it was pulled out."""
+class SerialSensorSource(LiveSource):
+    """Reads a serial port in a thread of its own, and reopens it after it was unplugged."""
 
     @classmethod
     def add_arguments(cls, parser: ArgumentParser) -> None:
-        """Say what its command line can hold."""
+        """Add the options of this source to a command line."""
         parser.add_argument("--port", help="such as COM3 or /dev/ttyACM0 (default: the only one)")
         parser.add_argument("--baud", type=int, default=BAUD, help="default: %(default)s")
         add_signal_arguments(parser)
@@ -124,7 +124,7 @@ class SerialSensor(LiveSource):
         notify: Notify,
         open_port: Callable[[str, int], Port] | None = None,
     ) -> None:
-        """Look at the command line."""
+        """Read the command line. Raises SourceError where no port can be chosen."""
         self.settings = IntakeSettings.read(options)
         self.port: str = options.port or find_port()
         self._baud: int = options.baud
@@ -132,7 +132,7 @@ class SerialSensor(LiveSource):
         self._open_port = open_port or open_serial
 
     async def read(self, intake: Intake) -> None:
-        """Take frames for as long as this runs."""
+        """Read frames for as long as this runs."""
         loop = asyncio.get_running_loop()
         stopped = threading.Event()
 
@@ -144,12 +144,12 @@ class SerialSensor(LiveSource):
                 )
             intake.add_rows(rows)
 
-        def tell(function: Callable[..., object], *arguments: object) -> None:
+        def call_in_loop(function: Callable[..., object], *arguments: object) -> None:
             if not stopped.is_set():
                 loop.call_soon_threadsafe(function, *arguments)
 
         reading = threading.Thread(
-            target=self._read_port, args=(tell, take, stopped), name="serial", daemon=True
+            target=self._read_port, args=(call_in_loop, take, stopped), name="serial", daemon=True
         )
         reading.start()
         try:
@@ -160,7 +160,7 @@ class SerialSensor(LiveSource):
 
     def _read_port(
         self,
-        tell: Callable[..., None],
+        call_in_loop: Callable[..., None],
         take: Callable[[list[Mapping[str, Cell]], int], None],
         stopped: threading.Event,
     ) -> None:
@@ -171,12 +171,14 @@ class SerialSensor(LiveSource):
             except (OSError, ValueError) as problem:  # SerialException is an OSError
                 text = f"{self.port} cannot be opened ({problem})"
                 if text != said:
-                    tell(self._notify, f"{text}. Plug the sensor in, or close what uses it.")
+                    call_in_loop(
+                        self._notify, f"{text}. Plug the sensor in, or close what uses it."
+                    )
                 said = text
                 stopped.wait(RETRY_S)
                 continue
             said = ""
-            tell(self._notify, f"Reading {self.port}.")
+            call_in_loop(self._notify, f"Reading {self.port}.")
             frames = FrameReader()
             try:
                 while not stopped.is_set():
@@ -184,9 +186,9 @@ class SerialSensor(LiveSource):
                     before = frames.damaged
                     rows = frames.read(data) if data else []
                     if rows or frames.damaged > before:
-                        tell(take, rows, frames.damaged - before)
+                        call_in_loop(take, rows, frames.damaged - before)
             except OSError as problem:
-                tell(
+                call_in_loop(
                     self._notify,
                     f"The sensor at {self.port} is gone ({problem}). Plug it in again.",
                 )
@@ -204,7 +206,7 @@ def open_serial(port: str, baud: int) -> Port:
 
 
 def find_port() -> str:
-    """Give the only serial port there is. Raises SourceError."""
+    """Return the only serial port there is. Raises SourceError."""
     from serial.tools.list_ports import comports
 
     ports = [found for found in comports() if found.vid is not None]
@@ -218,4 +220,4 @@ def find_port() -> str:
     )
 
 
-SOURCE = SerialSensor
+SOURCE = SerialSensorSource

@@ -1,4 +1,4 @@
-"""What a source is: something made from a command line that has strides to give."""
+"""What a source is: made from a command line, it supplies strides."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Source(ABC):
     options
         The command line, with what ``add_arguments`` added.
     notify
-        Called with what somebody who looks on should know.
+        Called with lines for the person who runs the source.
 
     Raises
     ------
@@ -33,38 +33,39 @@ class Source(ABC):
     @classmethod
     @abstractmethod
     def add_arguments(cls, parser: ArgumentParser) -> None:
-        """Say what its command line can hold."""
+        """Add the options of this source to a command line."""
 
     @abstractmethod
     def __init__(self, options: Namespace, notify: Notify) -> None:
-        """Look at the command line."""
+        """Read the command line."""
 
 
 class PlayedSource(Source):
     """A source that can be asked for the next stride: recorded or simulated.
 
-    ``ahead`` is how many strides may be unacknowledged before the next is asked for, at full speed.
+    ``max_unacknowledged`` is how many strides may be unacknowledged before the next is asked for,
+    at full speed.
     """
 
-    ahead = WINDOW
+    max_unacknowledged = WINDOW
 
     @abstractmethod
     def open_walk(self, trained_side: Side) -> NextStride:
-        """Begin to walk, in a session that trains this leg."""
+        """Return the strides of a session that trains this leg, one a call."""
 
 
 class LiveSource(Source):
-    """A source whose strides, or the signals they are made from, come when they come.
+    """A source whose strides, or the signals they are measured from, come when they come.
 
-    ``settings`` say how to read what comes.
+    ``settings`` define how to read what comes.
     """
 
     settings: IntakeSettings
 
     @abstractmethod
     async def read(self, intake: Intake) -> None:
-        """Hand in all that comes; return when no more can come.
+        """Hand everything that comes to the intake; return when no more can come.
 
-        It waits for senders that are not there yet and takes them up again when they come back.
-        Raises SourceError for what only somebody at the machine can put right.
+        It waits for senders that are not there yet and reconnects to them. Raises SourceError for
+        what only a person at the machine can put right.
         """

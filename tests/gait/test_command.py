@@ -15,7 +15,7 @@ COLUMNS = ["time=t", "left.force=Fz", "left.moment=M*1000", "left.angle=A*-1"]
 
 @pytest.fixture
 def lab_file(tmp_path):
-    """Give a recording of a lab that sends kilonewton meters and dorsiflexion."""
+    """Return a recording of a lab that sends kilonewton meters and dorsiflexion."""
     walk, _ = make_walk(strides=12)
     path = tmp_path / "walk.csv"
     table = np.column_stack(

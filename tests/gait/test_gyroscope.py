@@ -12,7 +12,7 @@ RATE_HZ = 204.8
 
 
 def read_feet():
-    """Give for each foot its times, sagittal rate [rad/s] and events [s]."""
+    """Return for each foot its times, sagittal rate [rad/s] and events [s]."""
     folder = signals("gaitmap_imu")
     with (folder / "imu_sample.csv").open() as file:
         sensors, axes = next(csv.reader(file)), next(csv.reader(file))
@@ -75,7 +75,7 @@ def test_the_same_in_any_chunks(feet, size):
 
 
 def swing(rate_hz=100, strides=20, stride_s=1.2, strength=5.0):
-    """Give a leg that turns back, swings for 0.4 s and turns back again."""
+    """Return a leg that turns back, swings for 0.4 s and turns back again."""
     time = np.arange(int(strides * stride_s * rate_hz)) / rate_hz
     phase = time % stride_s
     rate = np.where(phase < 0.4, -strength * np.sin(np.pi * phase / 0.4), 0.0)

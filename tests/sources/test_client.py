@@ -35,7 +35,7 @@ def even_walk(count=1000, every_s=1.0):
     return open_walk
 
 
-PLAYED = ("speed", "ahead", "monotonic")
+PLAYED = ("speed", "max_unacknowledged", "monotonic")
 
 
 def make_client(garry, open_walk, token=TOKEN, **settings):
@@ -397,7 +397,9 @@ async def test_a_simulated_patient_walks_in_the_phases_that_the_server_tells(gar
         await ours.sleep(seconds)
 
     async with serve_garry(garry):
-        client = make_client(garry, open_walk, speed=speed, ahead=1, monotonic=ours, sleep=sleep)
+        client = make_client(
+            garry, open_walk, speed=speed, max_unacknowledged=1, monotonic=ours, sleep=sleep
+        )
         await run(client)
 
     other = SyntheticWalker(GOOD, 3, Side.RIGHT)

@@ -39,7 +39,9 @@ async def running(source, garry, said):
         client = SourceClient(dial, feed)
         doing = run_live_source(source, Intake(feed, source.settings, said.append), client)
     else:
-        client = SourceClient(dial, StridePlayback(source.open_walk, None, source.ahead))
+        client = SourceClient(
+            dial, StridePlayback(source.open_walk, None, source.max_unacknowledged)
+        )
         doing = run_client(client, client.describe)
     task = asyncio.create_task(doing)
     try:

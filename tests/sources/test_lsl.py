@@ -24,7 +24,7 @@ def test_a_correction_that_wanders_never_turns_the_stamps_around():
     stamps = np.arange(100_000) / 1000
     times = []
     for start in range(0, len(stamps), 50):
-        correction.measure(5.0 + rng.normal(0, 0.002))
+        correction.update(5.0 + rng.normal(0, 0.002))
         times.append(correction.correct(stamps[start : start + 50]))
     found = np.concatenate(times)
 
@@ -34,7 +34,7 @@ def test_a_correction_that_wanders_never_turns_the_stamps_around():
 
 def test_another_clock_is_taken_at_once():
     correction = ClockCorrection(5.0)
-    correction.measure(900.0)
+    correction.update(900.0)
     assert correction.correct(np.array([1.0])) == pytest.approx([901.0])
 
 

@@ -24,7 +24,7 @@ def ours():
 
 
 def due(playback, unacknowledged=0) -> Measurement:
-    """Give the stride that must be due now."""
+    """Return the stride that must be due now."""
     stride = playback.poll(unacknowledged)
     assert isinstance(stride, Measurement)
     return stride
@@ -45,10 +45,10 @@ def steady(times_s, phases=None):
     return walk
 
 
-def make_player(speed, ahead, ours, *walks):
+def make_player(speed, max_unacknowledged, ours, *walks):
     """Make a playback that begins these walks, one after the other."""
     begun = iter(walks)
-    return StridePlayback(lambda _side: next(begun), speed, ahead, ours)
+    return StridePlayback(lambda _side: next(begun), speed, max_unacknowledged, ours)
 
 
 def test_a_clock_stands_runs_and_stands(ours):

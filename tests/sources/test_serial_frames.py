@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rehab.sources.serial_sensor import FrameReader, find_checksum
+from rehab.sources.serial_sensor import FrameReader, compute_checksum
 from tests.sources.labs import frame
 
 NAMES = b"$H,left_force_n,left_angle_rad*4D\n"
@@ -67,4 +67,4 @@ def test_the_sketch_sends_what_is_documented():
     assert "921600" in text
     for word in ("$", "*%02X", "micros()", "left_force_n"):
         assert word in text
-    assert find_checksum(b"H,left_force_n,left_angle_rad") == 0x4D
+    assert compute_checksum(b"H,left_force_n,left_angle_rad") == 0x4D

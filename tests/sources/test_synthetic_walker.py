@@ -28,7 +28,7 @@ WASHOUT = make_phase("washout")
 
 
 def steady(profile=GOOD, **changes):
-    """Give a profile that learns nothing, tires of nothing and stays at its first level."""
+    """Return a profile that learns nothing, tires of nothing and stays at its first level."""
     return replace(
         profile, trained_level=1.5, exploration_level=1.5, fatigue_per_100_strides=0, **changes
     )
@@ -143,7 +143,7 @@ def test_walker_and_session_agree_on_the_phase_of_every_stride(phases, seed):
 
 @pytest.fixture(scope="module")
 def walks():
-    """Walk session 1 with twenty seeds; give usable values per phase as ratios to the baseline."""
+    """Walk session 1 with twenty seeds; return usable values per phase as ratios to the baseline."""
     values: dict[str, list[float]] = {}
     for seed in range(20):
         strides = walk(GOOD, seed, SESSION_1)

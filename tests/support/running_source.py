@@ -12,7 +12,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rehab.sources.synthetic.signals import Recording
+from rehab.sources.synthetic.signals import SyntheticRecording
 from tests.servers import ROOT
 
 NAMES = [
@@ -30,13 +30,13 @@ class Source:
     said: list[str]
 
     def acks(self) -> list[dict[str, float]]:
-        """Give its acknowledgments: session, number and time [s since 1970]."""
+        """Return its acknowledgments: session, number and time [s since 1970]."""
         if not self.log.exists():
             return []
         return [json.loads(line) for line in self.log.read_text("utf-8").splitlines()]
 
     async def wait_for(self, words: str, seconds: float = 30) -> str:
-        """Give the line in which it says this."""
+        """Return the line in which it says this."""
         async with asyncio.timeout(seconds):
             while True:
                 for line in self.said:
@@ -72,8 +72,8 @@ async def run_source(*arguments: str, token: str, server: str, folder: Path):
         await listening
 
 
-async def send_in_time(made: Recording, send: Send, chunk: int) -> float:
-    """Send samples when their times come; give when the clock of the samples was 0 [s since 1970].
+async def send_in_time(made: SyntheticRecording, send: Send, chunk: int) -> float:
+    """Send samples when their times come; return when the clock of the samples was 0 [s since 1970].
 
     ``send`` gets rows of time and the channels in ``NAMES``.
     """

@@ -21,7 +21,7 @@ async def walk_with_restarts(
 ) -> tuple[int, int, str]:
     """Walk so long, with a server that is ended then and comes back.
 
-    Gives how many strides are not in the log, how many were walked, and what became of them.
+    Returns how many strides are not in the log, how many were walked, and what became of them.
     """
     torture = Torture(folder, seed=1)
     server = await torture.start_server()

@@ -28,7 +28,7 @@ def make_plan(
     measure: Measure = A2,
     **settings: Any,
 ) -> SessionPlan:
-    """Give a plan for the left leg: training without end unless phases are given."""
+    """Return a plan for the left leg: training without end unless phases are given."""
     return SessionPlan(
         measure=measure,
         valence=find_valence(valence),
@@ -40,12 +40,12 @@ def make_plan(
 
 
 def others_than(valence: str) -> tuple[Valence, ...]:
-    """Give the valences that a session of this one may be changed to."""
+    """Return the valences that a session of this one may be changed to."""
     return tuple(other for slug, other in VALENCES.items() if slug != valence)
 
 
 def start(plan: SessionPlan) -> SessionFold:
-    """Give a running session."""
+    """Return a running session."""
     fold = SessionFold(plan)
     fold.change(Change(ChangeKind.START))
     return fold

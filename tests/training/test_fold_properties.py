@@ -88,7 +88,7 @@ def plans(draw: st.DrawFn) -> SessionPlan:
 
 @st.composite
 def sessions(draw: st.DrawFn) -> tuple[SessionPlan, Log]:
-    """Give a plan and a log of it: what a session accepted of what happened."""
+    """Return a plan and a log of it: what a session accepted of what happened."""
     plan = draw(plans())
     fold = start(plan)
     log: Log = [Change(ChangeKind.START)]
@@ -212,7 +212,7 @@ def test_every_scored_step_keeps_its_promises(session: tuple[SessionPlan, Log]) 
 
 
 def valence_at(fold: SessionFold, step: ScoredStep) -> Valence:
-    """Give the valence that was in force when a step came, by the switches alone."""
+    """Return the valence that was in force when a step came, by the switches alone."""
     slug = fold.plan.valence.slug
     for after, changed_to in fold.switches:
         if step.number > after:

@@ -1,8 +1,8 @@
-"""How a source brings its strides to the server: everything but the strides.
+"""How a source sends its strides to the server: everything but the strides.
 
-``queue`` keeps what is not acknowledged, ``feed`` walks by a ``clock`` that can stand still,
-``live`` is given strides as they are measured; they know no sockets. ``client`` connects them with
-the server. docs/protocol.md is the contract.
+``step_queue`` keeps what is not acknowledged, ``playback`` plays strides by a ``clock`` that can be
+paused, ``live`` takes strides as they are measured, ``follower`` follows the session; they know no
+sockets. ``client`` connects them with the server. docs/protocol.md is the contract.
 """
 
 from rehab.sources.client.client import SourceClient

@@ -1,4 +1,4 @@
-"""A source that dials in: walks while the session runs, sends strides until they are stored."""
+"""A source's client: plays while the session runs, sends strides until they are stored."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ class SourceClient:
         Where the strides come from: a ``StridePlayback`` plays them, a ``LiveFeed`` has them as
         they are measured.
     run
-        Names this run of the source; otherwise chance does.
+        Name of this run of the source; random by default.
     session
-        Which session to join; otherwise the station's open one.
+        Which session to join; the station's open one by default.
     stay
         Whether to go on with the station's later sessions.
     on_ack
-        Called with session and number of each ack.
+        Called with session and number of each acknowledgment.
     notify
-        Called with what somebody who looks on should know.
+        Called with lines for the person who runs the source.
     sleep
         How to wait [s].
     """
@@ -71,7 +71,7 @@ class SourceClient:
 
     @property
     def unacknowledged(self) -> int:
-        """How many strides the server may not have."""
+        """How many strides the server may not have stored."""
         return self._queue.unacknowledged
 
     @property
@@ -81,14 +81,14 @@ class SourceClient:
 
     @property
     def lost(self) -> int:
-        """How many strides their session ended without."""
+        """How many strides were not stored when their session ended."""
         return self._follower.lost
 
     async def run(self) -> None:
-        """Walk until the strides are over and acknowledged, or the session is.
+        """Run until the strides are over and acknowledged, or the session is.
 
-        Raises LinkRefused where the server will not have this source, StepsLost where it has lost
-        steps and UnsendableStride for a stride that the protocol has no room for.
+        Raises LinkRefused where the server refuses this source, StepsLost where it has lost steps
+        and UnsendableStride for a stride that does not fit the protocol.
         """
         doing = [
             self._listen(),
@@ -108,7 +108,7 @@ class SourceClient:
             await self._link.close()
 
     def describe(self) -> str:
-        """Say in one line how it goes."""
+        """Return the state of the client in one line."""
         session, visit = self._queue.session, self._follower
         if session is None:
             return "Waiting for a session." if visit.is_welcome else "Waiting for the server."
@@ -186,7 +186,7 @@ class SourceClient:
     # --- Waiting ---
 
     def _tell(self) -> None:
-        """Let everyone who waits look again."""
+        """Wake everything that waits for a change."""
         # One event for each change: what was set stays set for those who have waited for it.
         self._changed.set()
         self._changed = asyncio.Event()

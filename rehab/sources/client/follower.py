@@ -1,4 +1,4 @@
-"""A source's part in the sessions of a station, as the server tells it: no sockets, no waiting."""
+"""Follows the sessions of a station as the server reports them: no sockets, no waiting."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from robot.link import NOT_PROTOCOL, LinkRefused, Message
 
 
 class SessionFollower:
-    """Has the feed walk and the queue send as the session wants it.
+    """Lets the feed play and the queue send as the session requires.
 
     Parameters
     ----------
     feed
-        Walks while the session runs.
+        Plays while the session runs.
     queue
-        Keeps the strides that the server may not have.
+        Keeps the strides that the server may not have stored.
     stay
         Whether to go on with the station's later sessions.
     on_ack
-        Called with session and number of each ack.
+        Called with session and number of each acknowledgment.
     notify
-        Called with what somebody who looks on should know.
+        Called with lines for the person who runs the source.
 
     Attributes
     ----------
     state, goal, unit
-        Of the session, as it was told last.
+        Of the session, as last reported.
     is_welcome
-        Whether the server has answered on this connection.
+        Whether the server has sent its welcome on this connection.
     is_over
-        Whether there is nothing more to come.
+        Whether nothing more will come.
     acknowledged, lost
-        How many strides are stored, and how many their session ended without.
+        How many strides are stored, and how many were not when their session ended.
     """
 
     def __init__(
@@ -71,13 +71,13 @@ class SessionFollower:
 
     @property
     def is_done(self) -> bool:
-        """Whether the strides are over and stored, or the session is."""
+        """Whether the strides are over and stored, or the session is over."""
         has_walked = self._queue.session is not None and self._feed.is_over
         all_stored = has_walked and not self._queue.unacknowledged
         return self.is_over or (all_stored and not self._stay)
 
     def handle(self, message: Message) -> None:
-        """Follow what the server says. Raises LinkRefused where that is not the protocol."""
+        """Follow a message of the server. Raises LinkRefused where it is not the protocol's."""
         match message["type"]:
             case "welcome":
                 self._join(message)
@@ -139,7 +139,7 @@ class SessionFollower:
             self._feed.pause()
 
     def leave(self) -> None:
-        """Let a session go that has ended, with the strides that it does not have."""
+        """Leave a session that has ended, and drop the strides that it does not have."""
         session, lost = self._queue.session, self._queue.leave()
         self.state = None
         self._feed.end_session()
@@ -157,7 +157,7 @@ class SessionFollower:
             self._on_ack(self._queue.session, number)
 
     def _read_phase(self, message: Message) -> Phase:
-        """Give the phase that a message tells; a server that tells none is always training."""
+        """Return the phase in a message; training where the server sends none."""
         told = message.get("phase")
         if not isinstance(told, dict):
             return make_phase("training")
@@ -174,7 +174,7 @@ class SessionFollower:
 
 
 def _read(message: Message, name: str, kind: type[Any]) -> Any:
-    """Give a field of a message. Raises LinkRefused where the server left it out."""
+    """Return a field of a message. Raises LinkRefused where it is missing or of another type."""
     value = message.get(name)
     if not isinstance(value, kind):
         raise _misunderstood(message)
@@ -182,7 +182,7 @@ def _read(message: Message, name: str, kind: type[Any]) -> Any:
 
 
 def _read_goal(message: Message) -> float | None:
-    """Give the goal; None where it is not known yet."""
+    """Return the goal; None where it is not known yet."""
     goal = message.get("goal")
     return goal if isinstance(goal, int | float) else None
 

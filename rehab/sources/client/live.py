@@ -1,4 +1,4 @@
-"""Strides as they are measured: they come when they come, and cannot be asked for."""
+"""Strides as they are measured: they cannot be asked for."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from rehab.training.steps import InvalidReason, Measurement, Side
 
 
 class LiveFeed:
-    """Takes strides from a source that measures, and gives them to ``SourceClient``.
+    """Takes strides from a source that measures, and hands them to ``SourceClient``.
 
     Strides of a session that runs are kept, whether or not the server can be reached. Those that
     are walked while it is paused are kept with that reason; those before it starts, and without a
-    session, belong to none and are left out.
+    session, belong to none and are excluded.
 
     Attributes
     ----------
     phase
-        The one that the session is in, as far as is known.
+        The session's, as far as is known.
     trained_side
-        The leg that the session trains, None before there was one.
+        The leg that the session trains, None before there was a session.
     excluded
         How many strides belonged to no session.
     on_change
@@ -53,7 +53,7 @@ class LiveFeed:
     def clock_s(self) -> float | None:
         """What the source's clock shows now [s]; None before the first stride.
 
-        From the stride that came quickest, so that one that is held up is known to be late.
+        From the stride with the shortest delay, so that a delayed one is known to be late.
         """
         return self._clock.read_s(self._monotonic())
 
@@ -64,7 +64,7 @@ class LiveFeed:
 
     @property
     def is_over(self) -> bool:
-        """Whether the last stride has been given."""
+        """Whether the last stride has been handed over."""
         return self._is_finished and not self._waiting
 
     def start_session(self, trained_side: Side, walked: int = 0) -> None:
@@ -79,15 +79,15 @@ class LiveFeed:
         self._is_open = self._has_walked = self._runs = False
 
     def resume(self) -> None:
-        """The session runs."""
+        """Note that the session runs."""
         self._has_walked = self._runs = True
 
     def pause(self) -> None:
-        """The session is paused, or has not begun."""
+        """Note that the session is paused, or has not begun."""
         self._runs = False
 
     def put(self, stride: Measurement) -> None:
-        """Take a stride that was measured just now."""
+        """Add a stride that was measured just now."""
         self._clock.observe(stride.time_s, self._monotonic())
         if not (self._is_open and self._has_walked) or len(self._waiting) >= KEPT_MAX:
             self.excluded += 1
@@ -98,12 +98,12 @@ class LiveFeed:
         self.on_change()
 
     def finish(self) -> None:
-        """Say that no more strides come."""
+        """Note that no more strides will come."""
         self._is_finished = True
         self.on_change()
 
     def poll(self, unacknowledged: int) -> Measurement | float:
-        """Give the next stride to send, or infinity for "who knows when"."""
+        """Return the next stride to send, or infinity while there is none."""
         if not self._waiting or unacknowledged >= KEPT_MAX:
             return math.inf
         return self._waiting.popleft()

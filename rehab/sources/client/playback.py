@@ -1,4 +1,4 @@
-"""Walks strides in time, or as fast as they are taken; knows no sockets and never waits itself."""
+"""Plays strides in time, or as fast as they are acknowledged; knows no sockets and never waits."""
 
 from __future__ import annotations
 
@@ -22,19 +22,32 @@ KEPT_MAX = 80_000
 
 
 class StridePlayback:
-    """Says which stride is due, and how long nothing is.
+    """Decides which stride is due, and how long none will be.
 
-    ``open_walk`` begins a walk, given a session's trained leg. ``speed`` is 1 for true cadence,
-    None for as fast as the server acknowledges; then at most ``ahead`` strides are unacknowledged.
-    Told to stand still, it does, and so does its clock. ``phase`` is the one that the next stride
-    is walked in. With ``resumes`` a walk goes on behind the strides that its session has already.
+    Parameters
+    ----------
+    open_walk
+        Returns the strides of a session that trains a leg.
+    speed
+        1 for true cadence; None for as fast as the server acknowledges.
+    max_unacknowledged
+        How many strides may be unacknowledged before the next is played, where ``speed`` is None.
+    monotonic
+        Our clock [s].
+    resumes
+        Whether to skip the strides that the session has already.
+
+    Attributes
+    ----------
+    phase
+        In which the next stride is walked.
     """
 
     def __init__(
         self,
         open_walk: Callable[[Side], NextStride],
         speed: float | None = 1.0,
-        ahead: int = WINDOW,
+        max_unacknowledged: int = WINDOW,
         monotonic: Callable[[], float] = time.monotonic,
         *,
         resumes: bool = False,
@@ -43,7 +56,7 @@ class StridePlayback:
         self.phase = make_phase("training")
         self._open_walk = open_walk
         self._clock = PlaybackClock(speed, monotonic)
-        self._ahead = ahead
+        self._max_unacknowledged = max_unacknowledged
         self._walk: NextStride | None = None
         self._stride: Measurement | None = None  # begun, not yet due
         self._last_s: float | None = None  # when the last one was, on the source's clock
@@ -56,16 +69,16 @@ class StridePlayback:
 
     @property
     def clock_s(self) -> float | None:
-        """What its clock shows [s]; None while it stands, and where strides wait for no clock."""
+        """What its clock shows [s]; None while paused, and where strides wait for no clock."""
         return self._clock.now_s if self._clock.is_running and self.speed is not None else None
 
     @property
     def is_over(self) -> bool:
-        """Whether the last stride has been given."""
+        """Whether the last stride has been played."""
         return self._walk is None and self._stride is None
 
     def start_session(self, trained_side: Side, walked: int = 0) -> None:
-        """Take another walk, once told to. ``walked`` strides are in its session already."""
+        """Begin another walk, paused. ``walked`` strides are in its session already."""
         self.pause()
         self._walk = self._open_walk(trained_side)
         for _ in range(walked if self._resumes else 0):
@@ -73,27 +86,27 @@ class StridePlayback:
         self._stride = self._last_s = None
 
     def end_session(self) -> None:
-        """Walk no more."""
+        """End the walk."""
         self.pause()
         self._walk = self._stride = None
 
     def resume(self) -> None:
-        """Walk, or walk on."""
+        """Play, or play on."""
         self._may_walk = True
         if self._stride is not None or self._last_s is not None:
             self._clock.start()
 
     def pause(self) -> None:
-        """Stand still."""
+        """Pause, with the clock."""
         self._may_walk = False
         self._clock.pause()
 
     def poll(self, unacknowledged: int) -> Measurement | float:
-        """Give the stride that is due, or how long none will be [s], infinity for "who knows".
+        """Return the stride that is due, or how long none will be [s], infinity if unknown.
 
         ``unacknowledged`` strides are with the caller.
         """
-        limit = self._ahead if self.speed is None else KEPT_MAX
+        limit = self._max_unacknowledged if self.speed is None else KEPT_MAX
         if not self._may_walk or unacknowledged >= limit:
             return math.inf
         if self._stride is None and self._walk is not None:

@@ -1,4 +1,4 @@
-"""The steps of one source that the server has not acknowledged, and which of them go out next."""
+"""The steps of one source that the server has not acknowledged, and which of them to send next."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _NAME = re.compile(r"[A-Za-z0-9_.:-]{1,64}")
 
 
 class UnsendableStride(ValueError):
-    """A stride that the protocol has no room for; the message says how to make it fit."""
+    """A stride that does not fit the protocol; the message says how to make it fit."""
 
 
 class StepsLost(RuntimeError):
@@ -38,14 +38,14 @@ class _QueuedStep(NamedTuple):
 
 
 def add_own_reason(reasons: tuple[str, ...], reason: str) -> tuple[str, ...]:
-    """Give a source's reasons with one of ours; its last ones make room for it."""
+    """Return a source's reasons with one of ours; the source's last ones make room for it."""
     ours = [one for one in OWN_REASONS if one in reasons or one == reason]
     others = [one for one in reasons if one not in OWN_REASONS]
     return (*others[: MAX_REASONS - len(ours)], *ours)
 
 
 def write_step(measurement: Measurement, number: int) -> Message:
-    """Give a stride as the protocol writes it. Raises UnsendableStride.
+    """Return a stride as the protocol writes it. Raises UnsendableStride.
 
     A value that is not finite becomes null with its reason: JSON has no word for it.
     """
@@ -81,10 +81,10 @@ def _check_names(measurement: Measurement, reasons: tuple[str, ...]) -> None:
 
 
 class StepQueue:
-    """Keeps a source's steps in their order until the server has them on its disk.
+    """Keeps a source's steps in order until the server has stored them.
 
-    It numbers strides as the session at hand needs it, says which steps to send next and never lets
-    more than ``WINDOW`` be on their way. It sends nothing itself.
+    It numbers strides as the current session needs it, decides which steps to send next and never
+    lets more than ``WINDOW`` be in flight. It sends nothing itself.
     """
 
     def __init__(self) -> None:
@@ -106,21 +106,21 @@ class StepQueue:
 
     @property
     def can_send(self) -> bool:
-        """Whether a step can go out now."""
+        """Whether a step can be sent now."""
         return self._sent < min(len(self._kept), WINDOW)
 
     @property
     def next_is_paused(self) -> bool:
-        """Whether the next step to go out was walked while the session was paused."""
+        """Whether the next step to send was walked while the session was paused."""
         waiting = self._kept[self._sent] if self._sent < len(self._kept) else None
         return waiting is not None and InvalidReason.PAUSED in waiting.step.get("reasons", ())
 
     def join(self, session: int, next_number: int) -> None:
-        """Take what a welcome says: in which session to go on, and where.
+        """Follow a welcome: in which session to go on, and from which number.
 
-        Steps below ``next_number`` stay kept until an ack covers them: the server has seen them,
-        which is not yet on the disk. The last of them goes out once more, to be acknowledged again.
-        Raises StepsLost where steps are wanted that were acknowledged.
+        Steps below ``next_number`` stay kept until an acknowledgment covers them: the server has
+        received them, which is not yet stored. The last of them is sent once more, to be
+        acknowledged again. Raises StepsLost where steps are wanted that were acknowledged.
         """
         if session != self.session:
             self.leave()
@@ -138,14 +138,14 @@ class StepQueue:
         self._next = max(next_number, self.last + 1)
 
     def leave(self) -> int:
-        """Leave the session; give how many of its steps were not acknowledged and are gone."""
+        """Leave the session; return how many of its steps were not acknowledged and are dropped."""
         lost = len(self._kept)
         self._kept.clear()
         self.session, self.last, self._next, self._sent = None, 0, 1, 0
         return lost
 
     def add(self, measurement: Measurement) -> int:
-        """Keep a stride to be sent and give the number it got. Raises UnsendableStride."""
+        """Keep a stride to be sent and return its number. Raises UnsendableStride."""
         number = self._next
         step = write_step(measurement, number)
         self._kept.append(_QueuedStep(number, step, len(json.dumps(step))))
@@ -154,7 +154,7 @@ class StepQueue:
         return number
 
     def next_frame(self) -> Message | None:
-        """Give the next frame to send, None for nothing; its steps are on their way then."""
+        """Return the next frame to send, None for nothing; its steps are in flight then."""
         steps: list[Message] = []
         room = FRAME_BYTES
         while self.can_send and room >= (kept := self._kept[self._sent]).size:
@@ -166,11 +166,11 @@ class StepQueue:
         return {"type": "step"} | steps[0] if len(steps) == 1 else {"type": "steps", "steps": steps}
 
     def acknowledge(self, number: int) -> None:
-        """Let go of every step up to this number."""
+        """Drop every step up to this number."""
         while self._kept and self._kept[0].number <= number:
             self._kept.popleft()
             self._sent = max(0, self._sent - 1)
 
     def rewind(self) -> None:
-        """Take back what is on its way: it was refused and has to go out again."""
+        """Mark all steps as not sent: they were refused and have to be sent again."""
         self._sent = 0

@@ -11,20 +11,20 @@ KINDS = ("tcp", "udp", "ws")
 
 
 class Address(NamedTuple):
-    """A way to talk, and where."""
+    """A transport, and where it leads."""
 
     kind: str
     host: str
     port: int
 
     def __str__(self) -> str:
-        """Write it as it is given."""
+        """Return it as it is written."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{self.kind}://{host}:{self.port}"
 
 
 def parse_address(text: str, kinds: tuple[str, ...] = KINDS) -> Address:
-    """Read an address. Raises SourceError."""
+    """Return the address that a text names. Raises SourceError for anything else."""
     try:
         parts = urlsplit(text)
         port = parts.port

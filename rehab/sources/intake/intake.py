@@ -1,4 +1,4 @@
-"""The door through which rows of a lab become strides of a session."""
+"""The entry through which rows of a lab become strides of a session."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ CURE_OF = {str(reason): text for reason, text in CURES.items()}
 
 
 class Intake:
-    """Takes rows, and puts the strides that they are or complete into a ``LiveFeed``.
+    """Turns rows into strides, and puts these into a ``LiveFeed``.
 
-    Nothing that comes can stop it but raw signals of a walker whose mass is not known. What cannot
-    be read is told with its cure, at most every ten seconds, and counted.
+    Nothing that comes can stop it but raw signals of a walker whose mass is not known. Rows that
+    cannot be read are counted, and reported with the cure, each kind at most every ten seconds.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Intake:
     settings
         How to read what comes.
     notify
-        Called with what somebody who looks on should know.
+        Called with lines for the person who runs the source.
     monotonic
         Our clock [s].
     """
@@ -89,17 +89,17 @@ class Intake:
             await asyncio.sleep(0.05)
 
     async def watch(self) -> None:
-        """Raise SourceError once something came that only somebody at the machine can put right."""
+        """Raise SourceError once something came that only a person at the machine can put right."""
         await self._failed.wait()
         if self._problem is not None:
             raise self._problem
 
     def expect_rate(self, rate_hz: float) -> None:
-        """Say how fast samples come, where their sender tells and the command line does not."""
+        """Set the rate of the samples [Hz], as their sender says it; the command line's wins."""
         self._rate_hz = self._rate_hz or rate_hz
 
     def add_rows(self, rows: Iterable[Mapping[str, Cell]]) -> None:
-        """Take rows in the order in which they came."""
+        """Add rows in the order in which they came."""
         samples: list[Mapping[str, Cell]] = []
         for row in rows:
             if VALUE in row:
@@ -120,22 +120,22 @@ class Intake:
             self._add_samples(samples)
 
     def reject_row(self, text: str) -> None:
-        """Count a row that could not be used, and say why, but not again and again."""
+        """Count a row that could not be used, and report why, but not again and again."""
         self.quality.bad_rows += 1
         self._warn(text[-40:], text)  # the cure
 
     def describe(self) -> str:
-        """Say in one line how it is heard, and count anew."""
+        """Return in one line how well the source is heard, and start counting anew."""
         return self.quality.describe()
 
     def finish(self) -> None:
-        """Say that nothing more comes."""
+        """End the feed: nothing more will come."""
         if self._pipeline is not None:
             self._put_strides(self._pipeline.finish())
         self._feed.finish()
 
     def close(self) -> None:
-        """End what is kept."""
+        """Close the file of recorded signals, if there is one."""
         if self._recorder is not None:
             self._recorder.close()
 
@@ -174,7 +174,7 @@ class Intake:
     # --- Samples ---
 
     def _add_samples(self, rows: list[Mapping[str, Cell]]) -> None:
-        """Take rows that have the same cells."""
+        """Add rows that have the same cells."""
         names = [name for name in rows[0] if name in self._columns]
         time = self._settings.columns.time
         times, cells = [], []
@@ -205,14 +205,14 @@ class Intake:
         table: Floats,
         there: Floats | None = None,
     ) -> None:
-        """Take samples of a stream as a table.
+        """Add samples of a stream as a table.
 
         Parameters
         ----------
         stream
-            Any name that tells it from others.
+            Any name that distinguishes it from others.
         names
-            Of the columns; those that are mapped to no channel are left out.
+            Of the columns; those that are mapped to no channel are excluded.
         t_s, table
             Times [s], shape (n,), and cells, shape (n, columns).
         there
@@ -227,7 +227,7 @@ class Intake:
             channel, factor = self._columns[names[place]]
             values[channel] = table[:, place] * factor
         sent = np.ones((len(t_s), len(known))) if there is None else there[:, known]
-        for samples in self._alignment.take(t_s, values, sent, self._monotonic()):
+        for samples in self._alignment.add(t_s, values, sent, self._monotonic()):
             self._measure(*samples)
 
     @property
@@ -236,7 +236,7 @@ class Intake:
         return {name for name, ((_, channel), _) in self._columns.items() if channel == "force"}
 
     def accepts(self, names: Iterable[str]) -> bool:
-        """Say whether rows with these cells are strides or samples."""
+        """Return whether rows with these cells are strides or samples."""
         there = set(names)
         return VALUE in there or bool(self._columns.keys() & there)
 
@@ -254,7 +254,7 @@ class Intake:
                 return
             look_ahead_s = self._settings.look_ahead_s
             self._pipeline = SignalPipeline(mass_kg, self._rate_hz, look_ahead_s, self._notify)
-        self._put_strides(self._pipeline.take(t_s, values))
+        self._put_strides(self._pipeline.add(t_s, values))
         for finding in self._pipeline.check():
             where = f" ({finding.side} leg)" if finding.side else ""
             self._notify(f"Check of the first half minute{where}: {finding.message}")

@@ -30,7 +30,7 @@ class LineReader:
         self._skips = False  # the rest of a line that was too long
 
     def read_bytes(self, data: bytes) -> tuple[list[Mapping[str, Cell]], list[str]]:
-        """Give the rows of all lines that these bytes complete, and what was wrong with others."""
+        """Return the rows of the lines that these bytes complete, and the problems of others."""
         rows: list[Mapping[str, Cell]] = []
         wrong: list[str] = []
         *lines, self._partial = (self._partial + data).split(b"\n")
@@ -54,7 +54,7 @@ class LineReader:
         return rows, wrong
 
     def read_line(self, line: str) -> Mapping[str, Cell] | None:
-        """Give a line's row, None for a blank line or a header. Raises BadRow, with the cure."""
+        """Return a line's row, None for a blank line or a header. Raises BadRow, with the cure."""
         line = line.strip().removeprefix("\ufeff")
         if not line:
             return None

@@ -1,4 +1,4 @@
-"""Strides that ``rehab.gait`` measured, as a source sends them."""
+"""Strides of ``rehab.gait`` as measurements, which a source sends."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ EXTRA = (
 
 
 def to_measurement(stride: Stride, number: int, side: Side) -> Measurement | None:
-    """Give a stride's measurement: A2, timed by its terminal contact, with all that is known of it.
+    """Return a stride as a measurement: A2 at its terminal contact, other figures as extras.
 
-    ``side`` is for strides of one leg that is not named. None for a stride without a time: no clock
-    could place it.
+    ``side`` is for strides whose leg is not named. None for a stride without a time: no clock could
+    place it.
     """
     time_s = stride.terminal_contact_s
     if not math.isfinite(time_s):

@@ -1,4 +1,4 @@
-"""Samples in, strides out: finds out rate and legs, then feeds the detectors of ``rehab.gait``."""
+"""From samples to strides: finds out rate and legs, then feeds the detectors of ``rehab.gait``."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ CHECK_S = 30.0
 
 
 class SignalPipeline:
-    """Makes strides of one or both legs of a walker.
+    """Measures the strides of one or both legs of a walker.
 
     Parameters
     ----------
     mass_kg
-        Of the walker.
+        Body mass of the walker.
     rate_hz
-        Samples per second, None to find out.
+        Samples per second; None to find out.
     look_ahead_s
         How long strides wait after terminal contact.
     notify
@@ -50,23 +50,23 @@ class SignalPipeline:
         self._others: set[str] = set()  # sides that came too late
         self._checked: list[Samples] | None = []
 
-    def take(self, t_s: Floats, values: dict[Channel, Floats]) -> list[Stride]:
-        """Take samples; give the strides that they complete."""
+    def add(self, t_s: Floats, values: dict[Channel, Floats]) -> list[Stride]:
+        """Add samples and return the strides that they complete."""
         if not len(t_s):
             return []
-        self._hold_for_check(t_s, values)
+        self._keep_for_check(t_s, values)
         if self._detector is not None:
             return self._feed(t_s, values)
         self._held.append((t_s, values))
         return self._begin() if sum(len(t) for t, _ in self._held) >= FIRST_SAMPLES else []
 
     def finish(self) -> list[Stride]:
-        """Give the strides that still wait, once no more samples come."""
+        """Return the strides that still wait, once no more samples come."""
         strides = self._begin() if self._held else []
         return strides + (self._detector.finish() if self._detector is not None else [])
 
     def check(self) -> tuple[Finding, ...]:
-        """Give, once, what the self-check of the first half minute found; nothing before."""
+        """Return what the self-check of the first half minute found, once; nothing before."""
         held = self._checked
         if not held or self.rate_hz is None or held[-1][0][-1] - held[0][0][0] < CHECK_S:
             return ()
@@ -81,7 +81,7 @@ class SignalPipeline:
             t_s, legs[0], legs[1], rate_hz=self.rate_hz, mass_kg=self.mass_kg
         ).findings
 
-    def _hold_for_check(self, t_s: Floats, values: dict[Channel, Floats]) -> None:
+    def _keep_for_check(self, t_s: Floats, values: dict[Channel, Floats]) -> None:
         if self._checked is None:
             return
         if self._checked and not t_s[0] > self._checked[-1][0][-1]:
@@ -89,7 +89,7 @@ class SignalPipeline:
         self._checked.append((t_s, values))
 
     def _begin(self) -> list[Stride]:
-        """Set up the detectors by what was held, and feed it to them."""
+        """Set up the detectors for the samples that were held, and feed these to them."""
         held, self._held = self._held, []
         channels = {channel for _, values in held for channel in values}
         sides = tuple(s for s in SIDES if all((s, name) in channels for name in REQUIRED))
@@ -137,7 +137,7 @@ class SignalPipeline:
 
 
 def estimate_rate(t_s: Floats) -> float:
-    """Give the samples' rate [Hz] by their times, without gaps. Raises GaitInputError."""
+    """Return the rate of samples [Hz] by their times, gaps excluded. Raises GaitInputError."""
     steps = np.diff(t_s)
     steps = steps[steps > 0]
     if not len(steps):
@@ -163,7 +163,7 @@ def _values(values: dict[Channel, Floats], channel: Channel, count: int) -> Floa
 
 
 def _leg(values: dict[Channel, Floats], side: str, t_s: Floats) -> LegSamples:
-    """Give a leg's channels; NaN for a needed one that these samples lack."""
+    """Return a leg's channels; NaN for a required one that these samples lack."""
     force, moment, angle = (_values(values, (side, name), len(t_s)) for name in REQUIRED)
     optional = values.get((side, "forward")), values.get((side, "position"))
     return LegSamples(force, moment, angle, *optional)

@@ -1,4 +1,4 @@
-"""Raw signals written down beside the session, on this machine only."""
+"""Raw signals recorded beside the session, on this machine only."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from rehab.sources.reporting import Notify, SourceError
 
 
 class SignalRecorder:
-    """Writes samples in SI units as CSV, in the layout ``garry`` of ``rehab.gait``.
+    """Records samples in SI units as CSV, in the layout ``garry`` of ``rehab.gait``.
 
-    The first samples say which channels there are; a channel that comes later is not written. A
-    disk that is full ends the file, not the session.
+    The first samples define the channels; a channel that comes later is not written. A full disk
+    ends the file, not the session.
     """
 
     def __init__(self, path: Path, notify: Notify) -> None:
@@ -33,7 +33,7 @@ class SignalRecorder:
             ) from None
 
     def write(self, t_s: Floats, values: dict[Channel, Floats]) -> None:
-        """Write samples down."""
+        """Write samples to the file."""
         if self._file is None:
             return
         nothing = np.full(len(t_s), np.nan)
@@ -52,7 +52,7 @@ class SignalRecorder:
             self._file = None
 
     def close(self) -> None:
-        """End the file."""
+        """Close the file."""
         if self._file is not None:
             self._file.close()
             self._file = None

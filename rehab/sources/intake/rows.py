@@ -25,7 +25,7 @@ class BadRow(ValueError):
 
 
 def read_number(cells: Mapping[str, Cell], name: str) -> float | None:
-    """Give a cell's number, None where it is blank. Raises BadRow for text."""
+    """Return a cell's number, None where it is blank. Raises BadRow for text."""
     cell = cells.get(name)
     if isinstance(cell, str):
         raise BadRow(f"{name} is {cell[:40]!r}, which is no number. Send a number or nothing.")
@@ -33,7 +33,7 @@ def read_number(cells: Mapping[str, Cell], name: str) -> float | None:
 
 
 def read_time(cells: Mapping[str, Cell], name: str) -> float:
-    """Give a row's time [s]. Raises BadRow where there is none."""
+    """Return a row's time [s]. Raises BadRow where there is none."""
     time_s = read_number(cells, name)
     if time_s is None or not -TIME_MAX_S <= time_s <= TIME_MAX_S:
         raise BadRow(
@@ -46,15 +46,15 @@ def read_time(cells: Mapping[str, Cell], name: str) -> float:
 def read_stride(
     cells: Mapping[str, Cell], number: int, side: Side, now_s: float
 ) -> tuple[Measurement, list[str]]:
-    """Give the stride that a row tells, and the names of cells that cannot travel with it.
+    """Return the stride in a row, and the names of cells that cannot be sent with it.
 
     Parameters
     ----------
     cells
-        ``value``, and as far as there are any ``time_s`` [s], ``side``, ``valid``, ``reason``;
-        all others are further named values.
+        ``value``, and as far as there are any ``time_s`` [s], ``side``, ``valid``, ``reason``; all
+        others are further named values.
     number
-        Counts the strides.
+        Of the stride.
     side, now_s
         For rows without a side, or without a time.
 
@@ -96,7 +96,7 @@ def _read_side(cell: Cell, side: Side) -> Side:
 
 
 def _read_reasons(cells: Mapping[str, Cell]) -> tuple[str, ...]:
-    """Give the sender's own doubts."""
+    """Return why the sender doubts the stride."""
     reasons = tuple(str(cells.get("reason") or "").split())
     if not all(NAME.fullmatch(reason) for reason in reasons):
         raise BadRow("A reason is a word of letters, digits or _, with blanks between several.")

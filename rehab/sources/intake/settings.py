@@ -1,4 +1,4 @@
-"""What has to be known of signals that cannot be seen in them."""
+"""What has to be known of signals that cannot be read from them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class IntakeSettings:
 
     @classmethod
     def read(cls, options: Namespace) -> Self:
-        """Take them from a command line. Raises SourceError or GaitInputError, with the cure."""
+        """Return those of a command line. Raises SourceError or GaitInputError, with the cure."""
         mass_kg, look_ahead_s = options.mass, options.look_ahead
         if mass_kg is not None and not MASS_MIN_KG <= mass_kg <= MASS_MAX_KG:
             raise SourceError(
@@ -73,7 +73,7 @@ class IntakeSettings:
 
 
 def add_signal_arguments(parser: ArgumentParser) -> None:
-    """Let a command line say what has to be known of signals."""
+    """Add the options for signals to a command line."""
     signals = parser.add_argument_group("raw signals")
     signals.add_argument("--mass", type=float, metavar="KG", help="the walker's body mass")
     signals.add_argument("--rate", type=float, metavar="HZ", help="default: by the samples' times")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from rehab.sources.recording.layout import Layout, make_phase
+from rehab.sources.recording.layout import Layout, make_row_phase
 from rehab.sources.recording.table import Row, quote
 from rehab.training.phases import PHASE_KINDS, Phase
 from rehab.training.steps import InvalidReason
@@ -33,7 +33,7 @@ def _read_task(row: Row) -> Phase:
             "Task",
         )
     gain = int(shown_percent[1]) / 100 if shown_percent else 1.0
-    return make_phase(row, "Task", kind, task, PHASE_KINDS[kind].feedback, gain)
+    return make_row_phase(row, "Task", kind, task, PHASE_KINDS[kind].feedback, gain)
 
 
 def _read_use(row: Row) -> tuple[str, ...]:

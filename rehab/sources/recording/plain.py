@@ -1,10 +1,10 @@
-"""The layout for everybody else: time and value, and whatever more there is to say."""
+"""The layout for everybody else: time and value, and optional columns for the rest."""
 
 from __future__ import annotations
 
 import re
 
-from rehab.sources.recording.layout import Layout, make_phase
+from rehab.sources.recording.layout import Layout, make_row_phase
 from rehab.sources.recording.table import Row, quote
 from rehab.training.phases import PHASE_KINDS, Phase
 from rehab.training.steps import InvalidReason
@@ -44,7 +44,7 @@ def _read_plain_phase(row: Row) -> Phase:
         )
     feedback = row.flag_in("feedback")
     gain = row.number_in("gain")
-    return make_phase(
+    return make_row_phase(
         row,
         "gain",
         kind.slug,

@@ -20,10 +20,10 @@ def measure_file(
     look_ahead_s: float,
     side: Side | None,
 ) -> tuple[list[Measurement], list[str]]:
-    """Give the strides of a file in the order walked, and what its self-check found.
+    """Return the strides of a file in the order walked, and what its self-check found.
 
-    ``side`` picks a leg; None gives both. Raises RecordingError for a file that cannot be read and
-    GaitInputError for signals that nothing can be measured from.
+    ``side`` selects a leg; None returns both. Raises RecordingError for a file that cannot be read
+    and GaitInputError for signals that nothing can be measured from.
     """
     try:
         t_s, legs = read_signals(path, columns)

@@ -25,7 +25,7 @@ class RecordingSource(PlayedSource):
 
     @classmethod
     def add_arguments(cls, parser: ArgumentParser) -> None:
-        """Say what its command line can hold."""
+        """Add the options of this source to a command line."""
         parser.add_argument("file", type=Path, metavar="FILE")
         parser.add_argument(
             "--layout", choices=sorted(LAYOUTS), help="of a session (default: by its header)"
@@ -53,7 +53,7 @@ class RecordingSource(PlayedSource):
             write_step(stride, stride.number)
 
     def open_walk(self, trained_side: Side) -> NextStride:
-        """Play it from its beginning."""
+        """Play the recording from its beginning."""
         if self._recorded_side not in {None, trained_side}:
             self._notify(
                 f"The session trains the {trained_side} leg, the recording the other one: its "
@@ -67,7 +67,7 @@ class RecordingSource(PlayedSource):
         return walk
 
     def _measure(self, options: Namespace, wanted: Side | None) -> Sequence[Measurement]:
-        """Give the strides of recorded signals, of the wanted leg or of both."""
+        """Return the strides of recorded signals, of the wanted leg or of both."""
         from rehab.sources.recording.signals import measure_file
 
         strides, findings = measure_file(
@@ -86,7 +86,7 @@ class RecordingSource(PlayedSource):
 
 
 def holds_signals(path: Path) -> bool:
-    """Say whether a file's header is one of signals; files that cannot be read are not."""
+    """Return whether a file's header is one of signals; not so for files that cannot be read."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             first = file.readline(64 * 1024)

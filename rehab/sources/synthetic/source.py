@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from rehab.sources.synthetic.streaming import SignalWalker
 
 
-class Synthetic(PlayedSource):
+class SyntheticSource(PlayedSource):
     """A simulated patient. Every stride depends on the phase that the one before may have ended."""
 
-    ahead = 1
+    max_unacknowledged = 1
 
     @classmethod
     def add_arguments(cls, parser: ArgumentParser) -> None:
-        """Say what its command line can hold."""
+        """Add the options of this source to a command line."""
         parser.add_argument("--seed", type=int, default=0, help="the same seed walks the same")
         parser.add_argument("--profile", choices=sorted(PROFILES), default="good")
         parser.add_argument(
@@ -42,7 +42,7 @@ class Synthetic(PlayedSource):
         )
 
     def __init__(self, options: Namespace, notify: Notify) -> None:
-        """Look at the command line. Raises SourceError or GaitInputError."""
+        """Read the command line. Raises SourceError or GaitInputError."""
         self._profile = PROFILES[options.profile]
         self._seed: int = options.seed
         self._side = Side(options.side) if options.side else None
@@ -50,7 +50,7 @@ class Synthetic(PlayedSource):
         self._limit: float = math.inf if options.strides is None else options.strides
 
     def open_walk(self, trained_side: Side) -> NextStride:
-        """Begin to walk."""
+        """Return the strides of a walk, one a call."""
         strider: SyntheticWalker | SignalWalker
         strider = SyntheticWalker(self._profile, self._seed, self._side or trained_side)
         if self._open_signals is not None:
@@ -66,7 +66,7 @@ class Synthetic(PlayedSource):
 
 
 def make_opener(options: Namespace, notify: Notify) -> Callable[[SyntheticWalker], SignalWalker]:
-    """Give how walkers get signals. Raises SourceError or GaitInputError for settings of no use."""
+    """Return what adds signals to a walker. Raises SourceError or GaitInputError."""
     from rehab.gait import TwoLegDetector
     from rehab.sources.intake import IntakeSettings
     from rehab.sources.intake.recorder import SignalRecorder
@@ -91,4 +91,4 @@ def make_opener(options: Namespace, notify: Notify) -> Callable[[SyntheticWalker
     return open_signals
 
 
-SOURCE = Synthetic
+SOURCE = SyntheticSource

@@ -27,9 +27,9 @@ STRIDE_S = 1.1  # for one that has no time, as after a pause
 
 
 class SignalMaker:
-    """Makes signals of both legs that end where the newest stride does, in constant memory.
+    """Makes signals of both legs that end with the newest stride, in constant memory.
 
-    The other leg steps half a stride later. What a stride is made with is as in ``make_signals``.
+    The other leg steps half a stride later. Strides are made as in ``make_signals``.
     """
 
     def __init__(self, mass_kg: float, sensors: Sensors, seed: int, side: Side) -> None:
@@ -43,7 +43,7 @@ class SignalMaker:
         self._begin_s = BEGIN_S
 
     def walk(self, stride: Measurement, stride_s: float) -> tuple[Floats, dict[Side, LegSignals]]:
-        """Give the samples up to this stride's end: their times, and the legs' signals."""
+        """Return the samples up to this stride's end: their times, and the legs' signals."""
         sensors, begin_s = self._sensors, self._begin_s
         stop = math.ceil((begin_s + stride_s) * sensors.rate_hz)
         t_s = np.arange(self._index, stop) / sensors.rate_hz
@@ -91,7 +91,7 @@ class SignalWalker:
         self._number = 0
 
     def next_stride(self, phase: Phase) -> Measurement:
-        """Walk in this phase until the next stride of either leg is known."""
+        """Walk in this phase until the next stride of either leg is measured, and return it."""
         while not self._ready:
             self._walk(phase)
         return self._ready.popleft()
