@@ -143,7 +143,7 @@ def test_walker_and_session_agree_on_the_phase_of_every_stride(phases, seed):
 
 @pytest.fixture(scope="module")
 def walks():
-    """Walk session 1 with twenty seeds; return usable values per phase as ratios to the baseline."""
+    """Return usable values per phase of session 1 with twenty seeds, as ratios to the baseline."""
     values: dict[str, list[float]] = {}
     for seed in range(20):
         strides = walk(GOOD, seed, SESSION_1)

@@ -73,7 +73,7 @@ async def run_source(*arguments: str, token: str, server: str, folder: Path):
 
 
 async def send_in_time(made: SyntheticRecording, send: Send, chunk: int) -> float:
-    """Send samples when their times come; return when the clock of the samples was 0 [s since 1970].
+    """Send samples when their times come; return when their clock was 0 [s since 1970].
 
     ``send`` gets rows of time and the channels in ``NAMES``.
     """
