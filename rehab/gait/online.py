@@ -29,7 +29,8 @@ class StrideDetector:
         Body mass of the walker, 10-300 kg.
     look_ahead_s
         How long to wait after terminal contact, 0-0.2 s. 50 ms reduce the error of A2 from 1.0 to
-        0.14 % (moore2013; the plain zero-phase filter has 1.8 and 0.5 %, gait.md 2.1).
+        0.14 % (moore2013; the plain zero-phase filter has 1.8 and 0.5 %:
+        docs/reference/gait.md#filters).
     cutoff_hz
         Cut-off of the zero-phase low-pass on moment and angle.
     contact_n, release_n

@@ -14,8 +14,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.gestures.picture import draw
-from rehab.people.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
-from rehab.people.refusals import in_words
+from rehab.people.web.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
+from rehab.people.web.refusals import in_words
 from robot.composed import MOVES_MAX, to_data
 from robot.gestures import TETHER_M, BadGesture
 from robot.trial import Trial, admit_gesture, try_gesture

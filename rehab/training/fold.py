@@ -38,7 +38,7 @@ from rehab.training.valences import Valence, bands_from_json
 
 # Strides further apart than this were not walked without a break, or a clock jumped: no more than
 # so much counts as walked. Recorded strides last 1-2 s, gaps between recorded trials 3.2-5.2 s
-# (gait.md 1.3).
+# (docs/reference/gait.md#protocol).
 MAX_GAP_S = 10.0
 
 
@@ -120,7 +120,7 @@ class SessionFold:
 
     @property
     def baseline_mean(self) -> float | None:
-        """Mean of the valid baseline values; None before there are enough of them (gait.md 1.2)."""
+        """Mean of the valid baseline values; None before there are enough of them."""
         baseline = self.tally_of("baseline")
         return baseline.mean_value if baseline.valid >= MIN_BASELINE_STRIDES else None
 

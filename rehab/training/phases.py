@@ -78,7 +78,7 @@ class Phase:
         Whether steps are rewarded, and shown.
     gain
         What the value is multiplied with before it is shown (ratio): the hidden decrement of the
-        recorded protocols is a gain of 0.85 (gait.md 1.3).
+        recorded protocols is a gain of 0.85 (docs/reference/gait.md#protocol).
     strides, seconds
         Its limits; None without.
 

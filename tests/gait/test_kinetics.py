@@ -8,7 +8,7 @@ from scipy.signal import butter, filtfilt
 
 from rehab.gait import compute_ankle_moment, measure_strides
 from rehab.gait.signals.filters import ZeroPhaseFilter, differentiate, interpolate_peak
-from tests.data import signals
+from tests.support.data import signals
 
 
 @pytest.mark.parametrize("rate_hz", [100, 1000])

@@ -10,7 +10,7 @@ from django.test import Client
 
 from rehab.gestures.models import Gesture
 from robot.trial import admit_gesture
-from tests.world import World, build_world, client_of
+from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 

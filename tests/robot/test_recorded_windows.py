@@ -9,7 +9,7 @@ from rehab.sources.recording import read_recording
 from robot.bases import BASES
 from robot.motion import TICK_S
 from robot.performer import Performer
-from tests.data import recording
+from tests.support.data import recording
 
 CUE = {
     "above": "celebrate",

@@ -25,7 +25,7 @@ from tests.robot.fake_ros import (
     wait_until,
 )
 from tests.robot.real_ros import RosMaster, why_missing
-from tests.wire import Wire
+from tests.support.wire import Wire
 
 pytestmark = [pytest.mark.ros, pytest.mark.realtime]
 

@@ -31,7 +31,7 @@ from tests.robot.fake_ros import (
     release,
     wait_until,
 )
-from tests.wire import Wire
+from tests.support.wire import Wire
 
 pytestmark = pytest.mark.realtime
 

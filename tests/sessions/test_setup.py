@@ -18,7 +18,7 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.valences import CueGestures
 from robot.composed import read_gesture
 from robot.motion import HOME
-from tests.world import World, build_world, client_of
+from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 

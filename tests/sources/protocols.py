@@ -2,7 +2,8 @@
 
 from rehab.training.phases import make_phase
 
-# The protocol of HEBB_03, session 1 (gait.md 1.3): kind, percent shown, strides.
+# The protocol of HEBB_03, session 1 (docs/reference/gait.md#protocol): kind, percent shown,
+# strides.
 SESSION_1 = [
     make_phase(kind, f"{kind} {percent}", gain=percent / 100, strides=strides)
     for kind, percent, strides in (

@@ -1,4 +1,7 @@
-"""Synthetic walkers: the same for the same seed, and alike to recorded ones (gait.md 1.4, 1.5)."""
+"""Synthetic walkers: the same for the same seed, and alike to recorded ones.
+
+Source: docs/reference/gait.md#dynamics.
+"""
 
 import hashlib
 import tracemalloc
@@ -153,7 +156,7 @@ def walks():
     return values
 
 
-# Mean and sd of session 1 in gait.md 1.4, in units of its goal of 3.908 W/kg.
+# Mean and sd of session 1 in docs/reference/gait.md#phases, in units of its goal of 3.908 W/kg.
 @pytest.mark.parametrize(
     ("phase", "value_mean", "value_sd"),
     [

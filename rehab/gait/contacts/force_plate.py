@@ -12,10 +12,11 @@ from rehab.gait.signals.buffer import LegBuffer
 from rehab.gait.signals.filters import Floats, find_maximum, find_upper_median
 from rehab.gait.signals.samples import FORCE, TIME
 
-# Force is not filtered here: 20 Hz of causal filter would move both events by 10 ms (gait.md 2.1).
-CONTACT_N = 30.0  # 6 times the noise of an unloaded treadmill plate (4.5 N sd, gait.md 2.1)
+# Force is not filtered here: 20 Hz of causal filter would move both events by 10 ms
+# (docs/reference/gait.md#contacts).
+CONTACT_N = 30.0  # 6 times the noise of an unloaded treadmill plate (4.5 N sd)
 RELEASE_N = 20.0
-STEP_PEAK = 0.25  # of body weight; a contact that never bears more is no step (gait.md 2.1)
+STEP_PEAK = 0.25  # of body weight; a contact that never bears more is no step
 BOUNCE_S = 0.15  # no foot swings faster; a contact sooner than that goes on with the last stance
 LOOK_BACK_S = 0.05  # loading takes less from release to contact threshold
 OFFSET_MAX = 0.15  # of body weight; a plate that reads more in swing needs its own zero button
@@ -65,7 +66,7 @@ class ContactFinder:
     rate_hz, weight_n
         Nominal rate of the samples, and body weight [N].
     contact_n, release_n
-        Thresholds above the plate's zero [N] (gait.md 2.1).
+        Thresholds above the plate's zero [N] (docs/reference/gait.md#contacts).
     """
 
     def __init__(

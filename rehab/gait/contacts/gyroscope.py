@@ -1,8 +1,8 @@
 """Contacts of a foot with the floor, from a gyroscope on foot or shank.
 
 While a leg swings, foot and shank rotate toes-up; both contacts lie where that rotation begins and
-ends (Catalfamo 2010, Jasiewicz 2006; gait.md 2.2). After a stroke a foot sensor finds more of them
-than one on the shank.
+ends (Catalfamo 2010, Jasiewicz 2006; docs/reference/gait.md#gyroscopes). After a stroke a foot
+sensor finds more of them than one on the shank.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ class GyroscopeDetector:
 
     Foot: contacts are the zero crossings around the swing. Shank: they are its fastest backward
     rotation before and after the swing. A terminal contact is returned once the swing exceeds its
-    threshold, about 50 ms later, an initial contact as soon as the sensor rotates back (gait.md
-    2.2).
+    threshold, about 50 ms later, an initial contact as soon as the sensor rotates back
+    (docs/reference/gait.md#gyroscopes).
 
     Parameters
     ----------

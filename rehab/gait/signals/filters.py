@@ -18,7 +18,8 @@ class ZeroPhaseFilter:
     Parameters
     ----------
     cutoff_hz
-        Cut-off of one run. 6 Hz is usual for ankle power in walking (Winter 1991; gait.md 2.1).
+        Cut-off of one run. 6 Hz is usual for ankle power in walking (Winter 1991;
+        docs/reference/gait.md#filters).
     rate_hz
         Of the samples.
     """

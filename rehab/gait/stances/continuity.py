@@ -1,7 +1,7 @@
 """Whether the samples of a stance are continuous: gaps, frozen values, jumps, spikes and steps.
 
 These are faults of sensors and of the way from them; what a person cannot walk is checked in
-``plausibility``. gait.md is in docs/reference.
+``plausibility``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rehab.gait.stances.kinetics import PushOff
 from rehab.gait.stances.resampling import ResampledStance
 from rehab.gait.strides import RejectionReason
 
-GAP_S = 0.05  # bridged by a straight line up to here (gait.md 2.1)
+GAP_S = 0.05  # bridged by a straight line up to here (docs/reference/gait.md#time-base)
 RATE_TOLERANCE = 0.2
 # One value for so long is no measurement. The moment changes all through stance; the angle rests
 # where the ankle turns, but not to the last digit.

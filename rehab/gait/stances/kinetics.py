@@ -16,10 +16,13 @@ from rehab.gait.signals.filters import (
 )
 from rehab.gait.stances.resampling import ResampledStance
 
-COP_FORCE_N = 40.0  # below, the center of pressure is a division by about nothing (gait.md 2.1)
+# Below, the center of pressure is a division by about nothing
+# (docs/reference/gait.md#center-of-pressure).
+COP_FORCE_N = 40.0
 COP_REACH_M = 0.35  # from the ankle; no shoe is longer
 CUTOFF_HZ = 6.0
-PUSH_OFF_FROM = 0.4  # of stance; the peak comes at 0.88-0.90 of it (gait.md 2.1)
+# Of stance; the peak comes at 0.88-0.90 of it (docs/reference/gait.md#push-off).
+PUSH_OFF_FROM = 0.4
 # What the ankle is taken to do after the last sample, where the filter needs to know: its
 # plantarflexion brakes evenly, so that it ends about 60 ms after the foot left the floor (56 and
 # 62 ms on the legs of moore2013), turns back for 30 ms and goes on as fast; its moment stays as
@@ -41,7 +44,8 @@ def compute_ankle_moment(
     """Return the ankle moment of the force under the foot [Nm, plantarflexion positive].
 
     ``M = (cop − ankle) × F`` in the sagittal plane; the foot's own weight and inertia are neglected
-    (quasi-static; against full inverse dynamics of one walker r = .99, 5.5 Nm rms, gait.md 2.1).
+    (quasi-static; against full inverse dynamics of one walker r = .99, 5.5 Nm rms,
+    docs/reference/gait.md#push-off).
 
     Parameters
     ----------
@@ -119,7 +123,7 @@ class PushOffAnalyzer:
     """Measures push-off of one buffered stance at a time: ``power = moment × velocity / mass``.
 
     A2 is the peak of ankle power in late stance (Winter 1991), here of the sagittal plane: 5-8 %
-    below a lab's three-plane power (gait.md 1.2, 6).
+    below a lab's three-plane power (docs/reference/gait.md#columns).
 
     Parameters
     ----------

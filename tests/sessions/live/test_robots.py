@@ -21,8 +21,8 @@ from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.valences import CueGestures
 from robot.trial import admit_gesture
-from tests.sessions.live.callers import Message, change, turns
-from tests.world import NOW
+from tests.support.callers import Message, change, turns
+from tests.support.world import NOW
 
 STATUS = {
     "kind": "status",

@@ -18,8 +18,8 @@ from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
 from robot.bases.kinematic import KinematicBase
 from robot.performer import Performer
-from tests.sessions.live.callers import SourceCaller, a_step, change, turns
-from tests.world import NOW
+from tests.support.callers import SourceCaller, a_step, change, turns
+from tests.support.world import NOW
 
 
 @sync_to_async
