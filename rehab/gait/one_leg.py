@@ -208,10 +208,10 @@ class LegDetector:
     def _is_measurable(self, contact: Contact) -> bool:
         """Return whether a contact is a stance to be measured; remember where it ended if not."""
         is_cut = contact.begin_index == 0  # the record began in the middle of it
-        if is_cut or contact.bounce:
+        if is_cut or contact.is_bounce:
             self._previous = None if is_cut else self._previous
             self._last_terminal = (contact.end_index or 0, contact.end_s or 0.0)
-        return not is_cut and not contact.bounce
+        return not is_cut and not contact.is_bounce
 
     def _measure(self, contact: Contact, due: int) -> OneLegStride:
         """Measure a stance that sample ``due`` completes."""
@@ -226,7 +226,7 @@ class LegDetector:
 
     def _find_cycle(self, contact: Contact) -> tuple[int | None, float | None, float | None]:
         """Return begin, stride and swing time of the cycle before a contact, if observed whole."""
-        if self._previous is None or self._last_terminal is None or not contact.seen:
+        if self._previous is None or self._last_terminal is None or not contact.is_onset_seen:
             return None, None, None
         left_index, left_s = self._last_terminal
         begin = self._previous.begin_index

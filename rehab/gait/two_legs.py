@@ -161,7 +161,9 @@ class TwoLegDetector:
         return OtherLeg(
             reasons=reasons,
             flags=flags,
-            step_s=_find_time(first.begin_s, this.begin_s) if first and first.seen else None,
+            step_s=_find_time(first.begin_s, this.begin_s)
+            if first and first.is_onset_seen
+            else None,
             step_length_m=length,
             step_symmetry=symmetry,
             first_double_support_s=_find_time(this.begin_s, first.end_s) if first else None,

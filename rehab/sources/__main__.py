@@ -143,23 +143,23 @@ async def run_client(
     Other work that ends changes nothing; other work that fails ends the client.
     """
 
-    async def tell() -> None:
+    async def report_status() -> None:
         while True:
             await asyncio.sleep(STATUS_EVERY_S)
             print_status(describe())
 
     walking = asyncio.create_task(client.run())
-    beside = [asyncio.create_task(work) for work in (tell(), *others)]
-    waiting = {walking, *beside}
+    others_running = [asyncio.create_task(work) for work in (report_status(), *others)]
+    waiting = {walking, *others_running}
     try:
         while walking in waiting:
             done, waiting = await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
                 task.result()
     finally:
-        for task in (walking, *beside):
+        for task in (walking, *others_running):
             task.cancel()
-        await asyncio.gather(walking, *beside, return_exceptions=True)
+        await asyncio.gather(walking, *others_running, return_exceptions=True)
 
 
 async def run_live_source(source: LiveSource, intake: Intake, client: SourceClient) -> None:

@@ -76,8 +76,8 @@ class SessionFold:
         self.words_shown = True
         self.chart_style = ChartStyle.POINTS
         self.pause_reason: PauseReason | None = None
-        self._joined = False  # whether the time since the last step was walked
-        self._begin(0)
+        self._was_walking = False  # whether the time since the last step was walked
+        self._begin_phase(0)
 
     @classmethod
     def replay(cls, plan: SessionPlan, log: Iterable[Measurement | Change]) -> SessionFold:
@@ -166,15 +166,15 @@ class SessionFold:
         self.last_number = scored.number
         if scored.side == self.plan.trained_side:
             self._count(scored, running)
-        if self._joined and not backwards:
+        if self._was_walking and not backwards:
             walked_s = min(elapsed_s, MAX_GAP_S)
             self.active_s += walked_s
             self.phase_s += walked_s
         # Later steps follow a clock that was set back (a source that began anew): one step is lost.
         self.last_time_s = time_s
-        self._joined = running and not backwards
+        self._was_walking = running and not backwards
         if running and self.phase.is_over(self.phase_strides, self.phase_s):
-            self._move_on()
+            self._advance_phase()
         return scored
 
     def _count(self, step: ScoredStep, running: bool) -> None:
@@ -188,24 +188,24 @@ class SessionFold:
                 self.feedback.add(step)
             self.phase_strides += 1
 
-    def _move_on(self) -> None:
+    def _advance_phase(self) -> None:
         """Begin the next phase, or note why that cannot be."""
         if self.phase_index + 1 == len(self.plan.phases):
             self.completed = True
             return
         try:
-            self._enter(self.phase_index + 1)
+            self._enter_phase(self.phase_index + 1)
         except InvalidSetting as problem:
             self.obstacle = str(problem)
 
-    def _enter(self, index: int) -> None:
+    def _enter_phase(self, index: int) -> None:
         """Begin a phase. Raises InvalidSetting where its goal should be known and cannot be."""
         kinds = [phase.kind for phase in self.plan.phases]
         if self.goal is None and kinds[index] != "baseline" and "baseline" in kinds[:index]:
             self.goal = self._goal_from_baseline()
-        self._begin(index)
+        self._begin_phase(index)
 
-    def _begin(self, index: int) -> None:
+    def _begin_phase(self, index: int) -> None:
         self.phase_index = index
         self.phase = self.plan.phases[index]  # the one that the next step falls in
         self.phase_strides = 0
@@ -250,24 +250,24 @@ class SessionFold:
             case ChangeKind.ROBOT_INTENSITY:
                 self.robot_intensity = check_robot_intensity(change.number)
             case ChangeKind.PHASE:
-                self._enter(self.plan.check_phase(change.number))
+                self._enter_phase(self.plan.check_phase(change.number))
             case ChangeKind.PAUSE:
-                self._joined = False
+                self._was_walking = False
                 known = [reason for reason in PauseReason if reason == change.value]
                 self.pause_reason = known[0] if known else None
             case ChangeKind.RESUME:
                 self.pause_reason = None
             case ChangeKind.VALENCE:
-                self._plan_valence(change.value)
+                self._schedule_valence(change.value)
             case ChangeKind.FEEDBACK_TEXT:
-                self._reword(change.value)
+                self._edit_feedback_text(change.value)
             case ChangeKind.WORDS_SHOWN:
                 self.words_shown = change.switch
             case ChangeKind.CHART_STYLE:
                 self.chart_style = check_chart_style(change.value)
         self.state = state
 
-    def _plan_valence(self, slug: object) -> None:
+    def _schedule_valence(self, slug: object) -> None:
         """Schedule the valence of the next phase with feedback; the current one cancels that."""
         if not isinstance(slug, str) or slug not in self.valences:
             known = ", ".join(self.valences)
@@ -285,7 +285,7 @@ class SessionFold:
                 "End this session and set up another one."
             )
 
-    def _reword(self, value: object) -> None:
+    def _edit_feedback_text(self, value: object) -> None:
         """Replace the bands of a valence. What a step earns stays as it was planned."""
         given = value if isinstance(value, Mapping) else {}
         slug = given.get("valence")

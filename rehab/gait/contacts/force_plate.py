@@ -35,9 +35,9 @@ class Contact:
         When the foot met and left the floor; None until it left.
     offset_n
         What the plate read in the swing before [N].
-    seen
+    is_onset_seen
         Whether its beginning was observed (not so at the start of the record or after a loss).
-    bounce
+    is_bounce
         Whether it only continues the stance before it.
     peak_n
         Largest force above the offset [N], once the contact has ended.
@@ -46,8 +46,8 @@ class Contact:
     begin_index: int
     begin_s: float
     offset_n: float
-    seen: bool
-    bounce: bool
+    is_onset_seen: bool
+    is_bounce: bool
     end_index: int | None = None
     end_s: float | None = None
     peak_n: float = 0.0
@@ -129,7 +129,7 @@ class ContactFinder:
         """Return the step under way, as if it ended with the last sample, if there is one."""
         contact, self._current = self._current, None
         stop = self._buffer.samples.end
-        if contact is None or not contact.seen or contact.bounce:
+        if contact is None or not contact.is_onset_seen or contact.is_bounce:
             return None
         contact.end_index = stop - 1
         contact.end_s = float(self._buffer.channel(TIME, stop - 1, stop)[0])

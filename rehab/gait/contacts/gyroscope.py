@@ -99,12 +99,12 @@ class GyroscopeDetector:
 
     def _reset(self) -> None:
         """Wait for a new swing, as after a gap."""
-        self._swing_s: float | None = None  # when the swing began
+        self._swing_begin_s: float | None = None  # when the swing began
         self._terminal_s: float | None = None
         self._fastest = 0.0
-        self._end_s: float | None = None  # where the turning last ended
-        self._best = (-math.inf, 0.0)  # of the shank after its swing
-        self._is_told = False
+        self._rotation_end_s: float | None = None  # where the turning last ended
+        self._backward_peak = (-math.inf, 0.0)  # of the shank after its swing
+        self._is_confirmed = False
         self._backward.clear()
 
     def _process_sample(self, time: float, rate: float, found: list[GyroscopeContact]) -> None:
@@ -114,41 +114,44 @@ class GyroscopeDetector:
         if last is None or not 0 < time - last[0] <= GAP_S:
             self._reset()
             return
-        if self._swing_s is None:
+        if self._swing_begin_s is None:
             if last[1] >= 0 > rate:
-                self._swing_s = _interpolate_crossing(last, (time, rate))
-                self._fastest, self._is_told, self._end_s = 0.0, False, None
-                self._terminal_s = self._swing_s if self._is_foot else self._find_push()
+                self._swing_begin_s = _interpolate_crossing(last, (time, rate))
+                self._fastest, self._is_confirmed, self._rotation_end_s = 0.0, False, None
+                self._terminal_s = self._swing_begin_s if self._is_foot else self._find_push()
             self._backward.append((rate, time))
             return
-        if self._end_s is None or rate < 0:
+        if self._rotation_end_s is None or rate < 0:
             self._fastest = min(self._fastest, rate)
         if rate < 0:
-            self._end_s = None
-        elif self._end_s is None:
-            self._end_s, self._best = _interpolate_crossing(last, (time, rate)), (-math.inf, 0.0)
-        self._best = max(self._best, (rate, time))
-        if not self._is_told and -self._fastest > self._find_threshold():
-            self._is_told = True
+            self._rotation_end_s = None
+        elif self._rotation_end_s is None:
+            self._rotation_end_s, self._backward_peak = (
+                _interpolate_crossing(last, (time, rate)),
+                (-math.inf, 0.0),
+            )
+        self._backward_peak = max(self._backward_peak, (rate, time))
+        if not self._is_confirmed and -self._fastest > self._find_threshold():
+            self._is_confirmed = True
             if self._terminal_s is not None:
                 found.append(GyroscopeContact(ContactKind.TERMINAL, self._terminal_s))
-        if self._end_s is not None:
+        if self._rotation_end_s is not None:
             self._finish(time, rate, found)
-        elif time - self._swing_s > SWING_MAX_S:
+        elif time - self._swing_begin_s > SWING_MAX_S:
             self._reset()
 
     def _finish(self, time: float, rate: float, found: list[GyroscopeContact]) -> None:
         """Check whether the swing is over, and was one."""
-        end_s, swing_s = self._end_s or 0.0, self._swing_s or 0.0
-        if self._is_foot or not self._is_told:
+        end_s, swing_s = self._rotation_end_s or 0.0, self._swing_begin_s or 0.0
+        if self._is_foot or not self._is_confirmed:
             is_over = rate > NOISE_RAD_S or time - end_s > SWING_MIN_S
             contact_s = end_s
         else:
-            is_over = rate < self._best[0] - NOISE_RAD_S or time - end_s > SHANK_PEAK_S
-            contact_s = self._best[1]
+            is_over = rate < self._backward_peak[0] - NOISE_RAD_S or time - end_s > SHANK_PEAK_S
+            contact_s = self._backward_peak[1]
         if not is_over:
             return
-        if self._is_told and end_s - swing_s >= SWING_MIN_S:
+        if self._is_confirmed and end_s - swing_s >= SWING_MIN_S:
             self._peaks.append(-self._fastest)
             found.append(GyroscopeContact(ContactKind.INITIAL, contact_s))
         self._reset()

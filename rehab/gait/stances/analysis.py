@@ -92,7 +92,7 @@ class StanceAnalyzer:
         begin_s, end_s = contact.begin_s, contact.end_s or 0.0
         if end - begin > 1.2 * STANCE_MAX_S * self._rate_hz:
             return Stance([RejectionReason.LONG_STANCE], None, None, None)
-        reasons = [] if contact.seen else [RejectionReason.FORCE_LOST]
+        reasons = [] if contact.is_onset_seen else [RejectionReason.FORCE_LOST]
         before = self._find_before(begin)
         window = self._buffer.view(begin - before, stop)
         reasons += check_samples(window, before, self._rate_hz, self._mass_kg, self._is_velocity)

@@ -56,7 +56,7 @@ class SourceClient:
         sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
     ) -> None:
         self.run_id = run or secrets.token_hex(8)
-        self._link = dial(greet=self._greet, on_lost=self._lose)
+        self._link = dial(greet=self._greet, on_lost=self._note_lost_link)
         self._wanted_session = session
         self._stay = stay
         self._notify = notify
@@ -66,7 +66,7 @@ class SourceClient:
         self._follower = SessionFollower(feed, self._queue, stay=stay, on_ack=on_ack, notify=notify)
         self._changed = asyncio.Event()
         if isinstance(feed, LiveFeed):
-            feed.on_change = self._tell
+            feed.on_change = self._wake_waiters
         self._strides = self._unusable = 0
 
     @property
@@ -91,7 +91,7 @@ class SourceClient:
         and UnsendableStride for a stride that does not fit the protocol.
         """
         doing = [
-            self._listen(),
+            self._receive(),
             self._walk(),
             self._send(),
             self._until(lambda: self._follower.is_done),
@@ -137,18 +137,18 @@ class SourceClient:
             hello["session"] = self._wanted_session
         return hello
 
-    def _lose(self, reason: str, pause_s: float) -> None:
+    def _note_lost_link(self, reason: str, pause_s: float) -> None:
         self._follower.is_welcome = False
         self._notify(f"{reason}; dialing in again in {pause_s:.1f} s.")
 
     # --- What the server says ---
 
-    async def _listen(self) -> None:
+    async def _receive(self) -> None:
         while True:
             try:
                 async for message in self._link:
                     self._follower.handle(message)
-                    self._tell()
+                    self._wake_waiters()
             except LinkRefused as refusal:
                 if refusal.code != ENDED or self._queue.session is None:
                     raise
@@ -170,10 +170,10 @@ class SourceClient:
                 self._queue.add(due)
                 self._strides += 1
                 self._unusable += due.value is None or bool(due.reasons)
-                self._tell()
+                self._wake_waiters()
             else:
                 if self._feed.is_over:
-                    self._tell()
+                    self._wake_waiters()
                 await self._wait(due)
 
     async def _send(self) -> None:
@@ -185,7 +185,7 @@ class SourceClient:
 
     # --- Waiting ---
 
-    def _tell(self) -> None:
+    def _wake_waiters(self) -> None:
         """Wake everything that waits for a change."""
         # One event for each change: what was set stays set for those who have waited for it.
         self._changed.set()
