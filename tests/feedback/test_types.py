@@ -10,7 +10,7 @@ from rehab.feedback.picture import show_bands
 from rehab.feedback.valences import valences_of
 from rehab.feedback.wording import words_in
 from rehab.people.roles import Role
-from rehab.training.valences import VALENCES, Cue
+from rehab.training.valences import VALENCES, CueGestures
 from tests.support.forms import feedback_form
 from tests.support.world import client_of, mark
 
@@ -90,7 +90,7 @@ def test_explicit_has_neither_points_nor_gestures_to_edit(world):
         f"{ADD}?slug=explicit", feedback_form("explicit", hit_points="5", cue_above="celebrate")
     )
     mine = valences_of(world.clinic.pk)["explicit"]
-    assert (mine.has_points, mine.cue) == (False, Cue())
+    assert (mine.has_points, mine.cue) == (False, CueGestures())
 
 
 def test_the_preview_shows_each_band_and_stores_nothing(world):

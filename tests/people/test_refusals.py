@@ -19,11 +19,11 @@ from rehab.people.roles import Role
 from rehab.people.web.refusals import in_words
 from rehab.sessions.protocols import Protocol
 from rehab.stations.models import Station
-from rehab.training.changes import ChangeKind, Refused, State, next_state
+from rehab.training.changes import ChangeKind, NotAllowed, State, next_state
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
-from rehab.training.valences import VALENCES, Cue, edit_valence
+from rehab.training.valences import VALENCES, CueGestures, edit_valence
 from robot.composed import Move, compose
 from robot.gestures import BadGesture
 from tests.support.forms import feedback_form, gesture_form, session_form
@@ -60,7 +60,11 @@ def said(act: Callable[[], object], language: str = "es") -> str:
         ),
         (
             lambda: edit_valence(
-                "negative", hit_points=1, miss_points=0, bands=VALENCES["negative"].bands, cue=Cue()
+                "negative",
+                hit_points=1,
+                miss_points=0,
+                bands=VALENCES["negative"].bands,
+                cue=CueGestures(),
             ),
             "Negativa: esta retroalimentación no da nada por un acierto y quita puntos",
         ),
@@ -77,7 +81,7 @@ def test_a_refusal_is_said_in_spanish_with_its_values(act, words):
 
 
 def test_the_message_itself_stays_english():
-    with override("es"), pytest.raises(Refused) as refused:
+    with override("es"), pytest.raises(NotAllowed) as refused:
         next_state(State.READY, ChangeKind.FINISH)
     assert str(refused.value) == (
         "A session that is ready cannot take the change 'finish'; it must be paused or running."

@@ -20,7 +20,7 @@ from rehab.stations.models import Device, Station
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.phases import Phase, make_phase
-from rehab.training.valences import Cue
+from rehab.training.valences import CueGestures
 from tests.support.world import signed_in
 
 PATIENCE_S = 10.0  # only a failing test waits so long
@@ -321,7 +321,7 @@ def open_session(
     goal: GoalRule | None = None,
     at_station: bool = True,
     beside: bool = False,
-    cue: Cue | None = None,
+    cue: CueGestures | None = None,
 ) -> TrainingSession:
     """Make a session that is ready at the place's station.
 

@@ -23,7 +23,7 @@ from rehab.sessions.formatting import at_clinic
 from rehab.sessions.forms import SessionForm, like_last_time
 from rehab.sessions.models import TrainingSession
 from rehab.stations.builtin import first_station
-from rehab.training.changes import OPEN
+from rehab.training.changes import OPEN_STATES
 
 SHOWN = 60  # patients on one page, those who were here last first
 DEMO_CODE = "demo"
@@ -40,7 +40,7 @@ def patients_of(user: User) -> QuerySet[Patient]:
 
 def open_sessions(user: User) -> QuerySet[TrainingSession]:
     """Give the sessions that have begun, or could, and have not ended."""
-    states = [state.value for state in OPEN]
+    states = [state.value for state in OPEN_STATES]
     return (
         TrainingSession.objects.visible_to(user)
         .filter(state__in=states)

@@ -15,7 +15,7 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.training.valences import Cue
+from rehab.training.valences import CueGestures
 from robot.trial import admit_gesture
 from tests.support.callers import Message, restart
 
@@ -264,7 +264,7 @@ async def test_a_tablet_leaves_the_robot_s_intensity_alone(place, begun):
 
 async def test_composed_gestures_travel_in_the_cue(place, ready):
     wave = await sync_to_async(compose)(place.clinic)
-    await ready(place, cue=Cue(above="wave"))
+    await ready(place, cue=CueGestures(above="wave"))
     cue = (await (await place.robot().dial()).hello())["cue"]
     assert (cue["above"], cue["below"]) == ("wave", None)
     assert cue["gestures"] == [wave]

@@ -22,7 +22,7 @@ export function createPatientPage({ announce, onPress, change }) {
       chart_style(session, event) {
         session.chart = event.value;
       },
-      words() {
+      feedback_text() {
         announce(_("The clinic’s words were edited; the patient reads them from the next step."));
       },
     },
