@@ -24,6 +24,8 @@ from rehab.people.sign_in.totp import (
     matching_time_step,
 )
 
+pytestmark = pytest.mark.postgres
+
 PASSWORD = "walk well 2026"
 RFC_SECRET = "GEZDGNBVGY3TQOJQGEZDGNBVGY3TQOJQ"  # "12345678901234567890"
 
@@ -76,11 +78,6 @@ def test_an_app_reads_who_and_where_from_the_square():
 
 
 # --- accounts -------------------------------------------------------------------------------------
-
-
-@pytest.fixture(autouse=True)
-def _quick_hashes(settings):
-    settings.PASSWORD_HASHERS = ["django.contrib.auth.hashers.MD5PasswordHasher"]
 
 
 @pytest.fixture

@@ -130,7 +130,7 @@ async def ping_layer() -> None:
 
 def examine_files() -> Iterator[Diagnosis]:
     """Diagnose the static files."""
-    missing = [name for name in ("css/tokens.css", "img/mark.svg") if not finders.find(name)]
+    missing = [name for name in ("css/shared/tokens.css", "img/mark.svg") if not finders.find(name)]
     missing += [name for name, folder in settings.BROWSER_LIBRARIES.items() if not folder.is_dir()]
     if missing:
         yield Diagnosis("files", f"missing: {', '.join(missing)}", "Run make setup.")

@@ -12,7 +12,7 @@ REFUSALS = [
     f'--keyword={name}:{place},"refusal"'
     for name, place in (
         ("InvalidSetting", 1),
-        ("Refused", 1),
+        ("NotAllowed", 1),
         ("BadGesture", 1),
         ("BadGoal", 2),
         ("Marked", 1),
