@@ -104,8 +104,8 @@ class GarrySite(AdminSite):
 
         user = user_of(request)
         now = timezone.now()
-        told = server_status(user) if user.role == Role.HOST else look(user, now)
-        return super().index(request, {**told, **(extra_context or {})})
+        context = server_status(user) if user.role == Role.HOST else look(user, now)
+        return super().index(request, {**context, **(extra_context or {})})
 
     def app_index(  # type: ignore[override]
         self, request: HttpRequest, app_label: str, extra_context: Any = None

@@ -1,4 +1,4 @@
-"""When a device last connected, in words."""
+"""When a device last connected, as text."""
 
 from __future__ import annotations
 

@@ -38,8 +38,8 @@ def pair(request: HttpRequest) -> HttpResponse:
         except PairingRefused as refused:
             problem = str(refused)
         else:
-            said = {"tablet": device.name, "station": station}
-            messages.success(request, _("%(tablet)s belongs to %(station)s now.") % said)
+            names = {"tablet": device.name, "station": station}
+            messages.success(request, _("%(tablet)s belongs to %(station)s now.") % names)
             return redirect("start")
     context = {"stations": stations, "code": code, "problem": problem}
     return render(request, "stations/pair.html", context)

@@ -84,9 +84,9 @@ def _may_show_patients(request: HttpRequest, match: ResolverMatch) -> bool:
 
 def _model_of(match: ResolverMatch) -> type[Model] | None:
     """Return the model of an admin page; None for pages of no model."""
-    words = (match.url_name or "").split("_")
+    parts = (match.url_name or "").split("_")
     try:
-        return apps.get_model(words[0], words[1])
+        return apps.get_model(parts[0], parts[1])
     except (LookupError, IndexError):
         return None
 

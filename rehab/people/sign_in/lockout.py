@@ -46,7 +46,7 @@ def lockout_response(
 
 
 def lockout_message(request: HttpRequest, now: datetime, **credentials: str) -> str:
-    """Return how long to wait, in words, during a lockout; "" where there is none."""
+    """Return a message with the time to wait during a lockout; "" where there is none."""
     if AxesProxyHandler.is_allowed(request, credentials):
         return ""
     name = attempt_username(request, credentials)

@@ -112,7 +112,7 @@ class ApiToken(TokenModel):
 
 
 def find_user_by_token(token: str, now: datetime) -> User | None:
-    """Give the person that a program calls as, with the token's role; None for a dead token.
+    """Return the person that a program calls as, with the token's role; None if it is invalid.
 
     A token is valid while its account is active and may delegate the role. The returned object is
     for this call alone and must not be saved.
