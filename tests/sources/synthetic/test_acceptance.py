@@ -13,7 +13,7 @@ from rehab.sources.recording import read_recording
 from rehab.sources.synthetic import GOOD, walk
 from rehab.training.phases import make_phase
 from rehab.training.steps import Measurement
-from tests.sources.protocols import SESSION_1, usable
+from tests.sources.synthetic.protocols import SESSION_1, usable
 from tests.support.data import recording
 
 SEEDS = range(20)

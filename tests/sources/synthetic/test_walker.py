@@ -23,7 +23,7 @@ from rehab.training.phases import make_phase
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES
-from tests.sources.protocols import SESSION_1, usable
+from tests.sources.synthetic.protocols import SESSION_1, usable
 
 BASELINE = make_phase("baseline")
 TRAINING = make_phase("training")

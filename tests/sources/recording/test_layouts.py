@@ -231,7 +231,7 @@ def test_layout_can_be_said(parse):
 
 
 def test_the_documented_example_reads(parse):
-    page = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text("utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "recordings.md").read_text("utf-8")
     example = re.search(r"```csv\n(.*?)```", page, re.DOTALL)
     assert example is not None
     recording = parse(example[1])
@@ -242,7 +242,7 @@ def test_the_documented_example_reads(parse):
 
 @pytest.mark.parametrize("layout", LAYOUTS.values(), ids=LAYOUTS)
 def test_the_documentation_names_every_layout_and_column(layout):
-    page = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text("utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "recordings.md").read_text("utf-8")
 
     assert f"## {layout.name}\n" in page
     for column in {*layout.required, *layout.other, *(layout.extra or ())}:
