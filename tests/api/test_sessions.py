@@ -26,11 +26,6 @@ pytestmark = pytest.mark.django_db
 
 
 @pytest.fixture
-def world() -> World:
-    return build_world("amber")
-
-
-@pytest.fixture
 def pt(world: World) -> Program:
     return program_of(world, Role.PT)
 

@@ -26,11 +26,9 @@ from rehab.training.phases import Phase
 from rehab.training.valences import VALENCES, CueGestures, edit_valence
 from robot.composed import Move, compose
 from robot.gestures import BadGesture
-from tests.feedback.test_types import form as feedback_form
-from tests.gestures.test_composing import filled as gesture_form
-from tests.sessions.test_two_at_once import choices
+from tests.support.forms import feedback_form, gesture_form, session_form
 from tests.support.programs import program_of
-from tests.support.world import World, build_world, client_of
+from tests.support.world import World, client_of
 
 CATALOG = Path(__file__).parents[2] / "locale/es/LC_MESSAGES/django.po"
 ENGLISH = re.compile(
@@ -108,8 +106,7 @@ def test_every_translated_refusal_takes_the_values_of_its_source():
 
 
 @pytest.fixture
-def world(db: None) -> World:
-    world = build_world("amber")
+def world(world: World) -> World:
     Clinic.everywhere.filter(pk=world.clinic.pk).update(language="es")
     return world
 
@@ -175,7 +172,7 @@ def test_a_set_up_is_refused_in_spanish_and_to_a_program_in_english(world):
         clinic=world.clinic, code="K-1", nickname="Rosa", paretic_side="left"
     )
     station = Station.everywhere.create(clinic=world.clinic, name="Ventana")
-    percent = choices(station) | {"goal_by": "percent", "goal_percent": "100"}
+    percent = session_form(station) | {"goal_by": "percent", "goal_percent": "100"}
     page = client_of(world).post(f"/patients/{rosa.pk}/new/", percent)
     told = str(page.context["form"].errors)
     assert "necesita una fase de línea base antes de la primera retroalimentación" in told

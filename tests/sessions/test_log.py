@@ -27,7 +27,7 @@ from rehab.training.phases import make_phase
 from rehab.training.steps import Measurement, Side
 from tests.support.world import NOW, store
 
-pytestmark = pytest.mark.django_db
+pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 TRAINING = (make_phase("training"),)
 

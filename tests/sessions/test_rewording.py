@@ -22,11 +22,6 @@ pytestmark = pytest.mark.django_db(transaction=True)
 
 
 @pytest.fixture
-def world():
-    return build_world("amber")
-
-
-@pytest.fixture
 def pt(world):
     return client_of(world)
 

@@ -24,11 +24,6 @@ pytestmark = pytest.mark.django_db
 
 
 @pytest.fixture
-def world() -> World:
-    return build_world("amber")
-
-
-@pytest.fixture
 def pt(world: World) -> Client:
     return client_of(world)
 

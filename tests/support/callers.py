@@ -12,6 +12,7 @@ from channels.testing import WebsocketCommunicator
 
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
+from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import create_session
@@ -352,3 +353,10 @@ async def numbers(session: TrainingSession) -> list[int]:
     """Give the numbers of a session's stored steps."""
     steps = Step.everywhere.filter(session=session).order_by("number")
     return [number async for number in steps.values_list("number", flat=True)]
+
+
+async def restart() -> None:
+    """Let this server go and another one come."""
+    runtime = runtimes.current()
+    await runtime.drain()
+    runtimes._current = None

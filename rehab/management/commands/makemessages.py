@@ -1,4 +1,4 @@
-"""Django's `makemessages`, which also knows the words of our scripts (static/js/language.js)."""
+"""Django's `makemessages`, which also finds the texts of our scripts (shared/language.js)."""
 
 from pathlib import Path
 

@@ -73,7 +73,7 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
     """List who is expected today, then all patients."""
     words = request.GET.get("q", "").strip()
     context = list_everybody(person(request), words) | {"q": words}
-    return render(request, "sessions/start.html", context)
+    return render(request, "patients/start.html", context)
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -101,7 +101,7 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
         ],
         "at": usual_time(user, patient, lists["now"]),
     }
-    return render(request, "sessions/start.html", context)
+    return render(request, "patients/start.html", context)
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -112,7 +112,7 @@ def add_patient(request: HttpRequest) -> HttpResponse:
     form = PatientForm(request.POST or None, by=user, now=timezone.now())
     if request.method == "POST" and form.keep():
         return redirect("setup", patient_id=form.instance.pk)
-    return render(request, "sessions/patient_form.html", {"form": form})
+    return render(request, "patients/form.html", {"form": form})
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -125,7 +125,7 @@ def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     if request.method == "POST" and form.keep():
         return redirect("patient", patient_id=patient.pk)
     context = {"form": form, "patient": Patient.objects.visible_to(user).get(pk=patient_id)}
-    return render(request, "sessions/patient_form.html", context)
+    return render(request, "patients/form.html", context)
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -136,7 +136,7 @@ def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
     form = ScreenForm(request.POST or None, instance=patient)
     if request.method == "POST" and form.keep():
         return redirect("patient", patient_id=patient.pk)
-    return render(request, "sessions/screen_form.html", {"form": form, "patient": patient})
+    return render(request, "patients/screen_form.html", {"form": form, "patient": patient})
 
 
 @for_roles(Role.LEAD, Role.PT)

@@ -15,8 +15,7 @@ from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.phases import make_phase
 from rehab.training.valences import CueGestures
-from tests.sessions.live.test_robots import restart
-from tests.support.callers import turns
+from tests.support.callers import restart, turns
 from tests.support.world import NOW
 
 TWO = (make_phase("training", "First", strides=2), make_phase("training", "Last"))
