@@ -22,11 +22,11 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from functools import partial
 
-from robot import doctor, solo
+from robot import doctor, play_gesture
 from robot.base_options import add_base_arguments, make_base
 from robot.bases import BadOption, BaseLost, MobileBase
 from robot.bases.twin.__main__ import main as run_twin
-from robot.dialing import CannotDial, add_dialing_arguments, find_token, websocket_url
+from robot.connection_args import CannotDial, add_dialing_arguments, find_token, websocket_url
 from robot.link import Link, LinkRefused
 from robot.original_topics import TOPICS, OriginalTopics
 from robot.worker import Worker
@@ -126,7 +126,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if words[:1] == ["doctor"]:
         return doctor.main(words[1:])
     if words[:1] == ["gesture"]:
-        return solo.main(words[1:])
+        return play_gesture.main(words[1:])
     if words[:1] == ["twin"]:
         return run_twin(words[1:])
     options = make_parser().parse_args(words)

@@ -8,8 +8,8 @@ from argparse import ArgumentParser
 from collections.abc import Iterator, Sequence
 
 from robot.bases.kobuki import KobukiBase
-from robot.safety import BASE_SILENT_S, BATTERY_LOW_V, BATTERY_WARN_V
-from robot.usb import Finding, find_port, list_ports, look_at_port
+from robot.behavior.safety import BASE_SILENT_S, BATTERY_LOW_V, BATTERY_WARN_V
+from robot.port.usb import Finding, find_port, list_ports, look_at_port
 
 LISTEN_S = 0.5
 FRAMES_PER_S = 45.0  # a base says 50; fewer are lost on the way

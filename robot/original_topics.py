@@ -16,7 +16,7 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Any, Self
 
-from robot.activation import BadMessage, read_number
+from robot.behavior.cue import BadMessage, read_number
 from robot.ros.bridge import Bridge
 from robot.ros.frames import (
     Frame,

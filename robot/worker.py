@@ -8,10 +8,10 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from robot.bases import MobileBase
+from robot.behavior.performer import NO_LINK, Performer
 from robot.link import NOT_PROTOCOL, Link, LinkRefused, Message
-from robot.motion import DEFAULT_LIMITS, TICK_S, Limits
+from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
 from robot.original_topics import OriginalTopics
-from robot.performer import NO_LINK, Performer
 
 
 class Worker:

@@ -16,9 +16,10 @@ from rehab.gestures.models import Gesture, GestureStep
 from rehab.gestures.picture import draw
 from rehab.people.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
 from rehab.people.refusals import in_words
-from robot.composed import MOVES_MAX, to_data
-from robot.gestures import TETHER_M, BadGesture
-from robot.trial import Trial, admit_gesture, try_gesture
+from robot.motion.dry_run import Trial, admit_gesture, try_gesture
+from robot.motion.gesture import TETHER_M
+from robot.motion.gesture_errors import BadGesture
+from robot.motion.gesture_spec import MOVES_MAX, to_data
 
 WINDOW_S = 5.0  # what takes longer is still running when the next decision comes
 

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
 
-from robot.composed import Move, places
-from robot.gestures import TETHER_M
-from robot.motion import Pose
-from robot.trial import Trial
+from robot.motion.dry_run import Trial
+from robot.motion.gesture import TETHER_M
+from robot.motion.gesture_spec import Move, places
+from robot.motion.pose import Pose
 
 BASE_M = 0.175  # radius of a Kobuki
 SIGHT_M = 0.05  # length of the line that says where it looks

@@ -15,8 +15,9 @@ from rehab.people.models import Patient, User
 from rehab.people.refusals import in_words
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import Cue
-from robot.gestures import GESTURES, ORIGINALS, BadGesture
-from robot.trial import admit_gesture
+from robot.motion.dry_run import admit_gesture
+from robot.motion.gesture_errors import BadGesture
+from robot.motion.gestures import GESTURES, ORIGINALS
 
 USUAL, NOTHING = "(usual)", "(nothing)"  # choices beside gestures, none of which has such a name
 

@@ -30,7 +30,7 @@ from rehab.sources.client import (
 )
 from rehab.sources.source import LiveSource, PlayedSource, Source, Unusable
 from rehab.training.steps import Side
-from robot.dialing import CannotDial, add_dialing_arguments, find_token, websocket_url
+from robot.connection_args import CannotDial, add_dialing_arguments, find_token, websocket_url
 from robot.link import Link, LinkRefused
 
 if TYPE_CHECKING:

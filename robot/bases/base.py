@@ -10,7 +10,8 @@ from enum import StrEnum
 from types import TracebackType
 from typing import ClassVar, Self
 
-from robot.motion import Pose, Twist
+from robot.motion.pose import Pose
+from robot.motion.twist import Twist
 
 
 class BaseLost(RuntimeError):

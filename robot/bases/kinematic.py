@@ -6,16 +6,9 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from robot.bases.base import Abilities, BaseState, MobileBase, Truth
-from robot.motion import (
-    CEILING_M_S,
-    CEILING_RAD_S,
-    HOME,
-    ORDER_HOLDS_S,
-    STILL,
-    Limits,
-    Twist,
-    advance,
-)
+from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, ORDER_HOLDS_S, Limits
+from robot.motion.pose import HOME, advance
+from robot.motion.twist import STILL, Twist
 
 WHEELS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
 

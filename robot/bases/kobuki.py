@@ -23,10 +23,11 @@ from robot.bases.kobuki_protocol.feedback import Button, decode_feedback
 from robot.bases.kobuki_protocol.frames import BAUD, FrameReader
 from robot.bases.kobuki_protocol.trust import Sighting, Trust
 from robot.bases.kobuki_protocol.wheels import STOP, WHEELBASE_M, control_of, twist_of
-from robot.motion import CEILING_M_S, CEILING_RAD_S, STILL, Limits, Twist
-from robot.odometry import Odometry
-from robot.port_client import Heard, PortClient
-from robot.usb import find_port
+from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, Limits
+from robot.motion.odometry import Odometry
+from robot.motion.twist import STILL, Twist
+from robot.port.client import Heard, PortClient
+from robot.port.usb import find_port
 
 WHEELS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
 STOP_FRAME = encode_commands(STOP)

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from robot.bases.base import Abilities, BaseState, MobileBase
-from robot.motion import HOME, STILL, Twist
+from robot.motion.pose import HOME
+from robot.motion.twist import STILL, Twist
 
 
 class NullBase(MobileBase):

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 
 from robot.bases.base import Abilities, BaseLost, Truth
 from robot.bases.kobuki import KobukiBase
-from robot.motion import Pose
+from robot.motion.pose import Pose
 
 END_S = 2.0
 

@@ -21,7 +21,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from robot.link import BackOff
-from robot.motion import TICK_S
+from robot.motion.limits import TICK_S
 from robot.ros.frames import MAX_FRAME_BYTES, BadFrame, Frame, Heard, read_frame, to_text
 
 DEFAULT_URL = "ws://127.0.0.1:9090"

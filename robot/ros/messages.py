@@ -10,7 +10,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from robot.motion import Pose, Twist
+from robot.motion.pose import Pose
+from robot.motion.twist import Twist
 from robot.ros.frames import BadFrame
 
 TWIST = "geometry_msgs/Twist"

@@ -7,9 +7,10 @@ import time
 import pytest
 
 from robot.bases.twinned import TwinBase
-from robot.gestures import GESTURES, ORIGINALS, TETHER_M
-from robot.safety import AWAY
-from robot.solo import play
+from robot.behavior.safety import AWAY
+from robot.motion.gesture import TETHER_M
+from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.play_gesture import play
 
 TIMES = 20
 

@@ -9,7 +9,7 @@ import pytest
 from django.test import Client
 
 from rehab.gestures.models import Gesture
-from robot.trial import admit_gesture
+from robot.motion.dry_run import admit_gesture
 from tests.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db

@@ -24,8 +24,8 @@ from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.valences import VALENCES, Cue, edit_valence
-from robot.composed import Move, compose
-from robot.gestures import BadGesture
+from robot.motion.gesture_errors import BadGesture
+from robot.motion.gesture_spec import Move, compose
 from tests.feedback.test_feedback_types import form as feedback_form
 from tests.gestures.test_composing import filled as gesture_form
 from tests.programs import program_of

@@ -17,7 +17,8 @@ from contextlib import suppress
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import serve
 
-from robot.motion import STILL, TICK_S
+from robot.motion.limits import TICK_S
+from robot.motion.twist import STILL
 
 TWIST, ODOMETRY = "geometry_msgs/Twist", "nav_msgs/Odometry"
 

@@ -11,15 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rehab.training import steps as stored
-from robot.activation import (
+from robot.behavior.cue import TIME_MAX_S, BadMessage, Cue
+from robot.behavior.window_decider import (
     LATE,
     NO_GESTURE,
     PERFORMING,
     RESTING,
-    TIME_MAX_S,
     Activation,
-    BadMessage,
-    Cue,
     Decision,
 )
 

@@ -5,17 +5,10 @@ import math
 import pytest
 
 from robot.bases import BASES, BaseState
-from robot.motion import (
-    CEILING_M_S,
-    CEILING_RAD_S,
-    HOME,
-    ORDER_HOLDS_S,
-    STILL,
-    Pose,
-    Twist,
-    advance,
-)
-from robot.rehearsal import REHEARSED
+from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, ORDER_HOLDS_S
+from robot.motion.pose import HOME, Pose, advance
+from robot.motion.twist import STILL, Twist
+from robot.simulation import REHEARSED
 
 SIMULATED = ["null", "kinematic"]
 

@@ -10,11 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot.bases.kinematic import KinematicBase
-from robot.composed import MOVES_MAX, NUMBERS, Move, compose, read_gesture, to_data
-from robot.gestures import GESTURES, ORIGINALS, REACH_M, TETHER_M, BadGesture
-from robot.motion import DEFAULT_LIMITS, HOME, TICK_S
-from robot.player import DONE, Player
-from robot.trial import admit_gesture, try_gesture
+from robot.motion.dry_run import admit_gesture, try_gesture
+from robot.motion.gesture import REACH_M, TETHER_M
+from robot.motion.gesture_errors import BadGesture
+from robot.motion.gesture_spec import MOVES_MAX, NUMBERS, Move, compose, read_gesture, to_data
+from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.limits import DEFAULT_LIMITS, TICK_S
+from robot.motion.player import DONE, Player
+from robot.motion.pose import HOME
 
 QUARTER = math.pi / 2
 NOD = [Move(forward_m=0.1), Move(forward_m=-0.1)]

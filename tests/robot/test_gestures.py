@@ -8,15 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rehab.training.valences import VALENCES
-from robot.gestures import (
-    GESTURES,
-    REACH_M,
-    BadGesture,
-    Gesture,
-    Goal,
-)
-from robot.legs import Drive, Turn, plan_legs
-from robot.motion import HOME, Pose
+from robot.motion.gesture import REACH_M, Gesture, Goal
+from robot.motion.gesture_errors import BadGesture
+from robot.motion.gestures import GESTURES
+from robot.motion.path import Drive, Turn, plan_legs
+from robot.motion.pose import HOME, Pose
 
 AWAY = Goal(0.1, 0.0, 0.0, within_s=4)
 BACK = Goal(0.0, 0.0, 0.0, within_s=4)

@@ -11,7 +11,8 @@ import pytest
 
 from robot.bases.base import Mood
 from robot.bases.kobuki import KobukiBase
-from robot.motion import HOME, STILL, Pose, Twist
+from robot.motion.pose import HOME, Pose
+from robot.motion.twist import STILL, Twist
 from tests.robot.fake_kobuki import FakeKobuki
 
 pytestmark = [

@@ -55,7 +55,7 @@ from robot.bases.kobuki_protocol import (
     twist_of,
     wheel_speeds,
 )
-from robot.motion import STILL, Twist
+from robot.motion.twist import STILL, Twist
 from tests.robot import damage
 
 # --- Golden frames (kobuki.md 1.4) ---------------------------------------------------------------

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 from websockets.asyncio.server import serve
 
-from robot.dialing import CannotDial, check_token, websocket_url
+from robot.connection_args import CannotDial, check_token, websocket_url
 from robot.link import (
     MAX_FRAME_BYTES,
     REFUSALS,

@@ -6,19 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot.motion import (
-    CEILING_M_S,
-    CEILING_RAD_S,
-    HOME,
-    LONGEST_STEP_S,
-    STILL,
-    Limits,
-    Pose,
-    Twist,
-    advance,
-    least_time_s,
-    wrap,
-)
+from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, LONGEST_STEP_S, Limits, least_time_s
+from robot.motion.pose import HOME, Pose, advance, wrap
+from robot.motion.twist import STILL, Twist
 
 anything = st.floats(allow_nan=True, allow_infinity=True)
 speeds = st.floats(-2, 2)

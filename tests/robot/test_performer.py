@@ -10,11 +10,13 @@ from hypothesis import strategies as st
 
 from robot.bases import Abilities, Mood, Senses
 from robot.bases.kinematic import KinematicBase
-from robot.composed import Move, to_data
-from robot.gestures import GESTURES, ORIGINALS
-from robot.motion import DEFAULT_LIMITS, HOME, STILL, TICK_S, Twist
-from robot.performer import SILENCE_S, Performer
-from robot.rehearsal import Rehearsal
+from robot.behavior.performer import SILENCE_S, Performer
+from robot.motion.gesture_spec import Move, to_data
+from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.limits import DEFAULT_LIMITS, TICK_S
+from robot.motion.pose import HOME
+from robot.motion.twist import STILL, Twist
+from robot.simulation import Rehearsal
 
 CUE = {
     "above": "celebrate",

@@ -6,9 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot.gestures import GESTURES, TETHER_M, Gesture, Goal
-from robot.motion import HOME, STILL, Limits, Pose, Twist, advance
-from robot.player import BAD_ODOMETRY, DONE, OUT_OF_TIME, Player
+from robot.motion.gesture import TETHER_M, Gesture, Goal
+from robot.motion.gestures import GESTURES
+from robot.motion.limits import Limits
+from robot.motion.player import BAD_ODOMETRY, DONE, OUT_OF_TIME, Player
+from robot.motion.pose import HOME, Pose, advance
+from robot.motion.twist import STILL, Twist
 
 each_gesture = pytest.mark.parametrize("gesture", GESTURES.values(), ids=lambda g: g.name)
 gestures = st.sampled_from(list(GESTURES.values()))

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from robot.port import PortOwner
+from robot.port.owner import PortOwner
 from tests.robot.fake_kobuki import FORWARD_200, STOP_FRAME, FakeKobuki
 
 pytestmark = [

@@ -7,8 +7,8 @@ import pytest
 
 from rehab.sources.recording import read_recording
 from robot.bases import BASES
-from robot.motion import TICK_S
-from robot.performer import Performer
+from robot.behavior.performer import Performer
+from robot.motion.limits import TICK_S
 from tests.data import recording
 
 CUE = {

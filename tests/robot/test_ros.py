@@ -10,11 +10,11 @@ from websockets.sync.client import connect
 
 from robot.bases.rosbridge import RosbridgeBase
 from robot.bases.rosbridge.topics import PROFILES, Topics
-from robot.gestures import GESTURES
-from robot.motion import STILL, Twist
+from robot.motion.gestures import GESTURES
+from robot.motion.twist import STILL, Twist
 from robot.original_topics import OriginalTopics
+from robot.play_gesture import play
 from robot.ros.frames import Topic
-from robot.solo import play
 from tests.robot.fake_ros import (
     FakeBase,
     FakeRosbridge,

@@ -15,12 +15,12 @@ import pytest
 from robot.bases import BaseLost
 from robot.bases.rosbridge import RosbridgeBase
 from robot.bases.rosbridge.topics import PROFILES, Topics
-from robot.gestures import GESTURES
-from robot.motion import STILL, Twist
+from robot.behavior.safety import BASE_SILENT_S
+from robot.motion.gestures import GESTURES
+from robot.motion.twist import STILL, Twist
 from robot.original_topics import OriginalTopics
+from robot.play_gesture import main, play
 from robot.ros.bridge import RETRY_LONGEST_S, Bridge
-from robot.safety import BASE_SILENT_S
-from robot.solo import main, play
 from tests.robot.fake_garry import TOKEN, FakeGarry, serve_garry
 from tests.robot.fake_ros import (
     FakeBase,

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot.motion import Pose, Twist
+from robot.motion.pose import Pose
+from robot.motion.twist import Twist
 from robot.ros.frames import (
     Answer,
     BadFrame,

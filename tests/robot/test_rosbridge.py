@@ -13,12 +13,14 @@ from robot.base_options import add_base_arguments, make_base
 from robot.bases import BASES, BadOption
 from robot.bases.rosbridge import RosbridgeBase
 from robot.bases.rosbridge.topics import PROFILES, Topics
-from robot.gestures import GESTURES, ORIGINALS
-from robot.motion import CEILING_M_S, CEILING_RAD_S, HOME, STILL, TICK_S, Twist
-from robot.performer import Performer
+from robot.behavior.performer import Performer
+from robot.behavior.safety import BASE_SILENT_S, OPEN_LOOP_MOST
+from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, TICK_S
+from robot.motion.pose import HOME
+from robot.motion.twist import STILL, Twist
+from robot.play_gesture import play
 from robot.ros.frames import BadFrame, Topic, read_frame, to_text
-from robot.safety import BASE_SILENT_S, OPEN_LOOP_MOST
-from robot.solo import play
 from tests.robot.fake_ros import FakeBase, FakeRosbridge
 from tests.robot.test_performer import CUE, WELCOME
 from tests.robot.test_ros_frames import ANYTHING

@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot import safety as rules
 from robot.bases import Abilities, BaseState, Senses
-from robot.gestures import GESTURES, ORIGINALS
-from robot.motion import HOME, STILL, Pose, Twist
-from robot.safety import Safety
+from robot.behavior import safety as rules
+from robot.behavior.safety import Safety
+from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.pose import HOME, Pose
+from robot.motion.twist import STILL, Twist
 
 REAL = Abilities(simulated=False, moves=True, announces=True)
 SIMULATED = Abilities(simulated=True, moves=True)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot.setpoint import Setpoint
+from robot.port.setpoint import Setpoint
 
 STOP, GO, OTHER = b"\xaa\x55stop", b"\xaa\x55go", b"\xaa\x55other"
 

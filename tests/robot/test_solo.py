@@ -13,8 +13,9 @@ import pytest
 
 from robot.__main__ import main
 from robot.bases.twinned import TwinBase
-from robot.gestures import GESTURES, ORIGINALS, TETHER_M
-from robot.solo import play
+from robot.motion.gesture import TETHER_M
+from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.play_gesture import play
 from tests.robot.fake_kobuki import FakeKobuki
 
 pytestmark = pytest.mark.realtime

@@ -11,7 +11,7 @@ import pytest
 
 from robot.bases.twin.__main__ import main
 from robot.bases.twin.camera import HEIGHT, WIDTH, Camera, write_png
-from robot.motion import HOME, Pose
+from robot.motion.pose import HOME, Pose
 
 pytest.importorskip("pybullet")
 

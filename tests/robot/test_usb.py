@@ -4,9 +4,9 @@ import sys
 
 import pytest
 
-from robot import usb
 from robot.__main__ import main
-from robot.usb import Usb, find_port, look_at_port
+from robot.port import usb
+from robot.port.usb import Usb, find_port, look_at_port
 from tests.robot.fake_kobuki import FakeKobuki
 
 KOBUKI = Usb("/dev/ttyUSB3", 0x0403, 0x6001, "kobuki_A505QO28")

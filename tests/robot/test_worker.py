@@ -10,7 +10,7 @@ import pytest
 from robot.bases import BASES, Abilities, BaseLost
 from robot.bases.kinematic import KinematicBase
 from robot.link import NOT_PROTOCOL, REFUSALS, Link, LinkRefused, Timing
-from robot.motion import STILL
+from robot.motion.twist import STILL
 from robot.worker import Worker
 from tests.robot.fake_garry import TOKEN, FakeGarry, serve_garry
 

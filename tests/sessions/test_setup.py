@@ -16,8 +16,8 @@ from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import Cue
-from robot.composed import read_gesture
-from robot.motion import HOME
+from robot.motion.gesture_spec import read_gesture
+from robot.motion.pose import HOME
 from tests.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db

@@ -27,7 +27,7 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.phases import Phase, make_phase
 from rehab.training.steps import Measurement, Side
 from rehab.training.valences import VALENCES
-from robot.rehearsal import REHEARSED, Rehearsal
+from robot.simulation import REHEARSED, Rehearsal
 
 BASELINE_STRIDES = 54
 MIN_SYNTHETIC_STRIDES = 100

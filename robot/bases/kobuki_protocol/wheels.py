@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from robot.bases.kobuki_protocol.commands import BaseControl
-from robot.motion import STILL, Twist
+from robot.motion.twist import STILL, Twist
 
 # kobuki.md 1.7: between the wheels [m], and one tick of an encoder [m].
 WHEELBASE_M = 0.23

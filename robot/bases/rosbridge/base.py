@@ -20,7 +20,7 @@ from robot.bases.rosbridge.topics import (
     add_topic_arguments,
     read_topics,
 )
-from robot.motion import STILL, Twist
+from robot.motion.twist import STILL, Twist
 from robot.ros.bridge import Bridge, find_bridge
 
 GREETING_S = 3.0  # a bridge that is there has said by then where the base is

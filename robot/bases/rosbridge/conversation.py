@@ -10,7 +10,7 @@ from robot.bases.base import BaseState, Senses
 from robot.bases.rosbridge.orders import Orders
 from robot.bases.rosbridge.sight import Feelers, Reckoning, Wheels
 from robot.bases.rosbridge.topics import Topics
-from robot.motion import STILL
+from robot.motion.twist import STILL
 from robot.ros.frames import (
     Answer,
     BadFrame,

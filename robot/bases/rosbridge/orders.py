@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections import Counter, deque
 
-from robot.motion import CEILING_M_S, CEILING_RAD_S, ORDER_HOLDS_S, STILL, Limits, Twist
+from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, ORDER_HOLDS_S, Limits
+from robot.motion.twist import STILL, Twist
 
 WHEELS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 
-from robot.motion import HOME, ORDER_HOLDS_S, STILL, Pose, Twist, advance, wrap
+from robot.motion.limits import ORDER_HOLDS_S
+from robot.motion.pose import HOME, Pose, advance, wrap
+from robot.motion.twist import STILL, Twist
 
 # From one odometry to the next a base comes no further [m, rad], at our ceilings and with a second
 # between them: it was started anew, or another program has set its odometry.

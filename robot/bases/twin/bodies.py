@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 from robot.bases.kobuki_protocol import WHEELBASE_M
-from robot.motion import HOME, Pose, Twist, advance
+from robot.motion.pose import HOME, Pose, advance
+from robot.motion.twist import Twist
 
 # Where the floor sensors see the floor they stand on [m]: 10.2 mm and 21.4 mm up (kobuki.md 2.1).
 FLOOR_M = 0.0316

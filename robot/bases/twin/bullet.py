@@ -9,7 +9,7 @@ from typing import Any
 
 from robot.bases.kobuki_protocol import Side, Wheel
 from robot.bases.twin.bodies import Touch
-from robot.motion import HOME, Pose, wrap
+from robot.motion.pose import HOME, Pose, wrap
 
 STEPS = 8  # of 2.5 ms each in a frame: 400 Hz, finer than the 240 Hz of kobuki.md 2.1
 

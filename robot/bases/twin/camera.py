@@ -21,7 +21,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from robot.bases.twin.quiet import keep_to_ourselves
-from robot.motion import Pose
+from robot.motion.pose import Pose
 
 INTERVAL_S = 0.2
 WIDTH, HEIGHT = 320, 240  # 33 ms a picture on a core of 2026; 480 × 360 takes 78

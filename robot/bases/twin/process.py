@@ -14,7 +14,7 @@ from robot.bases.kobuki_protocol import FRAME_S
 from robot.bases.twin.faults import BadFault
 from robot.bases.twin.firmware import Firmware
 from robot.bases.twin.lines import Line
-from robot.motion import HOME
+from robot.motion.pose import HOME
 
 HELD_BYTES = 4096  # of a stalled line, as many as a pty keeps; the oldest are lost
 LATE_S = 0.1  # behind its time by more than this it lets the time go, instead of catching up

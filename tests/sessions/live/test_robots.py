@@ -20,7 +20,7 @@ from rehab.sessions.live.session import NotStored
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.valences import Cue
-from robot.trial import admit_gesture
+from robot.motion.dry_run import admit_gesture
 from tests.sessions.live.callers import Message, change, turns
 from tests.world import NOW
 

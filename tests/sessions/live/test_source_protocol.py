@@ -17,7 +17,7 @@ from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
 from robot.bases.kinematic import KinematicBase
-from robot.performer import Performer
+from robot.behavior.performer import Performer
 from tests.sessions.live.callers import SourceCaller, a_step, change, turns
 from tests.world import NOW
 

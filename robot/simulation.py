@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from robot.bases import BASES
-from robot.motion import DEFAULT_LIMITS, TICK_S, Limits
-from robot.performer import Performer
+from robot.behavior.performer import Performer
+from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
 
 # Simulated bases that keep to any clock.
 REHEARSED = [

@@ -11,24 +11,17 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from robot.activation import (
-    PERFORMANCE_MAX,
-    QUIET_PACE,
-    TIME_MAX_S,
-    Activation,
-    BadMessage,
-    Cue,
-    Decision,
-    read_number,
-)
 from robot.bases import BaseState, MobileBase
-from robot.gestures import GESTURES, ORIGINALS, Gesture
-from robot.motion import DEFAULT_LIMITS, Limits
-from robot.player import BAD_ODOMETRY, OUT_OF_TIME, Player
-from robot.repertoire import Repertoire
-from robot.reports import Report, decision_report, stop_report
-from robot.safety import ANNOUNCE_S, AWAY, STALLED, STOPPED, Safety
-from robot.voice import Voice
+from robot.behavior.cue import PERFORMANCE_MAX, QUIET_PACE, TIME_MAX_S, BadMessage, Cue, read_number
+from robot.behavior.gesture_library import Repertoire
+from robot.behavior.reports import Report, decision_report, stop_report
+from robot.behavior.safety import ANNOUNCE_S, AWAY, STALLED, STOPPED, Safety
+from robot.behavior.status import Voice
+from robot.behavior.window_decider import Activation, Decision
+from robot.motion.gesture import Gesture
+from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.limits import DEFAULT_LIMITS, Limits
+from robot.motion.player import BAD_ODOMETRY, OUT_OF_TIME, Player
 
 Message = Mapping[str, Any]
 

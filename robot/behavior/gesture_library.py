@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from robot.gestures import GESTURES, ORIGINALS, BadGesture, Gesture
-from robot.motion import Limits
-from robot.trial import admit_gesture
+from robot.motion.dry_run import admit_gesture
+from robot.motion.gesture import Gesture
+from robot.motion.gesture_errors import BadGesture
+from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.limits import Limits
 
 # Why a name cannot be performed.
 UNKNOWN_GESTURE = "unknown_gesture"

@@ -6,9 +6,12 @@ import math
 from collections import deque
 from dataclasses import replace
 
-from robot.gestures import LEAST_PACE, NEAR_M, NEAR_RAD, Gesture, Goal, gettext_noop
-from robot.legs import Drive, Leg, Turn, plan_legs
-from robot.motion import HOME, STILL, Limits, Pose, Twist, wrap
+from robot.motion.gesture import LEAST_PACE, NEAR_M, NEAR_RAD, Gesture, Goal
+from robot.motion.gesture_errors import gettext_noop
+from robot.motion.limits import Limits
+from robot.motion.path import Drive, Leg, Turn, plan_legs
+from robot.motion.pose import HOME, Pose, wrap
+from robot.motion.twist import STILL, Twist
 
 DONE = "done"
 OUT_OF_TIME = gettext_noop("out_of_time")

@@ -12,21 +12,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
-from robot.gestures import (
-    GESTURE_MAX_S,
-    GESTURES,
-    NOT_FINITE,
-    ORIGINALS,
-    BadGesture,
-    BadGoal,
-    Gesture,
-    Goal,
-    Marked,
-    check_goal,
-    needed_time_s,
-    stages,
-)
-from robot.motion import DEFAULT_LIMITS, HOME, Pose
+from robot.motion.gesture import GESTURE_MAX_S, Gesture, Goal, check_goal, needed_time_s, stages
+from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadGoal, Marked
+from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.limits import DEFAULT_LIMITS
+from robot.motion.pose import HOME, Pose
 
 NAME = re.compile(r"[A-Za-z0-9_-]{1,32}")
 MOVES_MAX = 16

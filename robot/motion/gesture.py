@@ -1,7 +1,7 @@
 """Gestures: places to go to, one after the other, and home again.
 
 A gesture says where, never for how long: timed ones end rotated and displaced as soon as a base
-speeds up gently (kobuki.md 2.5). Here are the gestures that we bring along, and what makes one.
+speeds up gently (kobuki.md 2.5).
 """
 
 from __future__ import annotations
@@ -10,8 +10,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from robot.legs import Drive, Leg, lies_on, plan_legs
-from robot.motion import DEFAULT_LIMITS, HOME, Limits, Pose
+from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadGoal
+from robot.motion.limits import DEFAULT_LIMITS, Limits
+from robot.motion.path import Drive, Leg, lies_on, plan_legs
+from robot.motion.pose import HOME, Pose
 
 # A base never leaves this circle around its home [m]; gestures keep 5 cm away from its edge
 # (kobuki.md 5.3).
@@ -27,43 +29,6 @@ GOALS_MAX = 32
 TURN_MAX_RAD = math.tau  # a longer cable than this winds up
 LEAST_PACE = 0.2  # slower turns stick and shake (kobuki.md 3: below 0.33 rad/s)
 SLACK = 1.5  # a goal's time over its shortest possible: odometry, grip and latency cost some
-
-
-def gettext_noop(text: str) -> str:
-    """Mark a label: pages say it in their language; the robot's computer knows but one."""
-    return text
-
-
-NOT_FINITE = gettext_noop("{part} {number} has a number that is not finite.")
-
-
-class Marked(str):
-    """A word that has a translation, as it stands in a sentence."""
-
-    __slots__ = ()
-
-
-class BadGesture(ValueError):
-    """A gesture that a base could not perform; the message says what would be one.
-
-    It is ``template`` with ``values`` in its places: whoever shows it says it in another language.
-    """
-
-    def __init__(self, template: str, /, **values: object) -> None:
-        super().__init__(template.format(**values) if values else template)
-        self.template, self.values = template, values
-
-
-class BadGoal(BadGesture):
-    """A gesture of which one goal is at fault: ``number`` says which."""
-
-    def __init__(self, number: int, template: str, /, **values: object) -> None:
-        super().__init__(template, part=Marked("Goal"), number=number, **values)
-        self.number = number
-
-    def of_step(self, number: int) -> BadGesture:
-        """Say it of the step that the goal belongs to."""
-        return BadGesture(self.template, **self.values | {"part": Marked("Step"), "number": number})
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,85 +198,3 @@ def stages(goals: Sequence[Goal], limits: Limits) -> list[tuple[tuple[Leg, ...],
         (plan_legs(start, goal.pose), limits.scaled(goal.pace), goal.hold_s)
         for start, goal in zip(starts, goals, strict=True)
     ]
-
-
-# Up to 4 s each, so that a base is home and still before the next window of 5 s ends. Out and back
-# is what a patient sees of a round base; it goes out ahead, never backwards (no rear bumper).
-CELEBRATE = Gesture(
-    "celebrate",
-    gettext_noop("Celebrate: a step ahead and a wiggle"),
-    (
-        Goal(0.07, 0.0, 0.0, within_s=1.6),
-        Goal(0.07, 0.0, 0.28, within_s=1.2),
-        Goal(0.07, 0.0, -0.28, within_s=1.6),
-        Goal(0.0, 0.0, 0.0, within_s=2.5),
-    ),
-)
-DROOP = Gesture(
-    "droop",
-    gettext_noop("Droop: turn away slowly and come back"),
-    (
-        Goal(0.0, 0.0, -0.45, within_s=2.5, pace=0.5, hold_s=0.5),
-        Goal(0.0, 0.0, 0.0, within_s=2.0, pace=0.5),
-    ),
-)
-NOD = Gesture(
-    "nod",
-    gettext_noop("Nod: a little ahead and back, twice"),
-    (
-        Goal(0.04, 0.0, 0.0, within_s=1.2),
-        Goal(0.0, 0.0, 0.0, within_s=1.2),
-        Goal(0.04, 0.0, 0.0, within_s=1.2),
-        Goal(0.0, 0.0, 0.0, within_s=1.2),
-    ),
-)
-SWAY = Gesture(
-    "sway",
-    gettext_noop("Sway: left, right and back"),
-    (
-        Goal(0.0, 0.0, 0.4, within_s=1.5),
-        Goal(0.0, 0.0, -0.4, within_s=2.0),
-        Goal(0.0, 0.0, 0.0, within_s=1.5),
-    ),
-)
-
-GESTURES: dict[str, Gesture] = {gesture.name: gesture for gesture in (CELEBRATE, DROOP, NOD, SWAY)}
-
-# The original's three sequences (gesture_generation.py of 2024; kobuki.md 1.13, 2.5), for
-# replications. It ordered 0.2 m/s and 1.8 rad/s for 1 or 2 s each, without ramps; here are the
-# places that these come to, at our limits, so they take longer. Its binary one ended 0.09 m behind
-# home; ours goes on home from there.
-_OUT_M, _SPIN_RAD = 0.2, 3.6
-_LEFT_RAD = _SPIN_RAD / 2
-_ASIDE = (_OUT_M * math.cos(_LEFT_RAD), _OUT_M * math.sin(_LEFT_RAD))
-ORIGINAL_POSITIVE = Gesture(
-    "original_positive",
-    gettext_noop("The paper's positive: out, left, right, back"),
-    (
-        Goal(_OUT_M, 0.0, 0.0, within_s=3.4, hold_s=1.0),
-        Goal(_OUT_M, 0.0, _SPIN_RAD, within_s=4.5),
-        Goal(_OUT_M, 0.0, 0.0, within_s=4.5),
-        Goal(0.0, 0.0, 0.0, within_s=2.5),
-    ),
-)
-ORIGINAL_NEGATIVE = Gesture(
-    "original_negative",
-    gettext_noop("The paper's negative: spin left, spin right"),
-    (Goal(0.0, 0.0, _SPIN_RAD, within_s=4.5), Goal(0.0, 0.0, 0.0, within_s=4.5)),
-)
-ORIGINAL_BINARY = Gesture(
-    "original_binary",
-    gettext_noop("The paper's binary: left and ahead, right and ahead, left, home"),
-    (
-        Goal(0.0, 0.0, _LEFT_RAD, within_s=2.7),
-        Goal(*_ASIDE, _LEFT_RAD, within_s=2.5),
-        Goal(*_ASIDE, -_LEFT_RAD, within_s=4.5),
-        Goal(2 * _ASIDE[0], 0.0, -_LEFT_RAD, within_s=2.5),
-        Goal(2 * _ASIDE[0], 0.0, 0.0, within_s=2.7),
-        Goal(0.0, 0.0, 0.0, within_s=1.7),
-    ),
-)
-
-ORIGINALS: dict[str, Gesture] = {
-    gesture.name: gesture for gesture in (ORIGINAL_POSITIVE, ORIGINAL_NEGATIVE, ORIGINAL_BINARY)
-}

@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robot.motion import Limits, Pose, least_time_s, wrap
+from robot.motion.limits import Limits, least_time_s
+from robot.motion.pose import Pose, wrap
 
 ALIKE_M = 0.01  # a way lies on another one, give or take so much [m]
 

@@ -17,10 +17,12 @@ from typing import Any
 
 from robot.base_options import add_base_arguments, make_base
 from robot.bases import BASES, BadOption, BaseLost, MobileBase, Mood
-from robot.gestures import GESTURES, ORIGINALS, Gesture
-from robot.motion import DEFAULT_LIMITS, HOME, TICK_S
-from robot.player import DONE, Player
-from robot.safety import ANNOUNCE_S, AWAY, Safety
+from robot.behavior.safety import ANNOUNCE_S, AWAY, Safety
+from robot.motion.gesture import Gesture
+from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.limits import DEFAULT_LIMITS, TICK_S
+from robot.motion.player import DONE, Player
+from robot.motion.pose import HOME
 
 REST_S = 0.3  # until wheels, odometry and truth have come to rest
 

@@ -18,9 +18,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from robot.motion import ORDER_HOLDS_S
+from robot.motion.limits import ORDER_HOLDS_S
 
-PACKAGES = Path(__file__).parents[1]
+PACKAGES = Path(__file__).parents[2]
 OWNER_SILENT_S = 0.3  # it says a word every 0.1 s
 START_S = 3.0  # a slow computer starts Python
 END_S = 1.0

@@ -6,9 +6,9 @@ from collections import deque
 from collections.abc import Mapping
 
 from robot.bases import BaseState, MobileBase, Mood
-from robot.gestures import Gesture
-from robot.reports import Report, gesture_report, status_report
-from robot.safety import BATTERY_WARN_V, battery_share
+from robot.behavior.reports import Report, gesture_report, status_report
+from robot.behavior.safety import BATTERY_WARN_V, battery_share
+from robot.motion.gesture import Gesture
 
 STATUS_MOVING_S = 0.25
 STATUS_IDLE_S = 1.0

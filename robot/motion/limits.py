@@ -1,12 +1,11 @@
-"""Speeds, poses and limits of a base that drives and turns, and how it moves if nothing slips.
-
-Right-handed, as ROS has it: x ahead, y to the left, headings and turns counter-clockwise.
-"""
+"""Limits of speed and acceleration, and the times that orders to a base keep to."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+
+from robot.motion.twist import STILL, Twist
 
 TICK_S = 0.02  # between two orders to a base: 50 Hz, as often as a Kobuki tells where it is
 
@@ -22,57 +21,6 @@ ORDER_HOLDS_S = 0.25
 # gyro is calibrated up to 1.75 rad/s (kobuki.md 1.7, 4, 5.3).
 CEILING_M_S = 0.30
 CEILING_RAD_S = 1.8
-
-
-@dataclass(frozen=True, slots=True)
-class Twist:
-    """A velocity: ``v_m_s`` ahead [m/s] and ``w_rad_s`` counter-clockwise [rad/s]."""
-
-    v_m_s: float = 0.0
-    w_rad_s: float = 0.0
-
-    @property
-    def is_still(self) -> bool:
-        """Whether it moves nothing."""
-        return self.v_m_s == 0 and self.w_rad_s == 0
-
-    @property
-    def is_finite(self) -> bool:
-        """Whether both numbers are."""
-        return math.isfinite(self.v_m_s) and math.isfinite(self.w_rad_s)
-
-
-STILL = Twist()
-
-
-@dataclass(frozen=True, slots=True)
-class Pose:
-    """A place [m] and a heading [rad]. Headings add up over full turns, and never jump."""
-
-    x_m: float = 0.0
-    y_m: float = 0.0
-    heading_rad: float = 0.0
-
-    @property
-    def is_finite(self) -> bool:
-        """Whether all three numbers are."""
-        return all(map(math.isfinite, (self.x_m, self.y_m, self.heading_rad)))
-
-    def distance_m(self, other: Pose) -> float:
-        """Give how far apart two places are [m]."""
-        return math.hypot(other.x_m - self.x_m, other.y_m - self.y_m)
-
-    def turn_rad(self, other: Pose) -> float:
-        """Give how far apart two headings are [rad], 0 to π: full turns do not count."""
-        return abs(wrap(other.heading_rad - self.heading_rad))
-
-
-HOME = Pose()
-
-
-def wrap(angle_rad: float) -> float:
-    """Give the same direction [rad] within ±π."""
-    return math.remainder(angle_rad, math.tau)
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,22 +123,6 @@ def _ramp(now: float, wanted: float, more: float, less: float) -> float:
     if abs(wanted) >= abs(now):
         return math.copysign(min(abs(wanted), abs(now) + more), wanted)
     return math.copysign(max(abs(wanted), abs(now) - less), now)
-
-
-def advance(pose: Pose, twist: Twist, elapsed_s: float) -> Pose:
-    """Give where a base is after a time at one twist, if nothing slips: on an exact arc."""
-    turn_rad = twist.w_rad_s * elapsed_s
-    # The chord of the arc: its length is that of the arc times sin(half)/half, along the mean
-    # heading.
-    half_rad = turn_rad / 2
-    straight = math.sin(half_rad) / half_rad if abs(half_rad) > 1e-9 else 1.0
-    chord_m = twist.v_m_s * elapsed_s * straight
-    along_rad = pose.heading_rad + half_rad
-    return Pose(
-        pose.x_m + chord_m * math.cos(along_rad),
-        pose.y_m + chord_m * math.sin(along_rad),
-        pose.heading_rad + turn_rad,
-    )
 
 
 def least_time_s(distance: float, speed: float, speed_up: float, slow_down: float) -> float:

@@ -11,8 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from robot.bases.base import Abilities, BaseState
-from robot.gestures import TETHER_M, Gesture
-from robot.motion import HOME, ORDER_HOLDS_S, Twist
+from robot.motion.gesture import TETHER_M, Gesture
+from robot.motion.limits import ORDER_HOLDS_S
+from robot.motion.pose import HOME
+from robot.motion.twist import Twist
 
 # Light and sound come so long before a gesture [s]: a sudden motion may startle whoever walks.
 ANNOUNCE_S = 0.5

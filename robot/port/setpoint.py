@@ -8,7 +8,7 @@ import threading
 from collections import Counter
 from dataclasses import dataclass
 
-from robot.motion import ORDER_HOLDS_S
+from robot.motion.limits import ORDER_HOLDS_S
 
 EARLY_S = 0.05  # an order from further in the future was made up
 LONGEST_FRAME = 64  # a Kobuki's buffer for commands [bytes] (kobuki.md 1.2)

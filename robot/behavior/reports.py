@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from robot.activation import Decision
 from robot.bases.base import BaseState, MobileBase
+from robot.behavior.window_decider import Decision
 
 Report = dict[str, Any]
 

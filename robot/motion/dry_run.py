@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from robot.composed import read_gesture
-from robot.gestures import TETHER_M, BadGesture, Gesture, Marked
-from robot.motion import DEFAULT_LIMITS, HOME, TICK_S, Limits, Pose, advance
-from robot.player import DONE, Player
+from robot.motion.gesture import TETHER_M, Gesture
+from robot.motion.gesture_errors import BadGesture, Marked
+from robot.motion.gesture_spec import read_gesture
+from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
+from robot.motion.player import DONE, Player
+from robot.motion.pose import HOME, Pose, advance
 
 # Where it has to end [m, rad] (kobuki.md 5.3 asks for 1 cm and 2°; a player is nearer than that).
 END_M = 0.01

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from robot.motion import HOME, Pose
+from robot.motion.pose import HOME, Pose
 
 # A gyro that turns slower than this [rad/s] while both wheels stand still drifts: "a couple of
 # degrees a minute at worst" (kobuki.md 1.7), 30 times less. A base that is turned by hand turns its
