@@ -21,8 +21,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
-from tests.robot.fake_kobuki import FakeKobuki
 from tests.servers import ROOT, Server, clean_environment, serve
+from tests.support.fake_kobuki import FakeKobuki
 from tests.wire import Wire
 
 

@@ -12,7 +12,7 @@ from robot.bases.kinematic import KinematicBase
 from robot.link import NOT_PROTOCOL, REFUSALS, Link, LinkRefused, Timing
 from robot.motion.twist import STILL
 from robot.worker import Worker
-from tests.robot.fake_garry import TOKEN, FakeGarry, serve_garry
+from tests.support.fake_robot_server import TOKEN, FakeGarry, serve_garry
 
 pytestmark = pytest.mark.realtime
 

@@ -13,7 +13,7 @@ from robot.bases.base import Mood
 from robot.bases.kobuki import KobukiBase
 from robot.motion.pose import HOME, Pose
 from robot.motion.twist import STILL, Twist
-from tests.robot.fake_kobuki import FakeKobuki
+from tests.support.fake_kobuki import FakeKobuki
 
 pytestmark = [
     pytest.mark.realtime,

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from robot.__main__ import main
-from tests.robot.fake_garry import TOKEN, FakeGarry, serve_garry
+from tests.support.fake_robot_server import TOKEN, FakeGarry, serve_garry
 
 REPO = Path(__file__).parents[2]
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")

@@ -1,80 +1,28 @@
 """The process that owns a port: it stops the base whatever becomes of its owner."""
 
-import json
 import signal
-import subprocess
 import sys
 import time
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from robot.port.owner import PortOwner
-from tests.robot.fake_kobuki import FORWARD_200, STOP_FRAME, FakeKobuki
+from tests.support.fake_kobuki import STOP_FRAME, FakeKobuki
+from tests.support.port_process import Owner, owning
 
 pytestmark = [
     pytest.mark.realtime,
     pytest.mark.skipif(sys.platform == "win32", reason="no pty"),
 ]
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(params=["pty", "socket"])
 def kobuki(request):
     with FakeKobuki(request.param) as kobuki:
         yield kobuki
-
-
-class Owner:
-    """Orders a process by hand."""
-
-    def __init__(self, url):
-        self.number = 0
-        self.process = subprocess.Popen(
-            [sys.executable, "-W", "error", "-m", "robot.port", url, "--stop", STOP_FRAME.hex()],
-            cwd=ROOT,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-        )
-        self.said = {}
-
-    def order(self, frame, **more):
-        self.number += 1
-        order = {"number": self.number, "sent_s": time.monotonic(), "frame": frame.hex()}
-        self.process.stdin.write(json.dumps(order | more).encode() + b"\n")
-        self.process.stdin.flush()
-
-    def hear(self):
-        """Take one line of what it says."""
-        self.said = json.loads(self.process.stdout.readline())
-        return self.said
-
-    def drive(self, for_s):
-        """Order as a worker does, 50 times a second."""
-        end_s = time.monotonic() + for_s
-        self.order(STOP_FRAME)
-        while time.monotonic() < end_s:
-            self.order(FORWARD_200)
-            time.sleep(0.02)
-
-    def end(self):
-        _, said = self.process.communicate(timeout=10)
-        return said.decode()
-
-
-@contextmanager
-def owning(kobuki):
-    owner = Owner(kobuki.url)
-    try:
-        while not owner.hear()["bytes"]:
-            pass
-        yield owner
-    finally:
-        owner.process.kill()
-        owner.process.communicate()
 
 
 def zeros_at_the_end(kobuki):

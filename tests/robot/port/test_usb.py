@@ -7,7 +7,7 @@ import pytest
 from robot.__main__ import main
 from robot.port import usb
 from robot.port.usb import Usb, find_port, look_at_port
-from tests.robot.fake_kobuki import FakeKobuki
+from tests.support.fake_kobuki import FakeKobuki
 
 KOBUKI = Usb("/dev/ttyUSB3", 0x0403, 0x6001, "kobuki_A505QO28")
 CABLE = Usb("/dev/ttyUSB0", 0x0403, 0x6001, "FT0ABC")  # any FTDI cable has the same chip
@@ -90,7 +90,7 @@ def test_windows_has_no_devices_to_look_at():
 def test_the_rule_in_the_documentation_is_the_one_that_is_told():
     from pathlib import Path
 
-    assert usb.UDEV_RULE in (Path(__file__).parents[2] / "docs" / "robot.md").read_text("utf-8")
+    assert usb.UDEV_RULE in (Path(__file__).parents[3] / "docs" / "robot.md").read_text("utf-8")
 
 
 @POSIX
@@ -115,7 +115,7 @@ def test_the_doctor_listens_to_a_base(capsys):
 
 @POSIX
 def test_the_doctor_and_a_port_that_is_taken_or_not_there(capsys, tmp_path):
-    from tests.robot.test_port import owning
+    from tests.support.port_process import owning
 
     assert main(["doctor", "--port", str(tmp_path / "kobuki")]) == 1
     assert "cannot be opened" in capsys.readouterr().out

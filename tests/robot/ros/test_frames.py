@@ -6,7 +6,6 @@ from contextlib import suppress
 
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 
 from robot.motion.pose import Pose
 from robot.motion.twist import Twist
@@ -25,14 +24,9 @@ from robot.ros.frames import (
     unsubscribe,
 )
 from robot.ros.messages import EVENTS, read_event, read_odometry, read_twist, write_twist
+from tests.support.json_values import ANYTHING
 
 CMD = Topic("/cmd_vel", "geometry_msgs/Twist")
-
-ANYTHING = st.recursive(
-    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner),
-    max_leaves=20,
-)
 
 
 @pytest.mark.parametrize(

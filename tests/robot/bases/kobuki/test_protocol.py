@@ -56,7 +56,7 @@ from robot.bases.kobuki_protocol import (
     wheel_speeds,
 )
 from robot.motion.twist import STILL, Twist
-from tests.robot import damage
+from tests.support import kobuki_damage as damage
 
 # --- Golden frames (kobuki.md 1.4) ---------------------------------------------------------------
 

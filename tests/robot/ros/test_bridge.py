@@ -21,8 +21,8 @@ from robot.motion.twist import STILL, Twist
 from robot.original_topics import OriginalTopics
 from robot.play_gesture import main, play
 from robot.ros.bridge import RETRY_LONGEST_S, Bridge
-from tests.robot.fake_garry import TOKEN, FakeGarry, serve_garry
-from tests.robot.fake_ros import (
+from tests.support.fake_robot_server import TOKEN, FakeGarry, serve_garry
+from tests.support.fake_ros import (
     FakeBase,
     FakeRosbridge,
     ServedRos,
@@ -36,7 +36,7 @@ from tests.wire import Wire
 pytestmark = pytest.mark.realtime
 
 PLAIN = PROFILES["plain"]
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture

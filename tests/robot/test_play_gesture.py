@@ -16,7 +16,7 @@ from robot.bases.twinned import TwinBase
 from robot.motion.gesture import TETHER_M
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.play_gesture import play
-from tests.robot.fake_kobuki import FakeKobuki
+from tests.support.fake_kobuki import FakeKobuki
 
 pytestmark = pytest.mark.realtime
 

@@ -15,7 +15,7 @@ from robot.motion.twist import STILL, Twist
 from robot.original_topics import OriginalTopics
 from robot.play_gesture import play
 from robot.ros.frames import Topic
-from tests.robot.fake_ros import (
+from tests.support.fake_ros import (
     FakeBase,
     FakeRosbridge,
     ServedRos,
@@ -24,7 +24,7 @@ from tests.robot.fake_ros import (
     release,
     wait_until,
 )
-from tests.robot.real_ros import RosMaster, why_missing
+from tests.support.real_ros import RosMaster, why_missing
 from tests.wire import Wire
 
 pytestmark = [pytest.mark.ros, pytest.mark.realtime]
