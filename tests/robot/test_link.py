@@ -20,8 +20,6 @@ from robot.link import (
     Timing,
 )
 
-pytestmark = pytest.mark.realtime
-
 QUICK = Timing(retry_first_s=0.01, retry_longest_s=0.05, close_within_s=0.1)
 HELLO = {"type": "hello", "version": 1}
 
@@ -304,6 +302,7 @@ async def test_a_server_that_hangs_up_before_a_word_is_not_hammered():
     assert losses.pauses_s[:4] == pytest.approx([0.2, 0.4, 0.8, 1.6])
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("talks", [False, True], ids=["listening", "sending"])
 async def test_a_half_open_link_is_noticed(talks):
     greetings = []

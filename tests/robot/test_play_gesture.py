@@ -18,8 +18,6 @@ from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.play_gesture import play
 from tests.support.fake_kobuki import FakeKobuki
 
-pytestmark = pytest.mark.realtime
-
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="no pty")
 ROOT = Path(__file__).parents[2]
 
@@ -56,6 +54,7 @@ def test_a_wrong_command_line(words):
     assert ended.value.code == 2
 
 
+@pytest.mark.realtime
 def test_the_twin_comes_home_in_truth():
     done = subprocess.run(
         [sys.executable, "-m", "robot", "gesture", "celebrate", "--base", "twin", "--json"],
@@ -69,6 +68,7 @@ def test_the_twin_comes_home_in_truth():
     assert 0.05 < played["true_farthest_m"] <= TETHER_M
 
 
+@pytest.mark.realtime
 def test_a_gesture_on_a_twin_with_unequal_wheels():  # the others: tests/bench/test_twin_gestures
     options = ("--left-scale=1.02", "--right-scale=1.005", "--drift-deg-min=2")
     with TwinBase(time.monotonic, *options) as twin:
@@ -77,6 +77,7 @@ def test_a_gesture_on_a_twin_with_unequal_wheels():  # the others: tests/bench/t
     assert is_home(played["true_pose"])
 
 
+@pytest.mark.realtime
 def test_a_bump_ends_it_and_another_one_is_refused():
     with TwinBase(time.monotonic) as twin:
         bump = {"do": "set", "name": "bumper", "value": 2}
@@ -91,6 +92,7 @@ def test_a_bump_ends_it_and_another_one_is_refused():
         assert twin.truth().pose.x_m == pytest.approx(0, abs=0.001)
 
 
+@pytest.mark.realtime
 @POSIX
 def test_a_kobuki_plays_it_announced():
     with FakeKobuki() as kobuki:
@@ -108,6 +110,7 @@ def test_a_kobuki_that_is_not_there_plays_nothing(capsys):
     assert "base_silent" in capsys.readouterr().out
 
 
+@pytest.mark.realtime
 @POSIX
 def test_ctrl_c_stops_a_kobuki():
     with FakeKobuki() as kobuki:

@@ -14,8 +14,6 @@ from robot.motion.twist import STILL
 from robot.worker import Worker
 from tests.support.fake_robot_server import TOKEN, FakeGarry, serve_garry
 
-pytestmark = pytest.mark.realtime
-
 FAST = Timing(retry_first_s=0.02, retry_longest_s=0.1)
 ENDING = REFUSALS.keys() - {NOT_PROTOCOL}  # of the close codes, those that end the work
 
@@ -57,6 +55,7 @@ def is_kind(kind, **parts):
     return lambda report: report["kind"] == kind and parts.items() <= report.items()
 
 
+@pytest.mark.realtime
 async def test_it_says_hello_decides_performs_and_reports(garry):
     async with working(garry):
         await garry.until_hello(1)
@@ -70,6 +69,7 @@ async def test_it_says_hello_decides_performs_and_reports(garry):
         await garry.until(is_kind("gesture", phase="ended", outcome="done"))
 
 
+@pytest.mark.realtime
 async def test_a_stop_is_at_the_base_within_a_tenth_of_a_second(garry):
     base = BASES["kinematic"](time.monotonic)
     async with working(garry, base):
@@ -83,6 +83,7 @@ async def test_a_stop_is_at_the_base_within_a_tenth_of_a_second(garry):
         await garry.until(is_kind("gesture", phase="ended", outcome="stopped"))
 
 
+@pytest.mark.realtime
 async def test_silence_stops_it_and_what_was_on_its_way_counts_no_more(garry):
     base = BASES["kinematic"](time.monotonic)
     said: list[str] = []
@@ -101,6 +102,7 @@ async def test_silence_stops_it_and_what_was_on_its_way_counts_no_more(garry):
     assert any("silent" in line for line in said)
 
 
+@pytest.mark.realtime
 async def test_a_server_that_goes_stops_it_and_is_found_again():
     garry, base = FakeGarry(), BASES["kinematic"](time.monotonic)
     async with serve_garry(garry) as server:
@@ -122,6 +124,7 @@ STANDARD = [1000, 1001, 1002, 1003, 1007, 1008, 1009, 1010, 1011, 1012, 1013, 10
 OURS = [4000, 4001, 4004, 4008, 4009, 4011, 4012, 4029, 4400, 4409, 4410, 4999]
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("code", [None, *STANDARD, *OURS])
 async def test_however_the_server_hangs_up_it_stands_still_until_somebody_orders(garry, code):
     garry.welcome |= {"watched": True}

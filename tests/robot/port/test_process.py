@@ -12,10 +12,7 @@ from robot.port.owner import PortOwner
 from tests.support.fake_kobuki import STOP_FRAME, FakeKobuki
 from tests.support.port_process import Owner, owning
 
-pytestmark = [
-    pytest.mark.realtime,
-    pytest.mark.skipif(sys.platform == "win32", reason="no pty"),
-]
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pty")
 ROOT = Path(__file__).parents[3]
 
 
@@ -30,6 +27,7 @@ def zeros_at_the_end(kobuki):
     return len(speeds) - max((n + 1 for n, speed in enumerate(speeds) if speed), default=0)
 
 
+@pytest.mark.realtime
 def test_it_begins_with_stops_and_pumps_at_50_hz(kobuki):
     with owning(kobuki) as owner:
         assert [speed for _, speed, _ in kobuki.orders[:3]] == [0, 0, 0]
@@ -39,6 +37,7 @@ def test_it_begins_with_stops_and_pumps_at_50_hz(kobuki):
         assert kobuki.bad == 0
 
 
+@pytest.mark.realtime
 def test_stale_orders_stop_it(kobuki):
     with owning(kobuki) as owner:
         owner.drive(0.3)
@@ -47,6 +46,7 @@ def test_stale_orders_stop_it(kobuki):
         assert 0.15 < kobuki.moved_after(since_s) <= 0.35
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("how", ["pipe closes", "SIGTERM", "SIGHUP"])
 def test_its_end_stops_it_three_times(kobuki, how):
     with owning(kobuki) as owner:
@@ -63,6 +63,7 @@ def test_its_end_stops_it_three_times(kobuki, how):
         assert zeros_at_the_end(kobuki) >= 3
 
 
+@pytest.mark.realtime
 def test_ctrl_c_is_for_who_orders(kobuki):
     with owning(kobuki) as owner:
         owner.process.send_signal(signal.SIGINT)
@@ -70,6 +71,7 @@ def test_ctrl_c_is_for_who_orders(kobuki):
         assert kobuki.is_moving
 
 
+@pytest.mark.realtime
 def test_nobody_reads_what_it_hears_and_it_goes_on(kobuki):
     with owning(kobuki) as owner:
         kobuki.noise = bytes(range(256)) * 600  # more than a pipe holds
@@ -79,6 +81,7 @@ def test_nobody_reads_what_it_hears_and_it_goes_on(kobuki):
         assert max(late) < 0.2
 
 
+@pytest.mark.realtime
 def test_a_base_that_takes_nothing_is_lost_and_found():
     with FakeKobuki() as kobuki, owning(kobuki) as owner:
         kobuki.is_flooded = True
@@ -88,6 +91,7 @@ def test_a_base_that_takes_nothing_is_lost_and_found():
         kobuki.until(lambda: not kobuki.is_moving)
 
 
+@pytest.mark.realtime
 def test_any_line_is_counted_and_moves_nothing(kobuki):
     with owning(kobuki) as owner:
         for junk in (b"\n", b"junk\n", b"\xff\x00\n", b"[1]\n", b"9" * 100_000 + b"\n", b"{}\n"):
@@ -100,6 +104,7 @@ def test_any_line_is_counted_and_moves_nothing(kobuki):
         assert kobuki.is_moving
 
 
+@pytest.mark.realtime
 def test_two_programs_on_one_port():
     with FakeKobuki() as kobuki, owning(kobuki) as first:
         second = Owner(kobuki.url)

@@ -33,8 +33,6 @@ from tests.support.fake_ros import (
 )
 from tests.wire import Wire
 
-pytestmark = pytest.mark.realtime
-
 PLAIN = PROFILES["plain"]
 ROOT = Path(__file__).parents[3]
 
@@ -55,6 +53,7 @@ def open_base(url, topics=PLAIN):
     return base
 
 
+@pytest.mark.realtime
 def test_it_drives_stops_and_takes_its_leave(ros):
     with open_base(ros.url) as base:
         assert base.problem == ""
@@ -76,6 +75,7 @@ def test_it_drives_stops_and_takes_its_leave(ros):
     assert base.counters["bridge_openings"] == 1
 
 
+@pytest.mark.realtime
 def test_a_gesture_from_the_command_line(ros, capsys):
     words = ["nod", "--base", "rosbridge", "--ros-robot", "plain", "--ros-url", ros.url, "--json"]
     assert main(words) == 0
@@ -87,6 +87,7 @@ def test_a_gesture_from_the_command_line(ros, capsys):
     assert not ros.robot.is_moving
 
 
+@pytest.mark.realtime
 def test_an_open_loop_says_so_to_people(ros, capsys):
     words = ["nod", "--base", "rosbridge", "--ros-robot", "plain", "--odom-topic", "none"]
     assert main([*words, "--ros-url", ros.url]) == 0
@@ -103,6 +104,7 @@ def test_nobody_there_is_told_with_the_cure(capsys, monkeypatch):
     assert f"No rosbridge answers at {url}" in said.err
 
 
+@pytest.mark.realtime
 def test_a_bridge_that_comes_back_hears_a_stop_first_and_nothing_old(ros):
     with ExitStack() as stack:
         wire = stack.enter_context(Wire(ros.port))
@@ -122,6 +124,7 @@ def test_a_bridge_that_comes_back_hears_a_stop_first_and_nothing_old(ros):
         assert base.counters["refused"] > 0
 
 
+@pytest.mark.realtime
 def test_a_black_hole_is_told_and_stops_it(ros):
     with ExitStack() as stack:
         wire = stack.enter_context(Wire(ros.port))
@@ -142,6 +145,7 @@ def test_a_black_hole_is_told_and_stops_it(ros):
         assert late[1][0] - late[0][0] < 0.05
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize(
     "text",
     [
@@ -217,6 +221,7 @@ def test_a_thread_that_ended_is_a_base_that_is_lost(ros, monkeypatch):
         base.stop()  # never raises
 
 
+@pytest.mark.realtime
 def test_it_stands_still_by_itself_when_whoever_orders_hangs(ros):
     with open_base(ros.url) as base:
         release(base)

@@ -15,10 +15,7 @@ from robot.motion.pose import HOME, Pose
 from robot.motion.twist import STILL, Twist
 from tests.support.fake_kobuki import FakeKobuki
 
-pytestmark = [
-    pytest.mark.realtime,
-    pytest.mark.skipif(sys.platform == "win32", reason="no pty"),
-]
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pty")
 
 TICK_S = 0.02
 
@@ -63,6 +60,7 @@ def owner_of(base):
     return base._client._process.pid
 
 
+@pytest.mark.realtime
 def test_it_begins_at_home_still_and_knows_its_battery(base):
     state = base.read()
     assert (state.pose, state.twist) == (HOME, STILL)
@@ -73,6 +71,7 @@ def test_it_begins_at_home_still_and_knows_its_battery(base):
     assert base.problem == ""
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize(
     "twist",
     [Twist(0.2, 0), Twist(-0.2, 0), Twist(0, 1.5), Twist(0, -1.5), Twist(0.15, -0.8)],
@@ -152,6 +151,7 @@ def test_firmware_that_it_was_not_made_for(version, refusal):
         assert base.read().senses.refusal == refusal
 
 
+@pytest.mark.realtime
 def test_noise_is_counted_and_costs_nothing(kobuki, base):
     for _ in range(10):
         kobuki.noise = bytes.fromhex("AA554D010F") + os.urandom(40)
@@ -168,6 +168,7 @@ def test_a_base_that_falls_silent(kobuki, base):
     until(base, lambda senses: senses.silent_s < 0.1)
 
 
+@pytest.mark.realtime
 def test_a_base_that_is_switched_off_and_on_jumps_nowhere(kobuki, base):
     drive(base, Twist(0.2, 0.5), 0.4)
     there = base.read().pose
@@ -177,6 +178,7 @@ def test_a_base_that_is_switched_off_and_on_jumps_nowhere(kobuki, base):
     assert abs(base.read().pose.heading_rad - there.heading_rad) < 0.05
 
 
+@pytest.mark.realtime
 def test_a_port_that_vanishes_and_comes_back(tmp_path):
     """It comes back stopped, from where it was, and goes on only after an order to stand."""
     port = tmp_path / "kobuki"
@@ -207,6 +209,7 @@ def test_a_port_that_vanishes_and_comes_back(tmp_path):
                 assert again.is_moving
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP], ids=["SIGKILL", "SIGSTOP"])
 def test_a_port_process_that_dies_or_hangs_is_replaced_and_the_base_stopped(kobuki, base, how):
     drive(base, Twist(0.2, 0), 0.3)
@@ -223,6 +226,7 @@ def test_a_port_process_that_dies_or_hangs_is_replaced_and_the_base_stopped(kobu
     assert kobuki.is_moving
 
 
+@pytest.mark.realtime
 def test_leaving_it_stops_it(kobuki):
     with driving(kobuki.url) as base:
         drive(base, Twist(0.2, 0), 0.3)

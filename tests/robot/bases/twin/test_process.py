@@ -24,8 +24,6 @@ from tests.support.twin_bench import (
     whole,
 )
 
-pytestmark = pytest.mark.realtime
-
 
 class Process:
     """`python -m robot twin`, its orders and its answers."""
@@ -71,6 +69,7 @@ def read_all(read, for_s):
     return data
 
 
+@pytest.mark.realtime
 @needs_pty
 def test_a_byte_client_hears_it_at_a_pty(start):
     twin = start()
@@ -99,6 +98,7 @@ def test_a_byte_client_hears_it_at_a_pty(start):
     assert not folder.exists()
 
 
+@pytest.mark.realtime
 def test_a_byte_client_hears_it_at_a_socket(start):
     twin = start("--line", "socket", "--body", "kinematic")
     host, port = twin.port.removeprefix("socket://").split(":")
