@@ -26,37 +26,39 @@ from urllib.parse import urlsplit
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
 
-MAX_FRAME_BYTES = 64 * 1024
+from robot.wire.close_codes import CloseCode
+from robot.wire.limits import MAX_FRAME_BYTES
 
 Message = dict[str, Any]
-
-UNAUTHORIZED = 4001
-NO_SESSION = 4004
-REPLACED = 4009
-NOT_STORED = 4011
-TOO_MANY = 4029
-NOT_PROTOCOL = 4400
-TAKEN = 4409
-ENDED = 4410
 
 # Close code: what to do, for a server that does not say it itself. Dialing in again as it is would
 # not help; after 4009 it would throw the newer socket out, which would dial in again, and so on.
 REFUSALS: dict[int, str] = {
-    UNAUTHORIZED: "The token is missing, wrong or revoked. Make a new one for this device in the "
-    "admin.",
-    NO_SESSION: "There is no such session for this device. Check the address and the station.",
-    REPLACED: "Another program dialed in with the same token. Stop one of them, or give each its "
-    "own device.",
-    NOT_PROTOCOL: "The server does not understand this client. Use the version that fits the "
-    "server.",
-    TAKEN: "The session has another source or robot. Stop that one first.",
-    ENDED: "The session has ended.",
+    CloseCode.UNAUTHORIZED: (
+        "The token is missing, wrong or revoked. Make a new one for this device in the admin."
+    ),
+    CloseCode.NO_SESSION: (
+        "There is no such session for this device. Check the address and the station."
+    ),
+    CloseCode.REPLACED: (
+        "Another program dialed in with the same token. Stop one of them, or give each its own "
+        "device."
+    ),
+    CloseCode.NOT_PROTOCOL: (
+        "The server does not understand this client. Use the version that fits the server."
+    ),
+    CloseCode.BUSY: "The session has another source or robot. Stop that one first.",
+    CloseCode.ENDED: "The session has ended.",
 }
 # After these the server, or what we send, is in trouble that a quick return would make worse.
-_TROUBLE = frozenset({NOT_STORED, TOO_MANY, 1002, 1003, 1007, 1009})
+_TROUBLE = frozenset({CloseCode.NOT_STORED, CloseCode.TOO_MANY, 1002, 1003, 1007, 1009})
 
 # Handshakes that are refused by a status instead of a close code.
-_STATUS_CODES = {401: UNAUTHORIZED, 403: UNAUTHORIZED, 404: NO_SESSION}
+_STATUS_CODES = {
+    401: CloseCode.UNAUTHORIZED,
+    403: CloseCode.UNAUTHORIZED,
+    404: CloseCode.NO_SESSION,
+}
 _PASSING_STATUSES = frozenset({408, 425, 429})
 
 
@@ -280,7 +282,8 @@ class Link:
             kind = message["type"]
         except (ValueError, TypeError, KeyError, RecursionError):
             raise LinkRefused(
-                NOT_PROTOCOL, f"What answers at {self.url} is no GARRY server. Check the address."
+                CloseCode.NOT_PROTOCOL,
+                f"What answers at {self.url} is no GARRY server. Check the address.",
             ) from None
         if kind == "error":
             self._error = str(message.get("message", ""))
@@ -306,16 +309,16 @@ class Link:
         """Say why no connection came about. Raises LinkRefused where none ever will."""
         if isinstance(problem, ssl.SSLCertVerificationError):
             raise LinkRefused(
-                NOT_PROTOCOL,
+                CloseCode.NOT_PROTOCOL,
                 f"The certificate of {self.url} cannot be trusted ({problem.verify_message}). "
                 "Check the address, this computer's date, and the server's certificate.",
             )
         if isinstance(problem, InvalidStatus):
             status = problem.response.status_code
-            code = _STATUS_CODES.get(status, NOT_PROTOCOL)
+            code = _STATUS_CODES.get(status, CloseCode.NOT_PROTOCOL)
             fatal = status < 500 and status not in _PASSING_STATUSES
             # A proxy may answer 404 while the server behind it restarts, but nobody else gives 401.
-            if fatal and (code == UNAUTHORIZED or not self._was_welcome):
+            if fatal and (code == CloseCode.UNAUTHORIZED or not self._was_welcome):
                 cure = REFUSALS[code] if status in _STATUS_CODES else "Check the address."
                 raise LinkRefused(code, f"{self.url} answers with HTTP {status}. {cure}")
             return f"The server answers with HTTP {status}"

@@ -16,7 +16,6 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Any, Self
 
-from robot.behavior.cue import BadMessage, read_number
 from robot.ros.bridge import Bridge
 from robot.ros.frames import (
     Frame,
@@ -30,6 +29,7 @@ from robot.ros.frames import (
     unsubscribe,
 )
 from robot.ros.messages import BOOL, STRING
+from robot.wire.frames import BadFrame, read_number
 
 FEEDBACK_TYPE = Topic("/garry/feedback_type", STRING)
 GOOD_STEP = Topic("/garry/good_step", BOOL)
@@ -75,7 +75,7 @@ class OriginalTalk:
             case {"type": "welcome" | "cue", "valence": str(valence)}:
                 self._valence = valence
             case {"type": "step"}:
-                with suppress(BadMessage):
+                with suppress(BadFrame):
                     a2, goal = (
                         read_number(message, name, -NUMBER_MAX, NUMBER_MAX)
                         for name in ("shown", "goal")

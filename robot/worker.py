@@ -9,9 +9,10 @@ from typing import Any
 
 from robot.bases import MobileBase
 from robot.behavior.performer import NO_LINK, Performer
-from robot.link import NOT_PROTOCOL, Link, LinkRefused, Message
+from robot.link import Link, LinkRefused, Message
 from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
 from robot.original_topics import OriginalTopics
+from robot.wire.close_codes import CloseCode
 
 
 class Worker:
@@ -86,7 +87,7 @@ class Worker:
             except LinkRefused as refusal:
                 # What a server that has welcomed us does not understand, or breaks, does not end
                 # the work. Where it hung up over that, the link is lost like any other.
-                if refusal.code != NOT_PROTOCOL or not self.performer.is_linked:
+                if refusal.code != CloseCode.NOT_PROTOCOL or not self.performer.is_linked:
                     raise
                 self.performer.bad(str(refusal))
                 if not self._link.is_open:

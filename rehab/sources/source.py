@@ -7,8 +7,9 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from rehab.sources.client import WINDOW, Walk
+from rehab.sources.client import Walk
 from rehab.training.steps import Side
+from robot.wire.limits import MAX_STEPS
 
 if TYPE_CHECKING:
     from rehab.sources.intake import Intake, IntakeSettings
@@ -52,7 +53,7 @@ class PlayedSource(Source):
     ``ahead`` is how many strides may be unacknowledged before the next is asked for, at full speed.
     """
 
-    ahead = WINDOW
+    ahead = MAX_STEPS
 
     @abstractmethod
     def open_walk(self, trained_side: Side) -> Walk:

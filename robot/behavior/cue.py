@@ -6,30 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-# What the server stores at most (seconds since 1970 pass, milliseconds do not), and performances
-# that no step has.
-TIME_MAX_S = 1e10
-PERFORMANCE_MAX = 1000.0
-NAME_MAX = 64
+from robot.wire.frames import BadFrame, read_number
+from robot.wire.limits import MAX_CUE_GESTURES, MAX_NAME_CHARS
+
 LEAST_INTENSITY = 0.1
 # A cue of this intensity or less is performed quietly: without sounds, and at this share of every
 # speed and acceleration, so that half as far takes as long (our choice).
 QUIET = 0.5
 QUIET_PACE = 0.5
-
-GESTURES_MAX = 8  # that come along with a cue
-
-
-class BadMessage(ValueError):
-    """A message that is not the protocol; it is counted and has no effect."""
-
-
-def read_number(message: Mapping[str, Any], name: str, low: float, high: float) -> float:
-    """Read a number within bounds. Raises BadMessage."""
-    value = message.get(name)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-        raise BadMessage(f'"{name}" is a number from {low:g} to {high:g}.')
-    return float(value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,15 +45,15 @@ class Cue:
 
     @classmethod
     def read(cls, cue: Any) -> Cue:
-        """Read what the server sends. Raises BadMessage."""
+        """Read what the server sends. Raises BadFrame."""
         if not isinstance(cue, dict):
-            raise BadMessage('"cue" is an object.')
+            raise BadFrame('"cue" is an object.')
         intensity = read_number(cue, "intensity", 0.0, 1.0)
         if 0 < intensity < LEAST_INTENSITY:
-            raise BadMessage(f'"intensity" is 0, or a number from {LEAST_INTENSITY:g} to 1.')
+            raise BadFrame(f'"intensity" is 0, or a number from {LEAST_INTENSITY:g} to 1.')
         gestures = cue.get("gestures", [])
-        if not isinstance(gestures, list) or len(gestures) > GESTURES_MAX:
-            raise BadMessage(f'"gestures" is a list of up to {GESTURES_MAX}.')
+        if not isinstance(gestures, list) or len(gestures) > MAX_CUE_GESTURES:
+            raise BadFrame(f'"gestures" is a list of up to {MAX_CUE_GESTURES}.')
         return cls(
             above=_read_gesture(cue, "above"),
             below=_read_gesture(cue, "below"),
@@ -92,6 +76,8 @@ class Cue:
 
 def _read_gesture(cue: Mapping[str, Any], name: str) -> str | None:
     gesture = cue.get(name)
-    if gesture is not None and not (isinstance(gesture, str) and 0 < len(gesture) <= NAME_MAX):
-        raise BadMessage(f'"{name}" is the name of a gesture, or null.')
+    if gesture is not None and not (
+        isinstance(gesture, str) and 0 < len(gesture) <= MAX_NAME_CHARS
+    ):
+        raise BadFrame(f'"{name}" is the name of a gesture, or null.')
     return gesture

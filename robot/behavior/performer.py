@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from robot.bases import BaseState, MobileBase
-from robot.behavior.cue import PERFORMANCE_MAX, QUIET_PACE, TIME_MAX_S, BadMessage, Cue, read_number
+from robot.behavior.cue import QUIET_PACE, Cue
 from robot.behavior.gesture_library import Repertoire
 from robot.behavior.reports import Report, decision_report, stop_report
 from robot.behavior.safety import ANNOUNCE_S, AWAY, STALLED, STOPPED, Safety
@@ -22,6 +22,8 @@ from robot.motion.gesture import Gesture
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.limits import DEFAULT_LIMITS, Limits
 from robot.motion.player import BAD_ODOMETRY, OUT_OF_TIME, Player
+from robot.wire.frames import BadFrame, read_number
+from robot.wire.limits import PERFORMANCE_MAX, TIME_MAX_S
 
 Message = Mapping[str, Any]
 
@@ -92,7 +94,7 @@ class Performer:
         """Take a message of the server. What is not the protocol is counted and has no effect."""
         try:
             self._take(message, now_s)
-        except BadMessage as problem:
+        except BadFrame as problem:
             self.bad(str(problem))
 
     def bad(self, problem: str) -> None:
@@ -150,7 +152,7 @@ class Performer:
             case "arm":
                 self._arm(now_s)
             case _:
-                raise BadMessage("A robot hears welcome, step, state, cue, stop, arm, heartbeat.")
+                raise BadFrame("A robot hears welcome, step, state, cue, stop, arm, heartbeat.")
 
     def _join(self, message: Message) -> None:
         session = message.get("session")
@@ -159,7 +161,7 @@ class Performer:
         elif isinstance(session, int) and not isinstance(session, bool):
             cue, state = Cue.read(message.get("cue")), message.get("state")
             if not isinstance(state, str) or not isinstance(message.get("stopped", False), bool):
-                raise BadMessage("A welcome says in which state the session is.")
+                raise BadFrame("A welcome says in which state the session is.")
             if session != self._session:
                 self.activation = Activation(cue)
                 self.reports.clear()
@@ -170,7 +172,7 @@ class Performer:
             if message.get("stopped", False):
                 self._stop()
         else:
-            raise BadMessage('"session" is a number, or null.')
+            raise BadFrame('"session" is a number, or null.')
         if session != self._session or not self._is_running:
             self.player.stop(REPLACED)
         self._session, self._is_welcome = session, True
@@ -184,7 +186,7 @@ class Performer:
     def _follow_state(self, message: Message) -> None:
         state = message.get("state")
         if not isinstance(state, str):
-            raise BadMessage('"state" is a text.')
+            raise BadFrame('"state" is a text.')
         self._is_running = state == "running"
         if not self._is_running:
             self.player.stop(state[:16])
@@ -193,7 +195,7 @@ class Performer:
     def _follow_watch(self, message: Message, otherwise: bool) -> None:
         watched = message.get("watched", otherwise)
         if not isinstance(watched, bool):
-            raise BadMessage('"watched" is true or false.')
+            raise BadFrame('"watched" is true or false.')
         self.safety.is_watched = watched
 
     def _stand_still(self, reason: str) -> None:

@@ -22,7 +22,7 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from robot.link import BackOff
 from robot.motion.limits import TICK_S
-from robot.ros.frames import MAX_FRAME_BYTES, BadFrame, Frame, Heard, read_frame, to_text
+from robot.ros.frames import MAX_FRAME_BYTES, BadRosFrame, Frame, Heard, read_frame, to_text
 
 DEFAULT_URL = "ws://127.0.0.1:9090"
 
@@ -44,7 +44,7 @@ class Talk(Protocol):
         """Give what is to be said now."""
 
     def hear(self, heard: Heard, now_s: float) -> None:
-        """Take what came. Raises BadFrame."""
+        """Take what came. Raises BadRosFrame."""
 
     def lose(self, now_s: float) -> None:
         """Take note that the connection is lost."""
@@ -197,7 +197,7 @@ class Bridge:
                     heard = read_frame(text)
                     with self._lock:
                         self._talk.hear(heard, self._monotonic())
-                except BadFrame:
+                except BadRosFrame:
                     self.counters["bridge_bad"] += 1
                 else:
                     self._back_off.reset()

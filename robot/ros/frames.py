@@ -16,7 +16,7 @@ MAX_FRAME_BYTES = 64 * 1024  # an Odometry with its covariances has 2 KiB
 Frame = dict[str, Any]
 
 
-class BadFrame(ValueError):
+class BadRosFrame(ValueError):
     """What came is no frame that would mean something here."""
 
 
@@ -96,11 +96,11 @@ def to_text(frame: Frame) -> str:
 
 
 def read_frame(text: str | bytes) -> Heard:
-    """Read what a bridge said. Raises BadFrame for anything that is neither of the two."""
+    """Read what a bridge said. Raises BadRosFrame for anything that is neither of the two."""
     try:
         frame = json.loads(text)
     except (ValueError, RecursionError):
-        raise BadFrame("A frame is a JSON object.") from None
+        raise BadRosFrame("A frame is a JSON object.") from None
     match frame:
         case {"op": "publish", "topic": str(topic), "msg": dict(message)}:
             return Publication(topic, message)
@@ -108,4 +108,4 @@ def read_frame(text: str | bytes) -> Heard:
             # A failure puts its words where the values would be (kobuki.md 5.4).
             values = rest.get("values") if rest.get("result") is True else None
             return Answer(question, values if isinstance(values, dict) else None)
-    raise BadFrame('A frame that is heard has the "op" publish or service_response.')
+    raise BadRosFrame('A frame that is heard has the "op" publish or service_response.')

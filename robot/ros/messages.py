@@ -12,7 +12,7 @@ from typing import Any
 
 from robot.motion.pose import Pose
 from robot.motion.twist import Twist
-from robot.ros.frames import BadFrame
+from robot.ros.frames import BadRosFrame
 
 TWIST = "geometry_msgs/Twist"
 ODOMETRY = "nav_msgs/Odometry"
@@ -43,17 +43,17 @@ def write_twist(twist: Twist) -> dict[str, Any]:
 
 
 def read_twist(message: Message) -> Twist:
-    """Read a geometry_msgs/Twist. Raises BadFrame."""
+    """Read a geometry_msgs/Twist. Raises BadRosFrame."""
     return Twist(
         _number(message, FASTEST, "linear", "x"), _number(message, FASTEST, "angular", "z")
     )
 
 
 def read_odometry(message: Message) -> tuple[Pose, Twist]:
-    """Read a nav_msgs/Odometry: pose in its own frame, and velocity. Raises BadFrame."""
+    """Read a nav_msgs/Odometry: pose in its own frame, and velocity. Raises BadRosFrame."""
     x, y, z, w = (_number(message, 2.0, "pose", "pose", "orientation", axis) for axis in "xyzw")
     if abs(math.hypot(x, y, z, w) - 1) > 0.1:
-        raise BadFrame("An orientation is a unit quaternion.")
+        raise BadRosFrame("An orientation is a unit quaternion.")
     heading_rad = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     x_m, y_m = (_number(message, FARTHEST_M, "pose", "pose", "position", axis) for axis in "xy")
     twist = Twist(
@@ -64,15 +64,15 @@ def read_odometry(message: Message) -> tuple[Pose, Twist]:
 
 
 def read_event(kind: str, message: Message) -> tuple[int, bool]:
-    """Read an event: which feeler, and whether it feels something. Raises BadFrame."""
+    """Read an event: which feeler, and whether it feels something. Raises BadRosFrame."""
     if kind == BOOL:
         data = message.get("data")
         if not isinstance(data, bool):
-            raise BadFrame('"data" of a Bool is true or false.')
+            raise BadRosFrame('"data" of a Bool is true or false.')
         return 0, data
     which, state = message.get(EVENTS[kind]), message.get("state")
     if type(which) is not int or type(state) is not int or not 0 <= which <= 255:
-        raise BadFrame("An event says which feeler it was, and its state.")
+        raise BadRosFrame("An event says which feeler it was, and its state.")
     return which, state != 0
 
 
@@ -80,7 +80,7 @@ def _number(message: Any, most: float, *path: str) -> float:
     for name in path:
         message = message.get(name) if isinstance(message, dict) else None
     if isinstance(message, bool) or not isinstance(message, (int, float)):
-        raise BadFrame(f"{'.'.join(path)} is a number.")
+        raise BadRosFrame(f"{'.'.join(path)} is a number.")
     if not abs(message) <= most:
-        raise BadFrame(f"{'.'.join(path)} is no number that could be.")
+        raise BadRosFrame(f"{'.'.join(path)} is no number that could be.")
     return float(message)

@@ -11,7 +11,6 @@ from websockets.asyncio.server import serve
 
 from robot.connection_args import CannotDial, check_token, websocket_url
 from robot.link import (
-    MAX_FRAME_BYTES,
     REFUSALS,
     BackOff,
     FrameTooLarge,
@@ -19,6 +18,7 @@ from robot.link import (
     LinkRefused,
     Timing,
 )
+from robot.wire.limits import MAX_FRAME_BYTES
 
 QUICK = Timing(retry_first_s=0.01, retry_longest_s=0.05, close_within_s=0.1)
 HELLO = {"type": "hello", "version": 1}

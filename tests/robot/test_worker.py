@@ -9,13 +9,14 @@ import pytest
 
 from robot.bases import BASES, Abilities, BaseLost
 from robot.bases.kinematic import KinematicBase
-from robot.link import NOT_PROTOCOL, REFUSALS, Link, LinkRefused, Timing
+from robot.link import REFUSALS, Link, LinkRefused, Timing
 from robot.motion.twist import STILL
+from robot.wire.close_codes import CloseCode
 from robot.worker import Worker
 from tests.support.fake_robot_server import TOKEN, FakeGarry, serve_garry
 
 FAST = Timing(retry_first_s=0.02, retry_longest_s=0.1)
-ENDING = REFUSALS.keys() - {NOT_PROTOCOL}  # of the close codes, those that end the work
+ENDING = REFUSALS.keys() - {CloseCode.NOT_PROTOCOL}  # of the close codes, those that end the work
 
 
 class RealBase(KinematicBase):

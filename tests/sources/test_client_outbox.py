@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rehab.sources.client import WINDOW, LiveFeed, Outbox, OutOfStep, UnsendableStride, write_step
+from rehab.sources.client import LiveFeed, Outbox, OutOfStep, UnsendableStride, write_step
 from rehab.training.steps import Measurement, Side
+from robot.wire.limits import MAX_STEPS
 
 
 def stride(number=1, value=4.0, **more):
@@ -122,10 +123,10 @@ def test_an_ack_covers_all_steps_up_to_its_number():
 def test_no_more_than_the_window_is_on_the_way():
     outbox = outbox_with(1000)
 
-    assert take_numbers(outbox) == list(range(1, WINDOW + 1))
+    assert take_numbers(outbox) == list(range(1, MAX_STEPS + 1))
     outbox.acknowledge(10)
-    assert take_numbers(outbox) == list(range(WINDOW + 1, WINDOW + 11))
-    assert outbox.on_the_way == WINDOW
+    assert take_numbers(outbox) == list(range(MAX_STEPS + 1, MAX_STEPS + 11))
+    assert outbox.on_the_way == MAX_STEPS
 
 
 def test_steps_with_much_to_say_are_spread_over_frames():
@@ -241,7 +242,7 @@ def test_whatever_happens_every_step_is_stored_once_and_in_order(happenings):
             case "crash":
                 seen = committed
                 outbox.join(7, seen + 1)
-        assert outbox.on_the_way <= WINDOW
+        assert outbox.on_the_way <= MAX_STEPS
     outbox.join(7, seen + 1)
     while frame := outbox.take():
         deliver(frame)

@@ -8,7 +8,7 @@ from robot.bases.rosbridge.topics import PROFILES, Topics
 from robot.behavior.performer import Performer
 from robot.motion.limits import TICK_S
 from robot.motion.twist import STILL
-from robot.ros.frames import BadFrame, Topic, read_frame, to_text
+from robot.ros.frames import BadRosFrame, Topic, read_frame, to_text
 from tests.support.fake_ros import FakeBase, FakeRosbridge
 from tests.support.robot_stage import CUE, WELCOME
 
@@ -62,7 +62,7 @@ class Stage:
             self.client.take(self.outbox.pop(0))
         self.robot.tell()
         while self.inbox and not self.is_frozen:
-            with suppress(BadFrame):
+            with suppress(BadRosFrame):
                 self.talk.hear(read_frame(self.inbox.pop(0)), self.now_s)
 
     def tell(self, topic, message):

@@ -9,7 +9,6 @@ from rehab.sources.client.client import SourceClient
 from rehab.sources.client.clock import SourceClock
 from rehab.sources.client.live import LiveFeed
 from rehab.sources.client.outbox import (
-    WINDOW,
     Outbox,
     OutOfStep,
     UnsendableStride,
@@ -18,7 +17,6 @@ from rehab.sources.client.outbox import (
 from rehab.sources.client.player import Player, Walk
 
 __all__ = [
-    "WINDOW",
     "LiveFeed",
     "OutOfStep",
     "Outbox",

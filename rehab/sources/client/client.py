@@ -13,7 +13,8 @@ from rehab.sources.client.outbox import Outbox
 from rehab.sources.client.player import Player
 from rehab.sources.client.visit import Visit
 from rehab.training.steps import Measurement
-from robot.link import ENDED, Link, LinkRefused, Message
+from robot.link import Link, LinkRefused, Message
+from robot.wire.close_codes import CloseCode
 
 # Before asking for the station's next session, where the last one's end closed the connection.
 RETURN_S = 1.0
@@ -149,7 +150,7 @@ class SourceClient:
                     self._visit.take(message)
                     self._tell()
             except LinkRefused as refusal:
-                if refusal.code != ENDED or self._outbox.session is None:
+                if refusal.code != CloseCode.ENDED or self._outbox.session is None:
                     raise
                 # Somebody finished the session while steps were on their way.
                 self._visit.is_welcome = False

@@ -7,9 +7,9 @@ import time
 from collections.abc import Callable
 
 from rehab.sources.client.clock import SourceClock
-from rehab.sources.client.outbox import WINDOW
 from rehab.training.phases import Phase, make_phase
 from rehab.training.steps import Measurement, Side
+from robot.wire.limits import MAX_STEPS
 
 # Gives the next stride, walked in that phase; None at the end.
 Walk = Callable[[Phase], Measurement | None]
@@ -34,7 +34,7 @@ class Player:
         self,
         open_walk: Callable[[Side], Walk],
         speed: float | None = 1.0,
-        ahead: int = WINDOW,
+        ahead: int = MAX_STEPS,
         monotonic: Callable[[], float] = time.monotonic,
         *,
         resumes: bool = False,

@@ -13,7 +13,7 @@ from robot.bases.rosbridge.topics import Topics
 from robot.motion.twist import STILL
 from robot.ros.frames import (
     Answer,
-    BadFrame,
+    BadRosFrame,
     Frame,
     Heard,
     Publication,
@@ -93,7 +93,7 @@ class Conversation:
                 yield call_service(PUBLISHERS, {"topic": topic.name}, topic.name)
 
     def hear(self, heard: Heard, now_s: float) -> None:
-        """Take what the bridge said. Raises BadFrame for what cannot be believed."""
+        """Take what the bridge said. Raises BadRosFrame for what cannot be believed."""
         if isinstance(heard, Answer):
             self._take_answer(heard)
             return
@@ -165,7 +165,7 @@ class Conversation:
                 which, is_felt = read_event(topic.kind, heard.message)
                 self.feelers.take(hazard, which, is_felt, now_s)
                 return
-        raise BadFrame("Nobody asked for that topic.")
+        raise BadRosFrame("Nobody asked for that topic.")
 
     def _take_answer(self, answer: Answer) -> None:
         """Take who is at a topic. Where no rosapi runs, nothing is known and nothing refused."""

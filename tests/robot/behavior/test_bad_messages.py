@@ -6,9 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rehab.training.steps import InvalidMeasurement, Measurement, Side
 from robot.motion.limits import TICK_S
 from robot.motion.pose import HOME
 from robot.motion.twist import STILL
+from robot.wire.limits import TIME_MAX_S
 from tests.support.robot_stage import CUE, RealBase, Stage
 
 BAD = [
@@ -48,6 +50,17 @@ def test_what_is_not_the_protocol_is_counted_and_moves_nothing(stage, bad):
     stage.wait(2)
     assert stage.base.read().pose == HOME
     assert stage.of("status")[-1]["bad_messages"] == 1
+
+
+@pytest.mark.parametrize("time_s", [TIME_MAX_S, -TIME_MAX_S, 1.001 * TIME_MAX_S])
+def test_a_robot_takes_the_times_of_all_steps_that_are_stored(stage, time_s):
+    is_stored = True
+    try:
+        Measurement(1, time_s, Side.LEFT, 1.0)
+    except InvalidMeasurement:
+        is_stored = False
+    stage.hear(type="step", time_s=time_s, performance=1.0)
+    assert (stage.robot.bad_messages == 0) is is_stored
 
 
 json_values = st.recursive(

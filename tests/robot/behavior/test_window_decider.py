@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rehab.training import steps as stored
-from robot.behavior.cue import TIME_MAX_S, BadMessage, Cue
+from robot.behavior.cue import Cue
 from robot.behavior.window_decider import (
     LATE,
     NO_GESTURE,
@@ -20,6 +19,7 @@ from robot.behavior.window_decider import (
     Activation,
     Decision,
 )
+from robot.wire.frames import BadFrame
 
 CUE = Cue(above="celebrate", below="droop")
 
@@ -146,10 +146,6 @@ def test_rest_outlasts_a_pause_by_no_more_than_itself_whatever_the_clock(back_s)
     assert activation.obstacle(later, performing=False) == ""
 
 
-def test_the_clocks_of_all_steps_that_are_stored_are_heard():
-    assert TIME_MAX_S == stored.TIME_MAX_S
-
-
 def test_nobody_answers_a_window_of_long_ago():
     activation = Activation(CUE)
     activation.add(0, 1)
@@ -193,7 +189,7 @@ def test_an_order_is_read():
     ids=str,
 )
 def test_what_is_no_order(cue):
-    with pytest.raises(BadMessage):
+    with pytest.raises(BadFrame):
         Cue.read(cue)
 
 

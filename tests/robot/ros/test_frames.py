@@ -11,7 +11,7 @@ from robot.motion.pose import Pose
 from robot.motion.twist import Twist
 from robot.ros.frames import (
     Answer,
-    BadFrame,
+    BadRosFrame,
     Publication,
     Topic,
     advertise,
@@ -116,7 +116,7 @@ def test_what_is_heard(text, heard):
     ids=range(15),
 )
 def test_what_is_no_frame(text):
-    with pytest.raises(BadFrame):
+    with pytest.raises(BadRosFrame):
         read_frame(text)
 
 
@@ -152,14 +152,14 @@ def test_an_odometry_is_read():
     ids=range(11),
 )
 def test_an_odometry_that_cannot_be(message):
-    with pytest.raises(BadFrame):
+    with pytest.raises(BadRosFrame):
         read_odometry(message)
 
 
 def test_an_orientation_of_length_0_is_none():
     message = odometry()
     message["pose"]["pose"]["orientation"] = dict.fromkeys("xyzw", 0.0)
-    with pytest.raises(BadFrame, match="quaternion"):
+    with pytest.raises(BadRosFrame, match="quaternion"):
         read_odometry(message)
 
 
@@ -180,7 +180,7 @@ def test_an_event_is_read(kind, message, event):
 @given(ANYTHING)
 def test_no_message_does_more_than_be_refused(message):
     for read in (read_twist, read_odometry, *(lambda m, k=k: read_event(k, m) for k in EVENTS)):
-        with suppress(BadFrame):
+        with suppress(BadRosFrame):
             read(message if isinstance(message, dict) else {"twist": message, "pose": message})
-    with suppress(BadFrame):
+    with suppress(BadRosFrame):
         read_frame(json.dumps(message))
