@@ -26,7 +26,12 @@ from robot import doctor, play_gesture
 from robot.base_options import add_base_arguments, make_base
 from robot.bases import BadOption, BaseLost, MobileBase
 from robot.bases.twin.__main__ import main as run_twin
-from robot.connection_args import CannotDial, add_dialing_arguments, find_token, websocket_url
+from robot.connection_args import (
+    BadConnectionArgs,
+    add_connection_arguments,
+    find_token,
+    websocket_url,
+)
 from robot.link import Link, LinkRefused
 from robot.original_topics import TOPICS, OriginalTopics
 from robot.worker import Worker
@@ -52,7 +57,7 @@ def make_parser() -> ArgumentParser:
         help="publish on these of the original's topics at the rosbridge, beside any base "
         "(without a name: on all)",
     )
-    add_dialing_arguments(parser)
+    add_connection_arguments(parser)
     return parser
 
 
@@ -132,7 +137,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = make_parser().parse_args(words)
     try:
         return run(options)
-    except (CannotDial, BadOption) as problem:
+    except (BadConnectionArgs, BadOption) as problem:
         say(f"{problem}")
         return UNUSABLE
     except KeyboardInterrupt:

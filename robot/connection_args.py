@@ -8,7 +8,7 @@ from pathlib import Path
 from urllib.parse import urlsplit, urlunsplit
 
 
-class CannotDial(ValueError):
+class BadConnectionArgs(ValueError):
     """An address or a token that cannot be one; the message says what would be."""
 
 
@@ -24,7 +24,7 @@ def websocket_url(server: str, path: str) -> str:
 
     Raises
     ------
-    CannotDial
+    BadConnectionArgs
         For anything else.
     """
     try:
@@ -34,7 +34,7 @@ def websocket_url(server: str, path: str) -> str:
     except (KeyError, ValueError):
         is_server = False
     if not is_server or parts.query or parts.fragment or parts.username is not None:
-        raise CannotDial(
+        raise BadConnectionArgs(
             f"{server!r} is no server address. Write it as http://127.0.0.1:8000, or https://… for "
             "a hosted server."
         )
@@ -42,16 +42,16 @@ def websocket_url(server: str, path: str) -> str:
 
 
 def check_token(token: str) -> str:
-    """Give a token without the blanks around it. Raises CannotDial for what cannot be one."""
+    """Return a token without the blanks around it. Raises BadConnectionArgs."""
     token = token.strip()
     if not token or not token.isascii() or not token.isprintable() or " " in token:
-        raise CannotDial(
+        raise BadConnectionArgs(
             "That is no token. Copy it from the admin page that showed it, as a whole."
         )
     return token
 
 
-def add_dialing_arguments(parser: ArgumentParser | _ArgumentGroup) -> None:
+def add_connection_arguments(parser: ArgumentParser | _ArgumentGroup) -> None:
     """Let a command line name the server, the token, and that a server supervises us."""
     parser.add_argument(
         "--server",
@@ -68,21 +68,32 @@ def add_dialing_arguments(parser: ArgumentParser | _ArgumentGroup) -> None:
 
 
 def find_token(options: Namespace, variable: str, whose: str) -> str:
-    """Give the token of the command line, of its file or of an environment variable.
+    """Return the token of the command line, of its file or of an environment variable.
 
-    Raises CannotDial where there is none, or what there is cannot be one; ``whose`` says who needs
-    it, as in "a robot".
+    Parameters
+    ----------
+    options
+        The command line, with the arguments of ``add_connection_arguments``.
+    variable
+        Name of the environment variable.
+    whose
+        Who needs the token, for the error message: "a robot".
+
+    Raises
+    ------
+    BadConnectionArgs
+        Where there is no token, or what there is cannot be one.
     """
     if options.token_file is not None:
         try:
             return check_token(options.token_file.read_text("utf-8"))
         except (OSError, UnicodeDecodeError) as problem:
-            raise CannotDial(
+            raise BadConnectionArgs(
                 f"The token file {options.token_file} cannot be read: {problem}."
             ) from None
     token = options.token or os.environ.get(variable, "")
     if not token:
-        raise CannotDial(
+        raise BadConnectionArgs(
             f"{whose.capitalize()} needs the token of its device: --token-file FILE, --token "
             f"TOKEN, or {variable} in the environment. Make one in the admin (Devices)."
         )

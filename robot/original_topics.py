@@ -19,7 +19,7 @@ from typing import Any, Self
 from robot.ros.bridge import Bridge
 from robot.ros.frames import (
     Frame,
-    Heard,
+    Incoming,
     Publication,
     Topic,
     advertise,
@@ -52,7 +52,7 @@ LATE_S = 2.0  # what has not come back by then has not arrived
 NUMBER_MAX = 1e6
 
 
-class OriginalTalk:
+class OriginalTopicClient:
     """What is said on the original's topics. Time is told.
 
     Parameters
@@ -106,7 +106,7 @@ class OriginalTalk:
             if now_s - made_s <= FRESH_S:
                 yield self._publish(topic, message, now_s)
 
-    def hear(self, heard: Heard, now_s: float) -> None:
+    def hear(self, heard: Incoming, now_s: float) -> None:
         """Take note of what has come back."""
         if isinstance(heard, Publication):
             self._out.pop(heard.topic, None)
@@ -153,12 +153,12 @@ class OriginalTopics:
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self._url, self._monotonic = url, monotonic
-        self._talk, self._lock = OriginalTalk(names), threading.Lock()
+        self._client, self._lock = OriginalTopicClient(names), threading.Lock()
         self._bridge: Bridge | None = None
 
     def __enter__(self) -> Self:
         """Begin to connect."""
-        self._bridge = Bridge(self._url, self._talk, self._lock, self._monotonic)
+        self._bridge = Bridge(self._url, self._client, self._lock, self._monotonic)
         return self
 
     def __exit__(
@@ -177,18 +177,18 @@ class OriginalTopics:
         if self._bridge is None:
             return ""
         with self._lock:
-            return self._bridge.problem or self._talk.problem(self._monotonic())
+            return self._bridge.problem or self._client.problem(self._monotonic())
 
     def follow(self, message: Mapping[str, Any]) -> None:
         """Publish what a message of the server tells."""
         with self._lock:
-            self._talk.follow(message, self._monotonic())
+            self._client.follow(message, self._monotonic())
         self._wake()
 
     def decide(self, above: bool) -> None:
         """Publish what a window came to."""
         with self._lock:
-            self._talk.decide(above, self._monotonic())
+            self._client.decide(above, self._monotonic())
         self._wake()
 
     def _wake(self) -> None:

@@ -16,7 +16,7 @@ from dataclasses import asdict
 from typing import Any
 
 from robot.base_options import add_base_arguments, make_base
-from robot.bases import BASES, BadOption, BaseLost, MobileBase, Mood
+from robot.bases import BASES, BadOption, BaseLost, Indication, MobileBase
 from robot.behavior.safety import ANNOUNCE_S, AWAY, Safety
 from robot.motion.gesture import Gesture
 from robot.motion.gestures import GESTURES, ORIGINALS
@@ -42,7 +42,7 @@ class VirtualClock:
         self.now_s += span_s
 
 
-def play(
+def play_gesture(
     gesture: Gesture,
     base: MobileBase,
     monotonic: Callable[[], float],
@@ -56,19 +56,23 @@ def play(
     player, safety = Player(DEFAULT_LIMITS), Safety(base.abilities)
     safety.is_watched = True
     state, began_s = base.read(), monotonic()
-    outcome = safety.refuses(gesture) or safety.arm(began_s, state) or safety.obstacle(state)
+    outcome = (
+        safety.rejection_reason(gesture)
+        or safety.arm(began_s, state)
+        or safety.blocking_reason(state)
+    )
     if not outcome and not safety.is_at_home(state):
         outcome = AWAY
     if not outcome:
-        base.show(Mood.MOVING, aloud=True)
+        base.show(Indication.MOVING, aloud=True)
         after_s = ANNOUNCE_S if base.abilities.announces else 0.0
         player.start(gesture.scaled(safety.share), began_s, state.pose, after_s)
-        safety.begin(began_s, state)
+        safety.start_gesture(began_s, state)
     farthest_m = 0.0
     while player.is_busy:
         state, now_s = base.read(), monotonic()
         farthest_m = max(farthest_m, state.pose.distance_m(HOME))
-        found = safety.watch(now_s, state, player.twist, performing=True)
+        found = safety.check(now_s, state, player.twist, performing=True)
         if found:
             player.halt(found)
             base.stop()
@@ -77,11 +81,11 @@ def play(
         sleep(TICK_S)
     took_s = monotonic() - began_s
     outcome = outcome or player.outcome
-    base.show(Mood.READY if outcome == DONE else Mood.STOPPED, aloud=outcome != DONE)
+    base.show(Indication.READY if outcome == DONE else Indication.STOPPED, aloud=outcome != DONE)
     for _ in range(round(REST_S / TICK_S)):
         base.stop()
         sleep(TICK_S)
-    truth = base.truth()
+    truth = base.ground_truth()
     return {
         "gesture": gesture.name,
         "base": base.name,
@@ -95,7 +99,7 @@ def play(
     }
 
 
-def describe(played: dict[str, Any]) -> str:
+def format_result(played: dict[str, Any]) -> str:
     """Say it to people."""
     pose = played["true_pose"] or played["pose"]
     where = f"x {1000 * pose['x_m']:.0f} mm, y {1000 * pose['y_m']:.0f} mm"
@@ -125,8 +129,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         base = make_base(options, monotonic)
         with base:
             for _ in range(options.times):
-                played = play((GESTURES | ORIGINALS)[options.name], base, monotonic, sleep)
-                text = json.dumps(played) if options.json else describe(played)
+                played = play_gesture((GESTURES | ORIGINALS)[options.name], base, monotonic, sleep)
+                text = json.dumps(played) if options.json else format_result(played)
                 sys.stdout.write(f"{text}\n")
                 sys.stdout.flush()
                 outcome = played["outcome"]

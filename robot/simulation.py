@@ -13,20 +13,20 @@ from robot.behavior.performer import Performer
 from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
 
 # Simulated bases that keep to any clock.
-REHEARSED = [
+SIMULATED_BASES = [
     name
     for name, base in BASES.items()
     if base.abilities.simulated and not base.abilities.real_time
 ]
 
 
-class Rehearsal:
+class Simulation:
     """Hears a whole session, one fresh step after the other.
 
     Parameters
     ----------
     base
-        One of ``REHEARSED``.
+        One of ``SIMULATED_BASES``.
     cue
         The session's order to its robot, as the server sends it.
     limits
@@ -51,14 +51,14 @@ class Rehearsal:
         self._performer = Performer(robot, limits)
         self._hear({"type": "welcome", "session": 0, "state": "running", "cue": cue})
         if not self._performer.is_linked:
-            raise ValueError(self._performer.last_bad)
+            raise ValueError(self._performer.last_bad_message)
         self.decisions: list[dict[str, Any]] = []
         self.gestures: list[dict[str, Any]] = []
 
     @property
     def share(self) -> float | None:
         """The share of windows above the threshold."""
-        return self._performer.activation.share
+        return self._performer.decider.share
 
     def walk(self, steps: Iterable[tuple[float, float]]) -> None:
         """Take steps (source time [s], performance), and let the last gesture come to its end."""
@@ -73,7 +73,7 @@ class Rehearsal:
             self._let_pass(TICK_S)
 
     def _hear(self, message: Mapping[str, Any]) -> None:
-        self._performer.hear(message, self._now_s)
+        self._performer.handle(message, self._now_s)
 
     def _let_pass(self, span_s: float) -> None:
         """Let time go by; while nothing moves, in one step."""

@@ -75,7 +75,7 @@ class Worker:
         return {"type": "hello", "version": 1, "base": self._base.name}
 
     def _lose(self, reason: str, pause_s: float) -> None:
-        self.performer.lose(NO_LINK)
+        self.performer.disconnect(NO_LINK)
         self._notice(f"{reason}; standing still, dialing in again in {pause_s:.1f} s.")
 
     async def _listen(self) -> None:
@@ -89,14 +89,14 @@ class Worker:
                 # the work. Where it hung up over that, the link is lost like any other.
                 if refusal.code != CloseCode.NOT_PROTOCOL or not self.performer.is_linked:
                     raise
-                self.performer.bad(str(refusal))
+                self.performer.count_bad_message(str(refusal))
                 if not self._link.is_open:
                     await self._link.pause(str(refusal))
 
     def _hear(self, message: Message) -> None:
         was_linked, bad = self.performer.is_linked, self.performer.bad_messages
         decided = self.performer.decision
-        self.performer.hear(message, self._monotonic())
+        self.performer.handle(message, self._monotonic())
         if self._originals is not None:
             self._originals.follow(message)
             decision = self.performer.decision
@@ -105,7 +105,7 @@ class Worker:
         if self.performer.is_linked and not was_linked:
             self._notice(f"Joined session {message.get('session')}.")
         if self.performer.bad_messages > bad:
-            self._notice(f"A message was not understood: {self.performer.last_bad}")
+            self._notice(f"A message was not understood: {self.performer.last_bad_message}")
         self._reported.set()
 
     async def _drive(self) -> None:

@@ -15,7 +15,7 @@ from rehab.people.models import Patient, User
 from rehab.people.refusals import in_words
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import Cue
-from robot.motion.dry_run import admit_gesture
+from robot.motion.dry_run import validate_gesture
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gestures import GESTURES, ORIGINALS
 
@@ -76,7 +76,7 @@ def find_composed(patient: Patient, cue: Cue) -> Iterator[dict[str, Any]]:
             )
         data = row.to_data()
         try:
-            admit_gesture(data)
+            validate_gesture(data)
         except BadGesture as problem:
             raise InvalidSetting(
                 gettext("Gesture %(name)s: %(problem)s")

@@ -35,7 +35,7 @@ class Abilities:
     announces
         Whether it has lights and sounds, with which it tells that it is about to move.
     real_time
-        Whether it lives by the computer's clock, and so cannot be rehearsed with.
+        Whether it lives by the computer's clock, so it cannot run on a virtual one.
     closed_loop
         Whether it tells where it is. One that does not is reckoned to be where its orders lead.
     bumpers
@@ -50,7 +50,7 @@ class Abilities:
     bumpers: bool = False
 
 
-class Mood(StrEnum):
+class Indication(StrEnum):
     """What a base with lights shows."""
 
     WAITING = "waiting"  # it may not move now
@@ -60,7 +60,7 @@ class Mood(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Senses:
+class SensorState:
     """What a base feels beside its motion. By default nothing is wrong, and nothing known.
 
     Parameters
@@ -97,11 +97,11 @@ class BaseState:
 
     pose: Pose
     twist: Twist
-    senses: Senses = Senses()
+    sensors: SensorState = SensorState()
 
 
 @dataclass(frozen=True, slots=True)
-class Truth:
+class GroundTruth:
     """Where a simulated base really is, seen from home, and how far from it it has been [m]."""
 
     pose: Pose
@@ -173,9 +173,9 @@ class MobileBase(ABC):
     def set_home(self) -> None:
         """Begin odometry anew: this place is home. A simulation is put back to its own home."""
 
-    def truth(self) -> Truth | None:
+    def ground_truth(self) -> GroundTruth | None:
         """Give where it really is, where that can be known: in a simulation."""
         return None
 
-    def show(self, mood: Mood, *, aloud: bool) -> None:  # noqa: B027 (not every base can)
+    def show(self, indication: Indication, *, aloud: bool) -> None:  # noqa: B027 (not every base can)
         """Show by lights, and by a sound where it is ``aloud``, what it is about. Never raises."""

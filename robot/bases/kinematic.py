@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import ClassVar
 
-from robot.bases.base import Abilities, BaseState, MobileBase, Truth
+from robot.bases.base import Abilities, BaseState, GroundTruth, MobileBase
 from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, ORDER_HOLDS_S, Limits
 from robot.motion.pose import HOME, advance
 from robot.motion.twist import STILL, Twist
@@ -46,9 +46,9 @@ class KinematicBase(MobileBase):
         self.stop()
         self._pose, self._farthest_m = HOME, 0.0
 
-    def truth(self) -> Truth:
+    def ground_truth(self) -> GroundTruth:
         """Give where it is: its odometry is the truth."""
-        return Truth(self.read().pose, self._farthest_m)
+        return GroundTruth(self.read().pose, self._farthest_m)
 
     def _move(self) -> None:
         """Bring it to where it is now; no further than its last order held."""

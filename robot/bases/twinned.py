@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import Any, ClassVar, Self
 
-from robot.bases.base import Abilities, BaseLost, Truth
+from robot.bases.base import Abilities, BaseLost, GroundTruth
 from robot.bases.kobuki import KobukiBase
 from robot.motion.pose import Pose
 
@@ -67,10 +67,10 @@ class TwinBase(KobukiBase):
         self.ask({"do": "carry_home"})
         super().set_home()
 
-    def truth(self) -> Truth:
+    def ground_truth(self) -> GroundTruth:
         """Give where it really is, and how far from home it has been since the last look."""
         seen = self.ask({"do": "look"})
-        return Truth(Pose(**seen["pose"]), seen["farthest_m"])
+        return GroundTruth(Pose(**seen["pose"]), seen["farthest_m"])
 
     def ask(self, order: Mapping[str, Any]) -> dict[str, Any]:
         """Do something to the twin, and give its answer. Raises BaseLost, and ValueError."""

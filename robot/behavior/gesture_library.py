@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from robot.motion.dry_run import admit_gesture
+from robot.motion.dry_run import validate_gesture
 from robot.motion.gesture import Gesture
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gestures import GESTURES, ORIGINALS
@@ -16,7 +16,7 @@ UNKNOWN_GESTURE = "unknown_gesture"
 BAD_GESTURE = "bad_gesture"  # it came along, and no base may perform it
 
 
-class Repertoire:
+class GestureLibrary:
     """Gestures by name.
 
     Parameters
@@ -27,21 +27,21 @@ class Repertoire:
         Speeds and accelerations that a gesture has to do with.
     """
 
-    def __init__(self, own: Mapping[str, Gesture], limits: Limits) -> None:
-        self.own = own
+    def __init__(self, builtin: Mapping[str, Gesture], limits: Limits) -> None:
+        self.builtin = builtin
         self._limits = limits
-        self._came: dict[str, Gesture | None] = {}  # None: refused
+        self._received: dict[str, Gesture | None] = {}  # None: refused
 
-    def take(self, gestures: Iterable[Any]) -> list[str]:
+    def replace_received(self, gestures: Iterable[Any]) -> list[str]:
         """Take what came along instead of what came before; give what is wrong with the refused.
 
         Nobody's word counts: each is read, checked and tried here.
         """
-        self._came, problems = {}, []
+        self._received, problems = {}, []
         for data in gestures:
             try:
-                gesture = admit_gesture(data, self._limits)
-                if gesture.name in self.own:
+                gesture = validate_gesture(data, self._limits)
+                if gesture.name in self.builtin:
                     raise BadGesture(
                         "This robot has a gesture {name} of its own.", name=gesture.name
                     )
@@ -49,16 +49,16 @@ class Repertoire:
                 name = data.get("name") if isinstance(data, dict) else None
                 # A name that every robot knows means that gesture, whatever else comes under it.
                 if isinstance(name, str) and name not in GESTURES and name not in ORIGINALS:
-                    self._came[name] = None
+                    self._received[name] = None
                 problems.append(f"gesture {name}: {problem}")
             else:
-                self._came[gesture.name] = gesture
+                self._received[gesture.name] = gesture
         return problems
 
     def find(self, name: str) -> tuple[Gesture | None, str]:
         """Give the gesture of that name, or why there is none."""
-        if name in self._came:
-            gesture = self._came[name]
+        if name in self._received:
+            gesture = self._received[name]
             return gesture, "" if gesture else BAD_GESTURE
-        gesture = self.own.get(name)
+        gesture = self.builtin.get(name)
         return gesture, "" if gesture else UNKNOWN_GESTURE

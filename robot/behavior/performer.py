@@ -13,11 +13,11 @@ from typing import Any
 
 from robot.bases import BaseState, MobileBase
 from robot.behavior.cue import QUIET_PACE, Cue
-from robot.behavior.gesture_library import Repertoire
+from robot.behavior.gesture_library import GestureLibrary
 from robot.behavior.reports import Report, decision_report, stop_report
 from robot.behavior.safety import ANNOUNCE_S, AWAY, STALLED, STOPPED, Safety
-from robot.behavior.status import Voice
-from robot.behavior.window_decider import Activation, Decision
+from robot.behavior.status import StatusReporter
+from robot.behavior.window_decider import Decision, WindowDecider
 from robot.motion.gesture import Gesture
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.limits import DEFAULT_LIMITS, Limits
@@ -56,7 +56,7 @@ class Performer:
     ----------
     decision
         The newest decision; None before there was one.
-    bad_messages, last_bad
+    bad_messages, last_bad_message
         How many messages were not the protocol, and what was wrong with the last one.
     """
 
@@ -68,12 +68,12 @@ class Performer:
     ) -> None:
         self.base = base
         self.player = Player(limits)
-        self.repertoire = Repertoire(gestures, limits)
-        self.activation = Activation(Cue())
-        self.voice = Voice(base)
+        self.gestures = GestureLibrary(gestures, limits)
+        self.decider = WindowDecider(Cue())
+        self.status = StatusReporter(base)
         self.decision: Decision | None = None
         self.bad_messages = 0
-        self.last_bad = ""
+        self.last_bad_message = ""
         self.safety = Safety(base.abilities)
         self._session: int | None = None
         self._is_welcome = False  # on this connection; nothing before it counts
@@ -83,58 +83,58 @@ class Performer:
     @property
     def reports(self) -> deque[Report]:
         """What is to be sent, oldest first; whoever sends takes them from the left."""
-        return self.voice.reports
+        return self.status.reports
 
     @property
     def is_linked(self) -> bool:
         """Whether the server has welcomed it and is heard."""
         return self._is_welcome
 
-    def hear(self, message: Message, now_s: float) -> None:
+    def handle(self, message: Message, now_s: float) -> None:
         """Take a message of the server. What is not the protocol is counted and has no effect."""
         try:
-            self._take(message, now_s)
+            self._dispatch(message, now_s)
         except BadFrame as problem:
-            self.bad(str(problem))
+            self.count_bad_message(str(problem))
 
-    def bad(self, problem: str) -> None:
+    def count_bad_message(self, problem: str) -> None:
         """Count something that was not the protocol."""
         self.bad_messages += 1
-        self.last_bad = problem
+        self.last_bad_message = problem
 
-    def lose(self, reason: str) -> None:
+    def disconnect(self, reason: str) -> None:
         """Stand still at once: the server is not heard any more. A real base is disarmed."""
         self._is_welcome = self._is_running = False
-        self.voice.fall_silent()
-        self.safety.lose()
-        self._stand_still(reason)
-        self.activation.forget()
+        self.status.reset()
+        self.safety.disconnect()
+        self._halt(reason)
+        self.decider.drop_window()
 
     def tick(self, now_s: float) -> None:
         """Order what is to be ordered now; to be called 50 times a second. Raises BaseLost."""
         # Without a session it does not move, and nobody gives signs of life.
         if self._session is not None and self._is_welcome and now_s - self._heard_s > SILENCE_S:
-            self.lose(NO_LINK)
+            self.disconnect(NO_LINK)
         state, player = self.base.read(), self.player
-        found = self.safety.watch(now_s, state, player.twist, performing=player.is_busy)
+        found = self.safety.check(now_s, state, player.twist, performing=player.is_busy)
         if found:
-            self._stop_itself(found)
+            self._stop_for(found)
         was = player.gesture
         self.base.drive(player.step(now_s, state.pose))
         if was is not None and not player.is_busy:
-            self.voice.tell_gesture(was, "ended", player.outcome)
+            self.status.report_gesture(was, "ended", player.outcome)
             if player.outcome in (OUT_OF_TIME, BAD_ODOMETRY):
                 # What did not get there is held or blocked, and would be again in a moment.
-                self.safety.fail(STALLED, now_s)
-                self._stop_itself(STALLED)
-        self._tell(now_s, state)
+                self.safety.latch_fault(STALLED, now_s)
+                self._stop_for(STALLED)
+        self._report(now_s, state)
 
-    def _take(self, message: Message, now_s: float) -> None:
+    def _dispatch(self, message: Message, now_s: float) -> None:
         kind = message.get("type")
         if kind == "welcome":
-            self._join(message)
+            self._handle_welcome(message)
         elif kind == "stop":  # whenever it comes, from whichever connection
-            self._stop()
+            self._handle_stop()
         elif not self._is_welcome:
             return  # left over from a connection that was lost
         self._heard_s = now_s
@@ -142,19 +142,19 @@ class Performer:
             case "welcome" | "stop" | "error":
                 pass
             case "heartbeat":
-                self._follow_watch(message, self.safety.is_watched)
+                self._handle_watched(message, self.safety.is_watched)
             case "step":
-                self._walk(message, now_s)
+                self._handle_step(message, now_s)
             case "state":
-                self._follow_state(message)
+                self._handle_state(message)
             case "cue":
-                self._follow_cue(Cue.read(message.get("cue")))
+                self._set_cue(Cue.read(message.get("cue")))
             case "arm":
-                self._arm(now_s)
+                self._handle_arm(now_s)
             case _:
                 raise BadFrame("A robot hears welcome, step, state, cue, stop, arm, heartbeat.")
 
-    def _join(self, message: Message) -> None:
+    def _handle_welcome(self, message: Message) -> None:
         session = message.get("session")
         if session is None:
             self._is_running = False
@@ -163,108 +163,108 @@ class Performer:
             if not isinstance(state, str) or not isinstance(message.get("stopped", False), bool):
                 raise BadFrame("A welcome says in which state the session is.")
             if session != self._session:
-                self.activation = Activation(cue)
+                self.decider = WindowDecider(cue)
                 self.reports.clear()
-            self._follow_cue(cue)
-            self.activation.forget()
+            self._set_cue(cue)
+            self.decider.drop_window()
             self._is_running = state == "running"
-            self._follow_watch(message, False)
+            self._handle_watched(message, False)
             if message.get("stopped", False):
-                self._stop()
+                self._handle_stop()
         else:
             raise BadFrame('"session" is a number, or null.')
         if session != self._session or not self._is_running:
             self.player.stop(REPLACED)
         self._session, self._is_welcome = session, True
 
-    def _follow_cue(self, cue: Cue) -> None:
+    def _set_cue(self, cue: Cue) -> None:
         """Take an order, with the gestures that came along."""
-        for problem in self.repertoire.take(cue.gestures):
-            self.bad(problem)
-        self.activation.follow(cue)
+        for problem in self.gestures.replace_received(cue.gestures):
+            self.count_bad_message(problem)
+        self.decider.set_cue(cue)
 
-    def _follow_state(self, message: Message) -> None:
+    def _handle_state(self, message: Message) -> None:
         state = message.get("state")
         if not isinstance(state, str):
             raise BadFrame('"state" is a text.')
         self._is_running = state == "running"
         if not self._is_running:
             self.player.stop(state[:16])
-            self.activation.forget()
+            self.decider.drop_window()
 
-    def _follow_watch(self, message: Message, otherwise: bool) -> None:
+    def _handle_watched(self, message: Message, otherwise: bool) -> None:
         watched = message.get("watched", otherwise)
         if not isinstance(watched, bool):
             raise BadFrame('"watched" is true or false.')
         self.safety.is_watched = watched
 
-    def _stand_still(self, reason: str) -> None:
+    def _halt(self, reason: str) -> None:
         gesture = self.player.gesture
         self.player.halt(reason)
         self.base.stop()
         if gesture is not None:
-            self.voice.tell_gesture(gesture, "ended", self.player.outcome)
+            self.status.report_gesture(gesture, "ended", self.player.outcome)
 
-    def _stop(self) -> None:
+    def _handle_stop(self) -> None:
         """Follow a person's stop."""
         self.safety.stop(STOPPED)
-        self._stand_still(STOPPED)
+        self._halt(STOPPED)
 
-    def _stop_itself(self, reason: str) -> None:
+    def _stop_for(self, reason: str) -> None:
         """Stand still for a reason of its own, and have it stay so."""
-        self._stand_still(reason)
+        self._halt(reason)
         self.reports.append(stop_report(reason))
 
-    def _arm(self, now_s: float) -> None:
+    def _handle_arm(self, now_s: float) -> None:
         """Let it move again, from where it stands: that is home now."""
         problem = self.safety.arm(now_s, self.base.read())
         if problem:
-            self._stop_itself(problem)
+            self._stop_for(problem)
         elif not self.player.is_busy:
             self.base.set_home()
 
-    def _walk(self, message: Message, now_s: float) -> None:
+    def _handle_step(self, message: Message, now_s: float) -> None:
         time_s = read_number(message, "time_s", -TIME_MAX_S, TIME_MAX_S)
         performance = read_number(message, "performance", -PERFORMANCE_MAX, PERFORMANCE_MAX)
         if not self._is_running:
             return
-        decision = self.activation.add(time_s, performance)
+        decision = self.decider.add(time_s, performance)
         if decision is not None:
             self.decision = decision
-            self._answer(decision, now_s)
+            self._respond(decision, now_s)
 
-    def _answer(self, decision: Decision, now_s: float) -> None:
+    def _respond(self, decision: Decision, now_s: float) -> None:
         """Report a decision, and start the gesture that follows from it."""
-        state, cue = self.base.read(), self.activation.cue
-        name, share = cue.gesture(decision.above), self.activation.share
-        reason = self.activation.obstacle(decision, performing=self.player.is_busy)
+        state, cue = self.base.read(), self.decider.cue
+        name, share = cue.gesture(decision.above), self.decider.share
+        reason = self.decider.blocking_reason(decision, performing=self.player.is_busy)
         gesture = None
         if not reason and name is not None:
-            gesture, reason = self.repertoire.find(name)
+            gesture, reason = self.gestures.find(name)
         if gesture is not None:
-            reason = self._obstacle(gesture, state)
+            reason = self._blocking_reason(gesture, state)
         if reason or gesture is None:
             self.reports.append(decision_report(decision, None, None, reason, share))
             return
         # What replicates the paper does the same every time.
-        vigor = 1.0 if gesture.name in ORIGINALS else decision.vigor
-        intensity = round(cue.intensity * vigor * self.safety.share, 3)
+        strength = 1.0 if gesture.name in ORIGINALS else decision.strength
+        intensity = round(cue.intensity * strength * self.safety.share, 3)
         self.reports.append(decision_report(decision, gesture.name, intensity, "", share))
         after_s = ANNOUNCE_S if self.base.abilities.announces else 0.0
         pose = self.base.read().pose  # a simulated base may have been put back
         pace = QUIET_PACE if cue.is_quiet else 1.0
         self.player.start(gesture.scaled(intensity), now_s, pose, after_s, pace)
-        self.safety.begin(now_s, state)
-        self.activation.started(decision)
-        self.voice.tell_gesture(gesture, "started", "")
+        self.safety.start_gesture(now_s, state)
+        self.decider.mark_started(decision)
+        self.status.report_gesture(gesture, "started", "")
 
-    def _obstacle(self, gesture: Gesture, state: BaseState) -> str:
+    def _blocking_reason(self, gesture: Gesture, state: BaseState) -> str:
         """Say what keeps the base from performing a gesture; nothing where it may."""
         if not self.base.abilities.moves:
             return CANNOT_MOVE
-        if reason := self.safety.refuses(gesture):
+        if reason := self.safety.rejection_reason(gesture):
             return reason
-        if reason := self.safety.obstacle(state):
+        if reason := self.safety.blocking_reason(state):
             return reason
         if not self.safety.is_at_home(state):
             if not self.base.abilities.simulated:
@@ -274,7 +274,7 @@ class Performer:
 
     def _state(self, there: BaseState) -> tuple[str, str]:
         """Give the robot's state and why it would not perform now."""
-        reason = self.safety.obstacle(there)
+        reason = self.safety.blocking_reason(there)
         if self.safety.latch:
             return "stopped", reason
         if not self.safety.is_armed:
@@ -285,10 +285,12 @@ class Performer:
             return "idle", NO_SESSION
         return "idle", reason if self._is_running else NOT_RUNNING
 
-    def _tell(self, now_s: float, there: BaseState) -> None:
+    def _report(self, now_s: float, there: BaseState) -> None:
         """Show people what it is about, and report it to a server that hears it."""
         state, player = self._state(there), self.player
-        self.voice.show(state, is_quiet=self.activation.cue.is_quiet)
+        self.status.show(state, is_quiet=self.decider.cue.is_quiet)
         if self._is_welcome:
             counts = {"refused_arms": self.safety.refused_arms, **self.base.counters}
-            self.voice.tell_status(now_s, state, there, player.gesture, self.bad_messages, counts)
+            self.status.report_status(
+                now_s, state, there, player.gesture, self.bad_messages, counts
+            )

@@ -35,7 +35,7 @@ def status_report(
         "gesture": gesture,
         "pose": {"x_m": pose.x_m, "y_m": pose.y_m, "heading_rad": pose.heading_rad},
         "reason": reason,
-        "battery_v": there.senses.battery_v,
+        "battery_v": there.sensors.battery_v,
         "battery_share": battery_share,
         "battery_low": is_low,
         "bad_messages": bad_messages,

@@ -119,12 +119,12 @@ class Safety:
         self.latch = self.latch or reason
         self._felt_s = None
 
-    def fail(self, reason: str, now_s: float) -> None:
+    def latch_fault(self, reason: str, now_s: float) -> None:
         """Latch for a reason that the robot itself found."""
         if not self.latch:
             self.latch, self._felt_s = reason, now_s
 
-    def lose(self) -> None:
+    def disconnect(self) -> None:
         """Forget what the server said: a real base has to be armed anew."""
         self.is_armed, self.is_watched = self._abilities.simulated, False
 
@@ -133,24 +133,24 @@ class Safety:
 
         What stopped it has to be over. A gesture that was stopped is not taken up again.
         """
-        reason = self._unfit(state)
+        reason = self._base_fault(state)
         if not reason and self._felt_s is not None and now_s - self._felt_s < SEEN_S:
             reason = self.latch
         if reason:
             self.refused_arms += 1
-            self.fail(reason, now_s)
+            self.latch_fault(reason, now_s)
             return reason
         self.latch, self._felt_s, self.is_armed = "", None, True
         self._begun = 0
         self._since.clear()
         return ""
 
-    def begin(self, now_s: float, state: BaseState) -> None:
+    def start_gesture(self, now_s: float, state: BaseState) -> None:
         """Note that a gesture begins here and now."""
-        self._looked_s, self._slip_rad = now_s, state.senses.slip_rad
+        self._looked_s, self._slip_rad = now_s, state.sensors.slip_rad
         self._begun += 1
 
-    def watch(self, now_s: float, state: BaseState, ordered: Twist, *, performing: bool) -> str:
+    def check(self, now_s: float, state: BaseState, ordered: Twist, *, performing: bool) -> str:
         """Look at the base; give the code of what must stop it now, or nothing.
 
         Parameters
@@ -166,25 +166,25 @@ class Safety:
         """
         elapsed_s = 0.0 if self._looked_s is None else now_s - self._looked_s
         self._looked_s = now_s
-        found = next(self._dangers(now_s, state, ordered, performing, elapsed_s), "")
+        found = next(self._faults(now_s, state, ordered, performing, elapsed_s), "")
         if self.latch or not (found == BUTTON or self.is_armed):
             return ""
         if found:
-            self.fail(found, now_s)
+            self.latch_fault(found, now_s)
         return found
 
-    def obstacle(self, state: BaseState) -> str:
+    def blocking_reason(self, state: BaseState) -> str:
         """Say why no gesture may start now; nothing where one may."""
-        senses, is_real = state.senses, not self._abilities.simulated
+        sensors, is_real = state.sensors, not self._abilities.simulated
         if self.latch:
             return self.latch
-        if reason := self._unfit(state):
+        if reason := self._base_fault(state):
             return reason
         if not self.is_armed:
             return DISARMED
-        if senses.is_charging:
+        if sensors.is_charging:
             return CHARGING
-        if self._is_battery_low(senses.battery_v):
+        if self._is_battery_low(sensors.battery_v):
             return BATTERY_LOW
         if is_real and not self.is_watched:
             return UNWATCHED
@@ -197,7 +197,7 @@ class Safety:
         """The share of a gesture's size that the base may perform."""
         return 1.0 if self._abilities.closed_loop else OPEN_LOOP_SHARE
 
-    def refuses(self, gesture: Gesture) -> str:
+    def rejection_reason(self, gesture: Gesture) -> str:
         """Say why the base cannot perform a gesture safely; nothing where it can."""
         is_long = not self._abilities.closed_loop and gesture.least_s > OPEN_LOOP_S
         return OPEN_LOOP if is_long else ""
@@ -208,20 +208,20 @@ class Safety:
         pose = state.pose
         return pose.distance_m(HOME) <= AT_HOME_M and pose.turn_rad(HOME) <= AT_HOME_RAD
 
-    def _unfit(self, state: BaseState) -> str:
+    def _base_fault(self, state: BaseState) -> str:
         """Say what keeps the base itself from moving."""
-        senses = state.senses
-        if senses.silent_s > BASE_SILENT_S:
+        sensors = state.sensors
+        if sensors.silent_s > BASE_SILENT_S:
             return BASE_SILENT
-        if senses.stop_pressed:
+        if sensors.stop_pressed:
             return BUTTON
-        return senses.refusal or min(senses.hazards, default="")
+        return sensors.refusal or min(sensors.hazards, default="")
 
-    def _dangers(
+    def _faults(
         self, now_s: float, state: BaseState, ordered: Twist, performing: bool, elapsed_s: float
     ) -> Iterator[str]:
         """Give the codes of all that is wrong, the plainest first."""
-        if reason := self._unfit(state):
+        if reason := self._base_fault(state):
             yield reason
         if performing and elapsed_s > LAPSED_S:
             yield LAPSED
@@ -231,9 +231,9 @@ class Safety:
         astray_m_s += HALF_TRACK_M * abs(ordered.w_rad_s - state.twist.w_rad_s)
         if self._has_held(STALLED, performing and astray_m_s > ASTRAY_M_S, now_s, ASTRAY_S):
             yield STALLED
-        if performing and abs(state.senses.slip_rad - self._slip_rad) > SLIP_RAD:
+        if performing and abs(state.sensors.slip_rad - self._slip_rad) > SLIP_RAD:
             yield SLIPPED
-        battery_v = state.senses.battery_v
+        battery_v = state.sensors.battery_v
         is_empty = battery_v is not None and battery_v < BATTERY_EMPTY_V
         if self._has_held(BATTERY_EMPTY, is_empty, now_s, EMPTY_S):
             yield BATTERY_EMPTY

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 
-from robot.bases import BaseState, MobileBase, Mood
+from robot.bases import BaseState, Indication, MobileBase
 from robot.behavior.reports import Report, gesture_report, status_report
 from robot.behavior.safety import BATTERY_WARN_V, battery_share
 from robot.motion.gesture import Gesture
@@ -17,7 +17,7 @@ REPORTS_KEPT = 64  # while nobody fetches them the oldest are dropped: what is p
 State = tuple[str, str]  # the robot's state, and why it would not perform now
 
 
-class Voice:
+class StatusReporter:
     """Keeps reports until somebody sends them, and says everything once.
 
     Parameters
@@ -36,18 +36,18 @@ class Voice:
         self._base = base
         self._told_s: float | None = None  # the last status
         self._told: State | None = None
-        self._mood: Mood | None = None
+        self._indication: Indication | None = None
 
-    def fall_silent(self) -> None:
+    def reset(self) -> None:
         """Take it that nobody has heard anything: the next status is due at once."""
         self._told_s = None
 
-    def tell_gesture(self, gesture: Gesture, phase: str, outcome: str) -> None:
+    def report_gesture(self, gesture: Gesture, phase: str, outcome: str) -> None:
         """Report that a gesture has started or ended."""
         is_open = not self._base.abilities.closed_loop
         self.reports.append(gesture_report(gesture.name, phase, outcome, open_loop=is_open))
 
-    def tell_status(
+    def report_status(
         self,
         now_s: float,
         state: State,
@@ -63,7 +63,7 @@ class Voice:
             return
         self._told_s, self._told = now_s, state
         name = None if gesture is None else gesture.name
-        volts = there.senses.battery_v
+        volts = there.sensors.battery_v
         battery = (None, False) if volts is None else (battery_share(volts), volts < BATTERY_WARN_V)
         self.reports.append(
             status_report(self._base, *state, name, there, battery, bad_messages, counters)
@@ -73,13 +73,16 @@ class Voice:
         """Tell by the base's lights what it is about; sounds only where they are wanted."""
         match state:
             case "stopped", _:
-                mood = Mood.STOPPED
+                indication = Indication.STOPPED
             case "performing", _:
-                mood = Mood.MOVING
+                indication = Indication.MOVING
             case "idle", "":
-                mood = Mood.READY
+                indication = Indication.READY
             case _:
-                mood = Mood.WAITING
-        if mood is not self._mood:
-            self._mood = mood
-            self._base.show(mood, aloud=not is_quiet and mood in (Mood.MOVING, Mood.STOPPED))
+                indication = Indication.WAITING
+        if indication is not self._indication:
+            self._indication = indication
+            self._base.show(
+                indication,
+                aloud=not is_quiet and indication in (Indication.MOVING, Indication.STOPPED),
+            )

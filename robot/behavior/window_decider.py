@@ -44,7 +44,7 @@ class Decision:
         return self.at_s - self.until_s > self.until_s - self.from_s
 
     @property
-    def vigor(self) -> float:
+    def strength(self) -> float:
         """The share of the cue's intensity that answers it, ``FAINT`` to 1.
 
         Above the threshold it grows with the mean performance; a window below never makes it grow.
@@ -55,7 +55,7 @@ class Decision:
         return FAINT + (1 - FAINT) * grown
 
 
-class Activation:
+class WindowDecider:
     """Sorts steps into windows, and says when a gesture may start.
 
     Windows are counted from the first step: the one with the number k has the steps of which
@@ -68,23 +68,23 @@ class Activation:
         self.windows = 0  # those with a decision
         self.activated = 0  # those above
         self._started_s: float | None = None  # when the last gesture started
-        self.forget()
+        self.drop_window()
 
     @property
     def share(self) -> float | None:
         """The share of windows that were above; None before there was one."""
         return self.activated / self.windows if self.windows else None
 
-    def forget(self) -> None:
+    def drop_window(self) -> None:
         """Drop the window that is open: some of its steps are missing."""
         self._first_s: float | None = None
         self._window = 0
         self._steps, self._sum = 0, 0.0
 
-    def follow(self, cue: Cue) -> None:
+    def set_cue(self, cue: Cue) -> None:
         """Take another order, from the window on that is open."""
         if cue.window_s != self.cue.window_s:
-            self.forget()
+            self.drop_window()
         self.cue = cue
 
     def add(self, time_s: float, performance: float) -> Decision | None:
@@ -103,7 +103,7 @@ class Activation:
                 self._started_s = time_s  # set back meanwhile: nobody knows how long ago it was
         window = math.floor((time_s - self._first_s) / self.cue.window_s)
         if window < self._window:
-            self.forget()
+            self.drop_window()
             self._first_s, window = time_s, 0
             if self._started_s is not None:
                 self._started_s = time_s
@@ -133,7 +133,7 @@ class Activation:
             above=above,
         )
 
-    def obstacle(self, decision: Decision, *, performing: bool) -> str:
+    def blocking_reason(self, decision: Decision, *, performing: bool) -> str:
         """Say why no gesture may follow a decision now; nothing where one may.
 
         Parameters
@@ -155,6 +155,6 @@ class Activation:
             return RESTING
         return ""
 
-    def started(self, decision: Decision) -> None:
+    def mark_started(self, decision: Decision) -> None:
         """Note that a gesture answers this decision."""
         self._started_s = decision.at_s

@@ -8,7 +8,7 @@ from typing import Any
 
 from robot.motion.gesture import TETHER_M, Gesture
 from robot.motion.gesture_errors import BadGesture, Marked
-from robot.motion.gesture_spec import read_gesture
+from robot.motion.gesture_spec import parse_gesture
 from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
 from robot.motion.player import DONE, Player
 from robot.motion.pose import HOME, Pose, advance
@@ -19,7 +19,7 @@ END_RAD = 0.035
 
 
 @dataclass(frozen=True, slots=True)
-class Trial:
+class DryRun:
     """How it went: the outcome, the time it took [s], and where the base was at every tick."""
 
     outcome: str
@@ -32,27 +32,27 @@ class Trial:
         return max(pose.distance_m(HOME) for pose in self.way)
 
 
-def try_gesture(gesture: Gesture, limits: Limits = DEFAULT_LIMITS, pace: float = 1.0) -> Trial:
+def dry_run(gesture: Gesture, limits: Limits = DEFAULT_LIMITS, pace: float = 1.0) -> DryRun:
     """Play a gesture from home to its end; parameters are those of the player."""
     player, pose, time_s, way = Player(limits), HOME, 0.0, [HOME]
     player.start(gesture, time_s, pose, pace=pace)
-    while player.is_busy:  # each of its goals has an end, reached or not
+    while player.is_busy:  # each of its waypoints has an end, reached or not
         pose = advance(pose, player.step(time_s, pose), TICK_S)
         time_s += TICK_S
         way.append(pose)
-    return Trial(player.outcome, time_s, tuple(way))
+    return DryRun(player.outcome, time_s, tuple(way))
 
 
-def admit_gesture(data: Any, limits: Limits = DEFAULT_LIMITS) -> Gesture:
+def validate_gesture(data: Any, limits: Limits = DEFAULT_LIMITS) -> Gesture:
     """Read a composed gesture and try it. Raises BadGesture, with the cure, for one that fails."""
-    gesture = read_gesture(data)
+    gesture = parse_gesture(data)
     _check_trial(gesture, limits)
     return gesture
 
 
 @lru_cache(maxsize=64)  # it comes with every cue, and a trial takes some 20 ms
 def _check_trial(gesture: Gesture, limits: Limits) -> None:
-    trial = try_gesture(gesture, limits)
+    trial = dry_run(gesture, limits)
     if trial.farthest_m > TETHER_M:
         raise BadGesture(
             "Simulated, it goes {far:.2f} m from home, past the tether of {tether:g} m. Make it "

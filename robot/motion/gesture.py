@@ -10,9 +10,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadGoal
+from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadWaypoint
 from robot.motion.limits import DEFAULT_LIMITS, Limits
-from robot.motion.path import Drive, Leg, lies_on, plan_legs
+from robot.motion.path import Drive, Segment, is_on_path, plan_path
 from robot.motion.pose import HOME, Pose
 
 # A base never leaves this circle around its home [m]; gestures keep 5 cm away from its edge
@@ -20,19 +20,19 @@ from robot.motion.pose import HOME, Pose
 TETHER_M = 0.30
 REACH_M = 0.25
 
-# How near to its goal a base has to come [m, rad] (kobuki.md 5.3 asks for 1 cm and 2°).
+# How near to its waypoint a base has to come [m, rad] (kobuki.md 5.3 asks for 1 cm and 2°).
 NEAR_M = 0.004
 NEAR_RAD = 0.02
 
 GESTURE_MAX_S = 16.0  # the paper's longest, with slack
-GOALS_MAX = 32
+WAYPOINTS_MAX = 32
 TURN_MAX_RAD = math.tau  # a longer cable than this winds up
 LEAST_PACE = 0.2  # slower turns stick and shake (kobuki.md 3: below 0.33 rad/s)
-SLACK = 1.5  # a goal's time over its shortest possible: odometry, grip and latency cost some
+SLACK = 1.5  # a waypoint's time over its shortest possible: odometry, grip and latency cost some
 
 
 @dataclass(frozen=True, slots=True)
-class Goal:
+class Waypoint:
     """A pose to come to, seen from home.
 
     Parameters
@@ -62,14 +62,14 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Gesture:
-    """What a base performs: goals in their order, of which the last is home.
+    """What a base performs: waypoints in their order, of which the last is home.
 
     Raises BadGesture for what no base with the default limits should or could perform.
     """
 
     name: str
     label: str
-    goals: tuple[Goal, ...]
+    waypoints: tuple[Waypoint, ...]
 
     def __post_init__(self) -> None:
         check_gesture(self)
@@ -83,43 +83,47 @@ class Gesture:
         if not 0 < intensity <= 1:
             raise BadGesture("An intensity lies above 0 and up to 1.")
         turns = intensity if self._drives_ahead else 1.0
-        goals = tuple(
+        waypoints = tuple(
             replace(
-                goal,
-                x_m=goal.x_m * intensity,
-                y_m=goal.y_m * intensity,
-                heading_rad=goal.heading_rad * turns,
+                waypoint,
+                x_m=waypoint.x_m * intensity,
+                y_m=waypoint.y_m * intensity,
+                heading_rad=waypoint.heading_rad * turns,
             )
-            for goal in self.goals
+            for waypoint in self.waypoints
         )
-        return replace(self, goals=goals)
+        return replace(self, waypoints=waypoints)
 
     @property
     def _drives_ahead(self) -> bool:
         """Whether it drives with the heading of home only."""
-        legs = (leg for legs, _, _ in stages(self.goals, DEFAULT_LIMITS) for leg in legs)
-        drives = [leg for leg in legs if isinstance(leg, Drive)]
+        segments = (
+            segment
+            for segments, _, _ in stages(self.waypoints, DEFAULT_LIMITS)
+            for segment in segments
+        )
+        drives = [segment for segment in segments if isinstance(segment, Drive)]
         return all(abs(drive.heading_rad) < 1e-9 for drive in drives)
 
     @property
     def least_s(self) -> float:
         """The shortest time that it can take within the default limits [s]."""
         return sum(
-            hold_s + sum(leg.least_s(limits) for leg in legs)
-            for legs, limits, hold_s in stages(self.goals, DEFAULT_LIMITS)
+            hold_s + sum(segment.least_s(limits) for segment in segments)
+            for segments, limits, hold_s in stages(self.waypoints, DEFAULT_LIMITS)
         )
 
 
 def check_gesture(gesture: Gesture) -> None:
     """Raise BadGesture, with the cure, for a gesture that is not safe and possible."""
-    if not 1 <= len(gesture.goals) <= GOALS_MAX:
-        raise BadGesture("A gesture has 1 to {most} goals.", most=GOALS_MAX)
-    for number, goal in enumerate(gesture.goals, start=1):
-        check_goal(number, goal)
-    last = gesture.goals[-1].pose
+    if not 1 <= len(gesture.waypoints) <= WAYPOINTS_MAX:
+        raise BadGesture("A gesture has 1 to {most} goals.", most=WAYPOINTS_MAX)
+    for number, waypoint in enumerate(gesture.waypoints, start=1):
+        check_waypoint(number, waypoint)
+    last = gesture.waypoints[-1].pose
     if last.distance_m(HOME) or abs(last.turn_rad(HOME)) > 1e-9:
         raise BadGesture("A gesture's last goal is home: x 0, y 0, heading 0.")
-    needed_s = [needed_time_s(*stage) for stage in stages(gesture.goals, DEFAULT_LIMITS)]
+    needed_s = [needed_time_s(*stage) for stage in stages(gesture.waypoints, DEFAULT_LIMITS)]
     if sum(needed_s) > GESTURE_MAX_S:
         raise BadGesture(
             "This takes up to {took:.1f} s; a gesture takes at most {most:g} s. Make it smaller, "
@@ -127,74 +131,85 @@ def check_gesture(gesture: Gesture) -> None:
             took=sum(needed_s),
             most=GESTURE_MAX_S,
         )
-    for number, (goal, least_s) in enumerate(zip(gesture.goals, needed_s, strict=True), start=1):
-        if goal.within_s < least_s:
-            raise BadGoal(
+    for number, (waypoint, least_s) in enumerate(
+        zip(gesture.waypoints, needed_s, strict=True), start=1
+    ):
+        if waypoint.within_s < least_s:
+            raise BadWaypoint(
                 number,
                 "{part} {number} needs {needed:.1f} s; give it as long.",
                 needed=math.ceil(10 * least_s) / 10,
             )
-    _check_ways_back(gesture.goals)
+    _check_ways_back(gesture.waypoints)
 
 
-def needed_time_s(legs: Sequence[Leg], limits: Limits, hold_s: float) -> float:
-    """Give the time [s] that a goal has to be given: of its legs, with slack, and of its hold."""
-    return SLACK * sum(leg.least_s(limits) for leg in legs) + hold_s
+def needed_time_s(segments: Sequence[Segment], limits: Limits, hold_s: float) -> float:
+    """Return the time that a waypoint needs at least [s]: its segments with slack, and its hold."""
+    return SLACK * sum(segment.least_s(limits) for segment in segments) + hold_s
 
 
-def check_goal(number: int, goal: Goal) -> None:
-    """Raise BadGoal for a goal that no gesture may have, whatever comes before it."""
-    numbers = (goal.x_m, goal.y_m, goal.heading_rad, goal.within_s, goal.pace, goal.hold_s)
+def check_waypoint(number: int, waypoint: Waypoint) -> None:
+    """Raise BadWaypoint for a waypoint that no gesture may have, whatever comes before it."""
+    numbers = (
+        waypoint.x_m,
+        waypoint.y_m,
+        waypoint.heading_rad,
+        waypoint.within_s,
+        waypoint.pace,
+        waypoint.hold_s,
+    )
     if not all(map(math.isfinite, numbers)):
-        raise BadGoal(number, NOT_FINITE)
-    away_m = goal.pose.distance_m(HOME)
+        raise BadWaypoint(number, NOT_FINITE)
+    away_m = waypoint.pose.distance_m(HOME)
     if away_m > REACH_M:
-        raise BadGoal(
+        raise BadWaypoint(
             number,
             "{part} {number} goes {away:.2f} m away from home, further than {most:g} m. Make it "
             "shorter.",
             away=away_m,
             most=REACH_M,
         )
-    if abs(goal.heading_rad) > TURN_MAX_RAD:
-        raise BadGoal(
+    if abs(waypoint.heading_rad) > TURN_MAX_RAD:
+        raise BadWaypoint(
             number, "{part} {number} turns more than once around. Turn back first, or less."
         )
-    if not LEAST_PACE <= goal.pace <= 1:
-        raise BadGoal(
+    if not LEAST_PACE <= waypoint.pace <= 1:
+        raise BadWaypoint(
             number, "{part} {number} has a pace outside {least:g} to 1.", least=LEAST_PACE
         )
-    if not (0 < goal.within_s <= GESTURE_MAX_S and 0 <= goal.hold_s <= goal.within_s):
-        raise BadGoal(
+    if not (0 < waypoint.within_s <= GESTURE_MAX_S and 0 <= waypoint.hold_s <= waypoint.within_s):
+        raise BadWaypoint(
             number,
             "{part} {number} may take up to {most:g} s, its hold included.",
             most=GESTURE_MAX_S,
         )
 
 
-def _check_ways_back(goals: Sequence[Goal]) -> None:
+def _check_ways_back(waypoints: Sequence[Waypoint]) -> None:
     """Refuse a way that is backed over and was not come over before."""
     seen: list[tuple[Pose, Pose]] = []
     start = HOME
-    for number, goal in enumerate(goals, start=1):
-        for leg in plan_legs(start, goal.pose):
-            if not isinstance(leg, Drive):
+    for number, waypoint in enumerate(waypoints, start=1):
+        for segment in plan_path(start, waypoint.pose):
+            if not isinstance(segment, Drive):
                 continue
-            if leg.by_m > 0:
-                seen.append((start, goal.pose))
-            elif not lies_on(start, goal.pose, seen):
-                raise BadGoal(
+            if segment.by_m > 0:
+                seen.append((start, waypoint.pose))
+            elif not is_on_path(start, waypoint.pose, seen):
+                raise BadWaypoint(
                     number,
                     "{part} {number} backs where it did not come from; there is no bumper behind. "
                     "Let it face the way, or go ahead first.",
                 )
-        start = goal.pose
+        start = waypoint.pose
 
 
-def stages(goals: Sequence[Goal], limits: Limits) -> list[tuple[tuple[Leg, ...], Limits, float]]:
-    """Give each goal's legs, from the goal before, with their limits and the hold [s]."""
-    starts = (HOME, *(goal.pose for goal in goals[:-1]))
+def stages(
+    waypoints: Sequence[Waypoint], limits: Limits
+) -> list[tuple[tuple[Segment, ...], Limits, float]]:
+    """Return each waypoint's segments from the one before, their limits, and its hold [s]."""
+    starts = (HOME, *(waypoint.pose for waypoint in waypoints[:-1]))
     return [
-        (plan_legs(start, goal.pose), limits.scaled(goal.pace), goal.hold_s)
-        for start, goal in zip(starts, goals, strict=True)
+        (plan_path(start, waypoint.pose), limits.scaled(waypoint.pace), waypoint.hold_s)
+        for start, waypoint in zip(starts, waypoints, strict=True)
     ]

@@ -28,13 +28,13 @@ class BadGesture(ValueError):
         self.template, self.values = template, values
 
 
-class BadGoal(BadGesture):
-    """A gesture of which one goal is at fault: ``number`` says which."""
+class BadWaypoint(BadGesture):
+    """A gesture of which one waypoint is at fault: ``number`` says which."""
 
     def __init__(self, number: int, template: str, /, **values: object) -> None:
         super().__init__(template, part=Marked("Goal"), number=number, **values)
         self.number = number
 
     def of_step(self, number: int) -> BadGesture:
-        """Say it of the step that the goal belongs to."""
+        """Say it of the step that the waypoint belongs to."""
         return BadGesture(self.template, **self.values | {"part": Marked("Step"), "number": number})

@@ -12,8 +12,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
-from robot.motion.gesture import GESTURE_MAX_S, Gesture, Goal, check_goal, needed_time_s, stages
-from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadGoal, Marked
+from robot.motion.gesture import (
+    GESTURE_MAX_S,
+    Gesture,
+    Waypoint,
+    check_waypoint,
+    needed_time_s,
+    stages,
+)
+from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadWaypoint, Marked
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.limits import DEFAULT_LIMITS
 from robot.motion.pose import HOME, Pose
@@ -65,14 +72,16 @@ def to_data(name: str, moves: Sequence[Move]) -> dict[str, Any]:
     return {"name": name, "steps": [asdict(move) for move in moves]}
 
 
-def read_gesture(data: Any) -> Gesture:
+def parse_gesture(data: Any) -> Gesture:
     """Read a gesture that has traveled. Raises BadGesture, which names the step and the cure."""
     if not isinstance(data, Mapping):
         raise BadGesture("A gesture is an object with a name and steps.")
     steps = data.get("steps")
     if not isinstance(steps, list):
         raise BadGesture("A gesture has a list of steps.")
-    return compose(data.get("name"), [_read_move(n, step) for n, step in enumerate(steps, start=1)])
+    return build_gesture(
+        data.get("name"), [_read_move(n, step) for n, step in enumerate(steps, start=1)]
+    )
 
 
 def _read_move(number: int, step: Any) -> Move:
@@ -97,22 +106,22 @@ def check_name(name: Any) -> str:
     return name
 
 
-def compose(name: Any, moves: Sequence[Move]) -> Gesture:
+def build_gesture(name: Any, moves: Sequence[Move]) -> Gesture:
     """Make a gesture of steps. Raises BadGesture, which names the step and the cure."""
     check_name(name)
     if not 1 <= len(moves) <= MOVES_MAX:
         raise BadGesture("A gesture has 1 to {most} steps.", most=MOVES_MAX)
     for number, move in enumerate(moves, start=1):
         _check_move(number, move)
-    of_steps = list(_to_goals(moves))
-    goals = [goal for made in of_steps for goal in made]
+    of_steps = list(_to_waypoints(moves))
+    waypoints = [waypoint for made in of_steps for waypoint in made]
     owners = [number for number, made in enumerate(of_steps, start=1) for _ in made]
     try:
-        for number, goal in enumerate(goals, start=1):
-            check_goal(number, goal)
-        goals[-1] = _at_home(goals[-1])
-        return Gesture(name, name, tuple(_give_times(goals, owners, moves)))
-    except BadGoal as problem:
+        for number, waypoint in enumerate(waypoints, start=1):
+            check_waypoint(number, waypoint)
+        waypoints[-1] = _at_home(waypoints[-1])
+        return Gesture(name, name, tuple(_give_times(waypoints, owners, moves)))
+    except BadWaypoint as problem:
         raise problem.of_step(owners[problem.number - 1]) from None
 
 
@@ -136,20 +145,20 @@ def _check_move(number: int, move: Move) -> None:
         )
 
 
-def places(moves: Sequence[Move]) -> list[Pose]:
+def step_poses(moves: Sequence[Move]) -> list[Pose]:
     """Give where each step ends, seen from home."""
-    return [made[-1].pose for made in _to_goals(moves)]
+    return [made[-1].pose for made in _to_waypoints(moves)]
 
 
-def _to_goals(moves: Sequence[Move]) -> Iterator[list[Goal]]:
-    """Give the goals of each step: where it turns to, then where it goes. Times come later."""
+def _to_waypoints(moves: Sequence[Move]) -> Iterator[list[Waypoint]]:
+    """Give the waypoints of each step: where it turns to, then where it goes. Times come later."""
     here = HOME
     for move in moves:
         turned = replace(here, heading_rad=here.heading_rad + move.turn_rad)
         poses = [turned] if move.turn_rad or not move.forward_m else []
         if move.forward_m:
             poses.append(_ahead(turned, move.forward_m))
-        made = [Goal(p.x_m, p.y_m, p.heading_rad, GESTURE_MAX_S, move.pace) for p in poses]
+        made = [Waypoint(p.x_m, p.y_m, p.heading_rad, GESTURE_MAX_S, move.pace) for p in poses]
         made[-1] = replace(made[-1], hold_s=move.hold_s)
         yield made
         here = made[-1].pose
@@ -165,8 +174,8 @@ def _ahead(pose: Pose, by_m: float) -> Pose:
     return Pose(heading_rad=pose.heading_rad) if place.distance_m(HOME) <= HOME_M else place
 
 
-def _at_home(last: Goal) -> Goal:
-    """Give the last goal as home itself. Raises BadGesture where it is elsewhere."""
+def _at_home(last: Waypoint) -> Waypoint:
+    """Give the last waypoint as home itself. Raises BadGesture where it is elsewhere."""
     heading_rad = math.tau * round(last.heading_rad / math.tau)
     away_m, off_rad = last.pose.distance_m(HOME), last.heading_rad - heading_rad
     far, turned = 100 * away_m, abs(math.degrees(off_rad))
@@ -191,14 +200,14 @@ def _at_home(last: Goal) -> Goal:
 
 
 def _give_times(
-    goals: Sequence[Goal], owners: Sequence[int], moves: Sequence[Move]
-) -> Iterator[Goal]:
-    """Share each step's time among its goals, by what they need."""
-    needed_s = [needed_time_s(*stage) for stage in stages(goals, DEFAULT_LIMITS)]
+    waypoints: Sequence[Waypoint], owners: Sequence[int], moves: Sequence[Move]
+) -> Iterator[Waypoint]:
+    """Share each step's time among its waypoints, by what they need."""
+    needed_s = [needed_time_s(*stage) for stage in stages(waypoints, DEFAULT_LIMITS)]
     of_step = dict.fromkeys(owners, 0.0)
     for owner, least_s in zip(owners, needed_s, strict=True):
         of_step[owner] += least_s
-    for goal, owner, least_s in zip(goals, owners, needed_s, strict=True):
+    for waypoint, owner, least_s in zip(waypoints, owners, needed_s, strict=True):
         all_s, given_s = of_step[owner], moves[owner - 1].within_s
         if given_s is None:
             given_s = min(GENEROUS * all_s + MOMENT_S, max(GESTURE_MAX_S, all_s))
@@ -208,4 +217,4 @@ def _give_times(
                 number=owner,
                 needed=math.ceil(10 * all_s) / 10,
             )
-        yield replace(goal, within_s=min(given_s * least_s / all_s, GESTURE_MAX_S))
+        yield replace(waypoint, within_s=min(given_s * least_s / all_s, GESTURE_MAX_S))

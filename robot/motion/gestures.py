@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from robot.motion.gesture import Gesture, Goal
+from robot.motion.gesture import Gesture, Waypoint
 from robot.motion.gesture_errors import gettext_noop
 
 # Up to 4 s each, so that a base is home and still before the next window of 5 s ends. Out and back
@@ -13,37 +13,37 @@ CELEBRATE = Gesture(
     "celebrate",
     gettext_noop("Celebrate: a step ahead and a wiggle"),
     (
-        Goal(0.07, 0.0, 0.0, within_s=1.6),
-        Goal(0.07, 0.0, 0.28, within_s=1.2),
-        Goal(0.07, 0.0, -0.28, within_s=1.6),
-        Goal(0.0, 0.0, 0.0, within_s=2.5),
+        Waypoint(0.07, 0.0, 0.0, within_s=1.6),
+        Waypoint(0.07, 0.0, 0.28, within_s=1.2),
+        Waypoint(0.07, 0.0, -0.28, within_s=1.6),
+        Waypoint(0.0, 0.0, 0.0, within_s=2.5),
     ),
 )
 DROOP = Gesture(
     "droop",
     gettext_noop("Droop: turn away slowly and come back"),
     (
-        Goal(0.0, 0.0, -0.45, within_s=2.5, pace=0.5, hold_s=0.5),
-        Goal(0.0, 0.0, 0.0, within_s=2.0, pace=0.5),
+        Waypoint(0.0, 0.0, -0.45, within_s=2.5, pace=0.5, hold_s=0.5),
+        Waypoint(0.0, 0.0, 0.0, within_s=2.0, pace=0.5),
     ),
 )
 NOD = Gesture(
     "nod",
     gettext_noop("Nod: a little ahead and back, twice"),
     (
-        Goal(0.04, 0.0, 0.0, within_s=1.2),
-        Goal(0.0, 0.0, 0.0, within_s=1.2),
-        Goal(0.04, 0.0, 0.0, within_s=1.2),
-        Goal(0.0, 0.0, 0.0, within_s=1.2),
+        Waypoint(0.04, 0.0, 0.0, within_s=1.2),
+        Waypoint(0.0, 0.0, 0.0, within_s=1.2),
+        Waypoint(0.04, 0.0, 0.0, within_s=1.2),
+        Waypoint(0.0, 0.0, 0.0, within_s=1.2),
     ),
 )
 SWAY = Gesture(
     "sway",
     gettext_noop("Sway: left, right and back"),
     (
-        Goal(0.0, 0.0, 0.4, within_s=1.5),
-        Goal(0.0, 0.0, -0.4, within_s=2.0),
-        Goal(0.0, 0.0, 0.0, within_s=1.5),
+        Waypoint(0.0, 0.0, 0.4, within_s=1.5),
+        Waypoint(0.0, 0.0, -0.4, within_s=2.0),
+        Waypoint(0.0, 0.0, 0.0, within_s=1.5),
     ),
 )
 
@@ -60,27 +60,27 @@ ORIGINAL_POSITIVE = Gesture(
     "original_positive",
     gettext_noop("The paper's positive: out, left, right, back"),
     (
-        Goal(_OUT_M, 0.0, 0.0, within_s=3.4, hold_s=1.0),
-        Goal(_OUT_M, 0.0, _SPIN_RAD, within_s=4.5),
-        Goal(_OUT_M, 0.0, 0.0, within_s=4.5),
-        Goal(0.0, 0.0, 0.0, within_s=2.5),
+        Waypoint(_OUT_M, 0.0, 0.0, within_s=3.4, hold_s=1.0),
+        Waypoint(_OUT_M, 0.0, _SPIN_RAD, within_s=4.5),
+        Waypoint(_OUT_M, 0.0, 0.0, within_s=4.5),
+        Waypoint(0.0, 0.0, 0.0, within_s=2.5),
     ),
 )
 ORIGINAL_NEGATIVE = Gesture(
     "original_negative",
     gettext_noop("The paper's negative: spin left, spin right"),
-    (Goal(0.0, 0.0, _SPIN_RAD, within_s=4.5), Goal(0.0, 0.0, 0.0, within_s=4.5)),
+    (Waypoint(0.0, 0.0, _SPIN_RAD, within_s=4.5), Waypoint(0.0, 0.0, 0.0, within_s=4.5)),
 )
 ORIGINAL_BINARY = Gesture(
     "original_binary",
     gettext_noop("The paper's binary: left and ahead, right and ahead, left, home"),
     (
-        Goal(0.0, 0.0, _LEFT_RAD, within_s=2.7),
-        Goal(*_ASIDE, _LEFT_RAD, within_s=2.5),
-        Goal(*_ASIDE, -_LEFT_RAD, within_s=4.5),
-        Goal(2 * _ASIDE[0], 0.0, -_LEFT_RAD, within_s=2.5),
-        Goal(2 * _ASIDE[0], 0.0, 0.0, within_s=2.7),
-        Goal(0.0, 0.0, 0.0, within_s=1.7),
+        Waypoint(0.0, 0.0, _LEFT_RAD, within_s=2.7),
+        Waypoint(*_ASIDE, _LEFT_RAD, within_s=2.5),
+        Waypoint(*_ASIDE, -_LEFT_RAD, within_s=4.5),
+        Waypoint(2 * _ASIDE[0], 0.0, -_LEFT_RAD, within_s=2.5),
+        Waypoint(2 * _ASIDE[0], 0.0, 0.0, within_s=2.7),
+        Waypoint(0.0, 0.0, 0.0, within_s=1.7),
     ),
 )
 

@@ -1,4 +1,4 @@
-"""Legs: the turns and straight ways by which a base comes from one pose to the next."""
+"""Segments: the turns and straight ways by which a base comes from one pose to the next."""
 
 from __future__ import annotations
 
@@ -40,33 +40,33 @@ class Drive:
         return least_time_s(self.by_m, limits.v_m_s, limits.speed_up_m_s2, limits.slow_down_m_s2)
 
 
-Leg = Turn | Drive
+Segment = Turn | Drive
 
 
-def plan_legs(start: Pose, goal: Pose) -> tuple[Leg, ...]:
+def plan_path(start: Pose, waypoint: Pose) -> tuple[Segment, ...]:
     """Give the turns and the drive that lead from one pose to another.
 
-    The base turns to face the place, drives there and turns to the goal's heading. A place that
+    The base turns to face the place, drives there and turns to the waypoint's heading. A place that
     lies behind is driven to backwards, so that a base that went out comes back the way it went.
-    A turn by 0 is a leg too: who follows it comes to that heading from wherever it is.
+    A turn by 0 is a segment too: who follows it comes to that heading from wherever it is.
     """
-    legs: list[Leg] = []
+    segments: list[Segment] = []
     heading_rad = start.heading_rad
-    distance_m = start.distance_m(goal)
+    distance_m = start.distance_m(waypoint)
     if distance_m > 0:
-        bearing_rad = math.atan2(goal.y_m - start.y_m, goal.x_m - start.x_m)
+        bearing_rad = math.atan2(waypoint.y_m - start.y_m, waypoint.x_m - start.x_m)
         ahead_rad = wrap(bearing_rad - heading_rad)
         is_behind = abs(ahead_rad) > math.pi / 2
         face_rad = wrap(ahead_rad + math.pi) if is_behind else ahead_rad
         heading_rad += face_rad
-        legs.append(Turn(heading_rad, face_rad))
+        segments.append(Turn(heading_rad, face_rad))
         by_m = -distance_m if is_behind else distance_m
-        legs.append(Drive(goal.x_m, goal.y_m, heading_rad, by_m))
-    legs.append(Turn(goal.heading_rad, goal.heading_rad - heading_rad))
-    return tuple(legs)
+        segments.append(Drive(waypoint.x_m, waypoint.y_m, heading_rad, by_m))
+    segments.append(Turn(waypoint.heading_rad, waypoint.heading_rad - heading_rad))
+    return tuple(segments)
 
 
-def lies_on(start: Pose, end: Pose, ways: Sequence[tuple[Pose, Pose]]) -> bool:
+def is_on_path(start: Pose, end: Pose, ways: Sequence[tuple[Pose, Pose]]) -> bool:
     """Whether a straight way lies on others, looked at in steps of ``ALIKE_M``."""
     count = math.ceil(start.distance_m(end) / ALIKE_M)
     for index in range(count + 1):

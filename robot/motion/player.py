@@ -6,10 +6,10 @@ import math
 from collections import deque
 from dataclasses import replace
 
-from robot.motion.gesture import LEAST_PACE, NEAR_M, NEAR_RAD, Gesture, Goal
+from robot.motion.gesture import LEAST_PACE, NEAR_M, NEAR_RAD, Gesture, Waypoint
 from robot.motion.gesture_errors import gettext_noop
 from robot.motion.limits import Limits
-from robot.motion.path import Drive, Leg, Turn, plan_legs
+from robot.motion.path import Drive, Segment, Turn, plan_path
 from robot.motion.pose import HOME, Pose, wrap
 from robot.motion.twist import STILL, Twist
 
@@ -35,7 +35,7 @@ class Player:
     """Plays one gesture at a time, closed on odometry.
 
     ``step`` is to be called some 50 times a second, whether a gesture is played or not; it never
-    gives more than the limits allow, and eases off by itself after the last goal.
+    gives more than the limits allow, and eases off by itself after the last waypoint.
 
     Parameters
     ----------
@@ -49,11 +49,11 @@ class Player:
         self.outcome = ""  # of the gesture that was played last
         self.twist = STILL  # what was ordered last
         self._time_s: float | None = None
-        self._goals: deque[Goal] = deque()
-        self._legs: deque[Leg] = deque()
-        self._goal: Goal | None = None
-        self._until_s = 0.0  # the goal's time is over
-        self._there_s: float | None = None  # when its legs were done
+        self._waypoints: deque[Waypoint] = deque()
+        self._segments: deque[Segment] = deque()
+        self._waypoint: Waypoint | None = None
+        self._until_s = 0.0  # the waypoint's time is over
+        self._there_s: float | None = None  # when its segments were done
         self._begins_s = 0.0  # before that it stands still, announced
         self._verdict = ""  # the outcome-to-be, while the base comes to rest
         self._turns_rad = 0.0  # full turns that were made before the gesture
@@ -85,15 +85,15 @@ class Player:
         after_s
             How long it stands still first [s].
         pace
-            Share of each goal's own pace to go at, above 0 and up to 1; its time grows with it.
+            Share of each waypoint's own pace to go at, above 0 and up to 1; its time grows with it.
         """
         if self.gesture is not None:
             raise RuntimeError(f"{self.gesture.name} is being played.")
         self.gesture, self._verdict, self._pace = gesture, "", pace
         self._turns_rad = pose.heading_rad - wrap(pose.heading_rad)
-        self._goals = deque(gesture.goals)
+        self._waypoints = deque(gesture.waypoints)
         self._begins_s = time_s + after_s
-        self._next_goal(HOME, self._begins_s)
+        self._next_waypoint(HOME, self._begins_s)
 
     def stop(self, reason: str) -> None:
         """End the gesture: from now on the base slows down as its limits allow."""
@@ -121,81 +121,89 @@ class Player:
         if not pose.is_finite:
             self.halt(BAD_ODOMETRY)
             return STILL
-        limits, wanted = self._aim(time_s, pose)
+        limits, wanted = self._wanted_twist(time_s, pose)
         self.twist = limits.approach(self.twist, wanted, elapsed_s)
         if self._verdict and self.twist.is_still:
             self._end(self._verdict)
         return self.twist
 
-    def _aim(self, time_s: float, pose: Pose) -> tuple[Limits, Twist]:
-        """Give what the present goal asks for, within which limits."""
+    def _wanted_twist(self, time_s: float, pose: Pose) -> tuple[Limits, Twist]:
+        """Give what the present waypoint asks for, within which limits."""
         here = replace(pose, heading_rad=pose.heading_rad - self._turns_rad)
-        while self._goal is not None and not self._verdict:
-            limits = self.limits.scaled(self._share(self._goal))
+        while self._waypoint is not None and not self._verdict:
+            limits = self.limits.scaled(self._share(self._waypoint))
             if time_s < self._begins_s:
                 return limits, STILL
             if self._there_s is None and time_s > self._until_s:
                 self._verdict = OUT_OF_TIME
-            elif self._legs:
-                wanted = _follow(self._legs[0], here, limits)
+            elif self._segments:
+                wanted = _follow(self._segments[0], here, limits)
                 if wanted is not None:
                     return limits, wanted
-                self._legs.popleft()
+                self._segments.popleft()
             elif self._there_s is None:
                 self._there_s = time_s
-            elif time_s - self._there_s < max(self._goal.hold_s, 0 if self._goals else SETTLE_S):
+            elif time_s - self._there_s < max(
+                self._waypoint.hold_s, 0 if self._waypoints else SETTLE_S
+            ):
                 return limits, STILL
-            elif not self._goals and abs(self._goal.heading_rad - here.heading_rad) > NEAR_RAD:
-                self._legs.append(Turn(self._goal.heading_rad, 0.0))
+            elif (
+                not self._waypoints
+                and abs(self._waypoint.heading_rad - here.heading_rad) > NEAR_RAD
+            ):
+                self._segments.append(Turn(self._waypoint.heading_rad, 0.0))
                 self._there_s = None
             else:
-                self._next_goal(self._goal.pose, time_s)
+                self._next_waypoint(self._waypoint.pose, time_s)
         return self.limits, STILL
 
-    def _next_goal(self, start: Pose, time_s: float) -> None:
+    def _next_waypoint(self, start: Pose, time_s: float) -> None:
         self._there_s = None
-        if not self._goals:
-            self._goal, self._verdict = None, DONE
+        if not self._waypoints:
+            self._waypoint, self._verdict = None, DONE
             return
-        self._goal = self._goals.popleft()
-        self._legs = deque(plan_legs(start, self._goal.pose))
-        self._until_s = time_s + self._goal.within_s * self._goal.pace / self._share(self._goal)
+        self._waypoint = self._waypoints.popleft()
+        self._segments = deque(plan_path(start, self._waypoint.pose))
+        self._until_s = time_s + self._waypoint.within_s * self._waypoint.pace / self._share(
+            self._waypoint
+        )
 
-    def _share(self, goal: Goal) -> float:
-        """Give the share of the limits that a goal is gone to at."""
-        return max(LEAST_PACE, goal.pace * self._pace)
+    def _share(self, waypoint: Waypoint) -> float:
+        """Give the share of the limits that a waypoint is gone to at."""
+        return max(LEAST_PACE, waypoint.pace * self._pace)
 
     def _end(self, outcome: str) -> None:
-        self.gesture, self._goal = None, None
+        self.gesture, self._waypoint = None, None
         self.outcome, self._verdict = outcome, ""
-        self._goals.clear()
-        self._legs.clear()
+        self._waypoints.clear()
+        self._segments.clear()
 
 
-def _follow(leg: Leg, pose: Pose, limits: Limits) -> Twist | None:
-    """Give what brings a base along a leg; None at its end."""
-    match leg:
+def _follow(segment: Segment, pose: Pose, limits: Limits) -> Twist | None:
+    """Give what brings a base along a segment; None at its end."""
+    match segment:
         case Turn():
-            left_rad = leg.heading_rad - pose.heading_rad
+            left_rad = segment.heading_rad - pose.heading_rad
             if abs(left_rad) <= NEAR_RAD:
                 return None
-            return Twist(w_rad_s=_close(left_rad, limits.w_rad_s, limits.slow_down_rad_s2))
+            return Twist(w_rad_s=_approach_speed(left_rad, limits.w_rad_s, limits.slow_down_rad_s2))
         case Drive():
-            cos, sin = math.cos(leg.heading_rad), math.sin(leg.heading_rad)
-            x_m, y_m = leg.x_m - pose.x_m, leg.y_m - pose.y_m
+            cos, sin = math.cos(segment.heading_rad), math.sin(segment.heading_rad)
+            x_m, y_m = segment.x_m - pose.x_m, segment.y_m - pose.y_m
             left_m, beside_m = x_m * cos + y_m * sin, x_m * sin - y_m * cos
-            ahead = math.copysign(1.0, leg.by_m)
+            ahead = math.copysign(1.0, segment.by_m)
             if left_m * ahead <= NEAR_M:
                 return None
             # Towards the line; backwards that is by turning the other way.
             steer_rad = max(-STEER_MAX_RAD, min(STEER_MAX_RAD, STEER_RAD_M * beside_m)) * ahead
-            turn_rad = wrap(leg.heading_rad - steer_rad - pose.heading_rad)
+            turn_rad = wrap(segment.heading_rad - steer_rad - pose.heading_rad)
             return Twist(
-                _close(left_m, limits.v_m_s, limits.slow_down_m_s2), turn_rad * CLOSING_PER_S / 2
+                _approach_speed(left_m, limits.v_m_s, limits.slow_down_m_s2),
+                turn_rad * CLOSING_PER_S / 2,
             )
 
 
-def _close(left: float, speed: float, slow_down: float) -> float:
+def _approach_speed(left: float, speed: float, slow_down: float) -> float:
     """Give the speed at which what is left can still be braked for."""
     braking = math.sqrt(2 * BRAKING * slow_down * abs(left))
     return math.copysign(min(speed, braking, CLOSING_PER_S * abs(left)), left)

@@ -32,7 +32,7 @@ WRITE_S = 0.1  # a port that takes nothing for so long is lost
 LINES_KEPT = 25  # of what was heard, while nobody reads it: half a second
 
 
-class Teller:
+class PipeWriter:
     """Writes lines to a pipe on a thread of its own; drops the oldest while nobody reads."""
 
     def __init__(self, pipe: int) -> None:
@@ -90,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--baud", type=int, default=115200)
     parser.add_argument("--stop", type=bytes.fromhex, required=True, help="the frame that stops it")
     options = parser.parse_args(arguments)
-    teller = Teller(sys.stdout.fileno())
+    teller = PipeWriter(sys.stdout.fileno())
     owner = PortOwner(partial(open_serial, options.url, options.baud), options.stop, teller.tell)
     for name in ("SIGTERM", "SIGHUP", "SIGBREAK"):
         if hasattr(signal, name):

@@ -28,7 +28,7 @@ MOST_DEATHS = 5  # in a row, without a word from any: it cannot be run here
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class ReceivedBytes:
     """What came in at a port: when [s], since which opening of it, and the bytes."""
 
     at_s: float
@@ -67,7 +67,7 @@ class PortClient:
         url: str,
         baud: int,
         stop: bytes,
-        hear: Callable[[Heard], None],
+        hear: Callable[[ReceivedBytes], None],
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self._command = [sys.executable, "-m", "robot.port", url]
@@ -172,7 +172,9 @@ class PortClient:
     def _take(self, line: bytes) -> None:
         try:
             said = json.loads(line)
-            heard = Heard(float(said["at_s"]), int(said["opened"]), bytes.fromhex(said["bytes"]))
+            heard = ReceivedBytes(
+                float(said["at_s"]), int(said["opened"]), bytes.fromhex(said["bytes"])
+            )
             self._counted = Counter(said["counters"])
             self.problem = str(said["problem"])
         except (ValueError, TypeError, KeyError):
@@ -181,7 +183,7 @@ class PortClient:
         self._word_s, self._has_spoken = self._monotonic(), True
         self._openings = self._openings_before + heard.opened
         if heard.data:
-            self._hear(Heard(heard.at_s, self._openings, heard.data))
+            self._hear(ReceivedBytes(heard.at_s, self._openings, heard.data))
 
     def count(self) -> dict[str, int]:
         """Give all counters, those of the present process included."""

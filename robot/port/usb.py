@@ -52,20 +52,20 @@ def find_port() -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class Diagnosis:
     """What was looked at; ``cure`` is empty where nothing is wrong."""
 
     what: str
     cure: str = ""
 
 
-def look_at_port(
+def check_port(
     port: str,
     usbs: list[Usb],
     *,
     system: str = sys.platform,
     drivers: Path = Path("/sys/bus/usb-serial"),
-) -> Iterator[Finding]:
+) -> Iterator[Diagnosis]:
     """Say what is right and wrong with a port, without opening it.
 
     Parameters
@@ -79,12 +79,12 @@ def look_at_port(
     """
     kobukis = [usb.device for usb in usbs if usb.is_kobuki]
     if "://" in port:
-        yield Finding(f"{port} is reached over the network.")
+        yield Diagnosis(f"{port} is reached over the network.")
         return
     if kobukis:
-        yield Finding(f"A Kobuki is plugged in at {', '.join(kobukis)}.")
+        yield Diagnosis(f"A Kobuki is plugged in at {', '.join(kobukis)}.")
     else:
-        yield Finding(
+        yield Diagnosis(
             "No Kobuki is plugged in by USB.",
             "Switch it on (the switch at its side), and plug its USB cable in. A twin's port and a "
             "cable at the 3.3 V serial pins are not listed; name them with --port.",
@@ -92,20 +92,20 @@ def look_at_port(
     if system == "win32":
         return
     if not Path(port).exists():
-        yield Finding(f"{port} does not exist.", _cure_missing(kobukis, system, drivers))
+        yield Diagnosis(f"{port} does not exist.", _cure_missing(kobukis, system, drivers))
         return
     if not os.access(port, os.R_OK | os.W_OK):
-        yield Finding(
+        yield Diagnosis(
             f"{getpass.getuser()} may not use {port}.",
             f"sudo usermod -aG dialout {getpass.getuser()}, then sign out and in again; or install "
             f"the udev rule (docs/robot.md).",
         )
     else:
-        yield Finding(f"{port} may be read and written.")
+        yield Diagnosis(f"{port} may be read and written.")
     latency = drivers / "devices" / Path(port).resolve().name / "latency_timer"
     if latency.exists():
         wait_ms = int(latency.read_text())
-        yield Finding(
+        yield Diagnosis(
             f"The USB chip gathers bytes for {wait_ms} ms.",
             ""
             if wait_ms <= LATENCY_MS

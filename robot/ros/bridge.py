@@ -22,7 +22,7 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from robot.link import BackOff
 from robot.motion.limits import TICK_S
-from robot.ros.frames import MAX_FRAME_BYTES, BadRosFrame, Frame, Heard, read_frame, to_text
+from robot.ros.frames import MAX_FRAME_BYTES, BadRosFrame, Frame, Incoming, read_frame, to_text
 
 DEFAULT_URL = "ws://127.0.0.1:9090"
 
@@ -34,7 +34,7 @@ RETRY_FIRST_S, RETRY_LONGEST_S = 0.2, 5.0
 END_S = 2.0
 
 
-class Talk(Protocol):
+class TopicClient(Protocol):
     """What is said to a bridge, and what hears it."""
 
     def open(self, now_s: float) -> Iterable[Frame]:
@@ -43,7 +43,7 @@ class Talk(Protocol):
     def due(self, now_s: float) -> Iterable[Frame]:
         """Give what is to be said now."""
 
-    def hear(self, heard: Heard, now_s: float) -> None:
+    def hear(self, heard: Incoming, now_s: float) -> None:
         """Take what came. Raises BadRosFrame."""
 
     def lose(self, now_s: float) -> None:
@@ -81,7 +81,7 @@ class Bridge:
     def __init__(
         self,
         url: str,
-        talk: Talk,
+        client: TopicClient,
         lock: threading.Lock,
         monotonic: Callable[[], float] = time.monotonic,
         *,
@@ -89,7 +89,7 @@ class Bridge:
         jitter: Callable[[], float] = random.random,
     ) -> None:
         self.url = url
-        self._talk, self._lock = talk, lock
+        self._client, self._lock = client, lock
         self._monotonic = monotonic
         self._sleep = sleep
         self._back_off = BackOff(RETRY_FIRST_S, RETRY_LONGEST_S, jitter)
@@ -154,18 +154,18 @@ class Bridge:
                 await self._converse(socket)
             finally:
                 with self._lock:
-                    self._talk.lose(self._monotonic())
+                    self._client.lose(self._monotonic())
                 self.problem = f"The connection to the rosbridge at {self.url} was lost."
         await self._sleep(self._back_off.next_s())
 
     async def _converse(self, socket: ClientConnection) -> None:
         """Say and hear until the connection is lost, or we are closed."""
         try:
-            await self._say(socket, self._talk.open)
+            await self._say(socket, self._client.open)
             hearing = asyncio.create_task(self._listen(socket))
             try:
                 while not hearing.done():
-                    await self._say(socket, self._talk.due)
+                    await self._say(socket, self._client.due)
                     with suppress(TimeoutError):
                         async with asyncio.timeout(TICK_S):
                             await self._wanted.wait()
@@ -178,7 +178,7 @@ class Bridge:
             socket.transport.abort()
         except asyncio.CancelledError:
             with suppress(ConnectionClosed, TimeoutError):
-                await self._say(socket, self._talk.end)
+                await self._say(socket, self._client.end)
             raise
         finally:
             await socket.close()
@@ -196,7 +196,7 @@ class Bridge:
                 try:
                     heard = read_frame(text)
                     with self._lock:
-                        self._talk.hear(heard, self._monotonic())
+                        self._client.hear(heard, self._monotonic())
                 except BadRosFrame:
                     self.counters["bridge_bad"] += 1
                 else:

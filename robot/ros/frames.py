@@ -44,7 +44,7 @@ class Answer:
     values: Mapping[str, Any] | None
 
 
-Heard = Publication | Answer
+Incoming = Publication | Answer
 
 
 def advertise(topic: Topic, *, latch: bool = False) -> Frame:
@@ -95,7 +95,7 @@ def to_text(frame: Frame) -> str:
     return json.dumps(frame, separators=(",", ":"), allow_nan=False)
 
 
-def read_frame(text: str | bytes) -> Heard:
+def read_frame(text: str | bytes) -> Incoming:
     """Read what a bridge said. Raises BadRosFrame for anything that is neither of the two."""
     try:
         frame = json.loads(text)

@@ -18,14 +18,14 @@ TWIST = "geometry_msgs/Twist"
 ODOMETRY = "nav_msgs/Odometry"
 BOOL = "std_msgs/Bool"
 STRING = "std_msgs/String"
-# Type of an event: the name of its field that says which feeler it was. Its field ``state`` is 1
+# Type of an event: the name of its field that says which sensor it was. Its field ``state`` is 1
 # while it is pressed, sees an edge, or hangs free (kobuki_msgs).
 EVENTS = {
     "kobuki_msgs/BumperEvent": "bumper",
     "kobuki_msgs/CliffEvent": "sensor",
     "kobuki_msgs/WheelDropEvent": "wheel",
 }
-FEELERS = (*EVENTS, BOOL)
+SENSOR_TYPES = (*EVENTS, BOOL)
 
 # No base of ours is further from anywhere [m], nor faster [m/s, rad/s]: such a number was made up.
 FARTHEST_M = 1e6
@@ -64,7 +64,7 @@ def read_odometry(message: Message) -> tuple[Pose, Twist]:
 
 
 def read_event(kind: str, message: Message) -> tuple[int, bool]:
-    """Read an event: which feeler, and whether it feels something. Raises BadRosFrame."""
+    """Read an event: which sensor, and whether it feels something. Raises BadRosFrame."""
     if kind == BOOL:
         data = message.get("data")
         if not isinstance(data, bool):
@@ -72,7 +72,7 @@ def read_event(kind: str, message: Message) -> tuple[int, bool]:
         return 0, data
     which, state = message.get(EVENTS[kind]), message.get("state")
     if type(which) is not int or type(state) is not int or not 0 <= which <= 255:
-        raise BadRosFrame("An event says which feeler it was, and its state.")
+        raise BadRosFrame("An event says which sensor it was, and its state.")
     return which, state != 0
 
 

@@ -25,7 +25,7 @@ from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.valences import VALENCES, Cue, edit_valence
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gesture_spec import Move, compose
+from robot.motion.gesture_spec import Move, build_gesture
 from tests.feedback.test_feedback_types import form as feedback_form
 from tests.gestures.test_composing import filled as gesture_form
 from tests.programs import program_of
@@ -67,10 +67,13 @@ def said(act: Callable[[], object], language: str = "es") -> str:
             "Negativa: esta retroalimentación no da nada por un acierto y quita puntos",
         ),
         (
-            lambda: compose("wave", [Move(turn_rad=0.5)]),
+            lambda: build_gesture("wave", [Move(turn_rad=0.5)]),
             "Termina con un giro de 29° a la izquierda. Añada pasos que vuelvan al origen.",
         ),
-        (lambda: compose("wave", [Move(forward_m=0.4)]), "Paso 1: se aleja 0,40 m del origen"),
+        (
+            lambda: build_gesture("wave", [Move(forward_m=0.4)]),
+            "Paso 1: se aleja 0,40 m del origen",
+        ),
     ],
 )
 def test_a_refusal_is_said_in_spanish_with_its_values(act, words):

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 from websockets.asyncio.server import serve
 
-from robot.connection_args import CannotDial, check_token, websocket_url
+from robot.connection_args import BadConnectionArgs, check_token, websocket_url
 from robot.link import (
     REFUSALS,
     BackOff,
@@ -95,7 +95,7 @@ def test_a_server_address_becomes_a_websocket_address(server, url):
     ],
 )
 def test_what_is_no_address_is_refused_with_an_example(server):
-    with pytest.raises(CannotDial, match="http://127.0.0.1:8000"):
+    with pytest.raises(BadConnectionArgs, match="http://127.0.0.1:8000"):
         websocket_url(server, "/ws/source/")
 
 
@@ -105,7 +105,7 @@ def test_a_token_loses_its_blanks():
 
 @pytest.mark.parametrize("token", ["", "  ", "a b", "a\nb", "ä", "a\r\nX: y"])
 def test_what_is_no_token_is_refused(token):
-    with pytest.raises(CannotDial, match="Copy it"):
+    with pytest.raises(BadConnectionArgs, match="Copy it"):
         check_token(token)
 
 

@@ -15,7 +15,7 @@ from robot.__main__ import main
 from robot.bases.twinned import TwinBase
 from robot.motion.gesture import TETHER_M
 from robot.motion.gestures import GESTURES, ORIGINALS
-from robot.play_gesture import play
+from robot.play_gesture import play_gesture
 from tests.support.fake_kobuki import FakeKobuki
 
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="no pty")
@@ -72,7 +72,7 @@ def test_the_twin_comes_home_in_truth():
 def test_a_gesture_on_a_twin_with_unequal_wheels():  # the others: tests/bench/test_twin_gestures
     options = ("--left-scale=1.02", "--right-scale=1.005", "--drift-deg-min=2")
     with TwinBase(time.monotonic, *options) as twin:
-        played = play(GESTURES["sway"], twin, time.monotonic, time.sleep)
+        played = play_gesture(GESTURES["sway"], twin, time.monotonic, time.sleep)
     assert played["outcome"] == "done"
     assert is_home(played["true_pose"])
 
@@ -82,14 +82,14 @@ def test_a_bump_ends_it_and_another_one_is_refused():
     with TwinBase(time.monotonic) as twin:
         bump = {"do": "set", "name": "bumper", "value": 2}
         threading.Timer(1.0, lambda: twin.ask(bump)).start()
-        played = play(GESTURES["celebrate"], twin, time.monotonic, time.sleep)
+        played = play_gesture(GESTURES["celebrate"], twin, time.monotonic, time.sleep)
         assert played["outcome"] == "bump"
         assert twin.ask({"do": "look"})["setpoint"] == [0, 0]
-        assert play(GESTURES["nod"], twin, time.monotonic, time.sleep)["outcome"] == "bump"
+        assert play_gesture(GESTURES["nod"], twin, time.monotonic, time.sleep)["outcome"] == "bump"
         twin.ask(bump | {"value": 0})
         twin.set_home()
         time.sleep(0.3)
-        assert twin.truth().pose.x_m == pytest.approx(0, abs=0.001)
+        assert twin.ground_truth().pose.x_m == pytest.approx(0, abs=0.001)
 
 
 @pytest.mark.realtime

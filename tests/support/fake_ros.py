@@ -261,7 +261,7 @@ def drive(base, twist, until, within_s=10.0):
 
 def release(base):
     """Order it to stand still until it may be ordered to move."""
-    drive(base, STILL, lambda: not base._conversation.orders._is_held)
+    drive(base, STILL, lambda: not base._client.orders._is_held)
 
 
 def wait_until(holds, within_s=10.0):

@@ -13,15 +13,15 @@ from robot.bases.kobuki_protocol import (
     CliffRaw,
     CoreSensors,
     DockIr,
+    Estimate,
     Feedback,
+    FrameFilter,
     FrameReader,
     GpInput,
     GyroRaw,
     Inertia,
     MotorCurrent,
     Side,
-    Sighting,
-    Trust,
     decode_feedback,
     encode_feedback,
 )
@@ -135,7 +135,7 @@ def live_through(chance: random.Random, frames: int) -> Life:
     frames; where a button is pressed, a version known, the counters begun anew; or where the wheels
     or the heading are further off than one frame's largest movement.
     """
-    life, reader, trust = Life(), FrameReader(decode_feedback), Trust()
+    life, reader, frame_filter = Life(), FrameReader(decode_feedback), FrameFilter()
     said: deque[Feedback] = deque(maxlen=LAG)
     was_damaged = True
     for number in range(frames):
@@ -147,20 +147,26 @@ def live_through(chance: random.Random, frames: int) -> Life:
         life.mutated += was_damaged
         for heard in reader.feed(sent):
             life.fooled_checksum += heard not in said
-            seen = trust.take(heard, number * FRAME_S)
+            seen = frame_filter.take(heard, number * FRAME_S)
             if seen is not None and number > 2:
-                for fault in _faults(seen, trust, number):
+                for fault in _faults(seen, frame_filter, number):
                     life.wrong.append(f"frame {number}: {fault} {seen}")
     return life
 
 
-def _faults(seen: Sighting, trust: Trust, number: int) -> Iterator[str]:
+def _faults(seen: Estimate, frame_filter: FrameFilter, number: int) -> Iterator[str]:
     recent = {is_bumped(max(0, number - back)) for back in range(LAG)}
     if bool(seen.bumper) not in recent:
         yield "bumper"
     if seen.bumper & ~Side.CENTER or seen.cliff or seen.wheel_drop or seen.over_current:
         yield "hazard"
-    if seen.buttons or seen.pressed or seen.is_charging or trust.firmware or trust.hardware:
+    if (
+        seen.buttons
+        or seen.pressed
+        or seen.is_charging
+        or frame_filter.firmware
+        or frame_filter.hardware
+    ):
         yield "button, charger or version"
     if seen.began_anew:
         yield "began anew"

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import ClassVar
 
-from robot.bases import Abilities, Senses
+from robot.bases import Abilities, SensorState
 from robot.bases.kinematic import KinematicBase
 from robot.behavior.performer import Performer
 from robot.motion.limits import TICK_S
@@ -41,7 +41,7 @@ class Stage:
         self.heartbeats = True
 
     def hear(self, **message):
-        self.robot.hear(message, self.now_s)
+        self.robot.handle(message, self.now_s)
         self.collect()
 
     def collect(self):
@@ -91,13 +91,13 @@ class FeelingBase(RealBase):
 
     def __init__(self, monotonic):
         super().__init__(monotonic)
-        self.senses, self.shown, self.is_held = Senses(), [], False
+        self.sensors, self.shown, self.is_held = SensorState(), [], False
 
     def read(self):
         there = super().read()
         if self.is_held:
             there = replace(there, pose=HOME, twist=STILL)
-        return replace(there, senses=self.senses)
+        return replace(there, sensors=self.sensors)
 
-    def show(self, mood, *, aloud):
-        self.shown.append((mood, aloud))
+    def show(self, indication, *, aloud):
+        self.shown.append((indication, aloud))

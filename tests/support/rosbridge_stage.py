@@ -27,7 +27,7 @@ class Stage:
         self.robot = FakeBase(self.bridge.graph, lambda: self.now_s)
         self.bridge.graph.advertise(BUMPER.name, BUMPER.kind, "/base")
         self.base = RosbridgeBase(lambda: self.now_s, topics)
-        self.talk = self.base._conversation
+        self.base_client = self.base._client
         self.is_frozen = False  # nothing passes any more, and nobody is told; later it does
         self.inbox, self.outbox, self.client = [], [], None
         self.performer = None
@@ -36,14 +36,14 @@ class Stage:
 
     def connect(self):
         self.client = self.bridge.join(self.inbox.append)
-        for frame in self.talk.open(self.now_s):
+        for frame in self.base_client.open(self.now_s):
             self.client.take(to_text(frame))
 
     def lose(self):
         self.client.is_there, self.client = False, None
         self.inbox.clear()
         self.outbox.clear()
-        self.talk.lose(self.now_s)
+        self.base_client.lose(self.now_s)
 
     def wait(self, span_s, order=STILL):
         for _ in range(round(span_s / TICK_S)):
@@ -51,19 +51,19 @@ class Stage:
             if self.performer is None:
                 self.base.drive(order)
             else:
-                self.performer.hear({"type": "heartbeat"}, self.now_s)
+                self.performer.handle({"type": "heartbeat"}, self.now_s)
                 self.performer.tick(self.now_s)
             self.pass_on()
 
     def pass_on(self):
         if self.client is not None:
-            self.outbox += map(to_text, self.talk.due(self.now_s))
+            self.outbox += map(to_text, self.base_client.due(self.now_s))
         while self.outbox and not self.is_frozen:
             self.client.take(self.outbox.pop(0))
         self.robot.tell()
         while self.inbox and not self.is_frozen:
             with suppress(BadRosFrame):
-                self.talk.hear(read_frame(self.inbox.pop(0)), self.now_s)
+                self.base_client.hear(read_frame(self.inbox.pop(0)), self.now_s)
 
     def tell(self, topic, message):
         self.inbox.append(json.dumps({"op": "publish", "topic": topic, "msg": message}))
@@ -72,11 +72,11 @@ class Stage:
     def perform(self, cue=CUE):
         """Have a performer drive it, armed, with a gesture begun."""
         self.performer = Performer(self.base)
-        self.performer.hear(WELCOME | {"cue": cue}, self.now_s)
-        self.performer.hear({"type": "arm"}, self.now_s)
+        self.performer.handle(WELCOME | {"cue": cue}, self.now_s)
+        self.performer.handle({"type": "arm"}, self.now_s)
         for number in range(6):
             step = {"type": "step", "time_s": float(number), "performance": 1.2}
-            self.performer.hear(step, self.now_s)
+            self.performer.handle(step, self.now_s)
         return self
 
     def begin_moving(self):

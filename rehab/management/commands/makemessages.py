@@ -14,7 +14,7 @@ REFUSALS = [
         ("InvalidSetting", 1),
         ("Refused", 1),
         ("BadGesture", 1),
-        ("BadGoal", 2),
+        ("BadWaypoint", 2),
         ("Marked", 1),
     )
 ]

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Self
 
 from robot.bases.base import BaseLost, BaseState, MobileBase
-from robot.bases.rosbridge.conversation import Conversation
+from robot.bases.rosbridge.client import BaseClient
 from robot.bases.rosbridge.topics import (
     DEFAULT_PROFILE,
     PROFILES,
@@ -56,11 +56,9 @@ class RosbridgeBase(MobileBase):
 
     def __enter__(self) -> Self:
         """Connect, and give the bridge a moment to say where the base is."""
-        self._bridge = Bridge(
-            self.port or find_bridge(), self._conversation, self._lock, self._monotonic
-        )
+        self._bridge = Bridge(self.port or find_bridge(), self._client, self._lock, self._monotonic)
         until_s = self._monotonic() + GREETING_S
-        while self._monotonic() < until_s and self.read().senses.silent_s == math.inf:
+        while self._monotonic() < until_s and self.read().sensors.silent_s == math.inf:
             time.sleep(0.02)
         return self
 
@@ -79,7 +77,7 @@ class RosbridgeBase(MobileBase):
     def counters(self) -> Mapping[str, int]:
         """Count what went wrong with the connection, with orders, and with odometry."""
         with self._lock:
-            counts = dict(self._conversation.counters)
+            counts = dict(self._client.counters)
         return counts if self._bridge is None else counts | self._bridge.counters
 
     @property
@@ -88,14 +86,14 @@ class RosbridgeBase(MobileBase):
         if self._bridge is None:
             return ""
         with self._lock:
-            return self._bridge.problem or self._conversation.problem(self._monotonic())
+            return self._bridge.problem or self._client.problem(self._monotonic())
 
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
         if self._bridge is not None and self._bridge.is_dead:
             raise BaseLost("The thread that talks to the rosbridge has ended: see its words above.")
         with self._lock:
-            ordered = self._conversation.orders.order(twist, self._monotonic())
+            ordered = self._client.orders.order(twist, self._monotonic())
         if self._bridge is not None:
             self._bridge.wake()
         return ordered
@@ -108,13 +106,13 @@ class RosbridgeBase(MobileBase):
     def read(self) -> BaseState:
         """Give what is believed of it now."""
         with self._lock:
-            return self._conversation.state(self._monotonic())
+            return self._client.state(self._monotonic())
 
     def set_home(self) -> None:
         """Begin odometry anew: this place is home."""
         with self._lock:
-            self._conversation.sight.set_home()
+            self._client.odometry.set_home()
 
     def _choose(self, topics: Topics) -> None:
         self.abilities = topics.abilities
-        self._conversation = Conversation(topics, self._monotonic())
+        self._client = BaseClient(topics, self._monotonic())

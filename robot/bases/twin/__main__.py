@@ -37,8 +37,8 @@ from robot.bases.twin.camera import Camera
 from robot.bases.twin.faults import BadFault, Faults
 from robot.bases.twin.firmware import FIRMWARE, Firmware
 from robot.bases.twin.lines import Line, PtyLine, SocketLine
+from robot.bases.twin.output import redirect_output
 from robot.bases.twin.process import Twin
-from robot.bases.twin.quiet import keep_to_ourselves
 
 
 def make_body(name: str, notice: Callable[[str], None]) -> Body:
@@ -127,7 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             faults.change(fault.name, getattr(options, fault.name))
     except BadFault as problem:
         parser.error(str(problem))
-    answers = keep_to_ourselves()
+    answers = redirect_output()
 
     def answer(text: str) -> None:
         os.write(answers, text.encode() + b"\n")

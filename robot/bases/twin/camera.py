@@ -20,7 +20,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from robot.bases.twin.quiet import keep_to_ourselves
+from robot.bases.twin.output import redirect_output
 from robot.motion.pose import Pose
 
 INTERVAL_S = 0.2
@@ -84,7 +84,7 @@ class Camera:
                 pipe.close()
 
 
-class Studio:
+class Renderer:
     """The twin's looks in a world without physics. Raises ImportError without pybullet."""
 
     def __init__(self) -> None:
@@ -148,8 +148,8 @@ def main(file: Path) -> None:
     """Draw wherever standard input says the twin is, until it closes."""
     if hasattr(os, "nice"):
         os.nice(10)  # the twin and the server come first
-    keep_to_ourselves()
-    studio, rest = Studio(), b""
+    redirect_output()
+    studio, rest = Renderer(), b""
     new = file.with_name(f".{file.name}.new")
     while data := os.read(0, 65536):
         *lines, rest = (rest + data).split(b"\n")

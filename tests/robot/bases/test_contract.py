@@ -8,7 +8,7 @@ from robot.bases import BASES, BaseState
 from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, ORDER_HOLDS_S
 from robot.motion.pose import HOME, Pose, advance
 from robot.motion.twist import STILL, Twist
-from robot.simulation import REHEARSED
+from robot.simulation import SIMULATED_BASES
 
 SIMULATED = ["null", "kinematic"]
 
@@ -35,7 +35,7 @@ def base(request, clock):
 
 
 def test_each_simulated_base_is_tried_here():
-    assert REHEARSED == SIMULATED  # the twin: test_twinned
+    assert SIMULATED_BASES == SIMULATED  # the twin: test_twinned
 
 
 def test_a_base_knows_its_name(base):

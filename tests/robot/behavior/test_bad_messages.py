@@ -44,9 +44,9 @@ BAD = [
 @pytest.mark.parametrize("bad", BAD, ids=str)
 def test_what_is_not_the_protocol_is_counted_and_moves_nothing(stage, bad):
     stage.walk(0.95, 0.95)
-    stage.robot.hear(bad, stage.now_s)
+    stage.robot.handle(bad, stage.now_s)
     assert stage.robot.bad_messages == 1
-    assert len(stage.robot.last_bad) > 15
+    assert len(stage.robot.last_bad_message) > 15
     stage.wait(2)
     assert stage.base.read().pose == HOME
     assert stage.of("status")[-1]["bad_messages"] == 1
@@ -90,7 +90,7 @@ def test_any_json_moves_a_base_only_by_gestures_that_were_told(told):
     stage = Stage(RealBase)
     armed = False
     for message, ticks in told:
-        stage.robot.hear(message, stage.now_s)
+        stage.robot.handle(message, stage.now_s)
         armed = armed or message["type"] == "arm"
         if message["type"] == "stop":
             armed = False

@@ -95,7 +95,7 @@ def test_silence_halts_it_within_three_quarters_of_a_second(stage):
 
 def test_a_lost_link_halts_it_at_once(stage):
     stage.perform()
-    stage.robot.lose("no_link")
+    stage.robot.disconnect("no_link")
     assert stage.base.read().twist == STILL
     before = len(stage.of("status"))
     stage.wait(3)
@@ -111,7 +111,7 @@ def test_a_stop_is_immediate_and_holds_until_someone_arms_it(stage):
     stage.hear(type="stop")
     stage.walk(*[1.0] * 12)
     assert stage.state == ("stopped", "stopped")
-    stage.robot.lose("no_link")
+    stage.robot.disconnect("no_link")
     stage.hear(**WELCOME)
     stage.walk(*[1.0] * 12)
     assert {decision["reason"] for decision in stage.of("decision")[1:]} == {"stopped"}
@@ -145,7 +145,7 @@ def test_only_a_person_arms_a_real_base():
     stage.hear(type="arm")
     stage.walk(*[1.0] * 5)
     assert stage.of("decision")[-1]["gesture"] == "celebrate"
-    stage.robot.lose("no_link")
+    stage.robot.disconnect("no_link")
     stage.hear(**WELCOME)
     stage.walk(*[1.0] * 7)
     assert stage.of("decision")[-1]["reason"] == "disarmed"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from robot.bases import Mood, Senses
+from robot.bases import Indication, SensorState
 from robot.motion.limits import TICK_S
 from robot.motion.pose import HOME
 from robot.motion.twist import STILL
@@ -14,14 +14,14 @@ def test_a_gesture_is_announced_half_a_second_before_it_moves(felt):
     felt.hear(type="step", time_s=5.0, performance=1.0)
     begun_s = felt.now_s
     felt.wait(TICK_S)
-    assert felt.base.shown[-1] == (Mood.MOVING, True)
+    assert felt.base.shown[-1] == (Indication.MOVING, True)
     assert felt.robot.player.is_busy
     while felt.base.read().twist.is_still:
         felt.wait(TICK_S)
     assert 0.5 <= felt.now_s - begun_s <= 0.5 + 3 * TICK_S
     felt.wait(5)
     assert felt.ended == ["done"]
-    assert felt.base.shown[-1] == (Mood.READY, False)
+    assert felt.base.shown[-1] == (Indication.READY, False)
 
 
 @pytest.mark.parametrize("deed", [{"type": "stop"}, {"type": "state", "state": "paused"}])
@@ -40,7 +40,10 @@ def test_quiet_gestures_make_no_sound(felt):
     felt.walk(*[1.0] * 6)
     felt.hear(type="stop")
     felt.wait(0.1)
-    assert {mood for mood, _ in felt.base.shown} >= {Mood.MOVING, Mood.STOPPED}
+    assert {indication for indication, _ in felt.base.shown} >= {
+        Indication.MOVING,
+        Indication.STOPPED,
+    }
     assert not any(aloud for _, aloud in felt.base.shown)
 
 
@@ -55,15 +58,15 @@ def test_what_it_feels_halts_it_at_the_next_tick_and_holds(felt, hazard):
     felt.walk(*[1.0] * 6)
     felt.wait(0.5)
     assert not felt.base.read().twist.is_still
-    felt.base.senses = Senses(hazards=frozenset({hazard}))
+    felt.base.sensors = SensorState(hazards=frozenset({hazard}))
     felt.wait(TICK_S)
     assert felt.base.read().twist == STILL
     assert felt.ended == [hazard]
     assert felt.of("stop") == [{"kind": "stop", "reason": hazard}]
     felt.wait(1)
     assert felt.state == ("stopped", hazard)
-    assert felt.base.shown[-1] == (Mood.STOPPED, True)
-    felt.base.senses = Senses()
+    assert felt.base.shown[-1] == (Indication.STOPPED, True)
+    felt.base.sensors = SensorState()
     felt.walk(*[1.0] * 7)
     assert felt.of("decision")[-1]["reason"] == hazard
     felt.hear(type="stop")  # the server's echo of its report
@@ -75,7 +78,7 @@ def test_what_it_feels_halts_it_at_the_next_tick_and_holds(felt, hazard):
 
 
 def test_it_cannot_be_armed_while_something_is_wrong(felt):
-    felt.base.senses = Senses(hazards=frozenset({"cliff"}))
+    felt.base.sensors = SensorState(hazards=frozenset({"cliff"}))
     felt.wait(2)
     felt.hear(type="arm")
     assert felt.of("stop") == [{"kind": "stop", "reason": "cliff"}] * 2
@@ -86,9 +89,9 @@ def test_it_cannot_be_armed_while_something_is_wrong(felt):
 
 def test_its_button_stops_it_for_everyone(felt):
     felt.walk(*[1.0] * 6)
-    felt.base.senses = Senses(stop_pressed=True)
+    felt.base.sensors = SensorState(stop_pressed=True)
     felt.wait(TICK_S)
-    felt.base.senses = Senses()
+    felt.base.sensors = SensorState()
     assert felt.of("stop") == [{"kind": "stop", "reason": "button"}]
     felt.wait(1)
     assert felt.state == ("stopped", "button")
@@ -151,7 +154,7 @@ def test_a_robot_without_a_session_waits_for_one():
     ("battery_v", "share", "low"), [(None, None, False), (16.5, 1, False), (13.9, 0.25, True)]
 )
 def test_the_battery_is_told_as_people_read_it(felt, battery_v, share, low):
-    felt.base.senses = Senses(battery_v=battery_v)
+    felt.base.sensors = SensorState(battery_v=battery_v)
     felt.wait(1.1)
     status = felt.of("status")[-1]
     assert status["battery_v"] == battery_v

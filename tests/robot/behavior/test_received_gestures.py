@@ -49,7 +49,7 @@ def test_a_gesture_that_does_not_validate_here_moves_nothing(make, data, words):
     stage.walk(*[1.2] * 6)
     decision = stage.of("decision")[0]
     assert (decision["gesture"], decision["reason"]) == (None, "bad_gesture")
-    assert words in stage.robot.last_bad
+    assert words in stage.robot.last_bad_message
     assert stage.robot.bad_messages == 1
     assert stage.base.read().pose == HOME
     assert stage.of("gesture") == []
@@ -61,11 +61,11 @@ def test_what_comes_under_a_built_in_name_does_not_take_the_gesture_away(stage, 
     stage.walk(*[1.2] * 6)
     decision = stage.of("decision")[0]
     assert (decision["gesture"], decision["reason"]) == ("celebrate", "")
-    assert "celebrate" in stage.robot.last_bad
+    assert "celebrate" in stage.robot.last_bad_message
 
 
 def test_a_robot_s_own_gesture_is_not_replaced(stage):
-    stage.robot.repertoire.own = GESTURES | {"wave": GESTURES["nod"]}
+    stage.robot.gestures.builtin = GESTURES | {"wave": GESTURES["nod"]}
     stage.hear(type="cue", cue=CUE | {"above": "wave", "gestures": [WAVE]})
     stage.walk(*[1.2] * 6)
     assert stage.of("decision")[0]["reason"] == "bad_gesture"
@@ -77,7 +77,7 @@ def test_a_slower_robot_refuses_what_it_cannot_reach_in_time(stage):
     slow.hear(**WELCOME | {"cue": CUE | {"above": "wave", "gestures": [WAVE]}})
     slow.walk(*[1.2] * 6)
     assert slow.of("decision")[0]["reason"] == "bad_gesture"
-    assert "out_of_time" in slow.robot.last_bad
+    assert "out_of_time" in slow.robot.last_bad_message
 
 
 @settings(deadline=None)  # each walks six seconds
@@ -93,7 +93,7 @@ def test_gestures_are_a_short_list(stage):
     stage.hear(type="cue", cue=CUE | {"intensity": 0.3, "gestures": [WAVE] * 9})
     stage.hear(type="cue", cue=CUE | {"intensity": 0.3, "gestures": "wave"})
     assert stage.robot.bad_messages == 2
-    assert stage.robot.activation.cue.intensity == 1
+    assert stage.robot.decider.cue.intensity == 1
 
 
 def test_a_gesture_that_nobody_knows(stage):

@@ -58,15 +58,15 @@ def test_two_minutes_at_true_speed(phase):
     base = BASES["kinematic"](lambda: now_s)
     robot = Performer(base)
     welcome = {"type": "welcome", "session": 1, "state": "running", "cue": CUE}
-    robot.hear(welcome, now_s)
+    robot.handle(welcome, now_s)
     decisions, ended = [], []
     for number, (time_s, performance) in enumerate(strides, start=1):
         while now_s - start_s < time_s - times_s[0]:
             now_s += TICK_S
-            robot.hear({"type": "heartbeat"}, now_s)
+            robot.handle({"type": "heartbeat"}, now_s)
             robot.tick(now_s)
         step = {"type": "step", "number": number, "time_s": time_s, "performance": performance}
-        robot.hear(step, now_s)
+        robot.handle(step, now_s)
         while robot.reports:
             report = robot.reports.popleft()
             if report["kind"] == "decision":

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot.bases import Abilities, BaseState, Senses
+from robot.bases import Abilities, BaseState, SensorState
 from robot.behavior import safety as rules
 from robot.behavior.safety import Safety
 from robot.motion.gestures import GESTURES, ORIGINALS
@@ -16,12 +16,12 @@ from robot.motion.twist import STILL, Twist
 
 REAL = Abilities(simulated=False, moves=True, announces=True)
 SIMULATED = Abilities(simulated=True, moves=True)
-FINE = BaseState(HOME, STILL, Senses(battery_v=15.5))
+FINE = BaseState(HOME, STILL, SensorState(battery_v=15.5))
 AHEAD = Twist(0.2, 0.0)
 
 
-def feeling(**senses):
-    return replace(FINE, senses=replace(FINE.senses, **senses))
+def feeling(**sensors):
+    return replace(FINE, sensors=replace(FINE.sensors, **sensors))
 
 
 class Watch:
@@ -32,13 +32,13 @@ class Watch:
         self.safety.is_watched = True
         if armed:
             assert self.safety.arm(self.now_s, FINE) == ""
-        self.safety.begin(self.now_s, FINE)
+        self.safety.start_gesture(self.now_s, FINE)
 
     def look(self, state=FINE, ordered=STILL, *, performing=True, for_s=0.02):
         """Give the first latch within a time, and when it came."""
         for tick in range(round(for_s / 0.02)):
             self.now_s += 0.02
-            found = self.safety.watch(self.now_s, state, ordered, performing=performing)
+            found = self.safety.check(self.now_s, state, ordered, performing=performing)
             if found:
                 return found, round((tick + 1) * 0.02, 2)
         return "", for_s
@@ -54,22 +54,22 @@ def test_a_hazard_latches_at_the_first_look(hazard, abilities, performing):
     watch = Watch(abilities)
     felt = feeling(hazards=frozenset({hazard}))
     assert watch.look(felt, performing=performing) == (hazard, 0.02)
-    assert watch.safety.latch == watch.safety.obstacle(FINE) == hazard
+    assert watch.safety.latch == watch.safety.blocking_reason(FINE) == hazard
     assert watch.look(felt, for_s=1) == ("", 1)  # once; it stays so
     watch.now_s += 60
-    assert watch.safety.obstacle(FINE) == hazard  # over, and nobody has said so
+    assert watch.safety.blocking_reason(FINE) == hazard  # over, and nobody has said so
     assert watch.safety.arm(watch.now_s, felt) == hazard
     assert watch.safety.refused_arms == 1
     watch.now_s += 2
     assert watch.safety.arm(watch.now_s, FINE) == ""
-    assert watch.safety.obstacle(FINE) == ""
+    assert watch.safety.blocking_reason(FINE) == ""
 
 
 def test_only_an_armed_robot_latches_by_itself():
     watch = Watch(armed=False)
     assert watch.look(feeling(hazards=frozenset({"wheel_drop"})), for_s=1) == ("", 1)  # carried
-    assert watch.safety.obstacle(feeling(hazards=frozenset({"wheel_drop"}))) == "wheel_drop"
-    assert watch.safety.obstacle(FINE) == "disarmed"
+    assert watch.safety.blocking_reason(feeling(hazards=frozenset({"wheel_drop"}))) == "wheel_drop"
+    assert watch.safety.blocking_reason(FINE) == "disarmed"
     assert watch.look(feeling(stop_pressed=True)) == ("button", 0.02)  # a person's word
 
 
@@ -78,7 +78,7 @@ def test_real_ones_are_armed_by_people_simulated_ones_arm_themselves():
     assert Safety(SIMULATED).is_armed
     for abilities, armed in ((REAL, False), (SIMULATED, True)):
         watch = Watch(abilities)
-        watch.safety.lose()
+        watch.safety.disconnect()
         assert watch.safety.is_armed is armed
 
 
@@ -86,9 +86,9 @@ def test_a_persons_stop_is_idempotent_and_ends_with_an_arming():
     watch = Watch()
     for _ in range(3):
         watch.safety.stop("stopped")
-    assert watch.safety.obstacle(FINE) == "stopped"
+    assert watch.safety.blocking_reason(FINE) == "stopped"
     assert watch.safety.arm(watch.now_s, FINE) == ""  # the server knows their order
-    assert watch.safety.obstacle(FINE) == ""
+    assert watch.safety.blocking_reason(FINE) == ""
 
 
 def test_the_first_cause_stays():
@@ -127,7 +127,7 @@ def test_hanging_at_rest_is_nothing():
     watch.now_s += 60
     assert watch.look(performing=False) == ("", 0.02)
     watch.now_s += 60
-    watch.safety.begin(watch.now_s, FINE)
+    watch.safety.start_gesture(watch.now_s, FINE)
     assert watch.look() == ("", 0.02)
 
 
@@ -163,7 +163,7 @@ def test_wheels_that_go_astray_for_half_a_second(ordered, moving, found):
 
 def test_wheels_and_gyro_that_disagree_about_a_gesture():
     watch = Watch()
-    watch.safety.begin(watch.now_s, feeling(slip_rad=2.0))
+    watch.safety.start_gesture(watch.now_s, feeling(slip_rad=2.0))
     assert watch.look(feeling(slip_rad=2.17)) == ("", 0.02)
     assert watch.look(feeling(slip_rad=1.82)) == ("slipped", 0.02)
     rest = Watch()
@@ -179,7 +179,7 @@ def test_a_battery_that_runs_down():
         (14.1, ""),
         (None, ""),
     ):
-        assert watch.safety.obstacle(feeling(battery_v=volts)) == reason
+        assert watch.safety.blocking_reason(feeling(battery_v=volts)) == reason
     empty = feeling(battery_v=13.1)
     assert watch.look(empty, for_s=0.9) == ("", 0.9)  # a dip
     assert watch.look(FINE) == ("", 0.02)
@@ -189,17 +189,17 @@ def test_a_battery_that_runs_down():
 
 def test_obstacles_pass_by_themselves():
     watch = Watch()
-    assert watch.safety.obstacle(feeling(is_charging=True)) == "charging"
+    assert watch.safety.blocking_reason(feeling(is_charging=True)) == "charging"
     watch.safety.is_watched = False
-    assert watch.safety.obstacle(FINE) == "unwatched"
+    assert watch.safety.blocking_reason(FINE) == "unwatched"
     watch.safety.is_watched = True
-    assert watch.safety.obstacle(FINE) == ""
-    assert watch.safety.obstacle(feeling(refusal="firmware_refused")) == "firmware_refused"
+    assert watch.safety.blocking_reason(FINE) == ""
+    assert watch.safety.blocking_reason(feeling(refusal="firmware_refused")) == "firmware_refused"
     assert not watch.safety.latch
 
 
 def test_nobody_need_watch_a_simulation():
-    assert Safety(SIMULATED).obstacle(FINE) == ""
+    assert Safety(SIMULATED).blocking_reason(FINE) == ""
 
 
 def test_home():
@@ -212,8 +212,8 @@ states = st.builds(
     BaseState,
     pose=st.builds(Pose, st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), st.floats(-7, 7)),
     twist=st.builds(Twist, st.floats(-0.3, 0.3), st.floats(-2, 2)),
-    senses=st.builds(
-        Senses,
+    sensors=st.builds(
+        SensorState,
         hazards=st.frozensets(st.sampled_from(HAZARDS), max_size=2),
         stop_pressed=st.booleans(),
         battery_v=st.none() | st.floats(12, 17),
@@ -238,18 +238,18 @@ def test_nothing_but_an_arming_ends_a_latch(told):
             case "look":
                 state, performing, pause_s = more
                 now_s += pause_s
-                found = safety.watch(now_s, state, AHEAD, performing=performing)
+                found = safety.check(now_s, state, AHEAD, performing=performing)
                 assert not found or (safety.latch == found and not before)
             case "stop":
                 safety.stop(rules.STOPPED)
             case "lose":
-                safety.lose()
+                safety.disconnect()
                 assert not safety.is_armed
             case "arm":
                 assert bool(safety.arm(now_s, state)) == bool(safety.latch)
         if before and what != "arm":
             assert safety.latch == before
-            assert safety.obstacle(FINE) == before
+            assert safety.blocking_reason(FINE) == before
 
 
 @pytest.mark.parametrize(
@@ -265,8 +265,8 @@ OPEN = Abilities(simulated=False, moves=True, closed_loop=False)
 @pytest.mark.parametrize("gesture", (GESTURES | ORIGINALS).values(), ids=lambda one: one.name)
 def test_an_open_loop_refuses_long_gestures_and_halves_the_others(gesture):
     closed, opened = Safety(REAL), Safety(OPEN)
-    assert (closed.refuses(gesture), closed.share) == ("", 1.0)
-    assert opened.refuses(gesture) == ("open_loop" if gesture.least_s > 4.0 else "")
+    assert (closed.rejection_reason(gesture), closed.share) == ("", 1.0)
+    assert opened.rejection_reason(gesture) == ("open_loop" if gesture.least_s > 4.0 else "")
     assert opened.share == 0.5
 
 
@@ -274,9 +274,9 @@ def test_an_open_loop_has_to_be_looked_at_after_twenty_gestures():
     for abilities, refusal in ((REAL, ""), (OPEN, "place_unknown")):
         watch = Watch(abilities)  # which begins the first
         for _ in range(18):
-            watch.safety.begin(watch.now_s, FINE)
-        assert watch.safety.obstacle(FINE) == ""
-        watch.safety.begin(watch.now_s, FINE)
-        assert watch.safety.obstacle(FINE) == refusal
+            watch.safety.start_gesture(watch.now_s, FINE)
+        assert watch.safety.blocking_reason(FINE) == ""
+        watch.safety.start_gesture(watch.now_s, FINE)
+        assert watch.safety.blocking_reason(FINE) == refusal
         assert watch.safety.arm(watch.now_s, FINE) == ""
-        assert watch.safety.obstacle(FINE) == ""
+        assert watch.safety.blocking_reason(FINE) == ""

@@ -16,8 +16,8 @@ from robot.behavior.window_decider import (
     NO_GESTURE,
     PERFORMING,
     RESTING,
-    Activation,
     Decision,
+    WindowDecider,
 )
 from robot.wire.frames import BadFrame
 
@@ -54,9 +54,9 @@ def test_windows_are_those_of_the_oracle(walk, first_s):
         time_s += gap / 100
         times_s.append(time_s)
         performances.append(percent / 100)
-    activation, found = Activation(CUE), []
+    decider, found = WindowDecider(CUE), []
     for at_s, performance in zip(times_s, performances, strict=True):
-        decision = activation.add(at_s, performance)
+        decision = decider.add(at_s, performance)
         if decision is not None:
             number = round((decision.from_s - times_s[0]) / 5)
             assert decision.until_s == pytest.approx(decision.from_s + 5)
@@ -64,100 +64,102 @@ def test_windows_are_those_of_the_oracle(walk, first_s):
     expected = recompute(times_s, performances) if walk else []
     assert found == expected
     above = sum(decision[3] for decision in expected)
-    assert activation.share == (above / len(expected) if expected else None)
+    assert decider.share == (above / len(expected) if expected else None)
 
 
-def close(activation, time_s=5.0):
+def close(decider, time_s=5.0):
     """Add a step and expect the window to end."""
-    decision = activation.add(time_s, 1.0)
+    decision = decider.add(time_s, 1.0)
     assert decision is not None
     return decision
 
 
 def test_the_threshold_itself_is_above():
-    activation = Activation(CUE)
-    activation.add(0, 0.75)
-    activation.add(1, 1.05)
-    decision = close(activation)
+    decider = WindowDecider(CUE)
+    decider.add(0, 0.75)
+    decider.add(1, 1.05)
+    decision = close(decider)
     assert decision == Decision(0, 5, 5, 2, 0.9, 0.9, True)
-    assert activation.cue.gesture(decision.above) == "celebrate"
+    assert decider.cue.gesture(decision.above) == "celebrate"
 
 
 def test_one_step_decides_nothing():
-    activation = Activation(CUE)
-    activation.add(0, 1.0)
-    assert activation.add(6, 1.0) is None
-    assert activation.share is None
+    decider = WindowDecider(CUE)
+    decider.add(0, 1.0)
+    assert decider.add(6, 1.0) is None
+    assert decider.share is None
 
 
 def test_a_threshold_counts_from_the_open_window_on():
-    activation = Activation(CUE)
-    activation.add(0, 0.8)
-    activation.add(1, 0.8)
-    activation.follow(Cue(above="celebrate", threshold=0.7))
-    assert close(activation).above
-    assert activation.share == 1
+    decider = WindowDecider(CUE)
+    decider.add(0, 0.8)
+    decider.add(1, 0.8)
+    decider.set_cue(Cue(above="celebrate", threshold=0.7))
+    assert close(decider).above
+    assert decider.share == 1
 
 
 def test_another_length_of_windows_begins_anew():
-    activation = Activation(CUE)
-    activation.add(0, 0.8)
-    activation.add(1, 0.8)
-    activation.follow(Cue(window_s=2))
-    assert activation.add(5, 1) is None
-    activation.add(6, 1)
-    assert activation.add(7, 1) == Decision(5, 7, 7, 2, 1, 0.9, True)
+    decider = WindowDecider(CUE)
+    decider.add(0, 0.8)
+    decider.add(1, 0.8)
+    decider.set_cue(Cue(window_s=2))
+    assert decider.add(5, 1) is None
+    decider.add(6, 1)
+    assert decider.add(7, 1) == Decision(5, 7, 7, 2, 1, 0.9, True)
 
 
 def test_a_clock_that_was_set_back_begins_anew():
-    activation = Activation(CUE)
+    decider = WindowDecider(CUE)
     for time_s in (100, 101, 102):
-        activation.add(time_s, 0.5)
-    assert activation.add(3, 1.0) is None
-    assert activation.add(4, 1.0) is None
-    assert close(activation, 8.5) == Decision(3, 8, 8.5, 2, 1.0, 0.9, True)
+        decider.add(time_s, 0.5)
+    assert decider.add(3, 1.0) is None
+    assert decider.add(4, 1.0) is None
+    assert close(decider, 8.5) == Decision(3, 8, 8.5, 2, 1.0, 0.9, True)
 
 
 def test_rest_counts_from_the_start_of_the_last_gesture():
-    activation = Activation(CUE)
+    decider = WindowDecider(CUE)
     first = Decision(0, 5, 5.5, 4, 1.0, 0.9, True)
-    assert activation.obstacle(first, performing=False) == ""
-    activation.started(first)
+    assert decider.blocking_reason(first, performing=False) == ""
+    decider.mark_started(first)
     soon, later = replace(first, at_s=10.4, until_s=10), replace(first, at_s=10.5, until_s=10)
-    assert activation.obstacle(soon, performing=False) == RESTING
-    assert activation.obstacle(later, performing=True) == PERFORMING
-    assert activation.obstacle(later, performing=False) == ""
-    activation.add(20, 1)
-    activation.add(3, 1)  # the source's clock was set back
-    assert activation.obstacle(replace(first, at_s=7.9), performing=False) == RESTING
-    assert activation.obstacle(replace(first, at_s=8.0), performing=False) == ""
+    assert decider.blocking_reason(soon, performing=False) == RESTING
+    assert decider.blocking_reason(later, performing=True) == PERFORMING
+    assert decider.blocking_reason(later, performing=False) == ""
+    decider.add(20, 1)
+    decider.add(3, 1)  # the source's clock was set back
+    assert decider.blocking_reason(replace(first, at_s=7.9), performing=False) == RESTING
+    assert decider.blocking_reason(replace(first, at_s=8.0), performing=False) == ""
 
 
 @pytest.mark.parametrize("back_s", [0, 0.5, 4, 3000, 1.8e9])
 def test_rest_outlasts_a_pause_by_no_more_than_itself_whatever_the_clock(back_s):
-    activation = Activation(CUE)
+    decider = WindowDecider(CUE)
     first = Decision(back_s, back_s + 5, back_s + 5.5, 4, 1.0, 0.9, True)
-    activation.started(first)
-    activation.forget()  # paused, or out of reach
-    activation.add(5.6, 1)
+    decider.mark_started(first)
+    decider.drop_window()  # paused, or out of reach
+    decider.add(5.6, 1)
     begun_s = min(5.6, first.at_s)
     soon, later = (replace(first, from_s=5, until_s=10, at_s=begun_s + s) for s in (4.9, 5))
-    assert activation.obstacle(soon, performing=False) == RESTING
-    assert activation.obstacle(later, performing=False) == ""
+    assert decider.blocking_reason(soon, performing=False) == RESTING
+    assert decider.blocking_reason(later, performing=False) == ""
 
 
 def test_nobody_answers_a_window_of_long_ago():
-    activation = Activation(CUE)
-    activation.add(0, 1)
-    activation.add(1, 1)
-    decision = close(activation, 11)
+    decider = WindowDecider(CUE)
+    decider.add(0, 1)
+    decider.add(1, 1)
+    decision = close(decider, 11)
     assert decision.is_late
-    assert activation.obstacle(decision, performing=False) == LATE
+    assert decider.blocking_reason(decision, performing=False) == LATE
 
 
 def test_no_gesture_where_the_order_names_none():
     decision = Decision(0, 5, 5, 4, 1.0, 0.9, True)
-    assert Activation(Cue(below="droop")).obstacle(decision, performing=False) == NO_GESTURE
+    assert (
+        WindowDecider(Cue(below="droop")).blocking_reason(decision, performing=False) == NO_GESTURE
+    )
 
 
 GOOD = {"above": "a", "below": None, "threshold": 0.9, "window_s": 5, "rest_s": 5, "intensity": 1}
@@ -197,10 +199,10 @@ def test_what_is_no_order(cue):
 def test_strong_walking_is_answered_strongly_within_bounds(mean, threshold):
     above = mean >= threshold
     decision = Decision(0, 5, 5, 4, mean, threshold, above)
-    vigor = decision.vigor
-    assert 0.5 <= vigor <= 1
+    strength = decision.strength
+    assert 0.5 <= strength <= 1
     if not above or mean >= 1.1:
-        assert vigor == 1
+        assert strength == 1
     else:
-        assert vigor <= replace(decision, mean=mean + 0.1).vigor
-        assert replace(decision, mean=threshold).vigor == 0.5
+        assert strength <= replace(decision, mean=mean + 0.1).strength
+        assert replace(decision, mean=threshold).strength == 0.5

@@ -10,10 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot.bases.kinematic import KinematicBase
-from robot.motion.dry_run import admit_gesture, try_gesture
+from robot.motion.dry_run import dry_run, validate_gesture
 from robot.motion.gesture import REACH_M, TETHER_M
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gesture_spec import MOVES_MAX, NUMBERS, Move, compose, read_gesture, to_data
+from robot.motion.gesture_spec import (
+    MOVES_MAX,
+    NUMBERS,
+    Move,
+    build_gesture,
+    parse_gesture,
+    to_data,
+)
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.limits import DEFAULT_LIMITS, TICK_S
 from robot.motion.player import DONE, Player
@@ -28,7 +35,7 @@ def data(*moves: Move, name: str = "wave"):
 
 
 def test_steps_become_the_places_that_they_lead_to():
-    wave = compose(
+    wave = build_gesture(
         "wave",
         [
             Move(turn_rad=QUARTER, forward_m=0.1, hold_s=0.5, pace=0.5),
@@ -36,7 +43,7 @@ def test_steps_become_the_places_that_they_lead_to():
             Move(turn_rad=-QUARTER),
         ],
     )
-    turn, out, back, home = wave.goals
+    turn, out, back, home = wave.waypoints
     assert (turn.x_m, turn.y_m, turn.heading_rad, turn.hold_s) == (0, 0, QUARTER, 0)
     assert (out.x_m, out.y_m) == pytest.approx((0, 0.1))
     assert (out.heading_rad, out.pace, out.hold_s) == (QUARTER, 0.5, 0.5)
@@ -47,16 +54,16 @@ def test_steps_become_the_places_that_they_lead_to():
 
 def test_a_step_s_time_is_shared_by_its_turn_and_its_way():
     moves = [Move(QUARTER, 0.1, hold_s=1, within_s=9), Move(0, -0.1), Move(-QUARTER)]
-    turn, out, *_ = compose("wave", moves).goals
+    turn, out, *_ = build_gesture("wave", moves).waypoints
     assert turn.within_s + out.within_s == pytest.approx(9)
     assert out.within_s > turn.within_s  # the pause is part of it
 
 
 def test_three_sides_come_home_although_they_are_rounded():
     triangle = [Move(QUARTER / 2, 0.14), Move(3 * QUARTER / 2, 0.1), Move(QUARTER, 0.1)]
-    assert compose("triangle", [*triangle, Move(turn_rad=QUARTER)]).goals[-1].heading_rad == (
-        pytest.approx(math.tau)
-    )
+    assert build_gesture("triangle", [*triangle, Move(turn_rad=QUARTER)]).waypoints[
+        -1
+    ].heading_rad == (pytest.approx(math.tau))
 
 
 @pytest.mark.parametrize(
@@ -88,28 +95,28 @@ def test_three_sides_come_home_although_they_are_rounded():
 )
 def test_what_no_base_should_perform_is_refused_with_the_cure(moves, cure):
     with pytest.raises(BadGesture, match=cure):
-        admit_gesture(data(*moves))
+        validate_gesture(data(*moves))
 
 
 @pytest.mark.parametrize("name", [*GESTURES, *ORIGINALS])
 def test_no_name_stands_for_two_gestures(name):
     with pytest.raises(BadGesture, match="Choose another name"):
-        compose(name, NOD)
+        build_gesture(name, NOD)
 
 
 @pytest.mark.parametrize("name", ["", "a b", "x" * 33, "<b>", "é", None, 3])
 def test_names_can_be_said_in_every_message(name):
     with pytest.raises(BadGesture, match="letters, digits"):
-        compose(name, NOD)
+        build_gesture(name, NOD)
 
 
 @pytest.mark.parametrize("limit", [2.0, 3.0])
 def test_the_time_that_it_says_it_needs_is_enough(limit):
     moves = [Move(forward_m=0.1, within_s=0.1), Move(forward_m=-0.1)]
     with pytest.raises(BadGesture) as refused:
-        compose("wave", moves)
+        build_gesture("wave", moves)
     needed_s = float(re.search(r"needs ([\d.]+) s", str(refused.value))[1])
-    compose("wave", [Move(forward_m=0.1, within_s=needed_s), moves[1]])
+    build_gesture("wave", [Move(forward_m=0.1, within_s=needed_s), moves[1]])
     assert needed_s < limit
 
 
@@ -161,19 +168,19 @@ def perform(gesture, pace):
         twist = base.drive(player.step(now_s, base.read().pose))
         ordered.append((twist.v_m_s, twist.w_rad_s))
         now_s += TICK_S
-    return player.outcome, base.truth(), ordered
+    return player.outcome, base.ground_truth(), ordered
 
 
 @given(st.one_of(returning(), anything), st.floats(0.05, 1), st.sampled_from([1.0, 0.5]))
 def test_what_is_admitted_stays_near_and_comes_home_at_any_intensity(moves, intensity, pace):
     try:
-        gesture = admit_gesture(data(*moves))
+        gesture = validate_gesture(data(*moves))
     except BadGesture as refused:
         # The same words from the same data at the other end of the wire.
         with pytest.raises(BadGesture, match=re.escape(str(refused))):
-            admit_gesture(json.loads(json.dumps(data(*moves))))
+            validate_gesture(json.loads(json.dumps(data(*moves))))
         return
-    assert admit_gesture(json.loads(json.dumps(data(*moves)))) == gesture
+    assert validate_gesture(json.loads(json.dumps(data(*moves)))) == gesture
     scaled = gesture.scaled(intensity)
     assert scaled.least_s <= gesture.least_s + 1e-9
     outcome, truth, ordered = perform(scaled, pace)
@@ -201,7 +208,7 @@ steps = st.fixed_dictionaries({}, optional=dict.fromkeys(NUMBERS, jsons))
 )
 def test_any_json_is_a_gesture_or_is_refused(sent):
     try:
-        read_gesture(sent)
+        parse_gesture(sent)
     except BadGesture as refused:
         assert str(refused)
 
@@ -209,13 +216,13 @@ def test_any_json_is_a_gesture_or_is_refused(sent):
 @pytest.mark.parametrize("step", [{"forward_m": 10**400}, {"forward_m": True}, {"hold_s": "1"}, 3])
 def test_steps_are_numbers(step):
     with pytest.raises(BadGesture, match="Step 1"):
-        read_gesture({"name": "wave", "steps": [step]})
+        parse_gesture({"name": "wave", "steps": [step]})
 
 
 def test_a_trial_tells_how_long_and_how_far():
-    trial = try_gesture(compose("wave", NOD))
+    trial = dry_run(build_gesture("wave", NOD))
     assert trial.outcome == DONE
     assert 2 < trial.took_s < 4
     assert trial.farthest_m == pytest.approx(0.1, abs=0.01)
-    slow = try_gesture(compose("wave", NOD), pace=0.5)
+    slow = dry_run(build_gesture("wave", NOD), pace=0.5)
     assert slow.took_s > trial.took_s

@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rehab.training.valences import VALENCES
-from robot.motion.gesture import REACH_M, Gesture, Goal
+from robot.motion.gesture import REACH_M, Gesture, Waypoint
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gestures import GESTURES
-from robot.motion.path import Drive, Turn, plan_legs
+from robot.motion.path import Drive, Turn, plan_path
 from robot.motion.pose import HOME, Pose
 
-AWAY = Goal(0.1, 0.0, 0.0, within_s=4)
-BACK = Goal(0.0, 0.0, 0.0, within_s=4)
+AWAY = Waypoint(0.1, 0.0, 0.0, within_s=4)
+BACK = Waypoint(0.0, 0.0, 0.0, within_s=4)
 
 poses = st.builds(Pose, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(-3, 3))
 
@@ -34,14 +34,14 @@ def test_every_cue_names_gestures_that_exist():
 @pytest.mark.parametrize("gesture", GESTURES.values(), ids=lambda gesture: gesture.name)
 def test_each_is_short_near_and_never_goes_out_backwards(gesture):
     assert gesture.least_s <= 4
-    assert max(goal.pose.distance_m(HOME) for goal in gesture.goals) <= REACH_M
+    assert max(waypoint.pose.distance_m(HOME) for waypoint in gesture.waypoints) <= REACH_M
     farthest_m, start = 0.0, HOME
-    for goal in gesture.goals:
-        for leg in plan_legs(start, goal.pose):
+    for waypoint in gesture.waypoints:
+        for leg in plan_path(start, waypoint.pose):
             if isinstance(leg, Drive) and leg.by_m < 0:
-                assert goal.pose.distance_m(HOME) < farthest_m  # the way it came
-        farthest_m = max(farthest_m, goal.pose.distance_m(HOME))
-        start = goal.pose
+                assert waypoint.pose.distance_m(HOME) < farthest_m  # the way it came
+        farthest_m = max(farthest_m, waypoint.pose.distance_m(HOME))
+        start = waypoint.pose
 
 
 @pytest.mark.parametrize("gesture", GESTURES.values(), ids=lambda gesture: gesture.name)
@@ -57,9 +57,9 @@ def test_no_gesture_grows(intensity):
 
 
 @given(poses, poses)
-def test_legs_lead_from_a_pose_to_the_next(start, goal):
+def test_legs_lead_from_a_pose_to_the_next(start, waypoint):
     x_m, y_m, heading_rad = start.x_m, start.y_m, start.heading_rad
-    for leg in plan_legs(start, goal):
+    for leg in plan_path(start, waypoint):
         match leg:
             case Turn():
                 heading_rad += leg.by_rad
@@ -69,16 +69,16 @@ def test_legs_lead_from_a_pose_to_the_next(start, goal):
                 x_m += leg.by_m * math.cos(heading_rad)
                 y_m += leg.by_m * math.sin(heading_rad)
     end = Pose(x_m, y_m, heading_rad)
-    assert end.distance_m(goal) < 1e-9
-    assert heading_rad == pytest.approx(goal.heading_rad)
+    assert end.distance_m(waypoint) < 1e-9
+    assert heading_rad == pytest.approx(waypoint.heading_rad)
 
 
 def test_a_place_behind_is_driven_to_backwards():
-    assert plan_legs(Pose(0.1), HOME) == (Turn(0, 0), Drive(0, 0, 0, -0.1), Turn(0, 0))
+    assert plan_path(Pose(0.1), HOME) == (Turn(0, 0), Drive(0, 0, 0, -0.1), Turn(0, 0))
 
 
 @pytest.mark.parametrize(
-    ("goals", "cure"),
+    ("waypoints", "cure"),
     [
         ((), "1 to 32 goals"),
         ((BACK,) * 33, "1 to 32 goals"),
@@ -95,10 +95,10 @@ def test_a_place_behind_is_driven_to_backwards():
         ((AWAY, BACK) * 7, "at most 16 s"),
     ],
 )
-def test_what_no_base_should_perform_is_refused_with_the_cure(goals, cure):
+def test_what_no_base_should_perform_is_refused_with_the_cure(waypoints, cure):
     with pytest.raises(BadGesture, match=cure):
-        Gesture("bad", "Bad", goals)
+        Gesture("bad", "Bad", waypoints)
 
 
 def test_a_full_turn_comes_home():
-    Gesture("spin", "Spin", (Goal(0.0, 0.0, math.tau, within_s=8),))
+    Gesture("spin", "Spin", (Waypoint(0.0, 0.0, math.tau, within_s=8),))

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot.motion.gesture import TETHER_M, Gesture, Goal
+from robot.motion.gesture import TETHER_M, Gesture, Waypoint
 from robot.motion.gestures import GESTURES
 from robot.motion.limits import Limits
 from robot.motion.player import BAD_ODOMETRY, DONE, OUT_OF_TIME, Player
@@ -150,7 +150,7 @@ def test_it_stays_where_it_is_told_to():
     hold = Gesture(
         "wait",
         "Wait",
-        (Goal(0.1, 0, 0, within_s=5, hold_s=2), Goal(0, 0, 0, within_s=3)),
+        (Waypoint(0.1, 0, 0, within_s=5, hold_s=2), Waypoint(0, 0, 0, within_s=3)),
     )
     player, floor = Player(Limits()), Floor()
     player.start(hold, 0.0, HOME)

@@ -1,4 +1,4 @@
-"""Finding the port of a Kobuki, and `python -m robot doctor` on it."""
+"""Diagnosis the port of a Kobuki, and `python -m robot doctor` on it."""
 
 import sys
 
@@ -6,7 +6,7 @@ import pytest
 
 from robot.__main__ import main
 from robot.port import usb
-from robot.port.usb import Usb, find_port, look_at_port
+from robot.port.usb import Usb, check_port, find_port
 from tests.support.fake_kobuki import FakeKobuki
 
 KOBUKI = Usb("/dev/ttyUSB3", 0x0403, 0x6001, "kobuki_A505QO28")
@@ -16,7 +16,7 @@ POSIX = pytest.mark.skipif(sys.platform == "win32", reason="no pty")
 
 
 def cures(port, usbs, **options):
-    return [found.cure for found in look_at_port(str(port), usbs, **options) if found.cure]
+    return [found.cure for found in check_port(str(port), usbs, **options) if found.cure]
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from robot.behavior.safety import BASE_SILENT_S
 from robot.motion.gestures import GESTURES
 from robot.motion.twist import STILL, Twist
 from robot.original_topics import OriginalTopics
-from robot.play_gesture import main, play
+from robot.play_gesture import main, play_gesture
 from robot.ros.bridge import RETRY_LONGEST_S, Bridge
 from tests.support.fake_robot_server import TOKEN, FakeGarry, serve_garry
 from tests.support.fake_ros import (
@@ -57,7 +57,7 @@ def open_base(url, topics=PLAIN):
 def test_it_drives_stops_and_takes_its_leave(ros):
     with open_base(ros.url) as base:
         assert base.problem == ""
-        assert base.read().senses.silent_s < BASE_SILENT_S
+        assert base.read().sensors.silent_s < BASE_SILENT_S
         release(base)
         drive(base, Twist(0.1, 0.2), lambda: base.read().pose.x_m > 0.02)
         base.stop()
@@ -113,7 +113,7 @@ def test_a_bridge_that_comes_back_hears_a_stop_first_and_nothing_old(ros):
         drive(base, Twist(0.2, 0), lambda: ros.robot.is_moving)
         wire.go_down()
         drive(base, Twist(0.2, 0), lambda: "No rosbridge" in base.problem)
-        assert base.read().senses.silent_s > BASE_SILENT_S
+        assert base.read().sensors.silent_s > BASE_SILENT_S
         for _ in range(10):
             base.drive(Twist(0.2, 0))
         before = len(ros.robot.orders)
@@ -130,14 +130,14 @@ def test_a_black_hole_is_told_and_stops_it(ros):
         wire = stack.enter_context(Wire(ros.port))
         base = stack.enter_context(open_base(f"ws://127.0.0.1:{wire.port}"))
         threading.Timer(0.6, wire.freeze).start()
-        played = play(GESTURES["celebrate"], base, time.monotonic, time.sleep)
+        played = play_gesture(GESTURES["celebrate"], base, time.monotonic, time.sleep)
         assert played["outcome"] == "base_silent"
         assert played["took_s"] < 0.6 + BASE_SILENT_S + 0.3  # the machine may be busy
         wait_until(lambda: not ros.robot.is_moving)  # by its own timeout
         before = len(ros.robot.orders)
         wait_until(lambda: base.problem != "")
         wire.thaw()
-        drive(base, STILL, lambda: base.read().senses.silent_s < BASE_SILENT_S)
+        drive(base, STILL, lambda: base.read().sensors.silent_s < BASE_SILENT_S)
         # The one order that was on its way came late, and standing still right behind it.
         late = ros.robot.orders[before:]
         assert [any(order[1:]) for order in late].count(True) <= 1
@@ -165,7 +165,7 @@ def test_garbage_from_a_bridge_moves_nothing_and_is_outlived(ros, text):
         def is_back():
             return (
                 base.counters["bridge_openings"] == openings
-                and base.read().senses.silent_s < BASE_SILENT_S
+                and base.read().sensors.silent_s < BASE_SILENT_S
             )
 
         drive(base, STILL, is_back)
@@ -214,7 +214,7 @@ def test_pauses_between_attempts_grow_to_five_seconds_and_no_further():
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_a_thread_that_ended_is_a_base_that_is_lost(ros, monkeypatch):
     with open_base(ros.url) as base:
-        monkeypatch.setattr(base._conversation, "due", lambda now_s: 1 / 0)
+        monkeypatch.setattr(base._client, "due", lambda now_s: 1 / 0)
         wait_until(lambda: base._bridge.is_dead)
         with pytest.raises(BaseLost, match="see its words above"):
             base.drive(STILL)
@@ -232,9 +232,9 @@ def test_it_stands_still_by_itself_when_whoever_orders_hangs(ros):
 
 
 def test_a_bumper_that_nobody_publishes_keeps_it_from_moving(ros):
-    topics = Topics(PLAIN.order, PLAIN.odometry, PROFILES["kobuki"].feelers)
+    topics = Topics(PLAIN.order, PLAIN.odometry, PROFILES["kobuki"].sensors)
     with open_base(ros.url, topics) as base:
-        wait_until(lambda: base.read().senses.refusal == "feeler_missing")
+        wait_until(lambda: base.read().sensors.refusal == "feeler_missing")
 
 
 # --- the original's topics, at the same bridge --------------------------------------------------

@@ -13,7 +13,7 @@ from robot.bases.rosbridge.topics import PROFILES, Topics
 from robot.motion.gestures import GESTURES
 from robot.motion.twist import STILL, Twist
 from robot.original_topics import OriginalTopics
-from robot.play_gesture import play
+from robot.play_gesture import play_gesture
 from robot.ros.frames import Topic
 from tests.support.fake_ros import (
     FakeBase,
@@ -63,7 +63,7 @@ def test_a_node_of_rospy_receives_twists_and_its_odometry_closes_the_loop(ros):
     start = ros.robot.x_m, ros.robot.y_m
     with open_base(ros.url) as base:
         release(base)
-        played = play(GESTURES["celebrate"], base, time.monotonic, time.sleep)
+        played = play_gesture(GESTURES["celebrate"], base, time.monotonic, time.sleep)
     assert played["outcome"] == "done"
     assert 0.05 < played["farthest_m"] < 0.1
     assert math.dist(start, (ros.robot.x_m, ros.robot.y_m)) < 0.02
@@ -77,9 +77,9 @@ def test_a_bumper_of_a_node_stops_it(ros):
         release(base)
         drive(base, Twist(0.1, 0), lambda: ros.robot.is_moving)
         ros.node.publish(BUMPER.name, {"data": True})
-        drive(base, Twist(0.1, 0), lambda: "bump" in base.read().senses.hazards)
+        drive(base, Twist(0.1, 0), lambda: "bump" in base.read().sensors.hazards)
         ros.node.publish(BUMPER.name, {"data": False})
-        drive(base, STILL, lambda: not base.read().senses.hazards)
+        drive(base, STILL, lambda: not base.read().sensors.hazards)
 
 
 def test_a_reconnection_replays_nothing(ros):

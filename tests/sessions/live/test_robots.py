@@ -20,7 +20,7 @@ from rehab.sessions.live.session import NotStored
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.valences import Cue
-from robot.motion.dry_run import admit_gesture
+from robot.motion.dry_run import validate_gesture
 from tests.sessions.live.callers import Message, change, turns
 from tests.world import NOW
 
@@ -539,7 +539,7 @@ async def test_composed_gestures_travel_in_the_cue(place, ready):
     cue = (await (await place.robot().dial()).hello())["cue"]
     assert (cue["above"], cue["below"]) == ("wave", None)
     assert cue["gestures"] == [wave]
-    assert admit_gesture(cue["gestures"][0]).name == "wave"
+    assert validate_gesture(cue["gestures"][0]).name == "wave"
 
 
 def compose(clinic: Clinic) -> Message:

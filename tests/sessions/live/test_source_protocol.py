@@ -334,8 +334,8 @@ async def test_a_robot_answers_plain_text(place, begun):
     await source.say("4.02, 3.0")
     step = await robot.hear("step")
     performer = Performer(KinematicBase(lambda: 0.0))
-    performer.hear(robot.heard[0], 0.0)
-    performer.hear(step, 0.0)
+    performer.handle(robot.heard[0], 0.0)
+    performer.handle(step, 0.0)
     assert (performer.is_linked, performer.bad_messages) == (True, 0)
 
 

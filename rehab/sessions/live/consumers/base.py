@@ -192,7 +192,8 @@ class Socket(AsyncWebsocketConsumer):
     async def shut(self, code: int) -> None:
         """Close with a code."""
         if not self.is_closed:
-            await self._pass_on({"type": "websocket.close", "code": code})
+            # autobahn, below daphne, takes no subclass of int
+            await self._pass_on({"type": "websocket.close", "code": int(code)})
             self.is_closed = True
 
     async def _pass_on(self, message: dict[str, Any]) -> None:

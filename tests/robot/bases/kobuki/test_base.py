@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from robot.bases.base import Mood
+from robot.bases.base import Indication
 from robot.bases.kobuki import KobukiBase
 from robot.motion.pose import HOME, Pose
 from robot.motion.twist import STILL, Twist
@@ -50,7 +50,7 @@ def drive(base, twist, for_s):
 def until(base, holds, within_s=8.0):
     """Order it to stand until something holds, as a worker does."""
     end_s = time.monotonic() + within_s
-    while not holds(base.read().senses):
+    while not holds(base.read().sensors):
         assert time.monotonic() < end_s, base.read()
         base.stop()
         time.sleep(TICK_S)
@@ -64,10 +64,10 @@ def owner_of(base):
 def test_it_begins_at_home_still_and_knows_its_battery(base):
     state = base.read()
     assert (state.pose, state.twist) == (HOME, STILL)
-    assert state.senses.battery_v == 16.0
-    assert state.senses.refusal == ""
-    assert state.senses.hazards == frozenset()
-    assert state.senses.silent_s < 0.1
+    assert state.sensors.battery_v == 16.0
+    assert state.sensors.refusal == ""
+    assert state.sensors.hazards == frozenset()
+    assert state.sensors.silent_s < 0.1
     assert base.problem == ""
 
 
@@ -95,7 +95,7 @@ def test_it_goes_where_it_is_told_over_wraps_of_all_counters(kobuki, base, twist
     ):
         way = gone * math.copysign(1, speed) if speed else abs(gone)
         assert 0.2 * abs(speed) - 0.001 <= way <= longest_s * abs(speed) + 0.001
-    assert abs(state.senses.slip_rad) < 0.02
+    assert abs(state.sensors.slip_rad) < 0.02
     assert state.twist == STILL
     base.set_home()
     assert base.read().pose == HOME
@@ -111,23 +111,23 @@ def test_it_says_what_it_really_sends(base):
 @pytest.mark.parametrize("hazard", ["bump", "cliff", "wheel_drop", "over_current"])
 def test_what_it_feels(kobuki, base, hazard):
     setattr(kobuki, {"bump": "bumper"}.get(hazard, hazard), 1)
-    until(base, lambda senses: senses.hazards == {hazard})
+    until(base, lambda sensors: sensors.hazards == {hazard})
     setattr(kobuki, {"bump": "bumper"}.get(hazard, hazard), 0)
-    until(base, lambda senses: not senses.hazards)
+    until(base, lambda sensors: not sensors.hazards)
 
 
 def test_its_button_and_its_charger(kobuki, base):
     kobuki.buttons, kobuki.charger, kobuki.battery = 1, 6, 133
-    until(base, lambda senses: senses.stop_pressed)
-    until(base, lambda senses: senses.is_charging and senses.battery_v == 13.3)
+    until(base, lambda sensors: sensors.stop_pressed)
+    until(base, lambda sensors: sensors.is_charging and sensors.battery_v == 13.3)
     kobuki.buttons = 4
-    until(base, lambda senses: not senses.stop_pressed)
+    until(base, lambda sensors: not sensors.stop_pressed)
 
 
 def test_lights_and_sounds_never_cut_the_power(kobuki, base):
-    for mood in Mood:
-        base.show(mood, aloud=True)
-        until(base, lambda senses: senses.refusal == "")
+    for indication in Indication:
+        base.show(indication, aloud=True)
+        until(base, lambda sensors: sensors.refusal == "")
         drive(base, STILL, 0.06)
     lights = {0x00F0, 0x01F0, 0x02F0, 0x03F0}
     kobuki.until(lambda: set(kobuki.outputs) >= lights)
@@ -147,8 +147,8 @@ def test_lights_and_sounds_never_cut_the_power(kobuki, base):
 )
 def test_firmware_that_it_was_not_made_for(version, refusal):
     with FakeKobuki(version=version) as kobuki, driving(kobuki.url) as base:
-        until(base, lambda senses: senses.refusal != "firmware_unknown")
-        assert base.read().senses.refusal == refusal
+        until(base, lambda sensors: sensors.refusal != "firmware_unknown")
+        assert base.read().sensors.refusal == refusal
 
 
 @pytest.mark.realtime
@@ -156,16 +156,16 @@ def test_noise_is_counted_and_costs_nothing(kobuki, base):
     for _ in range(10):
         kobuki.noise = bytes.fromhex("AA554D010F") + os.urandom(40)
         drive(base, Twist(0.1, 0), 0.06)
-    assert base.read().senses.silent_s < 0.1
+    assert base.read().sensors.silent_s < 0.1
     assert base.counters["skipped_bytes"] > 300
     assert base.read().pose.x_m == pytest.approx(0.06, abs=0.03)
 
 
 def test_a_base_that_falls_silent(kobuki, base):
     kobuki.is_mute = True
-    until(base, lambda senses: senses.silent_s > 0.2)
+    until(base, lambda sensors: sensors.silent_s > 0.2)
     kobuki.is_mute = False
-    until(base, lambda senses: senses.silent_s < 0.1)
+    until(base, lambda sensors: sensors.silent_s < 0.1)
 
 
 @pytest.mark.realtime
@@ -173,7 +173,7 @@ def test_a_base_that_is_switched_off_and_on_jumps_nowhere(kobuki, base):
     drive(base, Twist(0.2, 0.5), 0.4)
     there = base.read().pose
     kobuki.restart()
-    until(base, lambda senses: "restarted" in senses.hazards)
+    until(base, lambda sensors: "restarted" in sensors.hazards)
     assert base.read().pose.distance_m(there) < 0.02
     assert abs(base.read().pose.heading_rad - there.heading_rad) < 0.05
 
@@ -203,7 +203,7 @@ def test_a_port_that_vanishes_and_comes_back(tmp_path):
                     time.sleep(TICK_S)
                 again.until(lambda: len(again.orders) >= 3)
                 assert not any(speed for _, speed, _ in again.orders)
-                until(base, lambda senses: senses.silent_s < 0.1 and not senses.refusal)
+                until(base, lambda sensors: sensors.silent_s < 0.1 and not sensors.refusal)
                 assert base.read().pose.distance_m(there) < 0.03
                 drive(base, Twist(0.1, 0), 0.2)
                 assert again.is_moving
@@ -241,5 +241,5 @@ def test_leaving_it_stops_it(kobuki):
 def test_a_port_that_is_not_there_says_so(tmp_path):
     with driving(str(tmp_path / "nothing")) as base:
         assert "could not open port" in base.problem
-        assert base.read().senses.silent_s > 1
+        assert base.read().sensors.silent_s > 1
         assert base.read().twist == STILL

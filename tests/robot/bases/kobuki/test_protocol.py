@@ -23,8 +23,10 @@ from robot.bases.kobuki_protocol import (
     CoreSensors,
     DockIr,
     Eeprom,
+    Estimate,
     Extra,
     Feedback,
+    FrameFilter,
     FrameReader,
     GetGain,
     GpInput,
@@ -39,10 +41,8 @@ from robot.bases.kobuki_protocol import (
     RequestExtra,
     SetGain,
     Side,
-    Sighting,
     Sound,
     SoundSequence,
-    Trust,
     Udid,
     Version,
     control_of,
@@ -316,19 +316,19 @@ def test_what_is_slower_than_a_millimeter_stands(twist):
     assert twist_of(control_of(twist)) == STILL
 
 
-# --- Trust ---------------------------------------------------------------------------------------
+# --- the frame filter ----------------------------------------------------------------------------
 
 
 class Line:
     """A base that is heard 50 times a second."""
 
     def __init__(self):
-        self.trust = Trust()
+        self.frame_filter = FrameFilter()
         self.now_s = 100.0
 
     def hear(self, said, after_s=FRAME_S):
         self.now_s += after_s
-        return self.trust.take(said, self.now_s)
+        return self.frame_filter.take(said, self.now_s)
 
 
 @pytest.fixture
@@ -348,8 +348,8 @@ def still(number, angle=0, rate=0, **core):
 def test_it_begins_with_two_frames():
     line = Line()
     assert line.hear(still(0)) is None
-    assert line.hear(still(1)) == Sighting(battery_v=16.7, began_anew=True)
-    assert line.hear(still(2)) == Sighting(battery_v=16.7)
+    assert line.hear(still(1)) == Estimate(battery_v=16.7, began_anew=True)
+    assert line.hear(still(2)) == Estimate(battery_v=16.7)
 
 
 def test_distances_and_headings_do_not_wrap():
@@ -367,11 +367,11 @@ def test_distances_and_headings_do_not_wrap():
     assert seen.right_m == pytest.approx(60 * (count - 1) * TICK_M)
     assert seen.heading_rad == pytest.approx(math.radians(2 * (count - 1)))
     assert seen.left_m_s == pytest.approx(-47 * TICK_M / FRAME_S)
-    assert line.trust.doubted == 0
+    assert line.frame_filter.doubted == 0
 
 
 def test_an_angle_may_also_wrap_as_a_number_of_16_bits(line):
-    line.trust.forget()
+    line.frame_filter.forget()
     for number, angle in enumerate((32_700, 32_750, -32_736, -32_686)):
         seen = line.hear(still(number, angle=angle))
     assert seen.heading_rad == pytest.approx(math.radians(1.5))
@@ -409,7 +409,7 @@ def test_a_button_is_pressed_once(line):
 def test_a_jump_is_put_aside(line, broken):
     assert line.hear(still(2, bumper=1, **broken)) is None
     assert line.hear(still(3, bumper=1)).bumper == 0
-    assert line.trust.doubted == 1
+    assert line.frame_filter.doubted == 1
 
 
 @pytest.mark.parametrize("ahead_ms", [-20_000, -1, 256, 30_000])
@@ -446,7 +446,7 @@ def test_versions_count_once_two_replies_agree(line):
     for number, patch, believed in [(2, 4, None), (3, 5, None), (4, 5, Version(1, 1, 5))]:
         said = still(number)
         line.hear(Feedback(said.core, inertia=said.inertia, firmware=Version(1, 1, patch)))
-        assert line.trust.firmware == believed
+        assert line.frame_filter.firmware == believed
 
 
 @pytest.mark.parametrize("lose", [damage.lose_bytes, damage.lose_a_byte])

@@ -28,7 +28,7 @@ def test_it_begins_at_home_wherever_that_is(stage):
     there = stage.base.read()
     assert there.pose.distance_m(HOME) < 1e-9
     assert there.twist == STILL
-    assert there.senses.silent_s == 0
+    assert there.sensors.silent_s == 0
 
 
 @pytest.mark.parametrize("bad", [Twist(math.nan, 0), Twist(0.1, math.inf)])
@@ -65,7 +65,7 @@ def test_stopping_waits_for_nothing(stage):
     stage.is_frozen = True  # nothing comes back any more
     stage.wait(0.1, Twist(0.1, 0))
     stage.base.stop()
-    assert stage.talk.orders.due(stage.now_s) == STILL
+    assert stage.base_client.orders.due(stage.now_s) == STILL
 
 
 def test_home_is_where_it_is_put_and_poses_are_seen_from_there(stage):
@@ -134,9 +134,9 @@ def test_a_first_stop_that_gets_lost_is_said_again():
     stage.connect()
     stage.wait(0.25, Twist(0.1, 0))
     assert len(stage.robot.orders) == before
-    assert stage.base.read().senses.silent_s > BASE_SILENT_S  # and until then nobody may move it
+    assert stage.base.read().sensors.silent_s > BASE_SILENT_S  # and until then nobody may move it
     stage.wait(0.25)
-    assert stage.base.read().senses.silent_s < BASE_SILENT_S
+    assert stage.base.read().sensors.silent_s < BASE_SILENT_S
     assert not moving(stage)
 
 

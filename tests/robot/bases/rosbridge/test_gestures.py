@@ -6,7 +6,7 @@ import pytest
 
 from robot.behavior.safety import OPEN_LOOP_MOST
 from robot.motion.gestures import GESTURES, ORIGINALS
-from robot.play_gesture import play
+from robot.play_gesture import play_gesture
 from tests.support.robot_stage import CUE
 from tests.support.rosbridge_stage import OPEN, Stage, moving
 
@@ -21,7 +21,7 @@ def test_every_gesture_closed_on_odometry_ends_at_home(name, goes):
         stage.now_s += span_s
         stage.pass_on()
 
-    played = play((GESTURES | ORIGINALS)[name], stage.base, lambda: stage.now_s, sleep)
+    played = play_gesture((GESTURES | ORIGINALS)[name], stage.base, lambda: stage.now_s, sleep)
     assert played["outcome"] == "done"
     assert played["abilities"]["closed_loop"]
     x_m, y_m = stage.robot.x_m - 3.0, stage.robot.y_m + 2.0
@@ -67,11 +67,11 @@ def test_an_open_loop_has_to_be_looked_at_after_so_many_gestures():
     for number in range(6, 5 * OPEN_LOOP_MOST + 6):
         stage.wait(1)
         step = {"type": "step", "time_s": float(number), "performance": 1.2}
-        stage.performer.hear(step, stage.now_s)
+        stage.performer.handle(step, stage.now_s)
         told += [stage.performer.decision] * (stage.performer.decision is not told[-1])
     assert len(told) == OPEN_LOOP_MOST + 1
     assert len(moving(stage)) > 0
     assert stage.of("decision")[-1]["reason"] == "place_unknown"
     assert stage.of("decision")[-2]["reason"] == ""
-    stage.performer.hear({"type": "arm"}, stage.now_s)
-    assert stage.performer.safety.obstacle(stage.base.read()) == ""
+    stage.performer.handle({"type": "arm"}, stage.now_s)
+    assert stage.performer.safety.blocking_reason(stage.base.read()) == ""

@@ -18,15 +18,15 @@ def base_of(*words):
 
 def test_its_topics_are_chosen():
     base = base_of("--ros-robot", "plain", "--ros-url", "ws://robot:9090")
-    assert (base.port, base._conversation.topics) == ("ws://robot:9090", PROFILES["plain"])
+    assert (base.port, base._client.topics) == ("ws://robot:9090", PROFILES["plain"])
     assert not base.abilities.bumpers
     base = base_of("--cmd-topic", "/mux/in", "--cliff-topic", "none", "--bumper-topic", "/b")
-    topics = base._conversation.topics
+    topics = base._client.topics
     assert topics.order == Topic("/mux/in", "geometry_msgs/Twist")
-    assert topics.feelers["bump"] == Topic("/b", "kobuki_msgs/BumperEvent")
-    assert set(topics.feelers) == {"bump", "wheel_drop"}
+    assert topics.sensors["bump"] == Topic("/b", "kobuki_msgs/BumperEvent")
+    assert set(topics.sensors) == {"bump", "wheel_drop"}
     base = base_of("--ros-robot", "plain", "--bumper-topic", "/b", "--odom-topic", "none")
-    assert base._conversation.topics.feelers["bump"].kind == "std_msgs/Bool"
+    assert base._client.topics.sensors["bump"].kind == "std_msgs/Bool"
     assert (base.abilities.bumpers, base.abilities.closed_loop) == (True, False)
 
 

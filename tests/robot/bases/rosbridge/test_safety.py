@@ -36,7 +36,7 @@ def test_odometry_that_goes_stale_stops_it(stage):
     assert not stage.robot.is_moving
     assert stage.of("stop")[0]["reason"] == "base_silent"
     stage.wait(1.0)
-    assert "No nav_msgs/Odometry comes on /odom" in stage.talk.problem(stage.now_s)
+    assert "No nav_msgs/Odometry comes on /odom" in stage.base_client.problem(stage.now_s)
 
 
 def test_odometry_that_does_not_move_stops_it(stage):
@@ -54,26 +54,26 @@ def test_a_bump_stops_it_in_place_and_holds(stage):
     assert not stage.robot.is_moving
     assert stage.of("stop")[0]["reason"] == "bump"
     stage.wait(1.0)
-    stage.performer.hear({"type": "arm"}, stage.now_s)
+    stage.performer.handle({"type": "arm"}, stage.now_s)
     assert stage.performer.safety.latch == "bump"  # it is pressed still
     stage.tell(BUMPER.name, {"data": False})
     stage.wait(0.2)
-    stage.performer.hear({"type": "arm"}, stage.now_s)
+    stage.performer.handle({"type": "arm"}, stage.now_s)
     assert stage.performer.safety.latch == ""
 
 
 def test_a_kobuki_s_own_feelers():
     stage = Stage(PROFILES["kobuki"])
     for hazard, field in (("bump", "bumper"), ("cliff", "sensor"), ("wheel_drop", "wheel")):
-        topic = PROFILES["kobuki"].feelers[hazard].name
+        topic = PROFILES["kobuki"].sensors[hazard].name
         stage.tell(topic, {field: 1, "state": 1})
-        assert hazard in stage.base.read().senses.hazards
+        assert hazard in stage.base.read().sensors.hazards
         stage.tell(topic, {field: 0, "state": 0})  # another one
         stage.now_s += 1
-        assert hazard in stage.base.read().senses.hazards
+        assert hazard in stage.base.read().sensors.hazards
         stage.tell(topic, {field: 1, "state": 0})
         stage.now_s += 1
-        assert hazard not in stage.base.read().senses.hazards
+        assert hazard not in stage.base.read().sensors.hazards
 
 
 def test_odometry_that_jumps_stops_it(stage):
@@ -143,23 +143,23 @@ def test_a_driver_that_is_not_there_is_told():
     stage = Stage()
     stage.bridge.graph.hearers[CMD.name].pop(0)
     stage.wait(2.5)
-    assert stage.base.read().senses.refusal == "nobody_listens"
-    assert "No driver listens on /cmd_vel" in stage.talk.problem(stage.now_s)
+    assert stage.base.read().sensors.refusal == "nobody_listens"
+    assert "No driver listens on /cmd_vel" in stage.base_client.problem(stage.now_s)
     stage.bridge.graph.subscribe(CMD.name, CMD.kind, stage.robot.follow)
     stage.wait(2.5)
-    assert stage.base.read().senses.refusal == ""
+    assert stage.base.read().sensors.refusal == ""
 
 
 def test_a_bumper_that_was_promised_and_is_not_there_is_told(stage):
     stage.bridge.graph.publishers[BUMPER.name].clear()
     stage.wait(2.5)
-    assert stage.base.read().senses.refusal == "feeler_missing"
-    assert "/bumper" in stage.talk.problem(stage.now_s)
+    assert stage.base.read().sensors.refusal == "feeler_missing"
+    assert "/bumper" in stage.base_client.problem(stage.now_s)
 
 
 def test_without_rosapi_nobody_knows_and_it_moves():
     stage = Stage(has_rosapi=False).begin_moving()
-    assert stage.base.read().senses.refusal == ""
+    assert stage.base.read().sensors.refusal == ""
 
 
 def test_what_does_not_come_back_is_told():
@@ -168,6 +168,6 @@ def test_what_does_not_come_back_is_told():
     stage.bridge.graph.types[CMD.name] = "geometry_msgs/TwistStamped"
     stage.connect()
     stage.wait(1.5)
-    assert stage.base.read().senses.silent_s == math.inf
-    assert "comes back" in stage.talk.problem(stage.now_s)
+    assert stage.base.read().sensors.silent_s == math.inf
+    assert "comes back" in stage.base_client.problem(stage.now_s)
     assert stage.bridge.log

@@ -10,8 +10,8 @@ import pytest
 
 from robot.bases.kobuki_protocol import (
     FRAME_S,
-    Sighting,
-    Trust,
+    Estimate,
+    FrameFilter,
     Version,
     decode_feedback,
 )
@@ -81,8 +81,8 @@ def test_odometry_tells_the_truth(bench):
 
     Here speeds jump, which costs a little grip.
     """
-    trust, x_m, y_m = Trust(), 0.0, 0.0
-    seen: Sighting | None = None
+    frame_filter, x_m, y_m = FrameFilter(), 0.0, 0.0
+    seen: Estimate | None = None
     for speed, radius, for_s in [
         (0, 0, 0.1),
         (200, 0, 1),
@@ -93,7 +93,7 @@ def test_odometry_tells_the_truth(bench):
     ]:
         for _ in range(round(for_s / FRAME_S)):
             (payload,) = bench.live(FRAME_S, order(speed, radius))
-            was, seen = seen, trust.take(decode_feedback(payload), bench.now_s)
+            was, seen = seen, frame_filter.take(decode_feedback(payload), bench.now_s)
             if was is not None and seen is not None:
                 way_m = (seen.left_m + seen.right_m - was.left_m - was.right_m) / 2
                 along_rad = (seen.heading_rad + was.heading_rad) / 2

@@ -6,16 +6,16 @@ import math
 from collections import Counter
 from collections.abc import Iterator
 
-from robot.bases.base import BaseState, Senses
+from robot.bases.base import BaseState, SensorState
 from robot.bases.rosbridge.orders import Orders
-from robot.bases.rosbridge.sight import Feelers, Reckoning, Wheels
+from robot.bases.rosbridge.perception import DeadReckoning, HazardSensors, ReportedOdometry
 from robot.bases.rosbridge.topics import Topics
 from robot.motion.twist import STILL
 from robot.ros.frames import (
     Answer,
     BadRosFrame,
     Frame,
-    Heard,
+    Incoming,
     Publication,
     advertise,
     call_service,
@@ -41,22 +41,24 @@ SUBSCRIBERS, PUBLISHERS = "/rosapi/subscribers", "/rosapi/publishers"
 ASK_EVERY_S = 2.0
 LATE_S = 1.0  # then somebody who looks on should know
 
-# Why it must not move; bases/base.py, Senses.
+# Why it must not move; bases/base.py, SensorState.
 NOBODY_LISTENS = "nobody_listens"
-FEELER_MISSING = "feeler_missing"
+SENSOR_MISSING = "feeler_missing"
 # Hazards of its own.
 RESTARTED = "restarted"
 OTHER_DRIVER = "other_driver"
 
 
-class Conversation:
+class BaseClient:
     """One base at one rosbridge."""
 
     def __init__(self, topics: Topics, now_s: float) -> None:
         self.topics = topics
         self.orders = Orders()
-        self.sight: Wheels | Reckoning = Reckoning() if topics.odometry is None else Wheels()
-        self.feelers = Feelers()
+        self.odometry: ReportedOdometry | DeadReckoning = (
+            DeadReckoning() if topics.odometry is None else ReportedOdometry()
+        )
+        self.sensors = HazardSensors()
         self._is_open = False
         self._opened_s = now_s
         self._asked_s = -math.inf
@@ -65,7 +67,7 @@ class Conversation:
     @property
     def counters(self) -> Counter[str]:
         """How often something went wrong."""
-        return self.orders.counters + self.feelers.counters
+        return self.orders.counters + self.sensors.counters
 
     def open(self, now_s: float) -> Iterator[Frame]:
         """Give what is said first on a new connection. Its first order is to stand still."""
@@ -76,23 +78,23 @@ class Conversation:
         yield subscribe(topics.order)
         if topics.odometry is not None:
             yield subscribe(topics.odometry, newest_every_ms=ODOMETRY_EVERY_MS)
-        for topic in topics.feelers.values():
+        for topic in topics.sensors.values():
             yield subscribe(topic)
 
     def due(self, now_s: float) -> Iterator[Frame]:
         """Give what is to be said now."""
         twist = self.orders.due(now_s)
         if twist is not None:
-            self.sight.order(twist, now_s)
+            self.odometry.order(twist, now_s)
             yield publish(self.topics.order, write_twist(twist))
         if self.orders.sent.is_still and now_s - self._asked_s >= ASK_EVERY_S:
             self._asked_s = now_s
             name = self.topics.order.name
             yield call_service(SUBSCRIBERS, {"topic": name}, name)
-            for topic in self.topics.feelers.values():
+            for topic in self.topics.sensors.values():
                 yield call_service(PUBLISHERS, {"topic": topic.name}, topic.name)
 
-    def hear(self, heard: Heard, now_s: float) -> None:
+    def hear(self, heard: Incoming, now_s: float) -> None:
         """Take what the bridge said. Raises BadRosFrame for what cannot be believed."""
         if isinstance(heard, Answer):
             self._take_answer(heard)
@@ -100,12 +102,14 @@ class Conversation:
         odometry = self.topics.odometry
         if heard.topic == self.topics.order.name:
             if self.orders.come_back(read_twist(heard.message)):
-                self.feelers.note(OTHER_DRIVER, now_s)
+                self.sensors.note(OTHER_DRIVER, now_s)
         elif odometry is not None and heard.topic == odometry.name:
             pose, twist = read_odometry(heard.message)
-            if isinstance(self.sight, Wheels) and self.sight.take(pose, twist, now_s):
-                self.feelers.counters["jumped"] += 1
-                self.feelers.note(RESTARTED, now_s)
+            if isinstance(self.odometry, ReportedOdometry) and self.odometry.take(
+                pose, twist, now_s
+            ):
+                self.sensors.counters["jumped"] += 1
+                self.sensors.note(RESTARTED, now_s)
         else:
             self._feel(heard, now_s)
 
@@ -113,8 +117,8 @@ class Conversation:
         """Forget what was ordered, and what was felt: the connection is lost."""
         self._is_open = False
         self.orders.forget()
-        self.sight.order(STILL, now_s)
-        self.feelers.forget()
+        self.odometry.order(STILL, now_s)
+        self.sensors.forget()
         self._missing.clear()
 
     def end(self, now_s: float) -> Iterator[Frame]:
@@ -123,26 +127,26 @@ class Conversation:
         topics = self.topics
         for _ in range(LAST_STOPS):
             yield publish(topics.order, write_twist(STILL))
-        for topic in (topics.order, topics.odometry, *topics.feelers.values()):
+        for topic in (topics.order, topics.odometry, *topics.sensors.values()):
             if topic is not None:
                 yield unsubscribe(topic)
         yield unadvertise(topics.order)
 
     def state(self, now_s: float) -> BaseState:
         """Give what is believed of the base now."""
-        self.sight.move(now_s)
-        senses = Senses(
-            hazards=self.feelers.hazards(now_s),
+        self.odometry.move(now_s)
+        sensors = SensorState(
+            hazards=self.sensors.hazards(now_s),
             refusal=min(self._missing.values(), default=""),
             silent_s=self.silent_s(now_s),
         )
-        return BaseState(self.sight.pose, self.sight.twist, senses)
+        return BaseState(self.odometry.pose, self.odometry.twist, sensors)
 
     def silent_s(self, now_s: float) -> float:
         """Give for how long it has been unknown whether orders arrive, or where it is [s]."""
         if not self._is_open or not self.orders.is_answered:
             return math.inf
-        return max(0.0, self.orders.unanswered_s(now_s), now_s - self.sight.seen_s)
+        return max(0.0, self.orders.unanswered_s(now_s), now_s - self.odometry.seen_s)
 
     def problem(self, now_s: float) -> str:
         """Say what is wrong at a bridge that answers; nothing where nothing is."""
@@ -151,7 +155,7 @@ class Conversation:
             return ""
         if not self.orders.is_answered or self.orders.unanswered_s(now_s) > LATE_S:
             return f"Nothing that is sent on {order} comes back: is it of the type {TWIST}?"
-        if odometry is not None and now_s - self.sight.seen_s > LATE_S:
+        if odometry is not None and now_s - self.odometry.seen_s > LATE_S:
             return f"No {ODOMETRY} comes on {odometry.name}: does its driver run?"
         for topic, reason in self._missing.items():
             if reason == NOBODY_LISTENS:
@@ -160,10 +164,10 @@ class Conversation:
         return ""
 
     def _feel(self, heard: Publication, now_s: float) -> None:
-        for hazard, topic in self.topics.feelers.items():
+        for hazard, topic in self.topics.sensors.items():
             if topic.name == heard.topic:
                 which, is_felt = read_event(topic.kind, heard.message)
-                self.feelers.take(hazard, which, is_felt, now_s)
+                self.sensors.take(hazard, which, is_felt, now_s)
                 return
         raise BadRosFrame("Nobody asked for that topic.")
 
@@ -177,4 +181,4 @@ class Conversation:
         if len(there) >= (2 if is_order else 1):
             self._missing.pop(answer.question, None)
         else:
-            self._missing[answer.question] = NOBODY_LISTENS if is_order else FEELER_MISSING
+            self._missing[answer.question] = NOBODY_LISTENS if is_order else SENSOR_MISSING

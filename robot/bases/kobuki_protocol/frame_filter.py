@@ -28,7 +28,7 @@ DEGREES = 0.01  # one digit of the gyro's angle and rate (kobuki.md 1.3)
 
 
 @dataclass(frozen=True, slots=True)
-class Sighting:
+class Estimate:
     """What is believed after a frame.
 
     Parameters
@@ -71,7 +71,7 @@ class Sighting:
     began_anew: bool = False
 
 
-class Trust:
+class FrameFilter:
     """Turns a stream of parsed feedback into what can be believed.
 
     A frame whose encoders, gyro or time jump further than they can is put aside; where the next one
@@ -93,7 +93,7 @@ class Trust:
         self.firmware: Version | None = None
         self.hardware: Version | None = None
         self.udid: Udid | None = None
-        self._sighting = Sighting()
+        self._estimate = Estimate()
         self._believed: list[_Frame] = []  # the last two, the newest first
         self._aside: _Frame | None = None
         self._heard_s = -math.inf
@@ -105,14 +105,14 @@ class Trust:
         self._claims.clear()
         self.firmware = self.hardware = self.udid = None
 
-    def take(self, feedback: Feedback, now_s: float) -> Sighting | None:
+    def take(self, feedback: Feedback, now_s: float) -> Estimate | None:
         """Take the next frame, at a monotonic time [s]; None where there is nothing to believe."""
         if feedback.core is None or feedback.inertia is None:
             return None
         if now_s - self._heard_s > GAP_S:
             self._believed, self._aside = [], None
         self._heard_s = now_s
-        now = _Frame(feedback.core, feedback.inertia, now_s, self._sighting)
+        now = _Frame(feedback.core, feedback.inertia, now_s, self._estimate)
         if self._believed and now.repeats(self._believed[0]):
             self.doubted += 1
             return None
@@ -122,8 +122,8 @@ class Trust:
                 return self._believe(feedback, before, now)
         if self._aside is not None and now.continues(self._aside):
             self._believe(feedback, self._aside, now)
-            self._sighting = replace(self._sighting, began_anew=True)
-            return self._sighting
+            self._estimate = replace(self._estimate, began_anew=True)
+            return self._estimate
         self.doubted += bool(self._believed)
         self._aside = now
         return None
@@ -136,13 +136,13 @@ class Trust:
                     setattr(self, name, said)
                 self._claims[name] = said
 
-    def _believe(self, feedback: Feedback, before: _Frame, now: _Frame) -> Sighting:
+    def _believe(self, feedback: Feedback, before: _Frame, now: _Frame) -> Estimate:
         self._hear_claims(feedback)
-        seen, held = now.since(before), self._sighting.buttons
-        self._sighting = replace(seen, pressed=seen.buttons & ~held)
-        self._believed = [replace(now, sighting=self._sighting), before]
+        seen, held = now.since(before), self._estimate.buttons
+        self._estimate = replace(seen, pressed=seen.buttons & ~held)
+        self._believed = [replace(now, estimate=self._estimate), before]
         self._aside = None
-        return self._sighting
+        return self._estimate
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +152,7 @@ class _Frame:
     core: CoreSensors
     inertia: Inertia
     heard_s: float
-    sighting: Sighting
+    estimate: Estimate
 
     def repeats(self, before: _Frame) -> bool:
         """Say whether the line has sent the same frame again."""
@@ -180,14 +180,14 @@ class _Frame:
             and abs(self.inertia.rate) * DEGREES <= TURN_BOUND_DEG_S
         )
 
-    def since(self, before: _Frame) -> Sighting:
+    def since(self, before: _Frame) -> Estimate:
         """Give what is believed now, given a frame that this one continues."""
-        was, core_was, core = before.sighting, before.core, self.core
+        was, core_was, core = before.estimate, before.core, self.core
         elapsed_s, (left_m, right_m) = self.elapsed_s(before), self.rolled_m(before)
         turned = _turned(before.inertia.angle, self.inertia.angle)
         agree_on_power = abs(core.battery - core_was.battery) <= BATTERY_NEAR
         agree_on_charger = core.is_charging == core_was.is_charging
-        return Sighting(
+        return Estimate(
             left_m=was.left_m + left_m,
             right_m=was.right_m + right_m,
             heading_rad=was.heading_rad + math.radians(turned * DEGREES),

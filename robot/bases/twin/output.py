@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 
-def keep_to_ourselves() -> int:
+def redirect_output() -> int:
     """Give standard output's file for the port and the answers alone; then import pybullet.
 
     It prints past Python: when it was built on importing, and more on ending.

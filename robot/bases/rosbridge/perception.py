@@ -16,7 +16,7 @@ JUMP_M, JUMP_RAD = 0.3, 1.8
 FELT_S = 0.1  # what was felt counts for so long [s]: no look in between misses it
 
 
-class Wheels:
+class ReportedOdometry:
     """Odometry of the base, seen from home; it begins at home, wherever that is.
 
     Attributes
@@ -67,7 +67,7 @@ class Wheels:
         )
 
 
-class Reckoning:
+class DeadReckoning:
     """Where a base without odometry is, if it does what it is sent: an open loop.
 
     Gestures that are closed on this are profiles of speed over time, with their ramps.
@@ -96,7 +96,7 @@ class Reckoning:
         self.pose = HOME
 
 
-class Feelers:
+class HazardSensors:
     """What its sensors feel: bumpers, edges, wheels; and what happened to it.
 
     Events come when something changes. One that was missed while the connection was lost is not
@@ -109,7 +109,7 @@ class Feelers:
         self._felt_s: dict[str, float] = {}
 
     def take(self, hazard: str, which: int, is_felt: bool, now_s: float) -> None:
-        """Take an event of one feeler."""
+        """Take an event of one sensor."""
         pressed = self._pressed.setdefault(hazard, set())
         (pressed.add if is_felt else pressed.discard)(which)
         if is_felt:
