@@ -16,12 +16,13 @@ from dataclasses import asdict
 from typing import Any
 
 from robot.base_options import add_base_arguments, make_base
-from robot.bases import BASES, BadOption, BaseLost, Indication, MobileBase
-from robot.behavior.safety import ANNOUNCE_S, AWAY, Safety
+from robot.bases import BASES, BadOption, BaseLost, MobileBase
+from robot.behavior.control_loop import control_loop
+from robot.behavior.performer import Performer
 from robot.motion.gesture import Gesture
 from robot.motion.gestures import GESTURES, ORIGINALS
-from robot.motion.limits import DEFAULT_LIMITS, TICK_S
-from robot.motion.player import DONE, Player
+from robot.motion.limits import TICK_S
+from robot.motion.player import DONE
 from robot.motion.pose import HOME
 
 REST_S = 0.3  # until wheels, odometry and truth have come to rest
@@ -50,38 +51,37 @@ def play_gesture(
 ) -> dict[str, Any]:
     """Play a gesture on an open base from where it stands, under the same safety as in a session.
 
-    Gives the outcome, how long it took [s], where odometry says it is, and where it is in truth,
-    which only a simulation knows.
+    Parameters
+    ----------
+    gesture
+        What to play.
+    base
+        An open base; a real one is armed by this.
+    monotonic, sleep
+        The clock [s], and how to wait by it.
+
+    Returns
+    -------
+    dict
+        The outcome, how long it took [s], the pose by odometry, and the true pose, which only a
+        simulation knows.
+
+    Raises
+    ------
+    BaseLost
+        Where the base does not answer any more.
     """
-    player, safety = Player(DEFAULT_LIMITS), Safety(base.abilities)
-    safety.is_watched = True
-    state, began_s = base.read(), monotonic()
-    outcome = (
-        safety.rejection_reason(gesture)
-        or safety.arm(began_s, state)
-        or safety.blocking_reason(state)
-    )
-    if not outcome and not safety.is_at_home(state):
-        outcome = AWAY
-    if not outcome:
-        base.show(Indication.MOVING, aloud=True)
-        after_s = ANNOUNCE_S if base.abilities.announces else 0.0
-        player.start(gesture.scaled(safety.share), began_s, state.pose, after_s)
-        safety.start_gesture(began_s, state)
+    performer = Performer(base)
+    began_s = monotonic()
+    refused = performer.play_alone(gesture, began_s)
     farthest_m = 0.0
-    while player.is_busy:
-        state, now_s = base.read(), monotonic()
-        farthest_m = max(farthest_m, state.pose.distance_m(HOME))
-        found = safety.check(now_s, state, player.twist, performing=True)
-        if found:
-            player.halt(found)
-            base.stop()
-        else:
-            base.drive(player.step(now_s, state.pose))
-        sleep(TICK_S)
+    if not refused:
+        performer.tick(began_s)
+    for pause_s in control_loop(performer, monotonic, lambda: not performer.player.is_busy):
+        farthest_m = max(farthest_m, base.read().pose.distance_m(HOME))
+        sleep(pause_s)
     took_s = monotonic() - began_s
-    outcome = outcome or player.outcome
-    base.show(Indication.READY if outcome == DONE else Indication.STOPPED, aloud=outcome != DONE)
+    outcome = refused or performer.player.outcome
     for _ in range(round(REST_S / TICK_S)):
         base.stop()
         sleep(TICK_S)

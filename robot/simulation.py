@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from robot.bases import BASES
+from robot.behavior.control_loop import control_loop
 from robot.behavior.performer import Performer
 from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
 
@@ -76,13 +77,18 @@ class Simulation:
         self._performer.handle(message, self._now_s)
 
     def _let_pass(self, span_s: float) -> None:
-        """Let time go by; while nothing moves, in one step."""
+        """Let time go by [s]; while nothing moves, in one step."""
         until_s = self._now_s + span_s
-        while self._performer.player.is_busy and self._now_s < until_s:
-            self._now_s = min(self._now_s + TICK_S, until_s)
-            self._hear({"type": "heartbeat"})
-            self._performer.tick(self._now_s)
+        player = self._performer.player
+        for pause_s in control_loop(
+            self._performer,
+            lambda: self._now_s,
+            lambda: not player.is_busy or self._now_s >= until_s,
+        ):
             self._collect()
+            self._now_s = min(self._now_s + pause_s, until_s)
+            self._hear({"type": "heartbeat"})
+        self._collect()
         self._now_s = max(self._now_s, until_s)
         self._hear({"type": "heartbeat"})
 

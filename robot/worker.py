@@ -8,9 +8,10 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from robot.bases import MobileBase
+from robot.behavior.control_loop import control_loop
 from robot.behavior.performer import NO_LINK, Performer
 from robot.link import Link, LinkRefused, Message
-from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
+from robot.motion.limits import DEFAULT_LIMITS, Limits
 from robot.original_topics import OriginalTopics
 from robot.wire.close_codes import CloseCode
 
@@ -109,23 +110,23 @@ class Worker:
         self._reported.set()
 
     async def _drive(self) -> None:
-        problem = trouble = ""
-        while True:
-            if problem != self._base.problem:
-                problem = self._base.problem
-                self._notice(problem or "The base answers.")
-            if self._originals is not None and trouble != self._originals.problem:
-                trouble = self._originals.problem
-                self._notice(trouble or "The original's topics are published.")
-            was_linked = self.performer.is_linked
-            self.performer.tick(self._monotonic())
+        problem = topics_problem = ""
+        was_linked = False
+        for pause_s in control_loop(self.performer, self._monotonic):
             if was_linked and not self.performer.is_linked:
                 # What is still on its way would come too late.
                 self._notice("The server is silent; standing still, dialing in again.")
                 self._link.hang_up()
             if self.performer.reports:
                 self._reported.set()
-            await self._sleep(TICK_S)
+            if problem != self._base.problem:
+                problem = self._base.problem
+                self._notice(problem or "The base answers.")
+            if self._originals is not None and topics_problem != self._originals.problem:
+                topics_problem = self._originals.problem
+                self._notice(topics_problem or "The original's topics are published.")
+            await self._sleep(pause_s)
+            was_linked = self.performer.is_linked
 
     async def _report(self) -> None:
         reports = self.performer.reports

@@ -78,6 +78,7 @@ class Performer:
         self._session: int | None = None
         self._is_welcome = False  # on this connection; nothing before it counts
         self._is_running = False
+        self._is_alone = False  # plays a gesture without a session
         self._heard_s = 0.0
 
     @property
@@ -109,6 +110,37 @@ class Performer:
         self.safety.disconnect()
         self._halt(reason)
         self.decider.drop_window()
+
+    def play_alone(self, gesture: Gesture, now_s: float) -> str:
+        """Arm the base and start a gesture where it stands, without a session.
+
+        The caller vouches for a person who watches. No base is carried home first.
+
+        Parameters
+        ----------
+        gesture
+            What to play; in an open loop at half its size.
+        now_s
+            The performer's clock [s].
+
+        Returns
+        -------
+        str
+            Why the gesture may not start, as a code; empty where it has started.
+        """
+        safety, state = self.safety, self.base.read()
+        self._is_alone = safety.is_watched = True
+        reason = (
+            safety.rejection_reason(gesture)
+            or safety.arm(now_s, state)
+            or safety.blocking_reason(state)
+        )
+        if not reason and not safety.is_at_home(state):
+            reason = AWAY
+        if not reason:
+            self._start(gesture.scaled(safety.share), now_s, state)
+        self.status.show(("stopped", reason) if reason else ("performing", ""), is_quiet=False)
+        return reason
 
     def tick(self, now_s: float) -> None:
         """Order what is to be ordered now; to be called 50 times a second. Raises BaseLost."""
@@ -250,12 +282,14 @@ class Performer:
         strength = 1.0 if gesture.name in ORIGINALS else decision.strength
         intensity = round(cue.intensity * strength * self.safety.share, 3)
         self.reports.append(decision_report(decision, gesture.name, intensity, "", share))
+        self._start(gesture.scaled(intensity), now_s, state, QUIET_PACE if cue.is_quiet else 1.0)
+        self.decider.mark_started(decision)
+
+    def _start(self, gesture: Gesture, now_s: float, state: BaseState, pace: float = 1.0) -> None:
         after_s = ANNOUNCE_S if self.base.abilities.announces else 0.0
         pose = self.base.read().pose  # a simulated base may have been put back
-        pace = QUIET_PACE if cue.is_quiet else 1.0
-        self.player.start(gesture.scaled(intensity), now_s, pose, after_s, pace)
+        self.player.start(gesture, now_s, pose, after_s, pace)
         self.safety.start_gesture(now_s, state)
-        self.decider.mark_started(decision)
         self.status.report_gesture(gesture, "started", "")
 
     def _blocking_reason(self, gesture: Gesture, state: BaseState) -> str:
@@ -281,9 +315,9 @@ class Performer:
             return "disarmed", reason
         if self.player.is_busy:
             return "performing", ""
-        if self._session is None:
+        if self._session is None and not self._is_alone:
             return "idle", NO_SESSION
-        return "idle", reason if self._is_running else NOT_RUNNING
+        return "idle", reason if self._is_running or self._is_alone else NOT_RUNNING
 
     def _report(self, now_s: float, there: BaseState) -> None:
         """Show people what it is about, and report it to a server that hears it."""
