@@ -1,4 +1,4 @@
-"""Where the server is and what opens it: an address and a token, as a command line gives them."""
+"""Address and token of the server, from a command line."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from urllib.parse import urlsplit, urlunsplit
 
 
 class BadConnectionArgs(ValueError):
-    """An address or a token that cannot be one; the message says what would be."""
+    """An address or a token that cannot be one; the message names the cure."""
 
 
 def websocket_url(server: str, path: str) -> str:
-    """Give the address of one of a server's sockets.
+    """Return the address of one of a server's sockets.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def check_token(token: str) -> str:
 
 
 def add_connection_arguments(parser: ArgumentParser | _ArgumentGroup) -> None:
-    """Let a command line name the server, the token, and that a server supervises us."""
+    """Add options for the server, the token and ``--child`` to a command line."""
     parser.add_argument(
         "--server",
         default=os.environ.get("GARRY_SERVER", "http://127.0.0.1:8000"),

@@ -1,4 +1,4 @@
-"""`python -m robot doctor`: finds a Kobuki's port and says what is wrong on the way to it."""
+"""`python -m robot doctor`: finds a Kobuki's port, and says what is wrong with it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CURES = {
 
 
 def listen(port: str) -> Iterator[Diagnosis]:
-    """Open a port for a second, with the wheels standing, and say what the base tells."""
+    """Open a port for a second, with the wheels standing, and yield what the base reports."""
     base = KobukiBase(time.monotonic)
     base.port = port
     with base:
@@ -72,7 +72,7 @@ def _cure_opening(problem: str) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Look, and print what was found. Give 0 where nothing is wrong, else 1."""
+    """Print the results of all checks. Return 0 where nothing is wrong, else 1."""
     parser = ArgumentParser(prog="python -m robot doctor", description=__doc__)
     parser.add_argument("--port", help="instead of the one that is found")
     port = parser.parse_args(arguments).port or find_port()

@@ -1,4 +1,4 @@
-"""The websocket by which robots and sources dial in to the server, and dial in again.
+"""The websocket client of robots and sources: it connects to the server, and reconnects.
 
 ::
 
@@ -105,31 +105,31 @@ class BackOff:
         self._jitter = jitter
 
     def next_s(self) -> float:
-        """Give the pause before the next attempt [s]."""
+        """Return the pause before the next attempt [s]."""
         pause_s = self._pause_s
         self._pause_s = min(2 * pause_s, self._longest_s)
         return pause_s * (1 - self._jitter() / 2)
 
     def reset(self) -> None:
-        """Begin again with the shortest pause."""
+        """Start again with the shortest pause."""
         self._pause_s = self._first_s
 
 
 def _ignore_loss(_reason: str, _pause_s: float) -> None:
-    """Say nothing of a loss."""
+    """Ignore a lost connection."""
 
 
 class Link:
-    """A connection to the server that comes back by itself. Iterating gives the server's messages.
+    """A connection to the server that reconnects by itself. Iterating yields the server's messages.
 
     Parameters
     ----------
     url
-        The socket's address, see ``dialing.websocket_url``.
+        The socket's address, see ``connection_args.websocket_url``.
     token
         The device's token.
     greet
-        Gives the first message of each connection, asked anew for each.
+        Returns the first message of each connection.
     on_lost
         Called with a reason and the pause before the next attempt [s], each time a connection is
         lost and each time none comes about. A robot stops here.
@@ -170,7 +170,7 @@ class Link:
         return self._socket is not None
 
     async def __aenter__(self) -> Self:
-        """Give the link; iterating connects it."""
+        """Return the link; iterating connects it."""
         return self
 
     async def __aexit__(
@@ -183,11 +183,11 @@ class Link:
         await self.close()
 
     def __aiter__(self) -> Self:
-        """Give the link itself."""
+        """Return the link itself."""
         return self
 
     async def __anext__(self) -> Message:
-        """Give the server's next message, connecting first where there is no connection."""
+        """Return the server's next message, after connecting where there is no connection."""
         while not self._is_closed:
             try:
                 if self._socket is None:
@@ -227,18 +227,18 @@ class Link:
         return False
 
     def hang_up(self) -> None:
-        """Abandon the connection, with all that is still on its way; iterating dials in anew.
+        """Abort the connection, with all that is still on its way; iterating connects again.
 
-        For whoever misses signs of life that come more often than pings.
+        For callers that expect signs of life more often than pings.
         """
         socket, self._socket = self._socket, None
         if socket is not None:
             socket.transport.abort()
 
     async def pause(self, reason: str) -> None:
-        """Tell of a lost connection, and wait before the next attempt.
+        """Report a lost connection, and wait before the next attempt.
 
-        Iterating does, but not where it raises: for whoever dials in again nevertheless.
+        Iterating does so by itself, except where it raises: for callers that connect again anyway.
         """
         pause_s = self._back_off.next_s()
         self._on_lost(reason, pause_s)
@@ -276,7 +276,7 @@ class Link:
             self._socket = socket
 
     def _read(self, text: str | bytes) -> Message:
-        """Give a frame's message. Raises LinkRefused for what no server of ours would send."""
+        """Return a frame's message. Raises LinkRefused for what no GARRY server sends."""
         try:
             message = json.loads(text)
             kind = message["type"]
@@ -293,7 +293,7 @@ class Link:
         return dict(message)
 
     def _explain(self, closed: ConnectionClosed) -> str:
-        """Say why a connection ended. Raises LinkRefused where it need not be tried again."""
+        """Return why a connection ended. Raises LinkRefused where trying again is useless."""
         code = 1006 if closed.rcvd is None else closed.rcvd.code
         said = self._error or ("" if closed.rcvd is None else closed.rcvd.reason)
         if code in REFUSALS:
@@ -306,7 +306,7 @@ class Link:
         return f"The server closed the connection ({code}{': ' if said else ''}{said})"
 
     def _explain_failure(self, problem: OSError | WebSocketException) -> str:
-        """Say why no connection came about. Raises LinkRefused where none ever will."""
+        """Return why there is no connection. Raises LinkRefused where trying again is useless."""
         if isinstance(problem, ssl.SSLCertVerificationError):
             raise LinkRefused(
                 CloseCode.NOT_PROTOCOL,

@@ -53,7 +53,7 @@ NUMBER_MAX = 1e6
 
 
 class OriginalTopicClient:
-    """What is said on the original's topics. Time is told.
+    """What is published on the original's topics. Time is a parameter.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class OriginalTopicClient:
         self._is_open = False
 
     def follow(self, message: Mapping[str, Any], now_s: float) -> None:
-        """Take a message of the server; what is not told in it is not published."""
+        """Handle a message of the server; what it does not hold is not published."""
         match message:
             case {"type": "welcome" | "cue", "valence": str(valence)}:
                 self._valence = valence
@@ -83,12 +83,12 @@ class OriginalTopicClient:
                     self._add(now_s, DATA, {"a2": a2, "goal": goal})
 
     def decide(self, above: bool, now_s: float) -> None:
-        """Take what a window came to."""
+        """Publish a decision: whether the window was above."""
         if self._valence in WITH_GOOD_STEP:
             self._add(now_s, GOOD_STEP, {"data": above})
 
     def open(self, now_s: float) -> Iterator[Frame]:
-        """Give what is said first on a new connection."""
+        """Yield the first frames of a new connection."""
         self.lose(now_s)
         self._is_open = True
         for topic in self._topics:
@@ -96,7 +96,7 @@ class OriginalTopicClient:
             yield subscribe(topic)
 
     def due(self, now_s: float) -> Iterator[Frame]:
-        """Give what is to be said now."""
+        """Yield the frames to send now."""
         told = FEEDBACK_TYPES.get(self._valence, "")
         if FEEDBACK_TYPE in self._topics and told and told != self._told:
             self._told = told
@@ -107,24 +107,24 @@ class OriginalTopicClient:
                 yield self._publish(topic, message, now_s)
 
     def hear(self, heard: Incoming, now_s: float) -> None:
-        """Take note of what has come back."""
+        """Store what has come back."""
         if isinstance(heard, Publication):
             self._out.pop(heard.topic, None)
 
     def lose(self, now_s: float) -> None:
-        """Forget what was to be said: it is past when there is a connection again."""
+        """Drop what was to be sent: it is out of date when there is a connection again."""
         self._is_open, self._told = False, ""
         self._events.clear()
         self._out.clear()
 
     def end(self, now_s: float) -> Iterator[Frame]:
-        """Give what is said last."""
+        """Yield the last frames."""
         for topic in self._topics:
             yield unsubscribe(topic)
             yield unadvertise(topic)
 
     def problem(self, now_s: float) -> str:
-        """Say what does not arrive; nothing where all does."""
+        """Return what does not arrive; empty where all does."""
         for topic in self._topics:
             if now_s - self._out.get(topic.name, math.inf) > LATE_S:
                 cure = "; build the package garry_ros there" if topic is DATA else ""
@@ -157,7 +157,7 @@ class OriginalTopics:
         self._bridge: Bridge | None = None
 
     def __enter__(self) -> Self:
-        """Begin to connect."""
+        """Start to connect."""
         self._bridge = Bridge(self._url, self._client, self._lock, self._monotonic)
         return self
 
@@ -173,7 +173,7 @@ class OriginalTopics:
 
     @property
     def problem(self) -> str:
-        """Say why nothing arrives; empty where all does."""
+        """Return why nothing arrives; empty where all does."""
         if self._bridge is None:
             return ""
         with self._lock:

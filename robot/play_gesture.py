@@ -29,13 +29,13 @@ REST_S = 0.3  # until wheels, odometry and truth have come to rest
 
 
 class VirtualClock:
-    """A clock that passes as fast as one waits."""
+    """A clock that only sleeping moves."""
 
     def __init__(self) -> None:
         self.now_s = 0.0
 
     def monotonic(self) -> float:
-        """Give the time [s]."""
+        """Return the time [s]."""
         return self.now_s
 
     def sleep(self, span_s: float) -> None:
@@ -100,7 +100,7 @@ def play_gesture(
 
 
 def format_result(played: dict[str, Any]) -> str:
-    """Say it to people."""
+    """Return a result as a line for people."""
     pose = played["true_pose"] or played["pose"]
     where = f"x {1000 * pose['x_m']:.0f} mm, y {1000 * pose['y_m']:.0f} mm"
     loop = "" if played["abilities"]["closed_loop"] else ", open loop: where it should be"
@@ -109,7 +109,7 @@ def format_result(played: dict[str, Any]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Play the gesture of the command line, and give the exit status."""
+    """Play the gesture of the command line, and return the exit status."""
     parser = ArgumentParser(
         prog="python -m robot gesture",
         description=__doc__,

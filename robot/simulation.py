@@ -1,4 +1,4 @@
-"""A robot on a virtual clock: an hour of a session in a second, by the code that drives live ones.
+"""A robot on a virtual clock: an hour of a session in a second, by the code of live robots.
 
 For recordings that are scored without pages. The clock is the source's, as far as it runs forward.
 """
@@ -22,7 +22,7 @@ SIMULATED_BASES = [
 
 
 class Simulation:
-    """Hears a whole session, one fresh step after the other.
+    """Runs a whole session, one fresh step after the other.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Simulation:
         return self._performer.decider.share
 
     def walk(self, steps: Iterable[tuple[float, float]]) -> None:
-        """Take steps (source time [s], performance), and let the last gesture come to its end."""
+        """Add steps (source time [s], performance), and play the last gesture to its end."""
         for time_s, performance in steps:
             if self._source_s is None:
                 self._now_s = self._source_s = time_s
@@ -93,7 +93,7 @@ class Simulation:
         self._hear({"type": "heartbeat"})
 
     def _collect(self) -> None:
-        """Sort what the robot has reported since."""
+        """Sort the robot's new reports."""
         reports = self._performer.reports
         while reports:
             report = reports.popleft()

@@ -1,4 +1,4 @@
-"""The robot's side of the link: hears the server, keeps the base driven, sends reports."""
+"""The live robot: receives the server's messages, drives the base, sends reports."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from robot.wire.close_codes import CloseCode
 
 
 class Worker:
-    """Lets a base perform for the sessions of its station.
+    """Runs a base for the sessions of its station.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class Worker:
     originals
         What publishes on the original's topics; open.
     notice
-        Called with what somebody who looks on should know.
+        Called with what people who watch should know.
     monotonic, sleep
         Our clock [s], and how to wait by it.
     """

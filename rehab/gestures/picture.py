@@ -32,7 +32,7 @@ LOOK = (
 )
 
 
-def draw(moves: Sequence[Move], trial: DryRun, words: str) -> SafeString:
+def draw(moves: Sequence[Move], dry_run: DryRun, words: str) -> SafeString:
     """Draw the way of a gesture, and where the base looks at the end of each step."""
     looks: dict[tuple[float, float, int], list[str]] = {}
     for number, place in enumerate(step_poses(moves), start=1):
@@ -45,7 +45,7 @@ def draw(moves: Sequence[Move], trial: DryRun, words: str) -> SafeString:
         words=words,
         tether=TETHER_M,
         base=BASE_M,
-        way="M" + "L".join(_place(pose) for pose in trial.way[::2]),
+        way="M" + "L".join(_place(pose) for pose in dry_run.poses[::2]),
         looks=format_html_join("", LOOK, (_look(at, numbers) for at, numbers in looks.items())),
     )
 

@@ -1,4 +1,4 @@
-"""A simulated base on a perfect floor: it does what it is told, and its odometry is the truth."""
+"""A simulated base on a perfect floor: it follows every order, and its odometry is exact."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class KinematicBase(MobileBase):
         self.drive(STILL)
 
     def read(self) -> BaseState:
-        """Give where it is now."""
+        """Return its state now."""
         self._move()
         return BaseState(self._pose, self._twist)
 
@@ -47,7 +47,7 @@ class KinematicBase(MobileBase):
         self._pose, self._farthest_m = HOME, 0.0
 
     def ground_truth(self) -> GroundTruth:
-        """Give where it is: its odometry is the truth."""
+        """Return its pose, which its odometry knows exactly."""
         return GroundTruth(self.read().pose, self._farthest_m)
 
     def _move(self) -> None:

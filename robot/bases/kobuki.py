@@ -1,4 +1,4 @@
-"""A Kobuki on a serial port, driven by way of the process that owns the port."""
+"""A Kobuki on a serial port, driven through the process that owns the port."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ SOUNDS = {Indication.MOVING: Melody.BUTTON, Indication.STOPPED: Melody.ERROR}
 
 
 class KobukiBase(MobileBase):
-    """Orders a Kobuki and adds up where it is. A port that is lost is opened again for ever."""
+    """Drives a Kobuki and integrates its odometry. A lost port is reopened for ever."""
 
     name: ClassVar[str] = "kobuki"
     abilities = Abilities(simulated=False, moves=True, announces=True, real_time=True, bumpers=True)
@@ -69,7 +69,7 @@ class KobukiBase(MobileBase):
         self._asked_s = self._lit_s = monotonic() - LIGHT_EVERY_S
 
     def __enter__(self) -> Self:
-        """Open the port, stop what hangs on it, and give it a moment to say what it is."""
+        """Open the port, stop the base, and wait a moment for its firmware version."""
         self._client = PortClient(
             self.port or find_port(), BAUD, STOP_FRAME, self._receive, self._monotonic
         )
@@ -121,13 +121,13 @@ class KobukiBase(MobileBase):
 
     @property
     def problem(self) -> str:
-        """Say why the port is not open; empty where it is."""
+        """Return why the port is not open; empty where it is."""
         return "" if self._client is None else self._client.problem
 
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
         if self._client is None or self._client.is_dead:
-            raise BaseLost("The process that owns the port does not run: see its words above.")
+            raise BaseLost("The process that owns the port does not run: see its messages above.")
         control = control_of(WHEELS.clip(twist))
         self._client.order(encode_commands(control), self._extra_commands())
         return twist_of(control)
@@ -138,9 +138,9 @@ class KobukiBase(MobileBase):
             self._client.order(STOP_FRAME, self._extra_commands())
 
     def read(self) -> BaseState:
-        """Give what is believed of it now."""
+        """Return its state now. Raises BaseLost."""
         if self._client is None or self._client.is_dead:
-            raise BaseLost("The process that owns the port does not run: see its words above.")
+            raise BaseLost("The process that owns the port does not run: see its messages above.")
         now_s = self._monotonic()
         with self._lock:
             estimate, odometry = self._estimate, self._odometry
@@ -166,7 +166,7 @@ class KobukiBase(MobileBase):
             return BaseState(odometry.pose, twist, sensors)
 
     def set_home(self) -> None:
-        """Begin odometry anew: this place is home."""
+        """Make this place home."""
         with self._lock:
             self._odometry.set_home()
 
@@ -177,7 +177,7 @@ class KobukiBase(MobileBase):
             self._sound = encode_commands(SoundSequence(SOUNDS[indication]))
 
     def _extra_commands(self) -> bytes:
-        """Give what is to be sent beside the next setpoint. External power stays on."""
+        """Return commands to send beside the next setpoint. External power stays on."""
         now_s = self._monotonic()
         extra, self._sound = self._sound, b""
         if now_s - self._lit_s >= LIGHT_EVERY_S:
@@ -189,7 +189,7 @@ class KobukiBase(MobileBase):
         return extra
 
     def _receive(self, heard: ReceivedBytes) -> None:
-        """Take bytes of the base, on the client's thread."""
+        """Handle bytes of the base, on the client's thread."""
         with self._lock:
             if heard.opened != self._opened:
                 self._opened = heard.opened
@@ -210,7 +210,7 @@ class KobukiBase(MobileBase):
             "cliff": estimate.cliff,
             "wheel_drop": estimate.wheel_drop,
             "over_current": estimate.over_current,
-            "restarted": anew,  # switched off, or carried away: where home is nobody knows
+            "restarted": anew,  # switched off or carried away: home is unknown
             "stop_button": estimate.buttons & Button.B0,
         }
         self._felt |= {name: at_s for name, is_felt in felt.items() if is_felt}

@@ -1,4 +1,4 @@
-"""No base at all: decisions are made and told, nothing moves."""
+"""No base at all: decisions are made and reported, nothing moves."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from robot.motion.twist import STILL, Twist
 
 
 class NullBase(MobileBase):
-    """Stays at home, whatever it is told."""
+    """Stays at home, whatever is ordered."""
 
     name: ClassVar[str] = "null"
     abilities = Abilities(simulated=True, moves=False)
@@ -27,7 +27,7 @@ class NullBase(MobileBase):
         """Stand still, as ever."""
 
     def read(self) -> BaseState:
-        """Give home."""
+        """Return home, standing still."""
         return BaseState(HOME, STILL)
 
     def set_home(self) -> None:

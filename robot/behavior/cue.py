@@ -32,7 +32,7 @@ class Cue:
     intensity
         Share of a gesture's size, 0.1 to 1; 0 for no gesture at all.
     gestures
-        Gestures that somebody composed, as they traveled: not read yet.
+        Composed gestures as JSON data, not parsed yet.
     """
 
     above: str | None = None
@@ -45,7 +45,7 @@ class Cue:
 
     @classmethod
     def read(cls, cue: Any) -> Cue:
-        """Read what the server sends. Raises BadFrame."""
+        """Return the cue that the server sends. Raises BadFrame."""
         if not isinstance(cue, dict):
             raise BadFrame('"cue" is an object.')
         intensity = read_number(cue, "intensity", 0.0, 1.0)
@@ -70,7 +70,7 @@ class Cue:
         return self.intensity <= QUIET
 
     def gesture(self, above: bool) -> str | None:
-        """Give the gesture after a decision."""
+        """Return the gesture after a window above or below the threshold."""
         return self.above if above else self.below
 
 

@@ -1,4 +1,4 @@
-"""What a robot can perform: gestures of its own, and those that came along with the cue."""
+"""The gestures that a robot can perform: built-in ones, and those received with the cue."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class GestureLibrary:
         self._received: dict[str, Gesture | None] = {}  # None: refused
 
     def replace_received(self, gestures: Iterable[Any]) -> list[str]:
-        """Take what came along instead of what came before; give what is wrong with the refused.
+        """Replace the received gestures, and return what is wrong with the refused ones.
 
-        Nobody's word counts: each is read, checked and tried here.
+        Each is parsed, checked and dry-run here, whatever the server has checked.
         """
         self._received, problems = {}, []
         for data in gestures:
@@ -56,7 +56,7 @@ class GestureLibrary:
         return problems
 
     def find(self, name: str) -> tuple[Gesture | None, str]:
-        """Give the gesture of that name, or why there is none."""
+        """Return the gesture of that name and no reason, or None and why there is none."""
         if name in self._received:
             gesture = self._received[name]
             return gesture, "" if gesture else BAD_GESTURE

@@ -1,4 +1,4 @@
-"""What a robot does with what it hears. Time is told to it, so that hours can pass in a second.
+"""What a robot does with the server's messages. Time is a parameter, so that hours take a second.
 
 It moves only while all of this holds: the server was heard within ``SILENCE_S``, the session runs,
 and safety.py sees nothing against it. Anything else ends the gesture, and no gesture is made up for
@@ -41,7 +41,7 @@ REPLACED = "replaced"  # a welcome to another session
 
 
 class Performer:
-    """One robot: hears messages, decides, moves its base, and has reports to send.
+    """One robot: handles messages, decides, moves its base, and has reports to send.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class Performer:
         return self._is_welcome
 
     def handle(self, message: Message, now_s: float) -> None:
-        """Take a message of the server. What is not the protocol is counted and has no effect."""
+        """Handle a message of the server; count one that is not the protocol, to no effect."""
         try:
             self._dispatch(message, now_s)
         except BadFrame as problem:
@@ -143,7 +143,7 @@ class Performer:
         return reason
 
     def tick(self, now_s: float) -> None:
-        """Order what is to be ordered now; to be called 50 times a second. Raises BaseLost."""
+        """Order the base's next twist; to be called 50 times a second. Raises BaseLost."""
         # Without a session it does not move, and nobody gives signs of life.
         if self._session is not None and self._is_welcome and now_s - self._heard_s > SILENCE_S:
             self.disconnect(NO_LINK)
@@ -210,7 +210,7 @@ class Performer:
         self._session, self._is_welcome = session, True
 
     def _set_cue(self, cue: Cue) -> None:
-        """Take an order, with the gestures that came along."""
+        """Use another cue, with the gestures that came with it."""
         for problem in self.gestures.replace_received(cue.gestures):
             self.count_bad_message(problem)
         self.decider.set_cue(cue)
@@ -248,7 +248,7 @@ class Performer:
         self.reports.append(stop_report(reason))
 
     def _handle_arm(self, now_s: float) -> None:
-        """Let it move again, from where it stands: that is home now."""
+        """Let it move again; where it stands is home now."""
         problem = self.safety.arm(now_s, self.base.read())
         if problem:
             self._stop_for(problem)
@@ -293,7 +293,7 @@ class Performer:
         self.status.report_gesture(gesture, "started", "")
 
     def _blocking_reason(self, gesture: Gesture, state: BaseState) -> str:
-        """Say what keeps the base from performing a gesture; nothing where it may."""
+        """Return what keeps the base from performing a gesture; empty where it may."""
         if not self.base.abilities.moves:
             return CANNOT_MOVE
         if reason := self.safety.rejection_reason(gesture):
@@ -307,7 +307,7 @@ class Performer:
         return ""
 
     def _state(self, there: BaseState) -> tuple[str, str]:
-        """Give the robot's state and why it would not perform now."""
+        """Return the robot's state, and why it would not perform now."""
         reason = self.safety.blocking_reason(there)
         if self.safety.latch:
             return "stopped", reason
@@ -320,7 +320,7 @@ class Performer:
         return "idle", reason if self._is_running or self._is_alone else NOT_RUNNING
 
     def _report(self, now_s: float, there: BaseState) -> None:
-        """Show people what it is about, and report it to a server that hears it."""
+        """Show the state to people, and report it to the server."""
         state, player = self._state(there), self.player
         self.status.show(state, is_quiet=self.decider.cue.is_quiet)
         if self._is_welcome:

@@ -1,4 +1,4 @@
-"""What a robot tells the server: docs/protocol.md is the contract."""
+"""Reports of a robot to the server (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ def status_report(
     bad_messages: int,
     counters: Mapping[str, int],
 ) -> Report:
-    """Say how it is: ``battery`` is its share and whether that is low. Of the counters, those that
-    counted something.
+    """Return the report of a robot's status.
+
+    ``battery`` is its share and whether that is low. Counters at 0 are left out.
     """
     pose, (battery_share, is_low) = there.pose, battery
     return {
@@ -50,7 +51,7 @@ def decision_report(
     reason: str,
     share: float | None,
 ) -> Report:
-    """Say what a window came to, and what follows."""
+    """Return the report of a decision, and of the gesture that follows or why none does."""
     return {
         "kind": "decision",
         "from_s": decision.from_s,
@@ -67,11 +68,11 @@ def decision_report(
 
 
 def gesture_report(name: str, phase: str, outcome: str, *, open_loop: bool) -> Report:
-    """Say that a gesture started or ended; one that no odometry closed is labeled so."""
+    """Return the report that a gesture started or ended, labeled where its loop is open."""
     report = {"kind": "gesture", "name": name, "phase": phase, "outcome": outcome}
     return report | {"open_loop": True} if open_loop else report
 
 
 def stop_report(reason: str) -> Report:
-    """Say that it has stopped itself, or cannot follow an arming."""
+    """Return the report that the robot stopped itself, or could not be armed."""
     return {"kind": "stop", "reason": reason}

@@ -76,13 +76,13 @@ PLACE_UNKNOWN = "place_unknown"  # such a base has to be looked at, and armed
 
 
 def battery_share(battery_v: float) -> float:
-    """Give how full a battery of that voltage [V] is, 0 to 1 (kobuki.md 1.9)."""
+    """Return how full a battery of that voltage [V] is, 0 to 1 (kobuki.md 1.9)."""
     share = (battery_v - BATTERY_EMPTY_V) / (BATTERY_FULL_V - BATTERY_EMPTY_V)
     return min(max(0.05 + 0.95 * share, 0.0), 1.0)
 
 
 class Safety:
-    """Says whether one base may move.
+    """Decides whether one base may move, and what stops it.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class Safety:
         self._is_low = False
 
     def stop(self, reason: str) -> None:
-        """Take a person's stop. More of them change nothing."""
+        """Latch for a person's stop. Repeating it changes nothing."""
         self.latch = self.latch or reason
         self._felt_s = None
 
@@ -125,13 +125,25 @@ class Safety:
             self.latch, self._felt_s = reason, now_s
 
     def disconnect(self) -> None:
-        """Forget what the server said: a real base has to be armed anew."""
+        """Reset what depends on the server: a real base has to be armed again."""
         self.is_armed, self.is_watched = self._abilities.simulated, False
 
     def arm(self, now_s: float, state: BaseState) -> str:
-        """Take a person's word that it may move; give why that cannot be, or nothing.
+        """Arm the base for a person, unless something speaks against it.
 
-        What stopped it has to be over. A gesture that was stopped is not taken up again.
+        What stopped it has to be over. A gesture that was stopped is not resumed.
+
+        Parameters
+        ----------
+        now_s
+            The time [s].
+        state
+            What the base reports.
+
+        Returns
+        -------
+        str
+            Why it cannot be armed, as a code; empty where it is armed now.
         """
         reason = self._base_fault(state)
         if not reason and self._felt_s is not None and now_s - self._felt_s < SEEN_S:
@@ -146,19 +158,19 @@ class Safety:
         return ""
 
     def start_gesture(self, now_s: float, state: BaseState) -> None:
-        """Note that a gesture begins here and now."""
+        """Store where and when a gesture begins."""
         self._looked_s, self._slip_rad = now_s, state.sensors.slip_rad
         self._begun += 1
 
     def check(self, now_s: float, state: BaseState, ordered: Twist, *, performing: bool) -> str:
-        """Look at the base; give the code of what must stop it now, or nothing.
+        """Return the code of what must stop the base now, and latch it; empty where nothing must.
 
         Parameters
         ----------
         now_s
             The time [s]; to be called some 50 times a second.
         state
-            What the base says.
+            What the base reports.
         ordered
             What it was ordered last.
         performing
@@ -174,7 +186,7 @@ class Safety:
         return found
 
     def blocking_reason(self, state: BaseState) -> str:
-        """Say why no gesture may start now; nothing where one may."""
+        """Return why no gesture may start now, as a code; empty where one may."""
         sensors, is_real = state.sensors, not self._abilities.simulated
         if self.latch:
             return self.latch
@@ -198,7 +210,7 @@ class Safety:
         return 1.0 if self._abilities.closed_loop else OPEN_LOOP_SHARE
 
     def rejection_reason(self, gesture: Gesture) -> str:
-        """Say why the base cannot perform a gesture safely; nothing where it can."""
+        """Return why the base cannot perform a gesture safely; empty where it can."""
         is_long = not self._abilities.closed_loop and gesture.least_s > OPEN_LOOP_S
         return OPEN_LOOP if is_long else ""
 
@@ -209,7 +221,7 @@ class Safety:
         return pose.distance_m(HOME) <= AT_HOME_M and pose.turn_rad(HOME) <= AT_HOME_RAD
 
     def _base_fault(self, state: BaseState) -> str:
-        """Say what keeps the base itself from moving."""
+        """Return what keeps the base itself from moving, as a code."""
         sensors = state.sensors
         if sensors.silent_s > BASE_SILENT_S:
             return BASE_SILENT
@@ -220,7 +232,7 @@ class Safety:
     def _faults(
         self, now_s: float, state: BaseState, ordered: Twist, performing: bool, elapsed_s: float
     ) -> Iterator[str]:
-        """Give the codes of all that is wrong, the plainest first."""
+        """Yield the codes of all that is wrong, the most direct first."""
         if reason := self._base_fault(state):
             yield reason
         if performing and elapsed_s > LAPSED_S:

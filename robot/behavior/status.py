@@ -1,4 +1,4 @@
-"""What a robot tells of itself: reports to the server, lights and sounds to people."""
+"""What a robot makes known: reports to the server, lights and sounds to people."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ State = tuple[str, str]  # the robot's state, and why it would not perform now
 
 
 class StatusReporter:
-    """Keeps reports until somebody sends them, and says everything once.
+    """Collects reports until they are sent, and shows the state by lights and sounds.
 
     Parameters
     ----------
     base
-        Whose lights and sounds show what the robot is about.
+        The base with the lights and sounds.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class StatusReporter:
         self._indication: Indication | None = None
 
     def reset(self) -> None:
-        """Take it that nobody has heard anything: the next status is due at once."""
+        """Make the next status due at once, for a server that knows nothing yet."""
         self._told_s = None
 
     def report_gesture(self, gesture: Gesture, phase: str, outcome: str) -> None:
@@ -70,7 +70,7 @@ class StatusReporter:
         )
 
     def show(self, state: State, *, is_quiet: bool) -> None:
-        """Tell by the base's lights what it is about; sounds only where they are wanted."""
+        """Show a state by the base's lights, and by a sound unless it is quiet."""
         match state:
             case "stopped", _:
                 indication = Indication.STOPPED

@@ -56,7 +56,7 @@ class Decision:
 
 
 class WindowDecider:
-    """Sorts steps into windows, and says when a gesture may start.
+    """Sorts steps into windows, and decides when a gesture may start.
 
     Windows are counted from the first step: the one with the number k has the steps of which
     ``(time - first) / window_s`` lies in [k, k + 1). A window ends with the first step of a later
@@ -76,19 +76,19 @@ class WindowDecider:
         return self.activated / self.windows if self.windows else None
 
     def drop_window(self) -> None:
-        """Drop the window that is open: some of its steps are missing."""
+        """Discard the open window, since some of its steps are missing."""
         self._first_s: float | None = None
         self._window = 0
         self._steps, self._sum = 0, 0.0
 
     def set_cue(self, cue: Cue) -> None:
-        """Take another order, from the window on that is open."""
+        """Use another cue, from the open window on."""
         if cue.window_s != self.cue.window_s:
             self.drop_window()
         self.cue = cue
 
     def add(self, time_s: float, performance: float) -> Decision | None:
-        """Add a step; give the decision about the window that it ended, if it did.
+        """Add a step, and return the decision about the window that it ended, or None.
 
         Parameters
         ----------
@@ -134,7 +134,7 @@ class WindowDecider:
         )
 
     def blocking_reason(self, decision: Decision, *, performing: bool) -> str:
-        """Say why no gesture may follow a decision now; nothing where one may.
+        """Return why no gesture may follow a decision now; empty where one may.
 
         Parameters
         ----------
@@ -156,5 +156,5 @@ class WindowDecider:
         return ""
 
     def mark_started(self, decision: Decision) -> None:
-        """Note that a gesture answers this decision."""
+        """Store that a gesture answers this decision."""
         self._started_s = decision.at_s

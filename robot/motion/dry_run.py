@@ -1,4 +1,4 @@
-"""A gesture tried on paper: by the player that plays it, on a base that does what it is told."""
+"""Dry runs of gestures: the player that plays them, on a base that follows exactly."""
 
 from __future__ import annotations
 
@@ -20,53 +20,77 @@ END_RAD = 0.035
 
 @dataclass(frozen=True, slots=True)
 class DryRun:
-    """How it went: the outcome, the time it took [s], and where the base was at every tick."""
+    """Result of a dry run: the outcome, the time it took [s], and the pose at every tick."""
 
     outcome: str
     took_s: float
-    way: tuple[Pose, ...]
+    poses: tuple[Pose, ...]
 
     @property
     def farthest_m(self) -> float:
         """How far from home it has been [m]."""
-        return max(pose.distance_m(HOME) for pose in self.way)
+        return max(pose.distance_m(HOME) for pose in self.poses)
 
 
 def dry_run(gesture: Gesture, limits: Limits = DEFAULT_LIMITS, pace: float = 1.0) -> DryRun:
-    """Play a gesture from home to its end; parameters are those of the player."""
-    player, pose, time_s, way = Player(limits), HOME, 0.0, [HOME]
+    """Return the result of playing a gesture from home to its end.
+
+    Parameters
+    ----------
+    gesture
+        What to play.
+    limits
+        Speeds and accelerations.
+    pace
+        Share of each waypoint's own pace, above 0 and up to 1.
+    """
+    player, pose, time_s, poses = Player(limits), HOME, 0.0, [HOME]
     player.start(gesture, time_s, pose, pace=pace)
     while player.is_busy:  # each of its waypoints has an end, reached or not
         pose = advance(pose, player.step(time_s, pose), TICK_S)
         time_s += TICK_S
-        way.append(pose)
-    return DryRun(player.outcome, time_s, tuple(way))
+        poses.append(pose)
+    return DryRun(player.outcome, time_s, tuple(poses))
 
 
 def validate_gesture(data: Any, limits: Limits = DEFAULT_LIMITS) -> Gesture:
-    """Read a composed gesture and try it. Raises BadGesture, with the cure, for one that fails."""
+    """Return the gesture that JSON data specify, once a dry run has succeeded.
+
+    Parameters
+    ----------
+    data
+        See ``parse_gesture``.
+    limits
+        Speeds and accelerations of the base that is to perform it.
+
+    Raises
+    ------
+    BadGesture
+        For data that are no gesture, and for one that leaves the tether (``TETHER_M``), runs out of
+        time, or ends further than ``END_M`` or ``END_RAD`` from home.
+    """
     gesture = parse_gesture(data)
-    _check_trial(gesture, limits)
+    _check_dry_run(gesture, limits)
     return gesture
 
 
-@lru_cache(maxsize=64)  # it comes with every cue, and a trial takes some 20 ms
-def _check_trial(gesture: Gesture, limits: Limits) -> None:
-    trial = dry_run(gesture, limits)
-    if trial.farthest_m > TETHER_M:
+@lru_cache(maxsize=64)  # it comes with every cue, and a dry run takes some 20 ms
+def _check_dry_run(gesture: Gesture, limits: Limits) -> None:
+    result = dry_run(gesture, limits)
+    if result.farthest_m > TETHER_M:
         raise BadGesture(
             "Simulated, it goes {far:.2f} m from home, past the tether of {tether:g} m. Make it "
             "smaller.",
-            far=trial.farthest_m,
+            far=result.farthest_m,
             tether=TETHER_M,
         )
-    end = trial.way[-1]
+    end = result.poses[-1]
     away_m, off_rad = end.distance_m(HOME), end.turn_rad(HOME)
-    if trial.outcome != DONE or away_m > END_M or off_rad > END_RAD:
+    if result.outcome != DONE or away_m > END_M or off_rad > END_RAD:
         raise BadGesture(
             "Simulated, it ends after {took:.1f} s, {far:.2f} m from home ({outcome}). Give its "
             "steps more time, or make them smaller.",
-            took=trial.took_s,
+            took=result.took_s,
             far=away_m,
-            outcome=Marked(trial.outcome),
+            outcome=Marked(result.outcome),
         )

@@ -75,10 +75,20 @@ class Gesture:
         check_gesture(self)
 
     def scaled(self, intensity: float) -> Gesture:
-        """Give the gesture at this share of its size, above 0 and up to 1; never longer.
+        """Return the gesture at a share of its size, which never takes longer.
 
         Ways shrink, and turns with them as long as it drives on the line ahead of home only. Where
-        it drives aside its turns say where to, and stay as they are.
+        it drives aside its turns set the direction, and stay as they are.
+
+        Parameters
+        ----------
+        intensity
+            The share, above 0 and up to 1.
+
+        Raises
+        ------
+        BadGesture
+            For any other share.
         """
         if not 0 < intensity <= 1:
             raise BadGesture("An intensity lies above 0 and up to 1.")
@@ -115,7 +125,15 @@ class Gesture:
 
 
 def check_gesture(gesture: Gesture) -> None:
-    """Raise BadGesture, with the cure, for a gesture that is not safe and possible."""
+    """Check that a gesture is safe and possible within ``DEFAULT_LIMITS``.
+
+    Raises
+    ------
+    BadGesture
+        For too many waypoints, one out of reach, too little or too much time, an end that is not
+        home, and a way that is driven backwards and was not driven forwards before (a Kobuki has no
+        rear bumper). The message names the waypoint and the cure.
+    """
     if not 1 <= len(gesture.waypoints) <= WAYPOINTS_MAX:
         raise BadGesture("A gesture has 1 to {most} goals.", most=WAYPOINTS_MAX)
     for number, waypoint in enumerate(gesture.waypoints, start=1):
@@ -149,7 +167,7 @@ def needed_time_s(segments: Sequence[Segment], limits: Limits, hold_s: float) ->
 
 
 def check_waypoint(number: int, waypoint: Waypoint) -> None:
-    """Raise BadWaypoint for a waypoint that no gesture may have, whatever comes before it."""
+    """Check what holds for a waypoint whatever comes before it. Raises BadWaypoint."""
     numbers = (
         waypoint.x_m,
         waypoint.y_m,

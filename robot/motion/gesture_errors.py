@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def gettext_noop(text: str) -> str:
-    """Mark a label: pages say it in their language; the robot's computer knows but one."""
+    """Return a text that is marked for translation; the robot's computer has no translations."""
     return text
 
 
@@ -12,15 +12,15 @@ NOT_FINITE = gettext_noop("{part} {number} has a number that is not finite.")
 
 
 class Marked(str):
-    """A word that has a translation, as it stands in a sentence."""
+    """A word within a message that is translated by itself."""
 
     __slots__ = ()
 
 
 class BadGesture(ValueError):
-    """A gesture that a base could not perform; the message says what would be one.
+    """A gesture that no base may perform; the message names the cure.
 
-    It is ``template`` with ``values`` in its places: whoever shows it says it in another language.
+    The message is ``template`` with ``values`` filled in, so that pages can translate it.
     """
 
     def __init__(self, template: str, /, **values: object) -> None:
@@ -36,5 +36,5 @@ class BadWaypoint(BadGesture):
         self.number = number
 
     def of_step(self, number: int) -> BadGesture:
-        """Say it of the step that the waypoint belongs to."""
+        """Return the error for the step that the waypoint belongs to."""
         return BadGesture(self.template, **self.values | {"part": Marked("Step"), "number": number})

@@ -1,7 +1,7 @@
-"""Gestures that people compose: steps from where the base is, made into poses seen from home.
+"""Specifications of composed gestures: steps relative to the base, made into poses from home.
 
-They travel as data, so that a new one needs no new robot. Whoever composes one and whoever plays it
-read it here: what is refused at one end is refused at the other, in the same words.
+They are sent as data, so that a new one needs no new robot. Server and robot read them here, so
+that both refuse the same ones with the same message.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from robot.motion.pose import HOME, Pose
 
 NAME = re.compile(r"[A-Za-z0-9_-]{1,32}")
 MOVES_MAX = 16
-LEAST_WAY_M = 0.01  # nobody sees less, and a base that is as near as this has arrived
+LEAST_WAY_M = 0.01  # less is invisible, and within the base's tolerance
 LEAST_TURN_RAD = math.radians(1)
 
 # The last step ends at home if it is so near [m, rad]: people round 0.1414 m to 0.14.
@@ -68,12 +68,23 @@ NUMBERS = [field.name for field in fields(Move)]
 
 
 def to_data(name: str, moves: Sequence[Move]) -> dict[str, Any]:
-    """Give a gesture as it travels."""
+    """Return the JSON data of a gesture."""
     return {"name": name, "steps": [asdict(move) for move in moves]}
 
 
 def parse_gesture(data: Any) -> Gesture:
-    """Read a gesture that has traveled. Raises BadGesture, which names the step and the cure."""
+    """Return the gesture that JSON data specify.
+
+    Parameters
+    ----------
+    data
+        ``{"name": …, "steps": [{"turn_rad": …, "forward_m": …, …}]}``, as ``to_data`` writes it.
+
+    Raises
+    ------
+    BadGesture
+        For anything else, and for what ``build_gesture`` refuses; names the step and the cure.
+    """
     if not isinstance(data, Mapping):
         raise BadGesture("A gesture is an object with a name and steps.")
     steps = data.get("steps")
@@ -98,7 +109,7 @@ def _read_move(number: int, step: Any) -> Move:
 
 
 def check_name(name: Any) -> str:
-    """Give a name back. Raises BadGesture for one that messages cannot say, or robots have."""
+    """Return a name. Raises BadGesture for one that messages cannot carry or robots have."""
     if not isinstance(name, str) or not NAME.fullmatch(name):
         raise BadGesture("A gesture's name has 1 to 32 letters, digits, hyphens or underscores.")
     if name in GESTURES or name in ORIGINALS:
@@ -107,7 +118,20 @@ def check_name(name: Any) -> str:
 
 
 def build_gesture(name: Any, moves: Sequence[Move]) -> Gesture:
-    """Make a gesture of steps. Raises BadGesture, which names the step and the cure."""
+    """Return the gesture that steps describe.
+
+    Parameters
+    ----------
+    name
+        1 to 32 letters, digits, hyphens or underscores; not that of a built-in gesture.
+    moves
+        1 to ``MOVES_MAX`` steps, which end at home within ``HOME_M`` and ``HOME_RAD``.
+
+    Raises
+    ------
+    BadGesture
+        For a step or a gesture that no base may perform; names the step and the cure.
+    """
     check_name(name)
     if not 1 <= len(moves) <= MOVES_MAX:
         raise BadGesture("A gesture has 1 to {most} steps.", most=MOVES_MAX)
@@ -146,12 +170,12 @@ def _check_move(number: int, move: Move) -> None:
 
 
 def step_poses(moves: Sequence[Move]) -> list[Pose]:
-    """Give where each step ends, seen from home."""
+    """Return the pose at the end of each step, seen from home."""
     return [made[-1].pose for made in _to_waypoints(moves)]
 
 
 def _to_waypoints(moves: Sequence[Move]) -> Iterator[list[Waypoint]]:
-    """Give the waypoints of each step: where it turns to, then where it goes. Times come later."""
+    """Yield the waypoints of each step: its turn, then its drive. Times are set later."""
     here = HOME
     for move in moves:
         turned = replace(here, heading_rad=here.heading_rad + move.turn_rad)
@@ -165,7 +189,7 @@ def _to_waypoints(moves: Sequence[Move]) -> Iterator[list[Waypoint]]:
 
 
 def _ahead(pose: Pose, by_m: float) -> Pose:
-    """Give the pose ahead; a place that is almost home is home."""
+    """Return the pose ahead; a place that is almost home becomes home."""
     place = Pose(
         pose.x_m + by_m * math.cos(pose.heading_rad),
         pose.y_m + by_m * math.sin(pose.heading_rad),
@@ -175,7 +199,7 @@ def _ahead(pose: Pose, by_m: float) -> Pose:
 
 
 def _at_home(last: Waypoint) -> Waypoint:
-    """Give the last waypoint as home itself. Raises BadGesture where it is elsewhere."""
+    """Return the last waypoint moved to home. Raises BadGesture where it is not near."""
     heading_rad = math.tau * round(last.heading_rad / math.tau)
     away_m, off_rad = last.pose.distance_m(HOME), last.heading_rad - heading_rad
     far, turned = 100 * away_m, abs(math.degrees(off_rad))

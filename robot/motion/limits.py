@@ -66,7 +66,10 @@ class Limits:
             )
 
     def scaled(self, share: float) -> Limits:
-        """Give limits of which speeds and accelerations are this share, above 0 and up to 1."""
+        """Return limits with this share of all speeds and accelerations.
+
+        Raises ValueError for a share that is not above 0 and up to 1.
+        """
         if not 0 < share <= 1:
             raise ValueError("A share of the limits lies above 0 and up to 1.")
         return replace(
@@ -74,14 +77,14 @@ class Limits:
         )
 
     def clip(self, twist: Twist) -> Twist:
-        """Give a twist within the speeds, on the same curve; what is not finite becomes still."""
+        """Return a twist within the speeds, on the same curve; ``STILL`` where not finite."""
         if not twist.is_finite:
             return STILL
         too_fast = max(abs(twist.v_m_s) / self.v_m_s, abs(twist.w_rad_s) / self.w_rad_s, 1.0)
         return Twist(twist.v_m_s / too_fast, twist.w_rad_s / too_fast)
 
     def approach(self, now: Twist, wanted: Twist, elapsed_s: float) -> Twist:
-        """Give what may be ordered next, on the way from one twist to another.
+        """Return what may be ordered next, on the way from one twist to another.
 
         Parameters
         ----------
@@ -114,7 +117,7 @@ DEFAULT_LIMITS = Limits()
 
 
 def _ramp(now: float, wanted: float, more: float, less: float) -> float:
-    """Give the speed that is nearest to the wanted one: at most so much more, or so much less.
+    """Return the speed nearest to the wanted one that a change by ``more`` or ``less`` can reach.
 
     A speed that turns round comes to 0 first, and speeds up from there in the next order.
     """
@@ -126,9 +129,21 @@ def _ramp(now: float, wanted: float, more: float, less: float) -> float:
 
 
 def least_time_s(distance: float, speed: float, speed_up: float, slow_down: float) -> float:
-    """Give the shortest time [s] from rest to rest over a distance, at a trapezoidal speed.
+    """Return the shortest time from rest to rest over a distance [s].
 
-    Units fit each other: m, m/s and m/s², or rad, rad/s and rad/s².
+    Parameters
+    ----------
+    distance
+        The way [m] or the turn [rad]; its sign does not matter.
+    speed
+        Largest speed [m/s or rad/s].
+    speed_up, slow_down
+        Largest accelerations [m/s² or rad/s²].
+
+    Notes
+    -----
+    The speed's profile is a trapezoid, or a triangle where the distance is too short to reach the
+    largest speed.
     """
     distance = abs(distance)
     ramps = speed * speed / 2 * (1 / speed_up + 1 / slow_down)

@@ -1,4 +1,4 @@
-"""Where a base is from home, by its wheels and its gyro."""
+"""Dead reckoning of a base by its wheels and its gyro."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ WHEEL_STILL_M = 1e-9
 
 
 class Odometry:
-    """Adds up what wheels and gyro tell: distances by the wheels, headings by the gyro.
+    """Integrates distances by the wheels and headings by the gyro.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class Odometry:
     Attributes
     ----------
     pose
-        Where it is from home.
+        Pose from home.
     slip_rad
         Heading by the wheels minus heading by the gyro [rad]: a wheel that slips, or a push.
     """
@@ -35,20 +35,20 @@ class Odometry:
         self.set_home()
 
     def set_home(self) -> None:
-        """Begin anew from here."""
+        """Make the present place home."""
         self.pose, self.slip_rad = HOME, 0.0
 
     def add(self, left_m: float, right_m: float, heading_rad: float, turn_rad_s: float) -> None:
-        """Take how far the wheels have rolled and the gyro has turned, since whenever.
+        """Add what wheels and gyro have measured since the last call.
 
         Parameters
         ----------
         left_m, right_m
-            Distances of the wheels [m]; those since the call before count.
+            Distances rolled so far [m]; only differences between calls count.
         heading_rad
-            Heading by the gyro [rad], full turns included, likewise.
+            Heading by the gyro [rad], full turns included; only differences count.
         turn_rad_s
-            Its rate now [rad/s].
+            Turning rate by the gyro [rad/s].
         """
         last, self._last = self._last, (left_m, right_m, heading_rad)
         if last is None:

@@ -1,4 +1,4 @@
-"""Segments: the turns and straight ways by which a base comes from one pose to the next."""
+"""Paths: the turns and straight drives by which a base comes from one pose to the next."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Turn:
     by_rad: float
 
     def least_s(self, limits: Limits) -> float:
-        """Give the shortest time that it takes [s]."""
+        """Return the shortest time that it takes [s]."""
         return least_time_s(
             self.by_rad, limits.w_rad_s, limits.speed_up_rad_s2, limits.slow_down_rad_s2
         )
@@ -36,7 +36,7 @@ class Drive:
     by_m: float
 
     def least_s(self, limits: Limits) -> float:
-        """Give the shortest time that it takes [s]."""
+        """Return the shortest time that it takes [s]."""
         return least_time_s(self.by_m, limits.v_m_s, limits.speed_up_m_s2, limits.slow_down_m_s2)
 
 
@@ -44,7 +44,7 @@ Segment = Turn | Drive
 
 
 def plan_path(start: Pose, waypoint: Pose) -> tuple[Segment, ...]:
-    """Give the turns and the drive that lead from one pose to another.
+    """Return the turns and the drive that lead from one pose to another.
 
     The base turns to face the place, drives there and turns to the waypoint's heading. A place that
     lies behind is driven to backwards, so that a base that went out comes back the way it went.
@@ -67,7 +67,15 @@ def plan_path(start: Pose, waypoint: Pose) -> tuple[Segment, ...]:
 
 
 def is_on_path(start: Pose, end: Pose, ways: Sequence[tuple[Pose, Pose]]) -> bool:
-    """Whether a straight way lies on others, looked at in steps of ``ALIKE_M``."""
+    """Return whether a straight way lies on others.
+
+    Parameters
+    ----------
+    start, end
+        The way; looked at in steps of ``ALIKE_M``.
+    ways
+        Starts and ends of the others, which may cover it in parts.
+    """
     count = math.ceil(start.distance_m(end) / ALIKE_M)
     for index in range(count + 1):
         share = index / count if count else 0.0
@@ -79,7 +87,7 @@ def is_on_path(start: Pose, end: Pose, ways: Sequence[tuple[Pose, Pose]]) -> boo
 
 
 def _beside_m(x_m: float, y_m: float, start: Pose, end: Pose) -> float:
-    """Give how far a place is from a straight way [m]."""
+    """Return the distance of a place from a straight way [m]."""
     along_x, along_y = end.x_m - start.x_m, end.y_m - start.y_m
     length2 = along_x**2 + along_y**2
     along = ((x_m - start.x_m) * along_x + (y_m - start.y_m) * along_y) / length2 if length2 else 0

@@ -107,7 +107,7 @@ class Player:
         self.twist = STILL
 
     def step(self, time_s: float, pose: Pose) -> Twist:
-        """Give the order for now.
+        """Return the twist to order now.
 
         Parameters
         ----------
@@ -128,7 +128,7 @@ class Player:
         return self.twist
 
     def _wanted_twist(self, time_s: float, pose: Pose) -> tuple[Limits, Twist]:
-        """Give what the present waypoint asks for, within which limits."""
+        """Return the limits and the twist that the present waypoint asks for."""
         here = replace(pose, heading_rad=pose.heading_rad - self._turns_rad)
         while self._waypoint is not None and not self._verdict:
             limits = self.limits.scaled(self._share(self._waypoint))
@@ -169,7 +169,7 @@ class Player:
         )
 
     def _share(self, waypoint: Waypoint) -> float:
-        """Give the share of the limits that a waypoint is gone to at."""
+        """Return the share of the limits for a waypoint."""
         return max(LEAST_PACE, waypoint.pace * self._pace)
 
     def _end(self, outcome: str) -> None:
@@ -180,7 +180,7 @@ class Player:
 
 
 def _follow(segment: Segment, pose: Pose, limits: Limits) -> Twist | None:
-    """Give what brings a base along a segment; None at its end."""
+    """Return the twist that follows a segment; None at its end."""
     match segment:
         case Turn():
             left_rad = segment.heading_rad - pose.heading_rad
@@ -204,6 +204,6 @@ def _follow(segment: Segment, pose: Pose, limits: Limits) -> Twist | None:
 
 
 def _approach_speed(left: float, speed: float, slow_down: float) -> float:
-    """Give the speed at which what is left can still be braked for."""
+    """Return a speed from which the rest of the way is long enough to brake."""
     braking = math.sqrt(2 * BRAKING * slow_down * abs(left))
     return math.copysign(min(speed, braking, CLOSING_PER_S * abs(left)), left)

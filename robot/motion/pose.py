@@ -25,11 +25,11 @@ class Pose:
         return all(map(math.isfinite, (self.x_m, self.y_m, self.heading_rad)))
 
     def distance_m(self, other: Pose) -> float:
-        """Give how far apart two places are [m]."""
+        """Return the distance between two places [m]."""
         return math.hypot(other.x_m - self.x_m, other.y_m - self.y_m)
 
     def turn_rad(self, other: Pose) -> float:
-        """Give how far apart two headings are [rad], 0 to π: full turns do not count."""
+        """Return the angle between two headings [rad], 0 to π; full turns do not count."""
         return abs(wrap(other.heading_rad - self.heading_rad))
 
 
@@ -37,12 +37,27 @@ HOME = Pose()
 
 
 def wrap(angle_rad: float) -> float:
-    """Give the same direction [rad] within ±π."""
+    """Return the same direction [rad] within ±π."""
     return math.remainder(angle_rad, math.tau)
 
 
 def advance(pose: Pose, twist: Twist, elapsed_s: float) -> Pose:
-    """Give where a base is after a time at one twist, if nothing slips: on an exact arc."""
+    """Return where a base is after a time at one twist, if nothing slips.
+
+    Parameters
+    ----------
+    pose
+        Where it is before.
+    twist
+        Its velocity, held throughout.
+    elapsed_s
+        The time [s].
+
+    Returns
+    -------
+    Pose
+        The end of an exact circular arc, not of an Euler step.
+    """
     turn_rad = twist.w_rad_s * elapsed_s
     # The chord of the arc: its length is that of the arc times sin(half)/half, along the mean
     # heading.

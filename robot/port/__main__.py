@@ -1,4 +1,4 @@
-"""`python -m robot.port`: owns a serial port, and stops what hangs on it when nobody orders it.
+"""`python -m robot.port`: owns a serial port, and stops the base on it when orders stop coming.
 
 A base may go on with its last setpoint for ever (kobuki.md 1.6). So a small process of its own
 sends it, 50 times a second, what was ordered last, and the stop frame as soon as that is older than
@@ -33,15 +33,15 @@ LINES_KEPT = 25  # of what was heard, while nobody reads it: half a second
 
 
 class PipeWriter:
-    """Writes lines to a pipe on a thread of its own; drops the oldest while nobody reads."""
+    """Writes lines to a pipe on a thread of its own; drops the oldest ones while nothing reads."""
 
     def __init__(self, pipe: int) -> None:
         self._pipe = pipe
         self._lines: deque[bytes] = deque(maxlen=LINES_KEPT)
         self._awake = threading.Event()
 
-    def tell(self, said: dict[str, Any]) -> None:
-        """Have it written soon."""
+    def write(self, said: dict[str, Any]) -> None:
+        """Queue a line."""
         self._lines.append(json.dumps(said).encode() + b"\n")
         self._awake.set()
 
@@ -90,14 +90,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--baud", type=int, default=115200)
     parser.add_argument("--stop", type=bytes.fromhex, required=True, help="the frame that stops it")
     options = parser.parse_args(arguments)
-    teller = PipeWriter(sys.stdout.fileno())
-    owner = PortOwner(partial(open_serial, options.url, options.baud), options.stop, teller.tell)
+    writer = PipeWriter(sys.stdout.fileno())
+    owner = PortOwner(partial(open_serial, options.url, options.baud), options.stop, writer.write)
     for name in ("SIGTERM", "SIGHUP", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), lambda *_: owner.end())
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who orders: the pipe closes then
     orders = partial(listen, sys.stdin.fileno(), owner.order, owner.end)
-    for work in (orders, partial(teller.run, owner.end)):
+    for work in (orders, partial(writer.run, owner.end)):
         threading.Thread(target=work, daemon=True).start()
     owner.run()
 

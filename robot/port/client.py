@@ -29,7 +29,7 @@ MOST_DEATHS = 5  # in a row, without a word from any: it cannot be run here
 
 @dataclass(frozen=True, slots=True)
 class ReceivedBytes:
-    """What came in at a port: when [s], since which opening of it, and the bytes."""
+    """Bytes received at a port: when [s], after which opening of it, and the data."""
 
     at_s: float
     opened: int
@@ -48,7 +48,7 @@ class PortClient:
     stop
         The frame that stops the base.
     hear
-        Takes what came in, on a thread of its own.
+        Called with what came in, on a thread of its own.
     monotonic
         The computer's clock [s], which the process shares.
 
@@ -88,7 +88,7 @@ class PortClient:
         self._thread.start()
 
     def order(self, frame: bytes, once: bytes = b"") -> None:
-        """Have this frame sent from now on, in place of the last one; ``once`` one time before."""
+        """Order this frame in place of the last one; ``once`` is sent one time before it."""
         now_s = self._monotonic()
         if now_s - self._ordered_s > ORDER_HOLDS_S:
             self._word_s = now_s  # it was us who hung
@@ -105,7 +105,7 @@ class PortClient:
                 pipe.write(json.dumps(order).encode() + b"\n")
 
     def close(self) -> None:
-        """Have the base stopped, and end the process. Never raises."""
+        """Stop the base, and end the process. Never raises."""
         self._closing.set()
         process = self._process
         with contextlib.suppress(OSError):
@@ -130,7 +130,7 @@ class PortClient:
         )
 
     def _listen(self) -> None:
-        """Hear one process after the other until closed; nothing is heard after a failure."""
+        """Read from one process after the other until closed or failed."""
         try:
             self._hear_on()
         finally:
@@ -186,7 +186,7 @@ class PortClient:
             self._hear(ReceivedBytes(heard.at_s, self._openings, heard.data))
 
     def count(self) -> dict[str, int]:
-        """Give all counters, those of the present process included."""
+        """Return all counters, those of the present process included."""
         total = Counter(self.counters)
         total.update(self._counted)
         return dict(total) | {"openings": self._openings}

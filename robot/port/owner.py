@@ -1,4 +1,4 @@
-"""Keeps a serial port open, and what hangs on it ordered or stopped."""
+"""Keeps a serial port open, and sends the base its orders or the stop."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ class SerialPort(Protocol):
     """What is used of pyserial."""
 
     def read(self, size: int = 1) -> bytes:
-        """Give what came within a moment."""
+        """Return what came within a moment."""
 
     def write(self, data: bytes, /) -> int | None:
         """Send bytes."""
 
     def close(self) -> None:
-        """Give it back."""
+        """Close it."""
 
 
 class PortOwner:
-    """Keeps a port open and what hangs on it ordered. ``run`` returns after ``end``.
+    """Keeps a port open, and sends the base its orders. ``run`` returns after ``end``.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class PortOwner:
     stop
         The frame that stops the base.
     tell
-        Takes what was heard; never waits.
+        Called with what was received; never waits.
     monotonic, sleep
         The computer's clock [s], and how to wait by it.
     """
@@ -70,13 +70,13 @@ class PortOwner:
         self._is_over = False
 
     def order(self, line: bytes) -> None:
-        """Take a line of the orders, from any thread."""
-        once = self.setpoint.take(line, self._monotonic())
+        """Handle a line of the orders, from any thread."""
+        once = self.setpoint.store(line, self._monotonic())
         if once:
             self._once.append(once)
 
     def end(self) -> None:
-        """Let ``run`` stop the base and return."""
+        """Make ``run`` stop the base and return."""
         self._is_over = True
 
     def run(self) -> None:

@@ -1,4 +1,4 @@
-"""What a base is sent now: the last order while it is fresh, else the stop."""
+"""The frame to send to a base now: the last order while it is fresh, else the stop."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LONGEST_FRAME = 64  # a Kobuki's buffer for commands [bytes] (kobuki.md 1.2)
 
 
 class BadOrder(ValueError):
-    """A line that is no order; the message says what is wrong with it."""
+    """A line that is no order; the message says what one is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Order:
 
     @classmethod
     def read(cls, line: bytes) -> Order:
-        """Read a line. Raises BadOrder."""
+        """Return the order of a line. Raises BadOrder."""
         try:
             said = json.loads(line)
             number, sent_s = said["number"], said["sent_s"]
@@ -44,7 +44,7 @@ class Order:
 
 
 class Setpoint:
-    """What is to be sent now: the last order while it is fresh, else the stop. Nothing is queued.
+    """The last order while it is fresh, else the stop. Nothing is queued.
 
     After a pause in the orders, and at the beginning, nothing but the stop is sent until just that
     is ordered: what was interrupted does not go on by itself.
@@ -69,17 +69,17 @@ class Setpoint:
         self._is_held = True
         self._lock = threading.Lock()  # orders come from another thread
 
-    def take(self, line: bytes, now_s: float) -> bytes:
-        """Take a line of the orders; give what is to be sent one time."""
+    def store(self, line: bytes, now_s: float) -> bytes:
+        """Store an order, and return the frame that it wants sent once."""
         try:
             order = Order.read(line)
         except BadOrder:
             self.counters["bad"] += 1
             return b""
         with self._lock:
-            return self._take(order, now_s)
+            return self._store(order, now_s)
 
-    def _take(self, order: Order, now_s: float) -> bytes:
+    def _store(self, order: Order, now_s: float) -> bytes:
         if order.number <= self._number or not -EARLY_S <= now_s - order.sent_s <= ORDER_HOLDS_S:
             self.counters["old"] += 1
             return b""
@@ -93,7 +93,7 @@ class Setpoint:
         return order.once
 
     def frame(self, now_s: float) -> bytes:
-        """Give the frame to send now."""
+        """Return the frame to send now."""
         with self._lock:
             order = self._order
             if order is None or order.frame == self.stop:

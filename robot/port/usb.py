@@ -1,4 +1,4 @@
-"""Which serial port a Kobuki is at, and what may be wrong with it."""
+"""Finds a Kobuki's serial port, and diagnoses it."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ class Usb:
 
 
 def list_ports() -> list[Usb]:
-    """Give the computer's serial ports."""
+    """Return the computer's serial ports."""
     from serial.tools.list_ports import comports
 
     return [Usb(port.device, port.vid, port.pid, port.serial_number or "") for port in comports()]
 
 
 def find_port() -> str:
-    """Give the port of the environment (GARRY_ROBOT_PORT), a Kobuki's, or where one would be."""
+    """Return the port in GARRY_ROBOT_PORT, else a Kobuki's, else the udev rule's."""
     if port := os.environ.get("GARRY_ROBOT_PORT"):
         return port
     return next((usb.device for usb in list_ports() if usb.is_kobuki), DEFAULT_PORT)
@@ -53,7 +53,7 @@ def find_port() -> str:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """What was looked at; ``cure`` is empty where nothing is wrong."""
+    """Result of one check; ``cure`` is empty where nothing is wrong."""
 
     what: str
     cure: str = ""
@@ -66,7 +66,7 @@ def check_port(
     system: str = sys.platform,
     drivers: Path = Path("/sys/bus/usb-serial"),
 ) -> Iterator[Diagnosis]:
-    """Say what is right and wrong with a port, without opening it.
+    """Yield what is right and wrong with a port, without opening it.
 
     Parameters
     ----------

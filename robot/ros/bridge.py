@@ -35,37 +35,37 @@ END_S = 2.0
 
 
 class TopicClient(Protocol):
-    """What is said to a bridge, and what hears it."""
+    """What publishes and subscribes at a bridge; every call is told the time."""
 
     def open(self, now_s: float) -> Iterable[Frame]:
-        """Give what is said first on a new connection."""
+        """Return the first frames of a new connection."""
 
     def due(self, now_s: float) -> Iterable[Frame]:
-        """Give what is to be said now."""
+        """Return the frames to send now."""
 
     def hear(self, heard: Incoming, now_s: float) -> None:
-        """Take what came. Raises BadRosFrame."""
+        """Handle a received frame. Raises BadRosFrame."""
 
     def lose(self, now_s: float) -> None:
-        """Take note that the connection is lost."""
+        """Handle the loss of the connection."""
 
     def end(self, now_s: float) -> Iterable[Frame]:
-        """Give what is said last."""
+        """Return the last frames."""
 
 
 class Bridge:
-    """A connection to a rosbridge that comes back by itself.
+    """A connection to a rosbridge that reconnects by itself.
 
     Parameters
     ----------
     url
         ws://host:9090.
-    talk
-        What is said and heard.
+    client
+        What publishes and subscribes.
     lock
-        Held while the talk is asked and told, which happens on our thread.
+        Held during each call of the client, on the bridge's thread.
     monotonic
-        The clock [s] that the talk is told.
+        The clock [s] of those calls.
     sleep, jitter
         How to pause between attempts, and where chance comes from, in [0, 1).
 
@@ -106,12 +106,12 @@ class Bridge:
         return not self._thread.is_alive()
 
     def wake(self) -> None:
-        """Have said at once what is due. Never waits, never raises."""
+        """Send at once what is due. Never waits, never raises."""
         with suppress(RuntimeError):  # it has been closed
             self._loop.call_soon_threadsafe(self._wanted.set)
 
     def close(self) -> None:
-        """Say the last words and hang up. Never raises."""
+        """Send the last frames and close. Never raises."""
         with suppress(RuntimeError):
             self._loop.call_soon_threadsafe(self._closing.set)
         self._thread.join(END_S)
@@ -159,7 +159,7 @@ class Bridge:
         await self._sleep(self._back_off.next_s())
 
     async def _converse(self, socket: ClientConnection) -> None:
-        """Say and hear until the connection is lost, or we are closed."""
+        """Send and receive until the connection is lost or the bridge closed."""
         try:
             await self._say(socket, self._client.open)
             hearing = asyncio.create_task(self._listen(socket))
@@ -205,7 +205,7 @@ class Bridge:
 
 
 def find_bridge() -> str:
-    """Give the address of the environment (GARRY_ROS_URL), or where a bridge would be here."""
+    """Return the address in GARRY_ROS_URL, or the default one on this computer."""
     return os.environ.get("GARRY_ROS_URL", DEFAULT_URL)
 
 

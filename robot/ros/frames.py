@@ -1,4 +1,4 @@
-"""Frames of rosbridge v2: the six operations that are said, and the two that are heard.
+"""Frames of rosbridge v2: the six operations that are sent, and the two that are received.
 
 A bridge complains of nothing that it is told (kobuki.md 2.6): what matters has to come back from
 it. So nothing is sent here that waits in a queue anywhere: publishers and subscriptions keep one.
@@ -17,7 +17,7 @@ Frame = dict[str, Any]
 
 
 class BadRosFrame(ValueError):
-    """What came is no frame that would mean something here."""
+    """A received frame without a meaning here; the message says what one would be."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ Incoming = Publication | Answer
 
 
 def advertise(topic: Topic, *, latch: bool = False) -> Frame:
-    """Say that we publish; with ``latch``, whoever comes later gets the last message."""
+    """Return an advertisement; with ``latch``, later subscribers get the last message."""
     return {
         "op": "advertise",
         "topic": topic.name,
@@ -59,17 +59,17 @@ def advertise(topic: Topic, *, latch: bool = False) -> Frame:
 
 
 def unadvertise(topic: Topic) -> Frame:
-    """Say that we do not publish any more."""
+    """Return the end of an advertisement."""
     return {"op": "unadvertise", "topic": topic.name}
 
 
 def publish(topic: Topic, message: Mapping[str, Any]) -> Frame:
-    """Publish a message."""
+    """Return a publication."""
     return {"op": "publish", "topic": topic.name, "msg": dict(message)}
 
 
 def subscribe(topic: Topic, *, newest_every_ms: int = 0) -> Frame:
-    """Ask for a topic's messages: each one, or only the newest of every so often."""
+    """Return a subscription: to each message, or to the newest at an interval [ms]."""
     return {
         "op": "subscribe",
         "topic": topic.name,
@@ -81,22 +81,22 @@ def subscribe(topic: Topic, *, newest_every_ms: int = 0) -> Frame:
 
 
 def unsubscribe(topic: Topic) -> Frame:
-    """Ask for a topic no more."""
+    """Return the end of a subscription."""
     return {"op": "unsubscribe", "topic": topic.name, "id": topic.name}
 
 
 def call_service(service: str, arguments: Mapping[str, Any], question: str) -> Frame:
-    """Ask a service; its answer has the question's name."""
+    """Return a service call; its answer has the question's name."""
     return {"op": "call_service", "service": service, "args": dict(arguments), "id": question}
 
 
 def to_text(frame: Frame) -> str:
-    """Give a frame's text. Raises ValueError for a number that is not finite."""
+    """Return a frame's text. Raises ValueError for a number that is not finite."""
     return json.dumps(frame, separators=(",", ":"), allow_nan=False)
 
 
 def read_frame(text: str | bytes) -> Incoming:
-    """Read what a bridge said. Raises BadRosFrame for anything that is neither of the two."""
+    """Return a publication or an answer. Raises BadRosFrame for anything else."""
     try:
         frame = json.loads(text)
     except (ValueError, RecursionError):

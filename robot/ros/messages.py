@@ -1,4 +1,4 @@
-"""Messages of ROS 1 as JSON: those that are published, and those that are believed.
+"""Messages of ROS 1 as JSON: written and read, with every number checked.
 
 Every number that comes in is checked: a bridge passes on NaN, text and whatever else it is given
 (kobuki.md 2.6). Axes are those of motion.py, which are those of ROS (REP 103).
@@ -35,7 +35,7 @@ Message = Mapping[str, Any]
 
 
 def write_twist(twist: Twist) -> dict[str, Any]:
-    """Give a geometry_msgs/Twist."""
+    """Return a geometry_msgs/Twist."""
     return {
         "linear": {"x": twist.v_m_s, "y": 0.0, "z": 0.0},
         "angular": {"x": 0.0, "y": 0.0, "z": twist.w_rad_s},

@@ -1,7 +1,7 @@
 """The protocol of a Kobuki, pure: commands and feedback, both ways, for driver and twin alike.
 
 ``frames`` finds and makes frames, ``commands`` and ``feedback`` are what they say, ``wheels`` turns
-twists into orders and back, ``trust`` says what can be believed of a damaged stream.
+twists into commands and back, ``frame_filter`` makes estimates of a damaged stream.
 """
 
 from robot.bases.kobuki_protocol.commands import (

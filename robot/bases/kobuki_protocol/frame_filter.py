@@ -1,4 +1,4 @@
-"""What can be believed of a stream of feedback: one damaged frame changes nothing for good.
+"""Filter of a stream of feedback: one damaged frame changes nothing for good.
 
 A checksum of one byte lets one damaged frame in 256 pass, more of those with two flipped bits.
 """
@@ -29,7 +29,7 @@ DEGREES = 0.01  # one digit of the gyro's angle and rate (kobuki.md 1.3)
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What is believed after a frame.
+    """State of a base after a frame, as far as it is confirmed.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Estimate:
 
 
 class FrameFilter:
-    """Turns a stream of parsed feedback into what can be believed.
+    """Turns a stream of decoded feedback into confirmed estimates.
 
     A frame whose encoders, gyro or time jump further than they can is put aside; where the next one
     continues it, the counters have begun anew. Whatever can stop, start or arm something counts
@@ -100,13 +100,21 @@ class FrameFilter:
         self._claims: dict[str, Version | Udid] = {}
 
     def forget(self) -> None:
-        """Begin anew with the next frames, as after the port was opened again."""
+        """Start over with the next frames, as after the port was opened again."""
         self._believed, self._aside = [], None
         self._claims.clear()
         self.firmware = self.hardware = self.udid = None
 
     def take(self, feedback: Feedback, now_s: float) -> Estimate | None:
-        """Take the next frame, at a monotonic time [s]; None where there is nothing to believe."""
+        """Add the next frame, and return the estimate, or None where the frame is not confirmed.
+
+        Parameters
+        ----------
+        feedback
+            The decoded frame.
+        now_s
+            When it was received, on a monotonic clock [s].
+        """
         if feedback.core is None or feedback.inertia is None:
             return None
         if now_s - self._heard_s > GAP_S:
@@ -155,21 +163,21 @@ class _Frame:
     estimate: Estimate
 
     def repeats(self, before: _Frame) -> bool:
-        """Say whether the line has sent the same frame again."""
+        """Return whether this is the same frame, sent again by the line."""
         return self.core == before.core and self.inertia == before.inertia
 
     def elapsed_s(self, before: _Frame) -> float:
         return _passed(before.core.time_ms, self.core.time_ms) / 1000
 
     def rolled_m(self, before: _Frame) -> tuple[float, float]:
-        """Give how far the wheels have rolled, left and right [m]."""
+        """Return how far the wheels have rolled, left and right [m]."""
         return (
             _passed(before.core.left_ticks, self.core.left_ticks) * TICK_M,
             _passed(before.core.right_ticks, self.core.right_ticks) * TICK_M,
         )
 
     def continues(self, before: _Frame) -> bool:
-        """Say whether a base can have come here from there."""
+        """Return whether a base can have moved from there to here in the time between."""
         elapsed_s = self.elapsed_s(before)
         if not 0 < elapsed_s <= min(GAP_S, self.heard_s - before.heard_s + AHEAD_S):
             return False
@@ -181,7 +189,7 @@ class _Frame:
         )
 
     def since(self, before: _Frame) -> Estimate:
-        """Give what is believed now, given a frame that this one continues."""
+        """Return the estimate now, given a frame that this one continues."""
         was, core_was, core = before.estimate, before.core, self.core
         elapsed_s, (left_m, right_m) = self.elapsed_s(before), self.rolled_m(before)
         turned = _turned(before.inertia.angle, self.inertia.angle)
@@ -205,12 +213,12 @@ class _Frame:
 
 
 def _passed(before: int, now: int) -> int:
-    """Give how far a counter of 16 bits has come, either way."""
+    """Return the signed difference of a counter of 16 bits, which wraps."""
     return (now - before + 0x8000) % 0x10000 - 0x8000
 
 
 def _turned(before: int, now: int) -> float:
-    """Give how far the gyro has turned [0.01°].
+    """Return how far the gyro has turned [0.01°].
 
     Its angle is one modulo 360°, in 16 bits (kobuki.md 1.3): it may jump by 360° or by 65536
     digits, and neither is a turn.
@@ -219,6 +227,6 @@ def _turned(before: int, now: int) -> float:
 
 
 def _agreed(was: int, before: int, now: int) -> int:
-    """Give bits that two frames running agree on; where they do not, as they were."""
+    """Return the bits that two consecutive frames agree on, and the old ones elsewhere."""
     same = ~(before ^ now)
     return (now & same) | (was & ~same)

@@ -1,4 +1,4 @@
-"""Wheels of a Kobuki: what a twist is in its orders, and what its orders are in wheel speeds."""
+"""Wheels of a Kobuki: twists as commands, and commands as wheel speeds."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ STOP = BaseControl(0, 0)
 
 
 def slow_to_wheels(twist: Twist) -> Twist:
-    """Give a twist on the same curve of which no wheel is too fast; what is not finite is still.
+    """Return a twist on the same curve with no wheel above ``WHEEL_MAX_M_S``.
+
+    ``STILL`` for one that is not finite.
 
     Clipping one of the two speeds would make it another curve (kobuki.md 1.5, c).
     """
@@ -33,7 +35,17 @@ def slow_to_wheels(twist: Twist) -> Twist:
 
 
 def control_of(twist: Twist) -> BaseControl:
-    """Give the order that comes nearest to a twist; one that is not finite is an order to stand.
+    """Return the command that comes nearest to a twist.
+
+    Parameters
+    ----------
+    twist
+        The velocity; one that is not finite gives the stop.
+
+    Returns
+    -------
+    BaseControl
+        Speed of the outer wheel [mm/s] and radius of the curve [mm].
 
     Notes
     -----
@@ -56,7 +68,7 @@ def control_of(twist: Twist) -> BaseControl:
 
 
 def twist_of(control: BaseControl) -> Twist:
-    """Give the twist that an order means, as the firmware reads it (kobuki.md 1.5)."""
+    """Return the twist that a command means, as the firmware reads it (kobuki.md 1.5)."""
     speed, radius = control
     if radius == 0:
         return Twist(speed / 1000, 0.0)
@@ -67,6 +79,6 @@ def twist_of(control: BaseControl) -> Twist:
 
 
 def wheel_speeds(twist: Twist) -> tuple[float, float]:
-    """Give the speeds of the left and the right wheel [m/s]."""
+    """Return the speeds of the left and the right wheel [m/s]."""
     turning_m_s = twist.w_rad_s * WHEELBASE_M / 2
     return twist.v_m_s - turning_m_s, twist.v_m_s + turning_m_s

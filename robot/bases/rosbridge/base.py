@@ -46,16 +46,16 @@ class RosbridgeBase(MobileBase):
 
     @classmethod
     def add_arguments(cls, group: ArgumentParser | _ArgumentGroup) -> None:
-        """Offer the base's topics."""
+        """Add options for the base's topics."""
         add_topic_arguments(group)
 
     def configure(self, options: Namespace) -> None:
-        """Take the bridge's address and the base's topics. Raises BadOption."""
+        """Apply the bridge's address and the base's topics. Raises BadOption."""
         self.port = options.ros_url
         self._choose(read_topics(options))
 
     def __enter__(self) -> Self:
-        """Connect, and give the bridge a moment to say where the base is."""
+        """Connect, and wait a moment for the base's odometry."""
         self._bridge = Bridge(self.port or find_bridge(), self._client, self._lock, self._monotonic)
         until_s = self._monotonic() + GREETING_S
         while self._monotonic() < until_s and self.read().sensors.silent_s == math.inf:
@@ -82,7 +82,7 @@ class RosbridgeBase(MobileBase):
 
     @property
     def problem(self) -> str:
-        """Say why the base is not reached; empty where it is."""
+        """Return why the base cannot be reached; empty where it can."""
         if self._bridge is None:
             return ""
         with self._lock:
@@ -91,7 +91,9 @@ class RosbridgeBase(MobileBase):
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
         if self._bridge is not None and self._bridge.is_dead:
-            raise BaseLost("The thread that talks to the rosbridge has ended: see its words above.")
+            raise BaseLost(
+                "The thread that talks to the rosbridge has ended: see its messages above."
+            )
         with self._lock:
             ordered = self._client.orders.order(twist, self._monotonic())
         if self._bridge is not None:
@@ -104,12 +106,12 @@ class RosbridgeBase(MobileBase):
             self.drive(STILL)
 
     def read(self) -> BaseState:
-        """Give what is believed of it now."""
+        """Return its state now."""
         with self._lock:
             return self._client.state(self._monotonic())
 
     def set_home(self) -> None:
-        """Begin odometry anew: this place is home."""
+        """Make this place home."""
         with self._lock:
             self._client.odometry.set_home()
 

@@ -1,4 +1,4 @@
-"""What is said to a rosbridge to drive a base, and what is believed of its words. Time is told."""
+"""What a base's driver publishes and subscribes to at a rosbridge. Time is a parameter."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class BaseClient:
         return self.orders.counters + self.sensors.counters
 
     def open(self, now_s: float) -> Iterator[Frame]:
-        """Give what is said first on a new connection. Its first order is to stand still."""
+        """Yield the first frames of a new connection. Its first order is to stand still."""
         self.lose(now_s)
         self._is_open, self._opened_s, self._asked_s = True, now_s, -math.inf
         topics = self.topics
@@ -82,7 +82,7 @@ class BaseClient:
             yield subscribe(topic)
 
     def due(self, now_s: float) -> Iterator[Frame]:
-        """Give what is to be said now."""
+        """Yield the frames to send now."""
         twist = self.orders.due(now_s)
         if twist is not None:
             self.odometry.order(twist, now_s)
@@ -95,7 +95,7 @@ class BaseClient:
                 yield call_service(PUBLISHERS, {"topic": topic.name}, topic.name)
 
     def hear(self, heard: Incoming, now_s: float) -> None:
-        """Take what the bridge said. Raises BadRosFrame for what cannot be believed."""
+        """Handle a frame of the bridge. Raises BadRosFrame for impossible values."""
         if isinstance(heard, Answer):
             self._take_answer(heard)
             return
@@ -114,7 +114,7 @@ class BaseClient:
             self._feel(heard, now_s)
 
     def lose(self, now_s: float) -> None:
-        """Forget what was ordered, and what was felt: the connection is lost."""
+        """Reset orders and hazards: the connection is lost."""
         self._is_open = False
         self.orders.forget()
         self.odometry.order(STILL, now_s)
@@ -122,7 +122,7 @@ class BaseClient:
         self._missing.clear()
 
     def end(self, now_s: float) -> Iterator[Frame]:
-        """Give what is said last: stand still, and that we are gone."""
+        """Yield the last frames: stand still, unsubscribe, unadvertise."""
         self.lose(now_s)
         topics = self.topics
         for _ in range(LAST_STOPS):
@@ -133,7 +133,7 @@ class BaseClient:
         yield unadvertise(topics.order)
 
     def state(self, now_s: float) -> BaseState:
-        """Give what is believed of the base now."""
+        """Return the state of the base now."""
         self.odometry.move(now_s)
         sensors = SensorState(
             hazards=self.sensors.hazards(now_s),
@@ -143,13 +143,13 @@ class BaseClient:
         return BaseState(self.odometry.pose, self.odometry.twist, sensors)
 
     def silent_s(self, now_s: float) -> float:
-        """Give for how long it has been unknown whether orders arrive, or where it is [s]."""
+        """Return how long it has been unknown whether orders arrive, or where it is [s]."""
         if not self._is_open or not self.orders.is_answered:
             return math.inf
         return max(0.0, self.orders.unanswered_s(now_s), now_s - self.odometry.seen_s)
 
     def problem(self, now_s: float) -> str:
-        """Say what is wrong at a bridge that answers; nothing where nothing is."""
+        """Return what is wrong at a bridge that answers; empty where nothing is."""
         order, odometry = self.topics.order.name, self.topics.odometry
         if not self._is_open or now_s - self._opened_s < LATE_S:
             return ""
@@ -172,7 +172,7 @@ class BaseClient:
         raise BadRosFrame("Nobody asked for that topic.")
 
     def _take_answer(self, answer: Answer) -> None:
-        """Take who is at a topic. Where no rosapi runs, nothing is known and nothing refused."""
+        """Store who uses a topic. Without rosapi that is unknown, and nothing is refused."""
         is_order = answer.question == self.topics.order.name
         there = (answer.values or {}).get("subscribers" if is_order else "publishers")
         if not isinstance(there, list):

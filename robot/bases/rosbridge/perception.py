@@ -1,4 +1,4 @@
-"""What is believed of a base that ROS drives: where it is, how it moves, what it feels."""
+"""State of a base that ROS drives: odometry, dead reckoning, hazards."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FELT_S = 0.1  # what was felt counts for so long [s]: no look in between misses 
 
 
 class ReportedOdometry:
-    """Odometry of the base, seen from home; it begins at home, wherever that is.
+    """Odometry that the base reports, seen from home; it begins at home.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class ReportedOdometry:
         self._heading_rad = 0.0  # likewise, full turns included
 
     def take(self, told: Pose, twist: Twist, now_s: float) -> bool:
-        """Take what the base tells; give whether it has jumped."""
+        """Store a reported pose, and return whether it has jumped."""
         turned_rad = wrap(told.heading_rad - self._last.heading_rad)
         jumped = self._home is not None and (
             told.distance_m(self._last) > JUMP_M or abs(turned_rad) > JUMP_RAD
@@ -47,16 +47,16 @@ class ReportedOdometry:
         return jumped
 
     def set_home(self) -> None:
-        """Take the place of now for home."""
+        """Make the present place home."""
         last = self._last
         self._home = Pose(last.x_m, last.y_m, self._heading_rad)
         self._look()
 
     def move(self, now_s: float) -> None:
-        """Do nothing: the base tells how it moves."""
+        """Do nothing: the base reports how it moves."""
 
     def order(self, twist: Twist, now_s: float) -> None:
-        """Do nothing: the base tells how it follows."""
+        """Do nothing: the base reports how it follows."""
 
     def _look(self) -> None:
         home = self._home or HOME
@@ -78,7 +78,7 @@ class DeadReckoning:
         self._until_s = self._ordered_s = -math.inf
 
     def order(self, twist: Twist, now_s: float) -> None:
-        """Note what was sent."""
+        """Store what was sent."""
         self.move(now_s)
         self.twist, self._ordered_s = twist, now_s
 
@@ -92,12 +92,12 @@ class DeadReckoning:
         self._until_s = max(self._until_s, now_s)
 
     def set_home(self) -> None:
-        """Take the place of now for home."""
+        """Make the present place home."""
         self.pose = HOME
 
 
 class HazardSensors:
-    """What its sensors feel: bumpers, edges, wheels; and what happened to it.
+    """Hazards: what bumpers, cliff sensors and wheels report, and what happened to it.
 
     Events come when something changes. One that was missed while the connection was lost is not
     known; that stops it anyhow.
@@ -109,21 +109,21 @@ class HazardSensors:
         self._felt_s: dict[str, float] = {}
 
     def take(self, hazard: str, which: int, is_felt: bool, now_s: float) -> None:
-        """Take an event of one sensor."""
+        """Store an event of one sensor."""
         pressed = self._pressed.setdefault(hazard, set())
         (pressed.add if is_felt else pressed.discard)(which)
         if is_felt:
             self._felt_s[hazard] = now_s
 
     def note(self, hazard: str, now_s: float) -> None:
-        """Take something that happened."""
+        """Store something that happened."""
         self._felt_s[hazard] = now_s
 
     def forget(self) -> None:
-        """Forget what is pressed: the connection is lost."""
+        """Reset what is pressed: the connection is lost."""
         self._pressed.clear()
 
     def hazards(self, now_s: float) -> frozenset[str]:
-        """Give what is felt now, or was a moment ago."""
+        """Return the hazards of now and of a moment ago."""
         recent = {name for name, felt_s in self._felt_s.items() if now_s - felt_s <= FELT_S}
         return frozenset(recent | {name for name, pressed in self._pressed.items() if pressed})

@@ -45,7 +45,7 @@ class Topics:
         )
 
     def chosen(self, options: Namespace) -> Topics:
-        """Give these with those of a command line in their place. Raises BadOption."""
+        """Return these with the topics of a command line in their place. Raises BadOption."""
         order = replace(self.order, name=options.cmd_topic or self.order.name)
         _check_name("--cmd-topic", order.name)
         odometry = self.odometry
@@ -83,7 +83,7 @@ DEFAULT_PROFILE = "kobuki"
 
 
 def add_topic_arguments(group: ArgumentParser | _ArgumentGroup) -> None:
-    """Let a command line name the topics of a base."""
+    """Add options for the topics of a base to a command line."""
     group.add_argument(
         "--ros-robot",
         choices=sorted(PROFILES),
@@ -104,7 +104,7 @@ def add_topic_arguments(group: ArgumentParser | _ArgumentGroup) -> None:
 
 
 def read_topics(options: Namespace) -> Topics:
-    """Give the topics of a command line. Raises BadOption."""
+    """Return the topics of a command line. Raises BadOption."""
     return PROFILES[options.ros_robot].chosen(options)
 
 

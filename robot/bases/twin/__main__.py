@@ -42,7 +42,7 @@ from robot.bases.twin.process import Twin
 
 
 def make_body(name: str, notice: Callable[[str], None]) -> Body:
-    """Give a body by its name, ``bullet`` or ``kinematic``; ``auto`` takes physics if it can.
+    """Return a body by its name, ``bullet`` or ``kinematic``; ``auto`` prefers physics.
 
     Raises ImportError where physics was asked for by name and is not there.
     """
@@ -61,8 +61,8 @@ def make_body(name: str, notice: Callable[[str], None]) -> Body:
     return KinematicBody(FRAME_S)
 
 
-def say(text: str) -> None:
-    """Print a line for whoever looks on."""
+def print_notice(text: str) -> None:
+    """Print a line to standard error."""
     print(text, file=sys.stderr, flush=True)
 
 
@@ -75,7 +75,7 @@ def read_version(text: str) -> Version:
 
 
 def make_parser() -> ArgumentParser:
-    """Give the command line."""
+    """Return the command line's parser."""
     parser = ArgumentParser(
         prog="python -m robot twin",
         description=__doc__,
@@ -114,7 +114,7 @@ def make_parser() -> ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the twin of the command line until told to end, and give the exit status."""
+    """Run the twin of the command line until told to end, and return the exit status."""
     parser = make_parser()
     options = parser.parse_args(arguments)
     if options.camera and not find_spec("pybullet"):
@@ -133,7 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.write(answers, text.encode() + b"\n")
 
     try:
-        body = make_body(options.body, say)
+        body = make_body(options.body, print_notice)
     except ImportError as problem:
         parser.error(f"{problem}. Cure: --body kinematic, or pip install 'garry[twin]'.")
     chance = random.Random(options.seed)  # noqa: S311 (nothing here is a secret)

@@ -52,7 +52,7 @@ class Body(Protocol):
         """Turn its wheels for one frame's time at these speeds [m/s]."""
 
     def touch(self) -> Touch:
-        """Give what it touches now."""
+        """Return what it touches now."""
 
     def carry_home(self) -> None:
         """Put it where it began."""
@@ -82,7 +82,7 @@ class KinematicBody:
         self.rolled_m = (left_m + left_m_s * self._frame_s, right_m + right_m_s * self._frame_s)
 
     def touch(self) -> Touch:
-        """Give that it touches the floor, and nothing else."""
+        """Return that it touches the floor alone."""
         return Touch()
 
     def carry_home(self) -> None:

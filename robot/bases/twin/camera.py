@@ -38,7 +38,7 @@ class Camera:
     file
         A PNG; always whole, since each picture takes the place of the last at once.
     look
-        Gives the twin's pose.
+        Returns the twin's pose.
     """
 
     def __init__(self, file: Path, look: Callable[[], Pose]) -> None:
@@ -108,7 +108,7 @@ class Renderer:
         self._lens = self._world.computeProjectionMatrixFOV(SEES_DEG, WIDTH / HEIGHT, 0.1, 10)
 
     def draw(self, pose: Pose) -> bytes:
-        """Give a picture of it at a pose, as PNG."""
+        """Return a picture of the twin at a pose, as PNG."""
         turned = self._world.getQuaternionFromEuler((0, 0, pose.heading_rad))
         self._world.resetBasePositionAndOrientation(self._robot, (pose.x_m, pose.y_m, 0.0), turned)
         picture = self._world.getCameraImage(
@@ -123,7 +123,7 @@ class Renderer:
 
 
 def write_png(width: int, height: int, rgba: bytes) -> bytes:
-    """Give a picture of rows of red, green, blue and opacity, a byte each, as PNG (RFC 2083)."""
+    """Return a picture of RGBA rows, a byte each, as PNG (RFC 2083)."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
         return (

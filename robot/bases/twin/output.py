@@ -1,4 +1,4 @@
-"""What pybullet prints does not come between the twin and whoever reads it."""
+"""Keeps what pybullet prints apart from the twin's answers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def redirect_output() -> int:
-    """Give standard output's file for the port and the answers alone; then import pybullet.
+    """Return a file for answers alone in place of standard output, and import pybullet.
 
     It prints past Python: when it was built on importing, and more on ending.
     """

@@ -44,7 +44,7 @@ class Twin:
         self._looked_s = -math.inf
 
     def listen(self, now_s: float) -> None:
-        """Take what the driver has sent, at a time [s]."""
+        """Read what the driver has sent, at a time [s]."""
         if now_s < self._stalled_until_s:
             return
         data = self.line.read()
@@ -68,7 +68,7 @@ class Twin:
         self._held = self._held[-HELD_BYTES:]
 
     def do(self, order: Mapping[str, Any], now_s: float) -> dict[str, Any]:
-        """Do something to it, at a time [s], and give the answer. Raises BadFault."""
+        """Carry out an order to the twin at a time [s], and return the answer. Raises BadFault."""
         match order:
             case {"do": "set", "name": str(name), "value": value}:
                 for_s = _seconds(order) if "for_s" in order else None

@@ -20,22 +20,22 @@ def order(number, frame=GO, sent_s=10.0, **more):
 def setpoint():
     setpoint = Setpoint(STOP)
     assert setpoint.frame(10.0) == STOP
-    setpoint.take(order(1, STOP), 10.0)
+    setpoint.store(order(1, STOP), 10.0)
     return setpoint
 
 
 def test_an_order_holds_for_a_quarter_of_a_second(setpoint):
-    setpoint.take(order(2), 10.01)
+    setpoint.store(order(2), 10.01)
     assert setpoint.frame(10.02) == setpoint.frame(10.25) == GO
     assert setpoint.frame(10.26) == STOP
     assert setpoint.counters["lapsed"] == 1
 
 
 def test_the_last_order_wins(setpoint):
-    setpoint.take(order(2), 10.0)
-    setpoint.take(order(3, OTHER), 10.0)
+    setpoint.store(order(2), 10.0)
+    setpoint.store(order(3, OTHER), 10.0)
     assert setpoint.frame(10.0) == OTHER
-    setpoint.take(order(4, STOP), 10.0)
+    setpoint.store(order(4, STOP), 10.0)
     assert setpoint.frame(10.0) == STOP
 
 
@@ -45,29 +45,29 @@ def test_the_last_order_wins(setpoint):
     ids=["repeated", "reordered", "negative", "stale", "from the future", "not finite"],
 )
 def test_an_order_that_is_not_new_or_not_of_now(setpoint, number, sent_s):
-    setpoint.take(order(3, STOP), 10.0)
-    assert setpoint.take(order(number, GO, sent_s, once="aa"), 10.0) == b""
+    setpoint.store(order(3, STOP), 10.0)
+    assert setpoint.store(order(number, GO, sent_s, once="aa"), 10.0) == b""
     assert setpoint.frame(10.0) == STOP
     assert setpoint.counters["old"] + setpoint.counters["bad"] == 1
 
 
 def test_what_was_interrupted_does_not_go_on(setpoint):
-    setpoint.take(order(2), 10.0)
+    setpoint.store(order(2), 10.0)
     assert setpoint.frame(11.0) == STOP
-    setpoint.take(order(3, GO, 11.0), 11.0)
+    setpoint.store(order(3, GO, 11.0), 11.0)
     assert setpoint.frame(11.0) == STOP
     assert setpoint.counters["refused"] == 1
-    setpoint.take(order(4, STOP, 11.0), 11.0)
-    setpoint.take(order(5, GO, 11.0), 11.0)
+    setpoint.store(order(4, STOP, 11.0), 11.0)
+    setpoint.store(order(5, GO, 11.0), 11.0)
     assert setpoint.frame(11.0) == GO
     setpoint.hold()
-    setpoint.take(order(6, GO, 11.0), 11.0)
+    setpoint.store(order(6, GO, 11.0), 11.0)
     assert setpoint.frame(11.0) == STOP
 
 
 def test_what_is_sent_once_is_given_once(setpoint):
-    assert setpoint.take(order(2, once="0102"), 10.0) == b"\x01\x02"
-    assert setpoint.take(order(2, once="0102"), 10.0) == b""
+    assert setpoint.store(order(2, once="0102"), 10.0) == b"\x01\x02"
+    assert setpoint.store(order(2, once="0102"), 10.0) == b""
 
 
 BAD = [
@@ -94,7 +94,7 @@ BAD = [
 
 @pytest.mark.parametrize("bad", BAD, ids=range(len(BAD)))
 def test_what_is_no_order_is_counted(setpoint, bad):
-    assert setpoint.take(bad, 10.0) == b""
+    assert setpoint.store(bad, 10.0) == b""
     assert setpoint.counters["bad"] == 1
     assert setpoint.frame(10.0) == STOP
 
@@ -115,7 +115,7 @@ def test_it_never_sends_what_is_not_the_freshest_order(told):
     setpoint, now_s, newest, fresh = Setpoint(STOP), 10.0, -1, (STOP, -math.inf)
     for frame, number, age_s, pause_s in told:
         sent_s = now_s + age_s
-        setpoint.take(order(number, frame, sent_s), now_s)
+        setpoint.store(order(number, frame, sent_s), now_s)
         if number > newest and -0.05 <= now_s - sent_s <= 0.25:
             newest, fresh = number, (frame, sent_s)
         now_s += pause_s

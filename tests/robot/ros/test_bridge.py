@@ -216,7 +216,7 @@ def test_a_thread_that_ended_is_a_base_that_is_lost(ros, monkeypatch):
     with open_base(ros.url) as base:
         monkeypatch.setattr(base._client, "due", lambda now_s: 1 / 0)
         wait_until(lambda: base._bridge.is_dead)
-        with pytest.raises(BaseLost, match="see its words above"):
+        with pytest.raises(BaseLost, match="see its messages above"):
             base.drive(STILL)
         base.stop()  # never raises
 
