@@ -256,6 +256,8 @@ async def test_pauses_stay_bounded_while_there_is_no_server():
     waiting = asyncio.create_task(anext(link))
     await until(lambda: len(losses.pauses_s) >= 9)
     waiting.cancel()
+    await asyncio.gather(waiting, return_exceptions=True)
+    await link.close()
 
     assert losses.pauses_s[:3] == pytest.approx([0.15, 0.3, 0.6])
     assert max(losses.pauses_s) == 3.75
@@ -297,6 +299,8 @@ async def test_a_server_that_hangs_up_before_a_word_is_not_hammered():
         waiting = asyncio.create_task(anext(link))
         await until(lambda: len(losses.pauses_s) >= 4)
         waiting.cancel()
+        await asyncio.gather(waiting, return_exceptions=True)
+        await link.close()
         serving_over.set()
 
     assert losses.pauses_s[:4] == pytest.approx([0.2, 0.4, 0.8, 1.6])
