@@ -16,7 +16,7 @@ if not settings.HOSTED:  # one machine serves its files as they lie; hosted, Whi
 from rehab.routing import websocket_urlpatterns  # noqa: E402  (models must be loaded first)
 
 # Devices send no Origin, so it is not asked for here; cookies count only on sockets that our own
-# pages opened (rehab.sessions.live.admission).
+# pages opened (rehab.sessions.live.auth).
 application = ProtocolTypeRouter(
     {"http": pages, "websocket": URLRouter(websocket_urlpatterns)},
 )

@@ -49,6 +49,7 @@ def words(name: str, default: str, about: str) -> list[str]:
 HOSTED = flag("GARRY_HOSTED", False, "many clinics on one server, behind TLS")
 DEBUG = flag("GARRY_DEBUG", False, "Django's debug pages; for developers only")
 DATA_DIR = Path(text("GARRY_DATA_DIR", str(BASE_DIR / "var"), "folder of database and secrets"))
+BACKUP_KEYS = words("GARRY_BACKUP_KEYS", "", "public keys that backups are encrypted to (age1…)")
 HOST = text("GARRY_HOST", "127.0.0.1", "address that the server listens on")
 PORT = number("GARRY_PORT", 8000, "port that the server listens on", low=1, high=65535)
 ALLOWED_HOSTS = words(
@@ -100,11 +101,12 @@ MIDDLEWARE = [
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",
     "django.contrib.auth.middleware.AuthenticationMiddleware",
-    "rehab.people.entry.EntryMiddleware",
+    "rehab.people.sign_in.flow.EntryMiddleware",
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "rehab.stations.tablets.TabletMiddleware",
-    "rehab.people.language.LanguageMiddleware",
+    "rehab.people.web.language.LanguageMiddleware",
+    "rehab.people.web.local_time.LocalTimeMiddleware",
     "rehab.people.access.AccessMiddleware",
     "axes.middleware.AxesMiddleware",
 ]
@@ -143,7 +145,8 @@ except ValueError as problem:
     ) from problem
 if DATABASES["default"]["ENGINE"].endswith("sqlite3"):
     DATA_DIR.mkdir(parents=True, exist_ok=True)
-    # FULL keeps acknowledged steps through a power cut, not only through a crash (stack.md, T3).
+    # FULL keeps acknowledged steps through a power cut, not only through a crash
+    # (docs/reference/stack.md#durability).
     DATABASES["default"]["OPTIONS"] = {
         "transaction_mode": "IMMEDIATE",
         "timeout": 20,
@@ -166,7 +169,7 @@ DEFAULT_AUTO_FIELD = "django.db.models.BigAutoField"
 REDIS_URL = text("GARRY_REDIS_URL", "", "channel layer between several server processes")
 CHANNEL_LAYERS = {
     "default": {
-        # Pub/sub, not the core layer: stack.md, T2.
+        # Pub/sub, not the core layer: docs/reference/stack.md#several-processes.
         "BACKEND": "channels_redis.pubsub.RedisPubSubChannelLayer",
         "CONFIG": {"hosts": [REDIS_URL]},
     }
@@ -192,11 +195,11 @@ AUTH_PASSWORD_VALIDATORS = [
 ]
 AUTHENTICATION_BACKENDS = [
     "axes.backends.AxesStandaloneBackend",  # first: who has guessed too often is not even asked
-    "rehab.people.backends.PasswordBackend",
-    "rehab.people.backends.CodeBackend",
+    "rehab.people.sign_in.backends.PasswordBackend",
+    "rehab.people.sign_in.backends.CodeBackend",
 ]
 LOGIN_URL = "sign-in"
-SESSION_ENGINE = "rehab.people.browser_sessions"
+SESSION_ENGINE = "rehab.people.sign_in.browser_sessions"
 SESSION_COOKIE_AGE = 12 * 3600  # one working day, however busy
 SESSION_COOKIE_SAMESITE = "Lax"
 SESSION_MINUTES = number(
@@ -214,14 +217,14 @@ PROXIES = number(
     high=9,
 )
 
-# Wrong passwords and codes: rehab.people.lockout says what counts together.
+# Wrong passwords and codes: rehab.people.sign_in.lockout says what counts together.
 AXES_FAILURE_LIMIT = 5
 AXES_COOLOFF_TIME = timedelta(minutes=15)
 AXES_RESET_COOL_OFF_ON_FAILURE_DURING_LOCKOUT = False  # so that the wait that we tell is true
-AXES_LOCKOUT_PARAMETERS = "rehab.people.lockout.counted_by"
-AXES_USERNAME_CALLABLE = "rehab.people.lockout.counted_name"
-AXES_CLIENT_IP_CALLABLE = "rehab.people.lockout.client_address"
-AXES_LOCKOUT_CALLABLE = "rehab.people.lockout.answer"
+AXES_LOCKOUT_PARAMETERS = "rehab.people.sign_in.lockout.counted_by"
+AXES_USERNAME_CALLABLE = "rehab.people.sign_in.lockout.counted_name"
+AXES_CLIENT_IP_CALLABLE = "rehab.people.sign_in.lockout.client_address"
+AXES_LOCKOUT_CALLABLE = "rehab.people.sign_in.lockout.answer"
 AXES_SENSITIVE_PARAMETERS = [
     *("username", "ip_address"),
     *("code", "passkey", "old_password", "new_password1", "new_password2", "csrfmiddlewaretoken"),

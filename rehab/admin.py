@@ -4,7 +4,7 @@ from rehab.boards import admin as boards
 from rehab.feedback import admin as feedback
 from rehab.gestures import admin as gestures
 from rehab.people import admin as people
-from rehab.people import log_admin as logs
+from rehab.people import audit_admin as logs
 from rehab.sessions import admin as sessions
 from rehab.sessions import protocol_admin as protocols
 from rehab.stations import admin as stations

@@ -15,9 +15,10 @@ from ninja import NinjaAPI
 from ninja.errors import AuthenticationError, HttpError, ValidationError
 
 from rehab.boards import api as boards
+from rehab.legacy import api as legacy
 from rehab.people import api as people
 from rehab.people.access import public
-from rehab.people.api_base import Browser, PerPerson, Rejected, Token, check_roles
+from rehab.people.web.api_base import Browser, PerPerson, Rejected, Token, check_roles
 from rehab.sessions import api as sessions
 
 api = NinjaAPI(
@@ -29,8 +30,8 @@ api = NinjaAPI(
     throttle=PerPerson(),
 )
 api.add_decorator(check_roles)
-for router in (people.router, sessions.router, boards.router, people.paper, sessions.paper):
-    api.add_router("", router)
+for room in (people, sessions, boards, legacy):
+    api.add_router("", room.router)
 
 log = logging.getLogger(__name__)
 

@@ -16,9 +16,9 @@ class RehabConfig(AppConfig):
         from rehab import checks  # noqa: F401
         from rehab.boards.watching import watch
         from rehab.models import TRACKED
-        from rehab.people.history import track
+        from rehab.people.audit.history import track
         from rehab.sessions.defaults import install_defaults
-        from rehab.sessions.rewording import listen
+        from rehab.sessions.feedback_text_updates import listen
 
         post_migrate.connect(install_defaults, sender=self)
         watch()

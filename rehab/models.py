@@ -3,19 +3,19 @@
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
-from rehab.people.audit import AuditEntry
-from rehab.people.consent import Consent, ConsentText
-from rehab.people.erased import ErasedOriginal
-from rehab.people.factors import Authenticator, RecoveryCode
-from rehab.people.history import HistoryEntry
+from rehab.patients.visits import Visit
+from rehab.people.audit.audit_log import AuditEntry
+from rehab.people.audit.history import HistoryEntry
+from rehab.people.consent.models import Consent, ConsentText
+from rehab.people.consent.tombstones import ErasedOriginal
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.tokens import ApiToken
+from rehab.people.sign_in.factors import Authenticator, RecoveryCode
+from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.presets import Preset
 from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase
-from rehab.sessions.visits import Visit
 from rehab.stations.models import Device, LeaveTries, Station
 
 # People and settings. What happens in a session is a log by itself, and so is consent.

@@ -70,8 +70,8 @@ class GarrySite(AdminSite):
         """Show the dashboard: a clinic's for its people, the server's for a host."""
         from rehab.people.access import person
         from rehab.people.roles import Role
-        from rehab.people.server import look_at_server
-        from rehab.sessions.dashboard import look
+        from rehab.people.server_status import look_at_server
+        from rehab.sessions.reports.dashboard import look
 
         user = person(request)
         now = timezone.now()

@@ -9,6 +9,7 @@ urlpatterns = [
     path("", include("rehab.people.urls")),
     path("", include("rehab.stations.urls")),
     path("", include("rehab.sessions.urls")),
+    path("", include("rehab.patients.urls")),
     path("", include("rehab.boards.urls")),
     path("", include("rehab.exports.urls")),
 ]

@@ -21,9 +21,9 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
-from tests.servers import ROOT, Server, clean_environment, serve
+from tests.support.servers import ROOT, Server, clean_environment, serve
+from tests.support.wire import Wire
 from tests.support.fake_kobuki import FakeKobuki
-from tests.wire import Wire
 
 
 class Page:
@@ -155,7 +155,7 @@ def robot_room(folder: Path) -> Iterator[Room]:
     with serve(folder) as server, Wire(server.port) as wire, ExitStack() as close:
         environment = clean_environment(folder, server.port)
         made = subprocess.run(
-            [sys.executable, "-m", "tests.live_seed", "1"],
+            [sys.executable, "-m", "tests.support.live_seed", "1"],
             cwd=ROOT,
             env=environment | {"DJANGO_SETTINGS_MODULE": "garry_site.settings"},
             capture_output=True,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rehab.sources.synthetic.signals import Recording
-from tests.servers import ROOT
+from tests.support.servers import ROOT
 
 NAMES = [
     f"{side}_{name}" for side in ("left", "right") for name in ("force_n", "moment_nm", "angle_rad")

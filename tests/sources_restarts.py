@@ -11,7 +11,7 @@ from pathlib import Path
 from rehab.sources.synthetic.signals import Sensors, make_signals
 from rehab.sources.synthetic.walker import walk
 from tests.sources_live import NAMES, run_source, send_in_time
-from tests.torture import Torture, Walk
+from tests.support.torture import Torture, Walk
 
 WARM_S = 1.0
 
@@ -25,7 +25,7 @@ async def walk_with_restarts(
     """
     torture = Torture(folder, seed=1)
     server = await torture.start_server()
-    (row,) = json.loads(torture.run_python("-m", "tests.live_seed", "1"))
+    (row,) = json.loads(torture.run_python("-m", "tests.support.live_seed", "1"))
     session = Walk(row, torture.port, 1.0)
     strides = list(walk(seed=3, strides=int(seconds / 1.05)))
     made = make_signals(strides, 75, Sensors(rate_hz=100), seed=3)
@@ -60,7 +60,7 @@ async def walk_with_restarts(
                 await asyncio.sleep(0.05)
     server.send_signal(signal.SIGTERM)
     await server.wait()
-    log = json.loads(torture.run_python("-m", "tests.live_log", str(row["session"])))
+    log = json.loads(torture.run_python("-m", "tests.support.live_log", str(row["session"])))
     numbers = log[str(row["session"])]["numbers"]
     assert numbers == list(range(1, len(numbers) + 1))
     return expected - len(numbers), expected, f"{len(restarts)} times {kill.name}"

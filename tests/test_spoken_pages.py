@@ -17,7 +17,7 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
-from tests.world import World, build_world, fill_board, signed_in
+from tests.support.world import World, build_world, fill_board, signed_in
 
 pytestmark = pytest.mark.django_db
 

@@ -21,9 +21,9 @@ from rehab.boards.forms import LeaderboardForm
 from rehab.boards.models import Leaderboard
 from rehab.boards.showing import Viewer
 from rehab.people.access import person
-from rehab.people.admin_preview import PreviewAdmin, find_faults
 from rehab.people.models import Boards, Patient
 from rehab.people.roles import Role
+from rehab.people.web.admin_preview import PreviewAdmin, find_faults
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
 

@@ -12,8 +12,8 @@ from ninja import Path, Query, Router, Schema
 from rehab.boards.models import Leaderboard
 from rehab.boards.showing import Shown, Viewer, show_after
 from rehab.people.access import for_roles
-from rehab.people.api_base import Key, Page, Paging, answers, caller, cut
 from rehab.people.roles import Role
+from rehab.people.web.api_base import Key, Page, Paging, answers, caller, cut
 from rehab.sessions.models import TrainingSession
 
 router = Router(tags=["Boards"])
@@ -81,4 +81,4 @@ def list_session_boards(request: HttpRequest, session_id: Path[Key]) -> list[Sho
     """Show the boards that the patient sees after a session."""
     sessions = TrainingSession.objects.visible_to(caller(request))
     session = get_object_or_404(sessions.select_related("patient", "clinic"), pk=session_id)
-    return show_after(session)
+    return show_after(session, timezone.now())

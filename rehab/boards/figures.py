@@ -15,7 +15,7 @@ from django.db.models.functions import Cast
 from rehab.boards.models import Leaderboard
 from rehab.boards.periods import Period, period_of
 from rehab.boards.rules import TYPED
-from rehab.people.consent import Purpose, agreed
+from rehab.people.consent.models import Purpose, agreed
 from rehab.people.models import Patient
 from rehab.sessions.log import SessionMetric
 from rehab.training.changes import State

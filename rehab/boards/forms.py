@@ -8,7 +8,7 @@ from django import forms
 from django.utils.translation import gettext_lazy as _
 
 from rehab.boards.models import Leaderboard
-from rehab.people.admin_base import ClinicForm
+from rehab.people.web.admin_base import ClinicForm
 from rehab.training.valences import VALENCES
 
 MOST_IN_GROUP = 1_000  # the preview's address names each, and servers refuse those beyond 16 kB

@@ -13,11 +13,11 @@ from django.utils.translation import gettext_lazy as _
 from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.exports.archive import write_csv, write_json
 from rehab.exports.tables import TABLES, Selection, codebook
-from rehab.people.consent import Consent
-from rehab.people.history import HistoryEntry
+from rehab.patients.visits import Visit
+from rehab.people.audit.history import HistoryEntry
+from rehab.people.consent.models import Consent
 from rehab.people.models import Patient, User
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.visits import Visit
 from rehab.training.scoring import RULES_VERSION
 
 FILES = {

@@ -18,9 +18,9 @@ from django.db.models import QuerySet
 
 from rehab.people.models import User
 from rehab.sessions.corrections import SessionCorrection
-from rehab.sessions.live.actor import fold_log
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.replay import fold_log
 from rehab.training.fold import SessionFold
 from rehab.training.metrics import METRICS
 

@@ -22,9 +22,9 @@ from rehab.feedback.valences import usual_valence, valences_of
 from rehab.feedback.wording import FALLBACK
 from rehab.gestures.choices import gesture_choices
 from rehab.people.access import clinic_of, person
-from rehab.people.admin_base import ScopedOptions
-from rehab.people.admin_preview import PreviewAdmin, find_faults
 from rehab.people.models import LANGUAGES
+from rehab.people.web.admin_base import ScopedOptions
+from rehab.people.web.admin_preview import PreviewAdmin, find_faults
 from rehab.training.valences import BANDS_MAX, VALENCES
 
 READ = ("from_percent", "words", "confetti")

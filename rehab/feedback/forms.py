@@ -11,9 +11,9 @@ from django.utils.text import format_lazy
 from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.models import FeedbackBand, FeedbackType
-from rehab.people.admin_base import ClinicForm
 from rehab.people.models import LANGUAGES
-from rehab.people.refusals import in_words
+from rehab.people.web.admin_base import ClinicForm
+from rehab.people.web.refusals import in_words
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import VALENCES, WORDS_MAX, Band
 

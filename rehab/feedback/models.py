@@ -14,8 +14,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.wording import FALLBACK, words_in
 from rehab.people.models import Clinic
-from rehab.people.refusals import in_words
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
+from rehab.people.web.refusals import in_words
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import (
     POINTS_MAX,

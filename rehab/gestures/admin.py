@@ -14,8 +14,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.gestures.picture import draw
-from rehab.people.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
-from rehab.people.refusals import in_words
+from rehab.people.web.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
+from rehab.people.web.refusals import in_words
 from robot.motion.dry_run import DryRun, dry_run, validate_gesture
 from robot.motion.gesture import TETHER_M
 from robot.motion.gesture_errors import BadGesture

@@ -10,8 +10,8 @@ from django.db import models
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
-from rehab.people.refusals import in_words
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
+from rehab.people.web.refusals import in_words
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gesture_spec import Move, check_name, to_data
 

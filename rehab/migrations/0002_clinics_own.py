@@ -8,7 +8,7 @@ import django.utils.timezone
 from django.conf import settings
 from django.db import migrations, models
 
-import rehab.people.history
+import rehab.people.audit.history
 import rehab.people.models
 
 
@@ -1399,7 +1399,7 @@ class Migration(migrations.Migration):
                 (
                     "noun",
                     models.CharField(
-                        choices=rehab.people.history.nouns, max_length=32, verbose_name="what"
+                        choices=rehab.people.audit.history.nouns, max_length=32, verbose_name="what"
                     ),
                 ),
                 ("row", models.BigIntegerField(verbose_name="number")),

@@ -13,7 +13,9 @@ from django.shortcuts import get_object_or_404
 from ninja import Field, Path, Query, Router, Schema, Status
 
 from rehab.people.access import clinic_of, for_roles
-from rehab.people.api_base import (
+from rehab.people.models import LANGUAGES, Patient, User
+from rehab.people.roles import Role
+from rehab.people.web.api_base import (
     Given,
     Key,
     Page,
@@ -27,12 +29,9 @@ from rehab.people.api_base import (
     say_errors,
     sees_names,
 )
-from rehab.people.models import LANGUAGES, Patient, User
-from rehab.people.roles import Role
 from rehab.training.steps import Side
 
 router = Router(tags=["People"])
-paper = Router(tags=["The paper's calls"])
 
 Short = Annotated[Words, Field(max_length=32)]
 Language = Annotated[str, Field(json_schema_extra={"enum": [code for code, _ in LANGUAGES]})]
@@ -113,19 +112,6 @@ class PatientFilter(Paging):
     code: Short | None = None
 
 
-class PaperUserGiven(Given):
-    """A new user in the paper's words."""
-
-    name: Short = Field(description="A nickname. The original kept real names; GARRY does not.")
-
-
-class PaperUser(Schema):
-    """A user in the paper's words: `id` is the patient's code, `name` the nickname."""
-
-    id: str = Field(alias="code")
-    name: str = Field(alias="nickname")
-
-
 def patients_of(user: User) -> QuerySet[Patient]:
     """Give the patients that somebody sees, by age of their file."""
     return Patient.objects.visible_to(user).order_by("pk")
@@ -188,18 +174,3 @@ def change_patient(request: HttpRequest, patient_id: Path[Key], given: PatientCh
     """Mend what is written of a patient."""
     patient = get_object_or_404(patients_of(caller(request)), pk=patient_id)
     return store(patient, given.model_dump(mode="json", exclude_unset=True))
-
-
-@paper.get("/users/{code}", response=answers(PaperUser, 404))
-@for_roles(Role.LEAD, Role.PT)
-def show_user(request: HttpRequest, code: Path[Short]) -> Patient:
-    """Read a user by the ID that a PT would type."""
-    return get_object_or_404(patients_of(caller(request)), code=code)
-
-
-@paper.post("/users/{code}", response=answers(PaperUser, 409, code=201))
-@for_roles(Role.LEAD, Role.PT)
-def add_user(request: HttpRequest, code: Path[Short], given: PaperUserGiven) -> Status[Patient]:
-    """Create a user with this ID."""
-    patient = Patient(clinic=clinic_of(caller(request)))
-    return Status(201, store(patient, {"code": code, "nickname": given.name}))

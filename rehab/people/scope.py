@@ -8,17 +8,22 @@ Every model of GARRY says how its rows belong to a clinic (`scope`), and offers 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self, TypeVar
+from typing import Any, ClassVar, NoReturn, Protocol, Self, TypeVar
 
 from django.db import models
 from django.db.models import Q, QuerySet
 
 from rehab.people.roles import Right, Role, rights_of
 
-if TYPE_CHECKING:
-    from rehab.people.models import User
-
 M = TypeVar("M", bound=models.Model)
+
+
+class Member(Protocol):
+    """What decides which rows an account sees."""
+
+    is_active: bool
+    role: str
+    clinic_id: int | None
 
 
 class UnscopedQuery(RuntimeError):
@@ -71,7 +76,7 @@ def visible(model: type[models.Model], actor: Any) -> Q | None:
     return None
 
 
-def _visible_to_user(scope: Scope, user: User, noun: str) -> Q | None:
+def _visible_to_user(scope: Scope, user: Member, noun: str) -> Q | None:
     if not user.is_active or Right.VIEW not in rights_of(user.role, noun):
         return None
     if user.role == Role.HOST:

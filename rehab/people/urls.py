@@ -2,7 +2,7 @@
 
 from django.urls import path
 
-from rehab.people.views import account, consent, home, language, second_factor, sign_in
+from rehab.people.pages import account, consent, home, language, second_factor, sign_in
 
 urlpatterns = [
     path("", home.home, name="home"),

@@ -13,14 +13,14 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import person
-from rehab.people.admin_base import ReadOnlyAdmin, ScopedAdmin
 from rehab.people.roles import Role
+from rehab.people.web.admin_base import ReadOnlyAdmin, ScopedAdmin
 from rehab.sessions.corrections import SessionCorrection, may_correct, tell_corrections
-from rehab.sessions.finding import Finder
+from rehab.sessions.formatting import at_clinic
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.trend import with_figures
-from rehab.sessions.words import at_clinic
+from rehab.sessions.reports.search import Finder
+from rehab.sessions.reports.trend import with_figures
 from rehab.training.changes import OPEN, State
 
 

@@ -11,22 +11,20 @@ from ninja import Path, Query, Router, Status
 from ninja.errors import HttpError
 
 from rehab.people.access import for_roles
-from rehab.people.api import Short
-from rehab.people.api_base import Key, Page, Paging, Rejected, answers, caller, cut, say_errors
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
+from rehab.people.web.api_base import Key, Page, Paging, Rejected, answers, caller, cut, say_errors
 from rehab.sessions.forms import SessionForm, like_last_time
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import NotStored
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocols import Protocol
+from rehab.sessions.reports.trend import with_figures
 from rehab.sessions.schemas import (
     ChangeGiven,
     Choice,
     MetricOut,
-    PaperFilter,
-    PaperSession,
     SessionFilter,
     SessionGiven,
     SessionOut,
@@ -34,15 +32,12 @@ from rehab.sessions.schemas import (
     StepPage,
 )
 from rehab.sessions.services import change_session
-from rehab.sessions.trend import with_figures
-from rehab.sessions.words import at_clinic
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind, Refused
 from rehab.training.measures import InvalidSetting
 
 router = Router(tags=["Sessions"])
-paper = Router(tags=["The paper's calls"])
 
 ORDERS = {
     "newest": ("-created_at", "-pk"),
@@ -163,35 +158,3 @@ def list_metrics(request: HttpRequest, session_id: Path[Key]) -> QuerySet[Sessio
     user = caller(request)
     session = find_session(user, session_id)
     return SessionMetric.objects.visible_to(user).filter(session=session).order_by("slug")
-
-
-@paper.get("/users/{code}/sessions", response=answers(Page[PaperSession], 404))
-@for_roles(Role.LEAD, Role.PT)
-def list_user_sessions(
-    request: HttpRequest, code: Path[Short], wanted: Query[PaperFilter]
-) -> dict[str, Any]:
-    """List a user's sessions by non-ascending score; those without a score come last."""
-    user = caller(request)
-    patient = get_object_or_404(Patient.objects.visible_to(user), code=code)
-    sessions = sessions_of(user).filter(patient=patient).select_related("clinic")
-    if wanted.feedback_type:
-        sessions = sessions.filter(valence=wanted.feedback_type)
-    page = cut(sessions.order_by(*ORDERS["best"]), wanted)
-    return page | {"items": [in_paper_words(session) for session in page["items"]]}
-
-
-def in_paper_words(session: Any) -> dict[str, Any]:
-    """Tell a session by the paper's attributes, its date by the clinic's clock."""
-    start = at_clinic(session.started_at or session.created_at, session.clinic)
-    return {
-        "session_id": session.pk,
-        "participant_id": session.patient.code,
-        "year": start.year,
-        "month": start.month,
-        "day": start.day,
-        "start_time": f"{start:%H:%M:%S}",
-        "duration": session.active_s,
-        "score": session.metric_score,
-        "feedback_type": session.valence,
-        "threshold": session.goal,
-    }

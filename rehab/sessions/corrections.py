@@ -16,7 +16,7 @@ from django.db import models, transaction
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.consent import PatientScope
+from rehab.people.consent.models import PatientScope
 from rehab.people.models import Patient, User
 from rehab.people.scope import ScopedModel
 from rehab.sessions.models import TrainingSession

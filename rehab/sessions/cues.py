@@ -12,7 +12,7 @@ from rehab.feedback.valences import valences_of
 from rehab.gestures.choices import gesture_choices
 from rehab.gestures.models import Gesture
 from rehab.people.models import Patient, User
-from rehab.people.refusals import in_words
+from rehab.people.web.refusals import in_words
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import Cue
 from robot.motion.dry_run import validate_gesture

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Protocol
 
-from rehab.sessions.facts import (
+from rehab.sessions.payloads import (
     Message,
     change_mark,
     describe_cue,

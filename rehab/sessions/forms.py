@@ -3,33 +3,26 @@
 from __future__ import annotations
 
 import math
-import secrets
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from django import forms
 from django.conf import settings
 from django.core.exceptions import ValidationError
-from django.db import transaction
 from django.db.models import QuerySet
-from django.utils import timezone
 from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.access import clinic_of
-from rehab.people.consent import Purpose, give, join_boards, offered
-from rehab.people.forms import PatientRowForm
-from rehab.people.models import SIDES, Boards, Patient, User
-from rehab.people.refusals import in_words
+from rehab.people.models import SIDES, Patient, User
+from rehab.people.web.refusals import in_words
 from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
+from rehab.sessions.formatting import LEVELS, say_source
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocols import Protocol
 from rehab.sessions.services import StationTaken, check_station, create_session
-from rehab.sessions.words import LEVELS, RECORDING, SIMULATED, say_source
+from rehab.sessions.step_sources import LIVE, list_sources, source_arguments
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
-from rehab.sources.synthetic import PROFILES
 from rehab.stations.models import Station
 from rehab.training.changes import OPEN, ChangeKind
 from rehab.training.goals import GoalRule, Target
@@ -38,82 +31,14 @@ from rehab.training.plans import ROBOT_LEVELS, name_robot_level
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES
 
-LIVE = "live"
-# The paper's example of a goal for a whole session (product.md 1): 60 % of the steps, ten minutes.
+# The paper's example of a goal for a whole session (docs/reference/original.md#goal-of-a-session):
+# 60 % of the steps, ten minutes.
 WANTED_HITS_PERCENT = 60
 PLANNED_MINUTES = 10
-# Mean A2 of a healthy walk in the recordings (gait.md 1.3): where a first goal begins.
+# Mean A2 of a healthy walk in the recordings (docs/reference/gait.md#protocol): where a first goal
+# begins.
 FIRST_GOAL_W_KG = 3.9
 TRAINING_ONLY, WITH_BASELINE = "Training only", "Baseline, training, washout"
-
-
-class PatientForm(PatientRowForm):
-    """A patient of the PT's clinic, new or to be mended."""
-
-    class Meta:
-        model = Patient
-        fields: ClassVar = ["nickname", "code", "paretic_side", "body_mass_kg"]
-
-    def __init__(self, *args: Any, by: User, **options: Any) -> None:
-        super().__init__(*args, **options)
-        self.instance.clinic = clinic_of(by)
-        self._by = by
-        self.fields["paretic_side"].required = True
-        self.fields["nickname"].widget.attrs["autofocus"] = True
-        if self.instance.is_new:
-            self.fields["agrees"] = forms.MultipleChoiceField(
-                label=_("What the patient agrees to"),
-                choices=[(one.value, one.label) for one in offered(self.instance.clinic)],
-                required=False,
-                widget=forms.CheckboxSelectMultiple,
-                help_text=_(
-                    "Read the clinic's words to the patient first. It can change any time."
-                ),
-            )
-
-    def clean_code(self) -> str:
-        """Refuse a code that is taken, and say by whom."""
-        code: str = self.cleaned_data["code"]
-        others = Patient.objects.visible_to(self._by).filter(code=code).exclude(pk=self.instance.pk)
-        if (other := others.first()) is not None:
-            said = _("Code %(code)s already exists: it is %(nickname)s's.")
-            raise ValidationError(said % {"code": code, "nickname": other.nickname})
-        return code
-
-    def save(self, commit: bool = True) -> Patient:
-        """Store the patient, and what a new one agrees to."""
-        with transaction.atomic():
-            patient = super().save(commit)
-            for purpose in map(Purpose, self.cleaned_data.get("agrees", [])):
-                if purpose is Purpose.BOARDS:
-                    join_boards(patient, Boards.CLINIC, self._by, timezone.now())
-                else:
-                    give(patient, purpose, self._by, timezone.now())
-        return patient
-
-
-class ScreenForm(PatientRowForm):
-    """How the patient's page looks and sounds for this patient."""
-
-    class Meta:
-        model = Patient
-        fields: ClassVar = ["screen_side", "screen_text", "screen_still", "screen_sounds"]
-        widgets: ClassVar = {"screen_side": forms.RadioSelect, "screen_text": forms.RadioSelect}
-
-
-def list_recordings() -> list[Path]:
-    """Give the recordings on this machine. None on a hosted server: they belong to no clinic."""
-    folder: Path = settings.DATA_DIR / "recordings"
-    return [] if settings.HOSTED or not folder.is_dir() else sorted(folder.glob("*.csv"))
-
-
-def list_sources() -> list[tuple[str, str]]:
-    """Give what steps can come from, with the words that a session keeps (`words.say_source`)."""
-    simulated = [(f"synthetic {name}", f"{SIMULATED}{name}") for name in PROFILES]
-    recordings = [
-        (f"recording {file.name}", f"{RECORDING}{file.name}") for file in list_recordings()
-    ]
-    return [(LIVE, "Live sensor"), *simulated, *recordings]
 
 
 class NumberField(forms.FloatField):
@@ -212,7 +137,7 @@ class SessionForm(forms.Form):
             created_by=self.by,
             source=dict(list_sources()).get(data["source"], ""),
             simulated=kind == "synthetic",
-            runs=_arguments(kind, name, self.patient),
+            runs=source_arguments(kind, name, self.patient),
         )
 
     def create(self) -> TrainingSession | None:
@@ -228,19 +153,8 @@ class SessionForm(forms.Form):
         return None
 
 
-def _arguments(kind: str, name: str, patient: Patient) -> list[str]:
-    """Give what the server runs as `python -m rehab.sources` for a choice of ``list_sources``."""
-    match kind:
-        case "synthetic":
-            return ["synthetic", "--profile", name, "--seed", str(secrets.randbelow(2**31))]
-        case "recording":
-            file = settings.DATA_DIR / "recordings" / name
-            mass = ["--mass", str(patient.body_mass_kg)] if holds_signals(file) else []
-            return ["recording", str(file), *mass]
-    return []
-
-
-# Usual stride time of the recordings (gait.md 1.4), to tell how long a phase of strides takes.
+# Usual stride time of the recordings (docs/reference/gait.md#phases), to tell how long a phase of
+# strides takes.
 STRIDE_S = 1.1
 
 

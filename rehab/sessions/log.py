@@ -10,7 +10,7 @@ from django.dispatch import Signal
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.consent import PatientScope
+from rehab.people.consent.models import PatientScope
 from rehab.people.models import SIDES, User
 from rehab.people.scope import ScopedModel
 from rehab.sessions.models import TrainingSession

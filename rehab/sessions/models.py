@@ -9,7 +9,7 @@ from django.utils import timezone
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.consent import PatientScope
+from rehab.people.consent.models import PatientScope
 from rehab.people.models import SIDES, Clinic, Patient, User
 from rehab.people.scope import ClinicRow
 from rehab.sessions.protocols import Measure, Protocol

@@ -6,19 +6,18 @@ from typing import Any, ClassVar
 
 from django.core.exceptions import ValidationError
 from django.core.validators import MaxValueValidator, MinValueValidator
-from django.db import IntegrityError, models, transaction
+from django.db import models
 from django.utils.text import capfirst
 from django.utils.translation import gettext, gettext_noop
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.access import clinic_of
-from rehab.people.models import Clinic, Patient, User
-from rehab.people.refusals import in_words
+from rehab.people.models import Clinic, User
 from rehab.people.scope import ClinicRow, Scope
+from rehab.people.web.refusals import in_words
 from rehab.sessions.cues import USUAL, name_gestures
-from rehab.sessions.forms import LIVE, SessionForm
+from rehab.sessions.formatting import LEVELS, SIMULATED, say_quantity, say_rate
 from rehab.sessions.protocols import Protocol
-from rehab.sessions.words import LEVELS, SIMULATED, say_quantity, say_rate
+from rehab.sessions.step_sources import LIVE
 from rehab.sources.synthetic import PROFILES
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting
@@ -26,8 +25,6 @@ from rehab.training.plans import ROBOT_LEVELS, SessionPlan
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES, find_valence
 
-# Not of a preset: they belong to the person and the place.
-PERSONAL = ("station", "trained_side")
 NAME_TAKEN = gettext_noop("A preset of this name exists. Choose another name.")
 
 
@@ -155,38 +152,3 @@ class Preset(ClinicRow):
         goal = {"goal_value": self.goal_value, "goal_percent": self.goal_percent}
         chosen |= {name: value for name, value in goal.items() if value is not None}
         return chosen | ({"source": self.source} if self.source else {})
-
-
-def keep_preset(data: Any, patient: Patient, by: User, name: str) -> Preset:
-    """Keep what stands in a set-up under a name; without one, under words that say what it is.
-
-    Raises ValidationError for what could not be walked, and for a name that is taken.
-    """
-    form = SessionForm(data, patient=patient, by=by)
-    for field in PERSONAL:
-        del form.fields[field]
-    if not form.is_valid():
-        raise ValidationError([words for errors in form.errors.values() for words in errors])
-    chosen = form.cleaned_data
-    kinds = {slug for slug, _words in Preset._meta.get_field("source").flatchoices}
-    preset = Preset(
-        clinic=clinic_of(by),
-        name=name,
-        **chosen | {"source": chosen["source"] if chosen["source"] in kinds else ""},
-    )
-    if not name:
-        preset.name = _find_name(preset.about, by)
-    preset.full_clean()
-    try:
-        with transaction.atomic():
-            preset.save()
-    except IntegrityError as problem:  # somebody was quicker
-        raise ValidationError(gettext(NAME_TAKEN)) from problem
-    return preset
-
-
-def _find_name(words: str, by: User) -> str:
-    """Give a name that no preset has: the words, or the words with a number."""
-    taken = set(Preset.objects.visible_to(by).values_list("name", flat=True))
-    names = (words, *(f"{words} ({number})" for number in range(2, len(taken) + 3)))
-    return next(name for name in names if name not in taken)

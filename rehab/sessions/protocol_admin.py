@@ -17,7 +17,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import person
-from rehab.people.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
+from rehab.people.web.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
 from rehab.sessions.cues import list_gestures
 from rehab.sessions.forms import STRIDE_S, minutes_of
 from rehab.sessions.presets import Preset

@@ -11,8 +11,8 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
-from rehab.people.refusals import in_words
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
+from rehab.people.web.refusals import in_words
 from rehab.training import measures as rules
 from rehab.training.phases import PHASE_KINDS, Phase
 

@@ -9,7 +9,7 @@ from ninja import Field, Schema
 from pydantic import AfterValidator
 
 from rehab.people.api import PatientName, Short
-from rehab.people.api_base import Given, Key, Moment, Paging, Whole, Words, left_out, sees_names
+from rehab.people.web.api_base import Given, Key, Moment, Paging, Whole, Words, left_out, sees_names
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ASKED, ChangeKind, State
@@ -180,24 +180,3 @@ class MetricOut(Schema):
     def resolve_unit(metric: SessionMetric) -> str:
         """Give the figure's unit; none for a ratio or a count."""
         return METRICS[metric.slug].unit
-
-
-class PaperSession(Schema):
-    """A session with the ten attributes of the paper, and its names for them."""
-
-    session_id: int
-    participant_id: str
-    year: int
-    month: int
-    day: int
-    start_time: str
-    duration: float = Field(description="Seconds walked.")
-    score: float | None
-    feedback_type: str
-    threshold: float | None = Field(description="The goal, in the measure's unit.")
-
-
-class PaperFilter(Paging):
-    """Which sessions of a user are wanted."""
-
-    feedback_type: FeedbackType | None = None

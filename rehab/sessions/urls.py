@@ -2,29 +2,12 @@
 
 from django.urls import path
 
-from rehab.sessions.views import (
-    history,
-    monitor,
-    report,
-    setup,
-    start,
-    tablet,
-    takehome,
-    visits,
-    walk,
-)
+from rehab.sessions.pages import history, monitor, report, setup, tablet, takehome, walk
 
 urlpatterns = [
-    path("start/", start.choose_patient, name="start"),
-    path("patients/new/", start.add_patient, name="new-patient"),
-    path("patients/demo/", start.add_demo, name="demo"),
-    path("patients/<int:patient_id>/", start.show_patient, name="patient"),
-    path("patients/<int:patient_id>/details/", start.mend_patient, name="mend-patient"),
-    path("patients/<int:patient_id>/screen/", start.set_screen, name="screen"),
     path("patients/<int:patient_id>/new/", setup.set_up, name="setup"),
     path("patients/<int:patient_id>/sessions/", history.list_sessions, name="history"),
     path("patients/<int:patient_id>/home/", takehome.show_take_home, name="take-home"),
-    path("patients/<int:patient_id>/visits/", visits.change_visits, name="visits"),
     path("tablet/", tablet.show_tablet, name="tablet"),
     path("tablet/app.webmanifest", tablet.describe_app, name="tablet-app"),
     path("tablet/state/", tablet.tell_tablet, name="tablet-state"),

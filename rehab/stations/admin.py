@@ -16,7 +16,7 @@ from django.utils.html import format_html_join
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.admin_base import ClinicForm, ScopedAdmin, ScopedOptions, TokenAdmin
+from rehab.people.web.admin_base import ClinicForm, ScopedAdmin, ScopedOptions, TokenAdmin
 from rehab.stations.models import Device, Station
 from rehab.stations.pins import LONGEST, set_pin
 from rehab.stations.presence import say_state

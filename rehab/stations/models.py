@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import ClassVar
 
 from django.db import models
@@ -9,7 +10,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
-from rehab.people.tokens import TokenRow, find_holder
+from rehab.people.sign_in.tokens import TokenRow, find_holder
 
 
 class Station(ClinicRow):
@@ -107,6 +108,6 @@ class LeaveTries(ScopedModel):
         return "Tries"
 
 
-def find_device(token: str) -> Device | None:
+def find_device(token: str, now: datetime) -> Device | None:
     """Give the device that this token belongs to; None for an unknown or revoked one."""
-    return find_holder(Device, token)
+    return find_holder(Device, token, now)

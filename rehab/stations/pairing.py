@@ -9,7 +9,7 @@ from django.core.cache import cache
 from django.utils.translation import gettext as _
 
 from rehab.people.models import UNAMBIGUOUS
-from rehab.people.tokens import hash_token
+from rehab.people.sign_in.tokens import hash_token
 from rehab.stations.models import Device, Pairing, Station
 
 LIFETIME = timedelta(minutes=5)

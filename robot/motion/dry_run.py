@@ -13,7 +13,8 @@ from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
 from robot.motion.player import DONE, Player
 from robot.motion.pose import HOME, Pose, advance
 
-# Where it has to end [m, rad] (kobuki.md 5.3 asks for 1 cm and 2°; a player is nearer than that).
+# Where it has to end [m, rad] (docs/reference/kobuki.md#beside-a-person asks for 1 cm and 2°; a
+# player is nearer than that).
 END_M = 0.01
 END_RAD = 0.035
 

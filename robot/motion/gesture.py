@@ -1,7 +1,7 @@
 """Gestures: places to go to, one after the other, and home again.
 
 A gesture says where, never for how long: timed ones end rotated and displaced as soon as a base
-speeds up gently (kobuki.md 2.5).
+speeds up gently (docs/reference/kobuki.md#timed-gestures).
 """
 
 from __future__ import annotations
@@ -16,18 +16,20 @@ from robot.motion.path import Drive, Segment, is_on_path, plan_path
 from robot.motion.pose import HOME, Pose
 
 # A base never leaves this circle around its home [m]; gestures keep 5 cm away from its edge
-# (kobuki.md 5.3).
+# (docs/reference/kobuki.md#beside-a-person).
 TETHER_M = 0.30
 REACH_M = 0.25
 
-# How near to its waypoint a base has to come [m, rad] (kobuki.md 5.3 asks for 1 cm and 2°).
+# How near to its waypoint a base has to come [m, rad] (docs/reference/kobuki.md#beside-a-person
+# asks for 1 cm and 2°).
 NEAR_M = 0.004
 NEAR_RAD = 0.02
 
 GESTURE_MAX_S = 16.0  # the paper's longest, with slack
 WAYPOINTS_MAX = 32
 TURN_MAX_RAD = math.tau  # a longer cable than this winds up
-LEAST_PACE = 0.2  # slower turns stick and shake (kobuki.md 3: below 0.33 rad/s)
+# Slower turns stick and shake (docs/reference/kobuki.md#what-users-report: below 0.33 rad/s).
+LEAST_PACE = 0.2
 SLACK = 1.5  # a waypoint's time over its shortest possible: odometry, grip and latency cost some
 
 

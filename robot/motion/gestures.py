@@ -49,8 +49,8 @@ SWAY = Gesture(
 
 GESTURES: dict[str, Gesture] = {gesture.name: gesture for gesture in (CELEBRATE, DROOP, NOD, SWAY)}
 
-# The original's three sequences (gesture_generation.py of 2024; kobuki.md 1.13, 2.5), for
-# replications. It ordered 0.2 m/s and 1.8 rad/s for 1 or 2 s each, without ramps; here are the
+# The original's three sequences (gesture_generation.py of 2024; docs/reference/original.md#robot),
+# for replications. It ordered 0.2 m/s and 1.8 rad/s for 1 or 2 s each, without ramps; here are the
 # places that these come to, at our limits, so they take longer. Its binary one ended 0.09 m behind
 # home; ours goes on home from there.
 _OUT_M, _SPIN_RAD = 0.2, 3.6

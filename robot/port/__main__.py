@@ -1,9 +1,10 @@
 """`python -m robot.port`: owns a serial port, and stops the base on it when orders stop coming.
 
-A base may go on with its last setpoint for ever (kobuki.md 1.6). So a small process of its own
-sends it, 50 times a second, what was ordered last, and the stop frame as soon as that is older than
-0.25 s, the pipe of the orders closes, or anything at all goes wrong here. It knows no base, only
-bytes. Orders come on standard input, what was heard goes to standard output, a JSON line each:
+A base may go on with its last setpoint for ever (docs/reference/kobuki.md#watchdogs). So a small
+process of its own sends it, 50 times a second, what was ordered last, and the stop frame as soon as
+that is older than 0.25 s, the pipe of the orders closes, or anything at all goes wrong here. It
+knows no base, only bytes. Orders come on standard input, what was received goes to standard output,
+a JSON line each:
 
     {"number": 7, "sent_s": 12.34, "frame": "aa55…", "once": "aa55…"}
     {"at_s": 12.35, "opened": 1, "bytes": "aa55…", "problem": "", "counters": {…}}

@@ -14,7 +14,7 @@ from robot.port.setpoint import Setpoint
 PUMP_S = 0.02
 READ_S = 0.005  # how long a read waits: a stop is on its way within that
 WORD_S = 0.1  # so often it says that it lives
-STOPS = 3  # frames; one may be damaged on its way (kobuki.md 5.2, rule 3)
+STOPS = 3  # frames; one may be damaged on its way (docs/reference/kobuki.md#orders)
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.2, 2.0  # before the port is opened again
 MOST_BYTES = 4096
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.servers import ROOT, clean_environment, serve
+from tests.support.servers import ROOT, clean_environment, serve
 
 
 def blocks(language: str) -> str:
@@ -25,7 +25,9 @@ def test_the_documented_examples_run(tmp_path: Path):
     with serve(tmp_path) as server:
         environment = clean_environment(tmp_path, server.port)
         environment |= {"DJANGO_SETTINGS_MODULE": "garry_site.settings", "URL": server.url}
-        environment["TOKEN"] = run([sys.executable, "-m", "tests.api_seed", "pt"], environment)
+        environment["TOKEN"] = run(
+            [sys.executable, "-m", "tests.support.api_seed", "pt"], environment
+        )
         said = run(["bash", "-euo", "pipefail", "-c", blocks("bash")], environment)
         answers = [json.loads(part) for part in re.split(r"(?<=[}\]])(?=[{\[])", said)]
         me, started, steered, finished, session, figures, steps, users = answers

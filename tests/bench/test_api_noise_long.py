@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.api_fuzz import run_noise
+from tests.support.api_fuzz import run_noise
 
 
 @pytest.mark.django_db(transaction=True)

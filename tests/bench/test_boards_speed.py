@@ -43,11 +43,11 @@ def fill(count: int) -> None:
     from django.db import connection
 
     from rehab.boards.models import Leaderboard
-    from rehab.people.consent import Consent
+    from rehab.people.consent.models import Consent
     from rehab.people.models import Clinic, Patient
     from rehab.sessions.models import TrainingSession
-    from tests.walks import strides, walk
-    from tests.world import agreeing
+    from tests.support.walks import strides, walk
+    from tests.support.world import agreeing
 
     clinic = Clinic.everywhere.create(name="Large")
     first = agreeing(
@@ -133,7 +133,7 @@ def measure(count: int) -> dict[str, float]:
     fill(count)
     filled = time.perf_counter()
     board = Leaderboard.everywhere.get()
-    entries.refresh(board)
+    entries.refresh(board, now=timezone.now())
     entries.tidy()
     built = time.perf_counter()
     assert BoardEntry.everywhere.count() == count
@@ -169,7 +169,7 @@ def measure(count: int) -> dict[str, float]:
     walkers = Patient.everywhere.select_related("clinic").in_bulk(patients)
     now = timezone.now()
     timed("whole_view", lambda patient: Viewer(board, now, walkers[patient]).show())
-    timed("one_more_session", lambda patient: entries.refresh(board, {patient}, now))
+    timed("one_more_session", lambda patient: entries.refresh(board, {patient}, now=now))
     found |= walk_while_one_is_built(patients=BESIDE)
     return {name: round(value, 3) for name, value in found.items()}
 
@@ -189,7 +189,7 @@ def walk_while_one_is_built(patients: int) -> dict[str, float]:
     from rehab.training.goals import GoalRule
     from rehab.training.phases import make_phase
     from rehab.training.steps import Measurement, Side
-    from tests.world import store
+    from tests.support.world import store
 
     walker = Patient.everywhere.order_by("pk")[0]
     phases = (make_phase("training"),)

@@ -36,7 +36,7 @@ headless.LiveSession.settled = counting
 command = Command()
 options = vars(command.create_parser("manage.py", "runsession").parse_args(
     ["--synthetic", "7", "--valence", "binary", "--strides", str(count)]))
-from rehab.people.first_start import prepare_database
+from rehab.people.sign_in.first_start import prepare_database
 prepare_database()
 figures = command._run(options)
 print(json.dumps({"steps_per_s": figures["steps_per_s"], "strides": figures["strides"],

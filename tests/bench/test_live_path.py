@@ -15,7 +15,7 @@ from typing import Any
 import psutil
 import pytest
 
-from tests.servers import ROOT, clean_environment, free_port, serve
+from tests.support.servers import ROOT, clean_environment, free_port, serve
 
 SIZES = (100, 500, 1000)
 
@@ -76,7 +76,7 @@ def measure(tmp_path: Path, count: int, viewers: int) -> tuple[dict[str, Any], d
     rows = tmp_path / "rows.json"
     with serve(tmp_path / "data") as server:
         made = subprocess.run(
-            [sys.executable, "-m", "tests.live_seed", str(count)],
+            [sys.executable, "-m", "tests.support.live_seed", str(count)],
             cwd=ROOT,
             env=clean_environment(server.folder, server.port)
             | {"DJANGO_SETTINGS_MODULE": "garry_site.settings"},

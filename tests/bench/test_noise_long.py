@@ -7,9 +7,9 @@ import gc
 import psutil
 import pytest
 
-from tests import form_noise, socket_noise
-from tests.noise import draw
 from tests.sessions.live.conftest import live_path  # noqa: F401 (a fixture)
+from tests.support import form_noise, socket_noise
+from tests.support.noise import draw
 
 COUNT = 10_000
 WARM = 1_000  # requests after which caches are full

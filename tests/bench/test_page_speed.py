@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Request
 
-from tests.browsers import SIZES, chromium
-from tests.servers import ROOT, serve
-from tests.walk_seed import make_walks
+from tests.support.browsers import SIZES, chromium
+from tests.support.servers import ROOT, serve
+from tests.support.walk_seed import make_walks
 
 pytestmark = pytest.mark.browser
 

@@ -19,7 +19,7 @@ from rehab.sources.synthetic.signals import Sensors, make_signals
 from rehab.sources.synthetic.walker import walk
 from tests.sources_live import NAMES, run_source, send_in_time
 from tests.sources_restarts import walk_with_restarts
-from tests.torture import Torture
+from tests.support.torture import Torture
 
 LOOK_AHEAD_S = 0.05
 RATE_HZ = 1000.0
@@ -46,7 +46,7 @@ async def measure(folder: Path, way: str) -> list[float]:
     """Walk into a real server; give how late each ack was [ms]."""
     torture = Torture(folder, seed=1)
     server = await torture.start_server()
-    (row,) = json.loads(torture.run_python("-m", "tests.live_seed", "1"))
+    (row,) = json.loads(torture.run_python("-m", "tests.support.live_seed", "1"))
     made = make_signals(list(walk(seed=1, strides=STRIDES)), 75, Sensors(rate_hz=RATE_HZ), seed=1)
     arguments = {
         "lsl": ("lsl", "--stream", "GARRY bench"),

@@ -3,7 +3,7 @@
 import asyncio
 import os
 
-from tests.torture import Torture
+from tests.support.torture import Torture
 
 
 def test_a_hundred_kills_lose_nothing(tmp_path):

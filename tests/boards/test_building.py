@@ -20,8 +20,8 @@ from rehab.boards.showing import show_after, show_waiting
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from tests.walks import strides, walk
-from tests.world import NOW, agreeing
+from tests.support.walks import strides, walk
+from tests.support.world import NOW, agreeing
 
 PEOPLE = 9
 
@@ -229,9 +229,9 @@ def test_of_a_group_only_those_are_made_anew_who_come_or_go(sessions, monkeypatc
     made: list[set[int]] = []
     real = entries.refresh
 
-    def refresh(board, patients=None, now=None, **how):
+    def refresh(board, patients=None, **how):
         made.append(patients)
-        real(board, patients, now, **how)
+        real(board, patients, **how)
 
     monkeypatch.setattr(entries, "refresh", refresh)
     board.group.set(people[:4])

@@ -22,8 +22,8 @@ from rehab.sessions.models import TrainingSession
 from rehab.training.changes import ChangeKind
 from rehab.training.phases import make_phase
 from rehab.training.valences import VALENCES
-from tests.walks import HIT, MISS, strides, walk
-from tests.world import World, build_world, client_of, signed_in
+from tests.support.walks import HIT, MISS, strides, walk
+from tests.support.world import World, build_world, client_of, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -41,7 +41,7 @@ class Seen:
 @pytest.fixture
 def world() -> World:
     world = build_world("amber")
-    Leaderboard.everywhere.all().delete()  # tests/boards/test_boards.py has those
+    Leaderboard.everywhere.all().delete()  # test_who_is_shown.py has those
     return world
 
 

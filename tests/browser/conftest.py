@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser
 
-from tests.browsers import chromium
-from tests.servers import Server, serve
+from tests.support.browsers import chromium
+from tests.support.servers import Server, serve
 
 
 @pytest.fixture(scope="module")

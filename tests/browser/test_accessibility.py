@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
 
-from tests.browsers import SIZES
-from tests.servers import ROOT, Server, clean_environment
-from tests.walk_seed import Walk, feet_of, make_walks
+from tests.support.browsers import SIZES
+from tests.support.servers import ROOT, Server, clean_environment
+from tests.support.walk_seed import Walk, feet_of, make_walks
 
 pytestmark = pytest.mark.browser
 
@@ -27,11 +27,11 @@ CHECK = """async ([rules, standards]) => {
 }"""
 WALKED = """
 from django.utils import timezone
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
 from rehab.sessions.protocols import Protocol
 from rehab.stations.models import Station
-from tests.walks import visit
+from tests.support.walks import visit
 rosa = Patient.everywhere.create(
     clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"
 )

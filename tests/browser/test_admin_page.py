@@ -9,17 +9,17 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.servers import ROOT, Server, clean_environment
-from tests.walk_seed import make_walks
+from tests.support.servers import ROOT, Server, clean_environment
+from tests.support.walk_seed import make_walks
 
 pytestmark = pytest.mark.browser
 
 SEED = """
 from django.utils import timezone
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
 from rehab.sessions.protocols import Protocol
-from tests.walks import strides, walk
+from tests.support.walks import strides, walk
 rosa = Patient.everywhere.create(
     clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"
 )

@@ -10,8 +10,8 @@ import sys
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browsers import SIZES, can_be_read, chromium
-from tests.servers import ROOT, clean_environment, serve
+from tests.support.browsers import SIZES, can_be_read, chromium
+from tests.support.servers import ROOT, clean_environment, serve
 
 pytestmark = pytest.mark.browser
 
@@ -19,10 +19,10 @@ PATIENCE_MS = 40_000
 
 SEED = """
 from django.utils import timezone
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
-from tests.walks import strides, walk
-from tests.world import agreeing
+from tests.support.walks import strides, walk
+from tests.support.world import agreeing
 clinic = first_clinic()
 for number, name in enumerate("Rosa Ken Mia Omar Lena Pavel".split()):
     patient = agreeing(Patient.everywhere.create(

@@ -12,9 +12,9 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from rehab.training.valences import VALENCES
-from tests.browsers import SIZES
-from tests.servers import ROOT, Server, clean_environment
-from tests.walk_seed import feet_of, make_walks
+from tests.support.browsers import SIZES
+from tests.support.servers import ROOT, Server, clean_environment
+from tests.support.walk_seed import feet_of, make_walks
 
 pytestmark = pytest.mark.browser
 
@@ -56,9 +56,9 @@ def page_with(
 EXPECTED = """
 from datetime import time
 from django.utils import timezone
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
-from rehab.sessions.visits import plan_visit
+from rehab.patients.visits import plan_visit
 from rehab.stations.models import Station
 amara = Patient.everywhere.create(
     clinic=first_clinic(), code="A-1", nickname="Amara", paretic_side="left"
@@ -330,10 +330,10 @@ def test_a_session_by_keys_alone(server: Server, browser: Browser) -> None:
 
 LONG_DAY = """
 from django.utils import timezone
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
 from rehab.sessions.log import Remark, SessionEvent
-from tests.walks import visit, walk
+from tests.support.walks import visit, walk
 long = Patient.everywhere.create(
     clinic=first_clinic(), code="C" * 32, nickname="Maximiliana-Konstantina-Schmidt.",
     paretic_side="left",

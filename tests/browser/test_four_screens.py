@@ -8,9 +8,9 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.test_patient_page import DIGEST, open_page, signed_in, stored, until_step
-from tests.browsers import SIZES
-from tests.servers import Server
-from tests.walk_seed import Feet, Walk, feet_of, make_walks
+from tests.support.browsers import SIZES
+from tests.support.servers import Server
+from tests.support.walk_seed import Feet, Walk, feet_of, make_walks
 
 pytestmark = pytest.mark.browser
 

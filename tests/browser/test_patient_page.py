@@ -15,10 +15,10 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 from playwright.sync_api import TimeoutError as PlaywrightTimeout
 from websockets.sync.client import connect
 
-from tests.browsers import SIZES
-from tests.servers import ROOT, Server
-from tests.walk_seed import Walk, feet_of, make_walks
-from tests.wire import Wire
+from tests.support.browsers import SIZES
+from tests.support.servers import ROOT, Server
+from tests.support.walk_seed import Walk, feet_of, make_walks
+from tests.support.wire import Wire
 
 pytestmark = pytest.mark.browser
 

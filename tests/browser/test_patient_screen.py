@@ -8,9 +8,9 @@ from contextlib import contextmanager
 import pytest
 from playwright.sync_api import Browser, Page
 
-from tests.browsers import SIZES
-from tests.servers import Server
-from tests.walk_seed import Walk, feet_of, make_walks
+from tests.support.browsers import SIZES
+from tests.support.servers import Server
+from tests.support.walk_seed import Walk, feet_of, make_walks
 
 pytestmark = pytest.mark.browser
 

@@ -10,16 +10,16 @@ from contextlib import contextmanager
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browsers import SIZES, can_be_read
-from tests.servers import ROOT, Server, clean_environment
+from tests.support.browsers import SIZES, can_be_read
+from tests.support.servers import ROOT, Server, clean_environment
 
 pytestmark = pytest.mark.browser
 
 SEED = """
 from django.utils import timezone
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
-from tests.walks import strides, walk
+from tests.support.walks import strides, walk
 rosa = Patient.everywhere.create(
     clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"
 )

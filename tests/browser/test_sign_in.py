@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from rehab.people.codes import STEP_S, code_of
-from tests.browsers import SIZES
-from tests.servers import Server, serve
+from rehab.people.sign_in.totp import STEP_S, code_of
+from tests.support.browsers import SIZES
+from tests.support.servers import Server, serve
 
 pytestmark = pytest.mark.browser
 

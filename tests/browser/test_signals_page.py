@@ -12,9 +12,9 @@ import sys
 import pytest
 from playwright.sync_api import Browser, ViewportSize, expect
 
-from tests.browsers import SIZES
-from tests.servers import ROOT, Server
-from tests.walk_seed import make_walks
+from tests.support.browsers import SIZES
+from tests.support.servers import ROOT, Server
+from tests.support.walk_seed import make_walks
 
 pytestmark = pytest.mark.browser
 

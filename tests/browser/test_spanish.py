@@ -10,8 +10,8 @@ import polib
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from tests.servers import Server
-from tests.walk_seed import Walk, feet_of, make_walks
+from tests.support.servers import Server
+from tests.support.walk_seed import Walk, feet_of, make_walks
 
 pytestmark = pytest.mark.browser
 

@@ -13,10 +13,10 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 from websockets.sync.client import connect
 
-from tests.browsers import SIZES
-from tests.servers import Server, serve
-from tests.walk_seed import Walk, feet_of, make_walks
-from tests.wire import Wire
+from tests.support.browsers import SIZES
+from tests.support.servers import Server, serve
+from tests.support.walk_seed import Walk, feet_of, make_walks
+from tests.support.wire import Wire
 
 pytestmark = pytest.mark.browser
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browsers import SIZES, chromium
-from tests.servers import serve
+from tests.support.browsers import SIZES, chromium
+from tests.support.servers import serve
 
 pytestmark = pytest.mark.browser
 

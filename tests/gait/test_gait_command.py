@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rehab.gait.__main__ import main
-from tests.data import signals
 from tests.gait.walks import make_walk, read_moore
+from tests.support.data import signals
 
 COLUMNS = ["time=t", "left.force=Fz", "left.moment=M*1000", "left.angle=A*-1"]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rehab.gait import ContactKind, GaitInputError, GyroscopeDetector, find_ankle_velocity
-from tests.data import signals
+from tests.support.data import signals
 
 RATE_HZ = 204.8
 

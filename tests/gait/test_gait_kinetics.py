@@ -8,7 +8,7 @@ from scipy.signal import butter, filtfilt
 
 from rehab.gait import find_ankle_moment, measure_strides
 from rehab.gait.filters import ZeroPhaseFilter, find_slope, refine_peak
-from tests.data import signals
+from tests.support.data import signals
 
 
 @pytest.mark.parametrize("rate_hz", [100, 1000])

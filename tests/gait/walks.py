@@ -10,7 +10,7 @@ from scipy.signal import butter, filtfilt
 from rehab.gait import LegSamples, measure_both_legs, measure_strides
 from rehab.sources.synthetic.signals import Sensors, make_signals
 from rehab.training.steps import Measurement, Side
-from tests.data import signals
+from tests.support.data import signals
 
 FORCE, MOMENT, ANGLE = range(3)
 

@@ -9,12 +9,12 @@ import time
 from pathlib import Path
 from typing import Any
 
-from tests.servers import ROOT, Server, clean_environment, serve
+from tests.support.servers import ROOT, Server, clean_environment, serve
 
 STRIDES = 24
 
 SEED = """
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
 from rehab.sessions.services import create_session
 from rehab.stations.builtin import first_station

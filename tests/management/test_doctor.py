@@ -9,7 +9,7 @@ import pytest
 from django.core.management import call_command
 
 from rehab.sessions.models import TrainingSession
-from tests.world import build_world
+from tests.support.world import build_world
 
 pytestmark = pytest.mark.django_db
 

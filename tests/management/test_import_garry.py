@@ -14,14 +14,14 @@ from zoneinfo import ZoneInfo
 import pytest
 from django.core.management import CommandError, call_command
 
-from rehab.people.erased import is_kept_away
+from rehab.patients.erasure import erase
+from rehab.people.consent.tombstones import is_kept_away
 from rehab.people.models import Clinic, Erasing, Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.endings import erase
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from tests.programs import Program, token_of
-from tests.world import NOW, signed_in
+from tests.support.programs import Program, token_of
+from tests.support.world import NOW, signed_in
 
 pytestmark = pytest.mark.django_db
 

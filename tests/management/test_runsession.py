@@ -18,8 +18,8 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import create_session
 from rehab.sources.recording import read_recording
 from rehab.training.goals import GoalRule
-from tests.data import recording
-from tests.world import build_world
+from tests.support.data import recording
+from tests.support.world import build_world
 
 pytestmark = pytest.mark.django_db(transaction=True)  # the writer has its own connection
 
@@ -30,7 +30,7 @@ def run(*arguments: str | int | Path) -> dict[str, Any]:
     return dict(json.loads(out.getvalue()))
 
 
-# gait.md 1.4: mean over usable strides, hit rate over all rows with a value.
+# Mean over usable strides, hit rate over all rows with a value (docs/reference/gait.md#phases).
 TABLE = {
     "SSWS": (54, 1.00, 3.908, 0.44),
     "SSWS_Fam": (30, 1.00, 4.392, 0.97),

@@ -12,7 +12,7 @@ import pytest
 from django.core.management import call_command
 
 from rehab.sessions.log import Step
-from tests.data import recording
+from tests.support.data import recording
 
 pytestmark = pytest.mark.django_db(transaction=True)  # the writer has its own connection
 

@@ -12,7 +12,7 @@ import urllib.request
 
 import pytest
 
-from tests.servers import ROOT, clean_environment, serve
+from tests.support.servers import ROOT, clean_environment, serve
 
 
 @pytest.fixture

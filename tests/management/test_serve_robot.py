@@ -16,13 +16,13 @@ import pytest
 from django.core.management import CommandError, call_command
 from websockets.asyncio.client import connect
 
-from tests.servers import ROOT, clean_environment, serve
+from tests.support.servers import ROOT, clean_environment, serve
 
 pytestmark = pytest.mark.realtime
 
 PREPARE = """
 import django; django.setup()
-from rehab.people.first_start import first_clinic, first_password, prepare_database
+from rehab.people.sign_in.first_start import first_clinic, first_password, prepare_database
 prepare_database()
 first_password()
 from django.test import Client

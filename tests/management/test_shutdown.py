@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from websockets.asyncio.client import connect
 
-from tests.servers import ROOT, clean_environment, serve
+from tests.support.servers import ROOT, clean_environment, serve
 
 pytestmark = pytest.mark.realtime
 
@@ -84,7 +84,7 @@ async def walk_until_closed(
 
 def test_sigterm_with_fifty_viewers(tmp_path):
     with serve(tmp_path) as server:
-        rows = json.loads(python(server, "-m", "tests.live_seed", "10"))
+        rows = json.loads(python(server, "-m", "tests.support.live_seed", "10"))
         codes, acknowledged = asyncio.run(
             walk_until_closed(
                 f"ws://127.0.0.1:{server.port}",
@@ -94,7 +94,7 @@ def test_sigterm_with_fifty_viewers(tmp_path):
         )
         assert server.process.wait(15) == 0
         ids = ",".join(str(row["session"]) for row in rows)
-        log = json.loads(python(server, "-m", "tests.live_log", ids))
+        log = json.loads(python(server, "-m", "tests.support.live_log", ids))
     assert codes == [4012] * 60
     assert len(acknowledged) == 10
     for session, number in acknowledged.items():

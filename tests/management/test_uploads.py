@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from django.test import Client
 
-from tests.servers import Server, serve
+from tests.support.servers import Server, serve
 
 HEAD = b"POST /sign-in/ HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
 TOO_MUCH = 3 * 1024 * 1024

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 
 import pytest
 from django.contrib import admin
@@ -11,27 +11,26 @@ from django.test import Client
 from django.urls import get_resolver, reverse
 from django.utils import timezone
 
-from rehab.people import audit, sightings
-from rehab.people.audit import Act, AppendOnly, AuditEntry, Recent, shorten
-from rehab.people.factors import Authenticator
+from rehab.people.audit import access_log, audit_log
+from rehab.people.audit.audit_log import Act, AppendOnly, AuditEntry, Recent, shorten
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
-from rehab.people.tokens import ApiToken
+from rehab.people.sign_in.factors import Authenticator
+from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocols import Measure, Protocol
 from rehab.stations.models import Device
-from tests.archives import body_of
-from tests.tenancy import all_routes, walk_patterns
-from tests.world import World, build_world, client_of, mark
+from tests.support.archives import body_of
+from tests.support.tenancy import all_routes, walk_patterns
+from tests.support.world import NOW, World, build_world, client_of, mark
 
 pytestmark = pytest.mark.django_db
-NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 
 
 @pytest.fixture(autouse=True)
 def nothing_noted_yet(monkeypatch):
-    monkeypatch.setattr(audit, "recent", Recent())
+    monkeypatch.setattr(audit_log, "recent", Recent())
 
 
 @pytest.fixture
@@ -83,7 +82,7 @@ def test_every_route_that_shows_patients_leaves_an_entry(world, monkeypatch):
     ]
     for route in all_routes((world,)):
         for client in people:
-            monkeypatch.setattr(audit, "recent", Recent())
+            monkeypatch.setattr(audit_log, "recent", Recent())
             before = entries().count()
             response = client.get(route.url)
             body_of(response)
@@ -106,9 +105,9 @@ def test_every_silent_route_is_one_that_there_is():
 def test_which_admin_pages_lead_to_patients():
     for model in admin.site._registry:
         name = f"admin:rehab_{model._meta.model_name}_changelist"
-        assert sightings.leads_to_patients(model) != is_silent(name), model
-    assert sightings.leads_to_patients(Step)
-    assert not any(map(sightings.leads_to_patients, (Clinic, Measure, Protocol, Device)))
+        assert access_log.leads_to_patients(model) != is_silent(name), model
+    assert access_log.leads_to_patients(Step)
+    assert not any(map(access_log.leads_to_patients, (Clinic, Measure, Protocol, Device)))
 
 
 # --- who, whose, what -----------------------------------------------------------------------------
@@ -174,10 +173,10 @@ def test_a_page_costs_at_most_two_statements_more_and_one_that_polls_none(
     request.resolver_match = get_resolver().resolve(request.path)
     response = client.get(request.path)
     with django_assert_num_queries(0):
-        sightings.note_request(request, response)
-    audit.recent = Recent()
+        access_log.note_request(request, response, NOW)
+    audit_log.recent = Recent()
     with django_assert_max_num_queries(4):  # whose session, the entry, and a savepoint around it
-        sightings.note_request(request, response)
+        access_log.note_request(request, response, NOW)
 
 
 def test_care_goes_on_when_the_log_cannot_be_written_but_nothing_is_given_out(world, monkeypatch):
@@ -197,7 +196,7 @@ def test_care_goes_on_when_the_log_cannot_be_written_but_nothing_is_given_out(wo
 
 
 def test_entries_cannot_be_changed_or_deleted(world):
-    audit.note(Act.VIEW, world.people[Role.PT], patient=world.patient.pk)
+    audit_log.note(Act.VIEW, world.people[Role.PT], patient=world.patient.pk, now=NOW)
     entry = entries().get()
     visible = AuditEntry.objects.visible_to(world.people[Role.LEAD])
     for attempt in (
@@ -216,7 +215,9 @@ def test_entries_cannot_be_changed_or_deleted(world):
 
 
 def test_leads_read_it_in_the_admin_and_nobody_writes_there(world):
-    audit.note(Act.EXPORT, world.people[Role.PT], patient=world.patient.pk, about="here")
+    audit_log.note(
+        Act.EXPORT, world.people[Role.PT], patient=world.patient.pk, about="here", now=NOW
+    )
     entry = entries().get()
     lead = client_of(world, Role.LEAD)
     changelist = reverse("admin:rehab_auditentry_changelist")
@@ -250,7 +251,7 @@ def test_of_an_address_the_network_is_kept(address, kept):
 
 
 def test_what_was_noted_is_forgotten_in_its_turn(monkeypatch):
-    monkeypatch.setattr(audit, "REMEMBERED", 2)
+    monkeypatch.setattr(audit_log, "REMEMBERED", 2)
     recent = Recent()
     assert [recent.is_new(key, NOW) for key in "abab"] == [True, True, False, False]
     assert recent.is_new("c", NOW)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from importlib import import_module
 
 import pytest
@@ -12,7 +11,7 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.boards.models import BoardEntry
-from rehab.people.consent import (
+from rehab.people.consent.models import (
     Consent,
     ConsentText,
     FixedText,
@@ -31,10 +30,9 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import create_session
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
-from tests.world import World, build_world, client_of
+from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
-NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 LOG = (TrainingSession, Step, SessionEvent, SessionMetric)
 
 

@@ -4,9 +4,9 @@ import pytest
 from django.conf import settings as live_settings
 from django.core.management import CommandError, call_command
 
-from rehab.people.first_start import first_clinic, first_password, prepare_database
 from rehab.people.models import User
 from rehab.people.roles import Role
+from rehab.people.sign_in.first_start import first_clinic, first_password, prepare_database
 
 pytestmark = pytest.mark.django_db
 
@@ -51,7 +51,8 @@ def test_a_hosted_database_is_never_migrated_behind_the_operators_back(settings,
     settings.HOSTED = True
     prepare_database()  # up to date: nothing to say
     monkeypatch.setattr(
-        "rehab.people.first_start.MigrationExecutor.migration_plan", lambda *_: [("x", False)]
+        "rehab.people.sign_in.first_start.MigrationExecutor.migration_plan",
+        lambda *_: [("x", False)],
     )
     with pytest.raises(CommandError, match=r"manage\.py migrate"):
         prepare_database()

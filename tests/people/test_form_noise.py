@@ -8,8 +8,8 @@ from django.urls import reverse
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.protocols import Protocol
-from tests.form_noise import run_noise
-from tests.world import build_world, client_of
+from tests.support.form_noise import run_noise
+from tests.support.world import build_world, client_of
 
 REQUESTS = 230  # tests/bench has 10,000
 

@@ -9,14 +9,14 @@ from django.urls import reverse
 from rehab.boards.models import Leaderboard
 from rehab.gestures.models import GestureStep
 from rehab.models import TRACKED
-from rehab.people import history
-from rehab.people.history import HistoryEntry
+from rehab.people.audit import history
+from rehab.people.audit.history import HistoryEntry
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
-from rehab.people.tokens import ApiToken
+from rehab.people.sign_in.tokens import ApiToken
 from rehab.stations.models import Device
 from rehab.stations.pins import set_pin
-from tests.world import World, build_world, client_of, mark
+from tests.support.world import World, build_world, client_of, mark
 
 pytestmark = pytest.mark.django_db
 

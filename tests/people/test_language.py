@@ -14,7 +14,7 @@ from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.stations import tablets
 from rehab.stations.models import Device
-from tests.world import World, build_world, client_of
+from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 

@@ -14,7 +14,7 @@ from django.urls import reverse
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocol_admin import PresetAdmin
-from tests.world import World, build_world, client_of, scoped_models
+from tests.support.world import World, build_world, client_of, scoped_models
 
 pytestmark = pytest.mark.django_db
 

@@ -13,7 +13,8 @@ from django.urls import reverse
 
 from rehab.boards import entries
 from rehab.boards.models import BoardEntry
-from rehab.people.consent import (
+from rehab.patients.erasure import erase
+from rehab.people.consent.models import (
     Consent,
     Purpose,
     current_text,
@@ -24,13 +25,12 @@ from rehab.people.consent import (
 )
 from rehab.people.models import Boards, Erasing, Patient
 from rehab.people.roles import Role
-from rehab.people.tokens import ApiToken
+from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.defaults import install_defaults
-from rehab.sessions.endings import erase
 from rehab.sessions.services import create_session
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
-from tests.world import NOW, World, build_world, client_of
+from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 SCREEN = {"screen_side": "left", "screen_text": "large"}
@@ -131,10 +131,10 @@ def test_nobody_agrees_joins_or_walks_for_a_person_who_was_just_erased(world):
 def test_who_no_longer_agrees_stands_on_no_board_whatever_the_row_says(world):
     board = BoardEntry.everywhere.get(patient=world.patient).board
     Consent.everywhere.filter(patient=world.patient).update(withdrawn_at=NOW)
-    entries.refresh(board)
+    entries.refresh(board, now=NOW)
     assert not BoardEntry.everywhere.filter(patient=world.patient).exists()
     Patient.everywhere.filter(pk=world.patient.pk).update(simulated=True)  # agrees to everything
-    entries.refresh(board)
+    entries.refresh(board, now=NOW)
     assert BoardEntry.everywhere.filter(patient=world.patient).exists()
 
 

@@ -15,8 +15,8 @@ from django.urls import reverse
 from django.utils.translation import override
 
 from rehab.people.models import Clinic, Patient
-from rehab.people.refusals import in_words
 from rehab.people.roles import Role
+from rehab.people.web.refusals import in_words
 from rehab.sessions.protocols import Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind, Refused, State, next_state
@@ -24,13 +24,13 @@ from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.valences import VALENCES, Cue, edit_valence
+from tests.feedback.test_types import form as feedback_form
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gesture_spec import Move, build_gesture
-from tests.feedback.test_feedback_types import form as feedback_form
 from tests.gestures.test_composing import filled as gesture_form
-from tests.programs import program_of
 from tests.sessions.test_two_at_once import choices
-from tests.world import World, build_world, client_of
+from tests.support.programs import program_of
+from tests.support.world import World, build_world, client_of
 
 CATALOG = Path(__file__).parents[2] / "locale/es/LC_MESSAGES/django.po"
 ENGLISH = re.compile(

@@ -12,12 +12,12 @@ from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 
-from rehab.people import codes, factors
-from rehab.people.audit import AuditEntry
-from rehab.people.codes import STEP_S, code_of, new_secret, step_of
-from rehab.people.factors import Authenticator, RecoveryCode
+from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
+from rehab.people.sign_in import factors, recovery_codes, totp
+from rehab.people.sign_in.factors import Authenticator, RecoveryCode
+from rehab.people.sign_in.totp import STEP_S, code_of, new_secret, step_of
 
 PASSWORD = "walk well 2026"
 RFC_SECRET = "GEZDGNBVGY3TQOJQGEZDGNBVGY3TQOJQ"  # "12345678901234567890"
@@ -55,14 +55,18 @@ def test_what_is_no_code_is_refused(code):
 
 
 def test_recovery_codes_are_read_as_people_type_them():
-    code = codes.new_recovery_code()
+    code = recovery_codes.new_recovery_code()
     assert re.fullmatch("([2-9A-Z]{4}-){2}[2-9A-Z]{4}", code)
-    assert codes.digest_of(f" {code.lower().replace('-', ' ')} ") == codes.digest_of(code)
-    assert codes.digest_of(code) != codes.digest_of(codes.new_recovery_code())
+    assert recovery_codes.digest_of(
+        f" {code.lower().replace('-', ' ')} "
+    ) == recovery_codes.digest_of(code)
+    assert recovery_codes.digest_of(code) != recovery_codes.digest_of(
+        recovery_codes.new_recovery_code()
+    )
 
 
 def test_an_app_reads_who_and_where_from_the_square():
-    address = codes.address(RFC_SECRET, "rosa@elm")
+    address = totp.address(RFC_SECRET, "rosa@elm")
     assert address == f"otpauth://totp/GARRY%3Arosa%40elm?secret={RFC_SECRET}&issuer=GARRY"
 
 

@@ -10,10 +10,10 @@ from django.contrib.sessions.models import Session
 from django.test import Client, RequestFactory
 from django.utils import timezone
 
-from rehab.people.browser_sessions import SEEN_AT, SIGNED_IN_AT
-from rehab.people.lockout import client_address
 from rehab.people.models import Clinic, User
+from rehab.people.networks import client_address
 from rehab.people.roles import Role
+from rehab.people.sign_in.browser_sessions import SEEN_AT, SIGNED_IN_AT
 
 pytestmark = pytest.mark.django_db
 PASSWORD = "walk well 2026"

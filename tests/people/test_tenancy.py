@@ -20,13 +20,13 @@ from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.boards.standings import Stored
 from rehab.people import api as people_api
 from rehab.people.access import for_roles, public
-from rehab.people.admin_base import ScopedOptions
 from rehab.people.models import Patient
 from rehab.people.roles import Right, Role, rights_of
 from rehab.people.scope import CrossClinic, Scope, ScopedManager, UnscopedQuery
+from rehab.people.web.admin_base import ScopedOptions
 from rehab.stations.models import Device, Station
-from tests.tenancy import all_routes, find_leaks, find_offers, may_read, walk_patterns
-from tests.world import (
+from tests.support.tenancy import all_routes, find_leaks, find_offers, may_read, walk_patterns
+from tests.support.world import (
     World,
     all_actors,
     build_world,
@@ -54,7 +54,7 @@ def test_every_model_says_how_it_belongs_to_a_clinic(worlds):
         assert isinstance(getattr(model, "scope", None), Scope), f"{model} has no scope"
         assert isinstance(model.objects, ScopedManager), f"{model}.objects is not scoped"
         for world in worlds:
-            assert model in world.rows, f"tests/world.py makes no {model.__name__}"
+            assert model in world.rows, f"tests/support/world.py makes no {model.__name__}"
 
 
 @pytest.mark.parametrize("model", scoped_models(), ids=lambda model: model.__name__)

@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from tests.browsers import SIZES, chromium
-from tests.servers import ROOT, clean_environment, serve
+from tests.support.browsers import SIZES, chromium
+from tests.support.servers import ROOT, clean_environment, serve
 
 pytestmark = pytest.mark.browser
 
@@ -69,7 +69,7 @@ PAGES = {
 VISITS = """
 from datetime import time, timedelta
 from django.utils import timezone
-from rehab.people.first_start import first_clinic
+from rehab.people.sign_in.first_start import first_clinic
 from rehab.gestures.models import Gesture
 from rehab.people.models import Patient, User
 from rehab.sessions.corrections import Part, correct_session
@@ -77,9 +77,9 @@ from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocols import Protocol
 from rehab.sessions.presets import Preset
-from rehab.sessions.visits import plan_visit
+from rehab.patients.visits import plan_visit
 from rehab.stations.models import Device, Station
-from tests.walks import visit
+from tests.support.walks import visit
 rosa = Patient.everywhere.create(
     clinic=first_clinic(), code="K7-204", nickname="Rosa", paretic_side="left"
 )

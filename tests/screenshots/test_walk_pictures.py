@@ -12,9 +12,9 @@ import pytest
 from playwright.sync_api import Page, ViewportSize
 from websockets.sync.client import connect
 
-from tests.browsers import SIZES, chromium
-from tests.servers import ROOT, Server, serve
-from tests.walk_seed import Walk, feet_of, make_walks
+from tests.support.browsers import SIZES, chromium
+from tests.support.servers import ROOT, Server, serve
+from tests.support.walk_seed import Walk, feet_of, make_walks
 
 pytestmark = pytest.mark.browser
 

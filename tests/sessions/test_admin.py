@@ -15,7 +15,7 @@ from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
 from rehab.boards.models import Leaderboard
-from rehab.people.consent import Purpose, give
+from rehab.people.consent.models import Purpose, give
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection
@@ -23,8 +23,8 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.presets import Preset
 from rehab.sessions.protocols import Protocol, ProtocolPhase
 from rehab.stations.models import Device, Station, find_device
-from tests.walks import strides, walk
-from tests.world import NOW, World, build_world, client_of
+from tests.support.walks import strides, walk
+from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -327,7 +327,7 @@ def test_a_token_is_renewed_and_revoked_from_the_devices_page(world):
     page = reverse("admin:rehab_device_change", args=[world.device.pk])
     answer = act(world, "device", "renew_tokens", world.device.pk, Role.LEAD)
     assert answer.headers["Location"] == page
-    assert find_device(world.token) is None
+    assert find_device(world.token, NOW) is None
     act(world, "device", "revoke_tokens", world.device.pk, Role.LEAD)
     told = client_of(world, Role.LEAD).get(page).content.decode()
     assert "revoked" in told

@@ -11,7 +11,7 @@ from collections import deque
 
 import pytest
 
-from rehab.sessions.live.children import Children, _listen
+from rehab.sessions.live.supervisor import Children, _listen
 
 
 async def until(condition, seconds: float = 5.0) -> None:
@@ -49,7 +49,7 @@ async def test_a_child_that_is_done_is_left_alone(children):
 
 
 async def test_a_stopped_child_is_gone_even_if_it_does_not_listen(children, monkeypatch):
-    monkeypatch.setattr("rehab.sessions.live.children.STOP_S", 0.2)
+    monkeypatch.setattr("rehab.sessions.live.supervisor.STOP_S", 0.2)
     deaf = "import signal, time; signal.signal(15, signal.SIG_IGN); print('on'); time.sleep(60)"
     child = children.start("deaf", [sys.executable, "-u", "-c", deaf])
     await until(lambda: "on" in child.last_words)
@@ -114,7 +114,7 @@ async def test_a_fault_of_ours_leaves_a_child_supervised_and_no_stop_undone(
             raise RuntimeError("a fault")
         await asyncio.sleep(60)
 
-    monkeypatch.setattr("rehab.sessions.live.children._listen", listen)
+    monkeypatch.setattr("rehab.sessions.live.supervisor._listen", listen)
     child = children.start("robot", python("import time; time.sleep(60)"))
     await until(lambda: len(told) == 2)
     assert (child.state, child.restarts) == ("running", 1)

@@ -12,19 +12,19 @@ from django.urls import reverse
 
 from rehab.boards import entries
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
-from rehab.people.consent import Purpose, give
+from rehab.patients.erasure import erase
+from rehab.people.consent.models import Purpose, give
 from rehab.people.models import Erasing, Patient
 from rehab.people.roles import Role
 from rehab.sessions import corrections
 from rehab.sessions.corrections import Part, SessionCorrection, correct_session
-from rehab.sessions.dashboard import read_week
-from rehab.sessions.endings import erase
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.takehome import sum_up_for_home
-from rehab.sessions.trend import read_trend
-from tests.walks import strides, walk
-from tests.world import NOW, World, agreeing, build_world, client_of
+from rehab.sessions.reports.dashboard import read_week
+from rehab.sessions.reports.takehome import sum_up_for_home
+from rehab.sessions.reports.trend import read_trend
+from tests.support.walks import strides, walk
+from tests.support.world import NOW, World, agreeing, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
@@ -93,7 +93,7 @@ def board_of(world: World) -> Leaderboard:
     board: Leaderboard = world.rows[Leaderboard]
     Leaderboard.everywhere.filter(pk=board.pk).update(types="all", metric="hit_rate")
     board.refresh_from_db()
-    entries.refresh(board)
+    entries.refresh(board, now=NOW)
     return board
 
 
@@ -112,7 +112,7 @@ def agrees_with_a_rebuild(board: Leaderboard) -> None:
         return [list(kept), list(counts.values_list("valence", "figure", "rows"))]
 
     kept_up = told()
-    entries.refresh(board)
+    entries.refresh(board, now=NOW)
     assert kept_up == told()
 
 

@@ -12,19 +12,19 @@ import pytest
 from django.urls import reverse
 from django.utils import timezone
 
-from rehab.people.consent import Purpose, give
+from rehab.people.consent.models import Purpose, give
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
-from rehab.sessions import dashboard
-from rehab.sessions.dashboard import find_matters, look, read_today, read_week
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports import dashboard
+from rehab.sessions.reports.dashboard import find_matters, look, read_today, read_week
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import say_seen
 from rehab.training.changes import ChangeKind, State
 from rehab.training.tallies import Tally
-from tests.walks import RIGHT, strides, walk
-from tests.world import World, build_world, client_of, mark, signed_in
+from tests.support.walks import RIGHT, strides, walk
+from tests.support.world import World, build_world, client_of, mark, signed_in
 
 pytestmark = pytest.mark.django_db
 

@@ -7,7 +7,7 @@ import re
 import subprocess
 import sys
 
-from tests.servers import ROOT, clean_environment, serve
+from tests.support.servers import ROOT, clean_environment, serve
 
 
 def test_the_documented_python_client_sends_steps(tmp_path):
@@ -19,7 +19,7 @@ def test_the_documented_python_client_sends_steps(tmp_path):
         environment = clean_environment(tmp_path, server.port)
         environment["DJANGO_SETTINGS_MODULE"] = "garry_site.settings"
         made = subprocess.run(
-            [sys.executable, "-m", "tests.live_seed", "1"],
+            [sys.executable, "-m", "tests.support.live_seed", "1"],
             cwd=ROOT,
             env=environment,
             capture_output=True,

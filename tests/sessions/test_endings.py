@@ -14,30 +14,23 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.boards.models import BoardEntry
-from rehab.people import audit
-from rehab.people.audit import Act, AuditEntry
-from rehab.people.history import HistoryEntry
+from rehab.patients.closure import StillOpen, end_program, reopen_program
+from rehab.patients.erasure import erase, months_before, overdue
+from rehab.patients.visits import Visit
+from rehab.people.audit import audit_log
+from rehab.people.audit.audit_log import Act, AuditEntry
+from rehab.people.audit.history import HistoryEntry
 from rehab.people.models import Ending, Erasing, Patient
 from rehab.people.roles import Role
 from rehab.sessions.corrections import Part, SessionCorrection, correct_session
-from rehab.sessions.endings import (
-    StillOpen,
-    end_program,
-    erase,
-    months_before,
-    overdue,
-    reopen_program,
-)
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import create_session
-from rehab.sessions.visits import Visit
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
-from tests.world import World, build_world, client_of, mark, scoped_models
+from tests.support.world import NOW, World, build_world, client_of, mark, scoped_models
 
 pytestmark = pytest.mark.django_db
-NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 
 
 @pytest.fixture
@@ -318,7 +311,7 @@ def test_both_logs_go_when_the_clinic_has_kept_them_long_enough(world):
     now = datetime.now(UTC)
     for months, about in ((13, "old"), (11, "new")):
         at = months_before(now, months)
-        audit.note(Act.VIEW, world.people[Role.PT], about=about, now=at)
+        audit_log.note(Act.VIEW, world.people[Role.PT], about=about, now=at)
         HistoryEntry.everywhere.create(clinic=world.clinic, noun=about, row=1, kind="added", at=at)
     world.clinic.keep_log_months = 12
     world.clinic.save()

@@ -25,7 +25,7 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.metrics import measure_session
 from rehab.training.phases import make_phase
 from rehab.training.steps import Measurement, Side
-from tests.world import NOW, store
+from tests.support.world import NOW, store
 
 pytestmark = pytest.mark.django_db
 

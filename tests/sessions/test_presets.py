@@ -15,7 +15,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.presets import Preset
 from rehab.sessions.protocols import Protocol
 from rehab.stations.models import Station
-from tests.world import World, build_world, client_of, mark
+from tests.support.world import World, build_world, client_of, mark
 
 pytestmark = pytest.mark.django_db
 

@@ -16,7 +16,7 @@ from rehab.sessions.log import SessionEvent
 from rehab.sessions.services import create_session
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
-from tests.world import build_world, client_of
+from tests.support.world import build_world, client_of
 
 pytestmark = pytest.mark.django_db(transaction=True)
 

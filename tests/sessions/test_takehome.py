@@ -11,8 +11,8 @@ from django.urls import reverse
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.training.phases import make_phase
-from tests.walks import HIT, MISS, RIGHT, walk
-from tests.world import World, build_world, client_of
+from tests.support.walks import HIT, MISS, RIGHT, walk
+from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 

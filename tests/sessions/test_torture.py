@@ -4,7 +4,7 @@ import asyncio
 import os
 import time
 
-from tests.torture import Torture
+from tests.support.torture import Torture
 
 
 def test_three_kills_lose_nothing(tmp_path, capsys):

@@ -20,8 +20,8 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocols import Protocol
 from rehab.sessions.services import StationTaken
 from rehab.stations.models import Station
-from tests.programs import program_of
-from tests.world import World, build_world, client_of
+from tests.support.programs import program_of
+from tests.support.world import World, build_world, client_of
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from django.utils import timezone
 from rehab.people.models import UNAMBIGUOUS
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device, Pairing, Station
-from tests.world import World, build_world, client_of
+from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 

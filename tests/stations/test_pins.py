@@ -12,7 +12,7 @@ from rehab.people.roles import Role
 from rehab.stations.models import Device, LeaveTries, Station
 from rehab.stations.pins import FREE_TRIES, LONGEST_WAIT, PinRefused, check_pin, set_pin
 from rehab.stations.tablets import COOKIE
-from tests.world import NOW, World, build_world, client_of
+from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 SCREEN = "tablet 1"

@@ -22,11 +22,11 @@ HAS_PHYSICS = importlib.util.find_spec("pybullet") is not None
 needs_physics = pytest.mark.skipif(not HAS_PHYSICS, reason="pybullet is not installed")
 needs_pty = pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals here")
 
-M_TICK = 1 / 11724.4  # kobuki.md 1.7
+M_TICK = 1 / 11724.4  # docs/reference/kobuki.md#odometry-and-gyro
 
 
 def order(speed: int, radius: int) -> bytes:
-    """Give a base control command, by the table of kobuki.md 1.4."""
+    """Give a base control command, by the table of docs/reference/kobuki.md#commands."""
     return framed(struct.pack("<BBhh", 1, 4, speed, radius))
 
 

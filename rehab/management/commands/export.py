@@ -12,8 +12,8 @@ from django.utils import timezone
 
 from rehab.exports.archive import write_zip
 from rehab.exports.patient_data import patient_files, session_files
-from rehab.people import audit
-from rehab.people.audit import Act
+from rehab.people.audit import audit_log
+from rehab.people.audit.audit_log import Act
 from rehab.people.models import Patient, User
 
 
@@ -42,7 +42,7 @@ class Command(BaseCommand):
             if whose is None:
                 raise CommandError(f"{username} sees no patient with the code {patient!r}.")
             files, key = patient_files(user, whose, now), whose.pk
-        audit.note(
+        audit_log.note(
             Act.EXPORT,
             None,
             clinic=user.clinic_id,
@@ -53,7 +53,7 @@ class Command(BaseCommand):
         try:
             descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
             with os.fdopen(descriptor, "wb") as out:
-                for part in write_zip(files, now):
+                for part in write_zip(files):
                     out.write(part)
         except OSError as problem:
             raise CommandError(

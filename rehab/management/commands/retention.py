@@ -9,8 +9,9 @@ from django.core.management.base import BaseCommand
 from django.db import transaction
 from django.utils import timezone
 
+from rehab.patients.closure import StillOpen
+from rehab.patients.erasure import erase, let_logs_go, overdue
 from rehab.people.models import Clinic, Erasing
-from rehab.sessions.endings import StillOpen, erase, let_logs_go, overdue
 
 
 class Command(BaseCommand):

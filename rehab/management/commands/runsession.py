@@ -13,11 +13,11 @@ from typing import Any
 
 from django.core.management import BaseCommand, CommandError
 
-from rehab.people.first_start import first_clinic, prepare_database
 from rehab.people.models import Clinic, Patient
-from rehab.sessions.facts import describe_cue
+from rehab.people.sign_in.first_start import first_clinic, prepare_database
 from rehab.sessions.headless import Pace, report, robot_steps, run_session, simulate_strides
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.payloads import describe_cue
 from rehab.sessions.services import create_session
 from rehab.sources.recording import Recording, RecordingError, read_recording
 from rehab.sources.synthetic import PROFILES, SyntheticWalker

@@ -13,7 +13,7 @@ from django.conf import settings
 from django.core.management import BaseCommand, CommandError
 
 from rehab.boards.building import builder
-from rehab.people.first_start import (
+from rehab.people.sign_in.first_start import (
     FIRST_USERNAME,
     first_clinic,
     first_password,

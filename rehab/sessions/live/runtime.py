@@ -21,11 +21,11 @@ from django.utils import timezone
 from rehab.people.models import User
 from rehab.sessions.events import Audience, to_text
 from rehab.sessions.live import owners, sources
-from rehab.sessions.live.admission import find_unwelcome, keep_signed_in
-from rehab.sessions.live.children import Children
+from rehab.sessions.live.audit_queue import Notes
+from rehab.sessions.live.auth import find_unwelcome, keep_signed_in
 from rehab.sessions.live.loading import find_newest_open, load
-from rehab.sessions.live.notes import Notes
 from rehab.sessions.live.session import LiveSession, Stop
+from rehab.sessions.live.supervisor import Children
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Remark
 from rehab.training.changes import (
@@ -47,7 +47,8 @@ log = logging.getLogger(__name__)
 SWEEP = round(PAGE_HEARTBEAT_S / ROBOT_HEARTBEAT_S)
 CHECKPOINT = 8  # heartbeats
 HEARTBEAT = to_text({"type": "heartbeat"})
-# Python's full collections take 200 ms with 2,000 sockets (stack.md, T4): make them rare.
+# Python's full collections take 200 ms with 2,000 sockets (docs/reference/stack.md#live-path): make
+# them rare.
 GC_THRESHOLDS = (50_000, 50, 100)
 # How long the event loop may keep the interpreter's lock while the writer wants it (default 5 ms).
 SWITCH_S = 0.002
@@ -266,8 +267,9 @@ class Runtime:
         """
         sockets = [socket for socket in self.sockets if socket.actor is not None]
         running = [one.scope for one in sockets if one.live is not None and one.live.is_running]
-        await keep_signed_in(running)
-        for index in await find_unwelcome([(one.actor, one.scope) for one in sockets]):
+        await keep_signed_in(running, timezone.now())
+        admitted = [(one.actor, one.scope) for one in sockets]
+        for index in await find_unwelcome(admitted, timezone.now()):
             sockets[index].send_off()
 
     async def _close(self, live: LiveSession) -> None:

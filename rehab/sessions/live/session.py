@@ -22,12 +22,12 @@ from rehab.sessions.events import (
     snapshot,
     step_event,
 )
-from rehab.sessions.facts import Message, type_mark
 from rehab.sessions.live.actor import Row, SessionActor
 from rehab.sessions.live.hub import Channel, Viewer
 from rehab.sessions.live.lateness import Lateness
 from rehab.sessions.live.writer import Job, Writer
 from rehab.sessions.log import Remark, RobotEntry, Step
+from rehab.sessions.payloads import Message, type_mark
 from rehab.training.changes import Change, ChangeKind, State
 from rehab.training.steps import Measurement, ScoredStep
 

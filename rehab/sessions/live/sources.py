@@ -6,7 +6,7 @@ import sys
 
 from asgiref.sync import sync_to_async
 
-from rehab.sessions.live.children import Children
+from rehab.sessions.live.supervisor import Children
 from rehab.sessions.models import TrainingSession
 from rehab.stations.builtin import builtin_token
 from rehab.stations.models import Device

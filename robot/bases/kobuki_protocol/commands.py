@@ -1,4 +1,4 @@
-"""Commands to a Kobuki (kobuki.md 1.4)."""
+"""Commands to a Kobuki (docs/reference/kobuki.md#commands)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Extra(IntFlag):
 
 
 class Output(IntFlag):
-    """Bits of ``GpOutput``, which is always written whole (kobuki.md 1.4).
+    """Bits of ``GpOutput``, which is always written whole (docs/reference/kobuki.md#commands).
 
     POWER is every external rail. A word without it cuts the power of whatever hangs on them, the
     robot's own computer included.
@@ -150,7 +150,8 @@ def decode_commands(payload: bytes) -> list[Command]:
     Raises
     ------
     Malformed
-        For sub-payloads that do not fill the payload, or have another length than kobuki.md 1.4.
+        For sub-payloads that do not fill the payload, or of another length than
+        docs/reference/kobuki.md#commands.
     """
     commands: list[Command] = []
     for number, data in split(payload):

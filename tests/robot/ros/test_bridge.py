@@ -31,7 +31,7 @@ from tests.support.fake_ros import (
     release,
     wait_until,
 )
-from tests.wire import Wire
+from tests.support.wire import Wire
 
 PLAIN = PROFILES["plain"]
 ROOT = Path(__file__).parents[3]

@@ -16,7 +16,7 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import writer as writers
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
-from tests.sessions.live.callers import Caller, Place, build_place, change, open_session
+from tests.support.callers import Caller, Place, build_place, change, open_session
 
 
 class Stall:

@@ -12,7 +12,7 @@ from rehab.sessions.live.consumers import base
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from robot.wire.limits import MAX_FRAME_BYTES
-from tests.sessions.live.callers import (
+from tests.support.callers import (
     Caller,
     Message,
     MonitorPage,

@@ -13,7 +13,7 @@ from rehab.sessions.live import owners
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
-from tests.sessions.live.callers import (
+from tests.support.callers import (
     Message,
     RobotCaller,
     SourceCaller,

@@ -10,7 +10,7 @@ from rehab.sessions.live.consumers import source as source_module
 from rehab.sessions.live.lateness import Lateness
 from rehab.sessions.log import Step
 from rehab.training.clocks import LATE_S, LEAK
-from tests.sessions.live.callers import a_step
+from tests.support.callers import a_step
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 2.0, 10.0])

@@ -8,11 +8,11 @@ import pytest
 from asgiref.sync import sync_to_async
 from django.db import DatabaseError
 
-from rehab.people import audit
-from rehab.people.audit import Act, AuditEntry, Recent
-from rehab.sessions.live import notes as notes_module
+from rehab.people.audit import audit_log
+from rehab.people.audit.audit_log import Act, AuditEntry, Recent
+from rehab.sessions.live import audit_queue as notes_module
 from rehab.sessions.live import runtime as runtimes
-from tests.sessions.live.callers import turns
+from tests.support.callers import turns
 
 pytestmark = pytest.mark.django_db(transaction=True)
 
@@ -22,7 +22,7 @@ ARM = {"type": "robot", "order": "arm"}
 
 @pytest.fixture(autouse=True)
 def nothing_noted_yet(monkeypatch):
-    monkeypatch.setattr(audit, "recent", Recent())
+    monkeypatch.setattr(audit_log, "recent", Recent())
 
 
 async def noted(count: int) -> list[tuple[Any, ...]]:
@@ -85,7 +85,7 @@ async def test_a_log_that_cannot_be_written_stops_no_step_and_no_robot(place, be
         raise DatabaseError("the disk is full")
 
     monkeypatch.setattr(AuditEntry.everywhere, "bulk_create", fail)
-    monkeypatch.setattr(audit.log, "exception", lambda *args: None)
+    monkeypatch.setattr(audit_log.log, "exception", lambda *args: None)
     session = await begun(place)
     robot, monitor, source = place.robot(), place.monitor(session), place.source()
     await (await robot.dial()).hello()

@@ -11,7 +11,7 @@ from django.utils import timezone
 
 from rehab.people.models import Clinic
 from rehab.sessions.live import runtime as runtimes
-from tests.sessions.live.callers import sign_in
+from tests.support.callers import sign_in
 
 pytestmark = pytest.mark.django_db(transaction=True)
 
@@ -58,7 +58,7 @@ async def test_a_working_day_ends_though_a_training_runs(place, begun, settings)
 
 
 def _signed_in_since(key: str, hours: float, settings) -> str:
-    from rehab.people.browser_sessions import SIGNED_IN_AT, SessionStore
+    from rehab.people.sign_in.browser_sessions import SIGNED_IN_AT, SessionStore
 
     settings.SESSION_MINUTES = 30
     store = SessionStore(key)

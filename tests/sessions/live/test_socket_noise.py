@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.socket_noise import run_noise
+from tests.support.socket_noise import run_noise
 
 FRAMES = 240  # tests/bench has 10,000
 

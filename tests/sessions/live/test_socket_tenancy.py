@@ -23,8 +23,8 @@ from rehab.sessions.services import create_session
 from rehab.stations.models import Device, Station
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
-from tests.sessions.live.callers import OWN_PAGE, Caller
-from tests.world import Actor, World, all_actors, build_world, signed_in
+from tests.support.callers import OWN_PAGE, Caller
+from tests.support.world import Actor, World, all_actors, build_world, signed_in
 
 # Who gets in, by the words of docs/protocol.md: roles, and kinds of device.
 MAY_OPEN: dict[type, set[str]] = {

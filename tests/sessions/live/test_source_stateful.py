@@ -25,18 +25,19 @@ from hypothesis.stateful import (
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import writer as writers
-from rehab.sessions.live.actor import SessionActor, read_log
+from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.live.consumers import source as source_consumers
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.replay import read_log
 from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.fold import SessionFold
 from rehab.training.phases import make_phase
 from rehab.training.steps import Measurement, Side
-from tests.sessions.live import callers
-from tests.sessions.live.callers import (
+from tests.support import callers
+from tests.support.callers import (
     PATIENCE_S,
     Caller,
     Place,

@@ -15,9 +15,9 @@ from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.phases import make_phase
 from rehab.training.valences import Cue
-from tests.sessions.live.callers import turns
 from tests.sessions.live.test_robots import restart
-from tests.world import NOW
+from tests.support.callers import turns
+from tests.support.world import NOW
 
 TWO = (make_phase("training", "First", strides=2), make_phase("training", "Last"))
 

@@ -19,14 +19,14 @@ from rehab.people.roles import Role
 from rehab.sessions.live import hub, owners
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.actor import SessionActor
-from rehab.sessions.live.past import PAGE
+from rehab.sessions.live.backlog import PAGE
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.log import Remark, SessionEvent
 from rehab.sessions.services import change_session, create_session
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
-from tests.sessions.live.callers import (
+from tests.support.callers import (
     Caller,
     Message,
     MonitorPage,

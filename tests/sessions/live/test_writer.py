@@ -26,8 +26,8 @@ from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.steps import Measurement, Side
-from tests.sessions.live.callers import a_step, change, turns
-from tests.world import NOW
+from tests.support.callers import a_step, change, turns
+from tests.support.world import NOW
 
 
 class Bench:

@@ -12,10 +12,10 @@ from channels.exceptions import StopConsumer
 from channels.generic.websocket import AsyncWebsocketConsumer
 
 from rehab.sessions.events import to_text
-from rehab.sessions.facts import Message
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.admission import Actor
+from rehab.sessions.live.auth import Actor
 from rehab.sessions.live.session import LiveSession, NotStored
+from rehab.sessions.payloads import Message
 from robot.wire.close_codes import CloseCode
 from robot.wire.frames import BadFrame, read_object
 
@@ -72,8 +72,8 @@ class Socket(AsyncWebsocketConsumer):
     """A socket of the live path.
 
     It uses no channel layer (the hub is in this process) and, unlike Channels' own dispatch, hops
-    to no database thread for each frame: half of what a step costs (stack.md, T1). Subclasses
-    implement ``opened``, ``heard`` and ``left``.
+    to no database thread for each frame: half of what a step costs
+    (docs/reference/stack.md#one-process). Subclasses implement ``opened``, ``heard`` and ``left``.
     """
 
     live: LiveSession | None = None

@@ -7,17 +7,11 @@ from typing import ClassVar
 
 from django.utils import timezone
 
-from rehab.sessions.facts import Message
-from rehab.sessions.live.admission import (
-    find_actor,
-    find_device_by,
-    may_open,
-    open_session_of,
-    token_of,
-)
+from rehab.sessions.live.auth import find_actor, find_device_by, may_open, open_session_of, token_of
 from rehab.sessions.live.consumers.base import Closing, Socket
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import LiveSession, Peer
+from rehab.sessions.payloads import Message
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED
 from robot.wire.close_codes import CloseCode

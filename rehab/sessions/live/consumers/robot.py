@@ -7,11 +7,11 @@ import asyncio
 from django.utils import timezone
 
 from rehab.sessions.events import Audience
-from rehab.sessions.facts import Message, describe_cue
 from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.hub import Lagged, Viewer
 from rehab.sessions.live.messages import read_report
 from rehab.sessions.live.session import LiveSession
+from rehab.sessions.payloads import Message, describe_cue
 from rehab.stations.models import Device
 from robot.wire.frames import BadFrame, read_name
 from robot.wire.limits import MAX_REPORT_CHARS

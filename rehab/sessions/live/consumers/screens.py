@@ -13,14 +13,14 @@ from django.conf import settings
 from django.utils import timezone
 from django.utils.translation import override
 
-from rehab.people.audit import Act
-from rehab.people.language import language_of
+from rehab.people.audit.audit_log import Act
 from rehab.people.models import User
-from rehab.people.refusals import in_words
 from rehab.people.roles import Role
+from rehab.people.web.language import language_of
+from rehab.people.web.refusals import in_words
 from rehab.sessions.events import Audience, history_entry, to_text
-from rehab.sessions.facts import Message
-from rehab.sessions.live.admission import Actor, find_actor, may_open, may_watch
+from rehab.sessions.live.auth import Actor, find_actor, may_open, may_watch
+from rehab.sessions.live.backlog import read_steps
 from rehab.sessions.live.consumers.base import Closing, Socket
 from rehab.sessions.live.hub import Lagged, Unseen, Viewer
 from rehab.sessions.live.messages import (
@@ -29,8 +29,8 @@ from rehab.sessions.live.messages import (
     read_remark,
 )
 from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.past import read_steps
 from rehab.sessions.live.session import LiveSession, NotStored
+from rehab.sessions.payloads import Message
 from rehab.stations.models import Device
 from rehab.training.changes import ChangeKind, PauseReason
 from rehab.training.measures import InvalidSetting
@@ -78,7 +78,7 @@ class ScreenConsumer(Socket):
             theirs = await database_sync_to_async(language_of)(self.actor)
             self.language = theirs or settings.LANGUAGE_CODE
         self.start(self._pump(live, _after(self.scope["query_string"])))
-        self.runtime.notes.add(Act.VIEW, self.actor, session_id, self.scope)
+        self.runtime.notes.add(Act.VIEW, self.actor, session_id, self.scope, timezone.now())
 
     @classmethod
     def is_welcome(cls, actor: Actor) -> bool:
@@ -209,7 +209,7 @@ class ScreenConsumer(Socket):
             self.start(_until_stored([s.arm_robot(by, timezone.now()) for s in sessions]))
         if by is not None or order == "stop":  # beside the socket: no robot waits for the log
             act = Act(f"robot_{order}")
-            self.runtime.notes.add(act, self.actor, live.id, self.scope)
+            self.runtime.notes.add(act, self.actor, live.id, self.scope, timezone.now())
 
     async def _refuse(self, mark: str, code: str, message: str) -> None:
         await self.say({"type": "error", "code": code, "id": mark, "message": message})

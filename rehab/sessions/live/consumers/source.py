@@ -7,7 +7,7 @@ import time
 from django.utils import timezone
 
 from rehab.sessions.events import source_goal_event
-from rehab.sessions.facts import Message
+from rehab.sessions.live.backlog import is_stored
 from rehab.sessions.live.consumers.base import Closing
 from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.lateness import Lateness
@@ -17,8 +17,8 @@ from rehab.sessions.live.messages import (
     read_plain,
     read_steps,
 )
-from rehab.sessions.live.past import is_stored
 from rehab.sessions.live.session import LiveSession, source_phase
+from rehab.sessions.payloads import Message
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED, State
 from rehab.training.steps import Measurement, Side

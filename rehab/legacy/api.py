@@ -1,0 +1,108 @@
+"""The API routes of the paper: users by ID, their sessions with the paper's ten attributes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.http import HttpRequest
+from django.shortcuts import get_object_or_404
+from ninja import Field, Path, Query, Router, Schema, Status
+
+from rehab.people.access import clinic_of, for_roles
+from rehab.people.api import Short, patients_of, store
+from rehab.people.models import Patient
+from rehab.people.roles import Role
+from rehab.people.web.api_base import (
+    Given,
+    Page,
+    Paging,
+    answers,
+    caller,
+    cut,
+)
+from rehab.sessions.api import ORDERS, sessions_of
+from rehab.sessions.formatting import at_clinic
+from rehab.sessions.schemas import FeedbackType
+
+router = Router(tags=["The paper's calls"])
+
+
+class PaperUserGiven(Given):
+    """A new user in the paper's words."""
+
+    name: Short = Field(description="A nickname. The original kept real names; GARRY does not.")
+
+
+class PaperUser(Schema):
+    """A user in the paper's words: `id` is the patient's code, `name` the nickname."""
+
+    id: str = Field(alias="code")
+    name: str = Field(alias="nickname")
+
+
+class PaperSession(Schema):
+    """A session with the ten attributes of the paper, and its names for them."""
+
+    session_id: int
+    participant_id: str
+    year: int
+    month: int
+    day: int
+    start_time: str
+    duration: float = Field(description="Seconds walked.")
+    score: float | None
+    feedback_type: str
+    threshold: float | None = Field(description="The goal, in the measure's unit.")
+
+
+class PaperFilter(Paging):
+    """Which sessions of a user are wanted."""
+
+    feedback_type: FeedbackType | None = None
+
+
+@router.get("/users/{code}", response=answers(PaperUser, 404))
+@for_roles(Role.LEAD, Role.PT)
+def show_user(request: HttpRequest, code: Path[Short]) -> Patient:
+    """Read a user by the ID that a PT would type."""
+    return get_object_or_404(patients_of(caller(request)), code=code)
+
+
+@router.post("/users/{code}", response=answers(PaperUser, 409, code=201))
+@for_roles(Role.LEAD, Role.PT)
+def add_user(request: HttpRequest, code: Path[Short], given: PaperUserGiven) -> Status[Patient]:
+    """Create a user with this ID."""
+    patient = Patient(clinic=clinic_of(caller(request)))
+    return Status(201, store(patient, {"code": code, "nickname": given.name}))
+
+
+@router.get("/users/{code}/sessions", response=answers(Page[PaperSession], 404))
+@for_roles(Role.LEAD, Role.PT)
+def list_user_sessions(
+    request: HttpRequest, code: Path[Short], wanted: Query[PaperFilter]
+) -> dict[str, Any]:
+    """List a user's sessions by non-ascending score; those without a score come last."""
+    user = caller(request)
+    patient = get_object_or_404(Patient.objects.visible_to(user), code=code)
+    sessions = sessions_of(user).filter(patient=patient).select_related("clinic")
+    if wanted.feedback_type:
+        sessions = sessions.filter(valence=wanted.feedback_type)
+    page = cut(sessions.order_by(*ORDERS["best"]), wanted)
+    return page | {"items": [in_paper_words(session) for session in page["items"]]}
+
+
+def in_paper_words(session: Any) -> dict[str, Any]:
+    """Tell a session by the paper's attributes, its date by the clinic's clock."""
+    start = at_clinic(session.started_at or session.created_at, session.clinic)
+    return {
+        "session_id": session.pk,
+        "participant_id": session.patient.code,
+        "year": start.year,
+        "month": start.month,
+        "day": start.day,
+        "start_time": f"{start:%H:%M:%S}",
+        "duration": session.active_s,
+        "score": session.metric_score,
+        "feedback_type": session.valence,
+        "threshold": session.goal,
+    }

@@ -1,0 +1,92 @@
+"""Erasing all that leads to a person, and what a clinic no longer keeps."""
+
+from __future__ import annotations
+
+from calendar import monthrange
+from datetime import datetime
+
+from django.contrib.admin.models import LogEntry
+from django.contrib.contenttypes.models import ContentType
+from django.db import transaction
+from django.db.models import Exists, F, Max, OuterRef, QuerySet
+from django.db.models.functions import Coalesce, Greatest
+from django.utils.translation import gettext as _
+
+from rehab.patients.closure import hold_closed
+from rehab.patients.visits import Visit
+from rehab.people.audit import audit_log
+from rehab.people.audit.audit_log import Act
+from rehab.people.audit.history import HistoryEntry, forget_values
+from rehab.people.consent.models import Purpose, withdraw
+from rehab.people.consent.tombstones import keep_away
+from rehab.people.models import Clinic, Erasing, Patient, User, new_pseudonym
+from rehab.sessions.corrections import forget_patient as forget_corrections
+from rehab.sessions.formatting import at_clinic
+from rehab.sessions.log import Remark, SessionEvent
+from rehab.sessions.models import TrainingSession
+
+
+def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) -> None:
+    """Erase all that leads to a person, for good and once. Raises StillOpen."""
+    with transaction.atomic():
+        hold_closed(patient)
+        if patient.erased_at is not None:
+            return  # somebody was quicker
+        withdraw(patient, Purpose.BOARDS, by, now)
+        known_as = patient.pseudonym
+        if patient.original_id is not None:
+            keep_away(patient.clinic_id, patient.original_id)
+        patient.pseudonym = patient.code = new_pseudonym()
+        patient.nickname = _("Erased")
+        patient.body_mass_kg = patient.original_id = patient.alias = None
+        patient.ended_at = patient.ended_at or now
+        patient.erased_at, patient.erased_because = now, because
+        patient.save()
+        sessions = TrainingSession.everywhere.filter(patient=patient)
+        sessions.update(source="", runs=[], original=None)  # names of files, rows of the original
+        # It still says that the session was imported, but no longer from where.
+        sessions.filter(original_id__isnull=False).update(original_id=-1 * F("pk"))
+        SessionEvent.everywhere.filter(
+            session__patient=patient, kind__in=[remark.value for remark in Remark]
+        ).update(data={})
+        forget_corrections(patient, known_as)
+        Visit.everywhere.filter(patient=patient).delete()
+        forget_values("Patient", patient.pk)
+        LogEntry.objects.filter(
+            content_type=ContentType.objects.get_for_model(Patient), object_id=str(patient.pk)
+        ).update(object_repr=patient.pseudonym)
+        audit_log.forget_patient(patient.pk)
+        audit_log.note(
+            Act.ERASE, by, clinic=patient.clinic_id, about=str(Erasing(because).label), now=now
+        )
+
+
+def overdue(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
+    """Give the patients whom a clinic has kept for as long as it wants to.
+
+    It counts from the last session, or from the day on which the patient was taken in: sessions
+    that were imported are older than that. Whoever is expected again stays.
+    """
+    patients = Patient.everywhere.filter(clinic=clinic, erased_at=None, simulated=False)
+    if clinic.keep_months is None:
+        return patients.none()
+    last = Greatest(Coalesce(Max("sessions__created_at"), "created_at"), "created_at")
+    before = months_before(now, clinic.keep_months)
+    today = at_clinic(now, clinic).date()
+    expected = Visit.everywhere.filter(patient=OuterRef("pk"), day__gte=today)
+    kept = patients.annotate(last_here=last).filter(last_here__lt=before)
+    return kept.exclude(Exists(expected)).order_by("pk")
+
+
+def let_logs_go(clinic: Clinic, now: datetime) -> int:
+    """Delete what is older than a clinic keeps its logs; give how many entries."""
+    before = months_before(now, clinic.keep_log_months)
+    changes, _each = HistoryEntry.everywhere.filter(clinic=clinic, at__lt=before).delete()
+    return changes + audit_log.forget_before(clinic.pk, before)
+
+
+def months_before(moment: datetime, months: int) -> datetime:
+    """Give the same day so many months earlier, or that month's last one where it has no such."""
+    year, month = divmod(moment.year * 12 + moment.month - 1 - months, 12)
+    year, month = max(year, 1), month + 1
+    return moment.replace(year=year, month=month, day=min(moment.day, monthrange(year, month)[1]))

@@ -1,0 +1,106 @@
+"""What is filled in about a patient: who it is, the screen, and the end of the program."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, ClassVar
+
+from django import forms
+from django.core.exceptions import ValidationError
+from django.db import transaction
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.access import clinic_of
+from rehab.people.consent.models import Purpose, give, join_boards, offered
+from rehab.people.forms import PatientRowForm
+from rehab.people.models import Boards, Ending, Erasing, Patient, User
+
+
+class PatientForm(PatientRowForm):
+    """A patient of the PT's clinic, new or to be mended."""
+
+    class Meta:
+        model = Patient
+        fields: ClassVar = ["nickname", "code", "paretic_side", "body_mass_kg"]
+
+    def __init__(self, *args: Any, by: User, now: datetime, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.instance.clinic = clinic_of(by)
+        self._by, self._now = by, now
+        self.fields["paretic_side"].required = True
+        self.fields["nickname"].widget.attrs["autofocus"] = True
+        if self.instance.is_new:
+            self.fields["agrees"] = forms.MultipleChoiceField(
+                label=_("What the patient agrees to"),
+                choices=[(one.value, one.label) for one in offered(self.instance.clinic)],
+                required=False,
+                widget=forms.CheckboxSelectMultiple,
+                help_text=_(
+                    "Read the clinic's words to the patient first. It can change any time."
+                ),
+            )
+
+    def clean_code(self) -> str:
+        """Refuse a code that is taken, and say by whom."""
+        code: str = self.cleaned_data["code"]
+        others = Patient.objects.visible_to(self._by).filter(code=code).exclude(pk=self.instance.pk)
+        if (other := others.first()) is not None:
+            said = _("Code %(code)s already exists: it is %(nickname)s's.")
+            raise ValidationError(said % {"code": code, "nickname": other.nickname})
+        return code
+
+    def save(self, commit: bool = True) -> Patient:
+        """Store the patient, and what a new one agrees to."""
+        with transaction.atomic():
+            patient = super().save(commit)
+            for purpose in map(Purpose, self.cleaned_data.get("agrees", [])):
+                if purpose is Purpose.BOARDS:
+                    join_boards(patient, Boards.CLINIC, self._by, self._now)
+                else:
+                    give(patient, purpose, self._by, self._now)
+        return patient
+
+
+class ScreenForm(PatientRowForm):
+    """How the patient's page looks and sounds for this patient."""
+
+    class Meta:
+        model = Patient
+        fields: ClassVar = ["screen_side", "screen_text", "screen_still", "screen_sounds"]
+        widgets: ClassVar = {"screen_side": forms.RadioSelect, "screen_text": forms.RadioSelect}
+
+
+class EndingForm(forms.Form):
+    """Why the program ends."""
+
+    because = forms.ChoiceField(
+        label=_("Why?"), choices=Ending.choices, initial=Ending.DONE, widget=forms.RadioSelect
+    )
+
+
+class ErasingForm(forms.Form):
+    """Why a patient is erased; the code, typed once more, says that it is meant."""
+
+    because = forms.ChoiceField(
+        label=_("Why?"),
+        choices=[choice for choice in Erasing.choices if choice[0] != Erasing.RETENTION],
+        widget=forms.RadioSelect,
+    )
+    code = forms.CharField(
+        label=_("The patient's code, once more"),
+        max_length=32,
+        widget=forms.TextInput(attrs={"autocomplete": "off"}),
+    )
+
+    def __init__(self, *args: Any, patient: Patient, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.label_suffix = ""
+        self.patient = patient
+
+    def clean_code(self) -> str:
+        """Refuse any other code."""
+        code: str = self.cleaned_data["code"]
+        if code != self.patient.code:
+            said = _("That is not %(patient)s's code. Nothing was erased.")
+            raise ValidationError(said % {"patient": self.patient.nickname})
+        return code

@@ -1,0 +1,69 @@
+"""Planning when a patient comes again."""
+
+from __future__ import annotations
+
+from datetime import date, time, timedelta
+
+from django.contrib import messages
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect
+from django.utils import timezone
+from django.utils.dateformat import format as format_date
+from django.utils.dateparse import parse_date, parse_time
+from django.utils.translation import gettext as _
+from django.views.decorators.http import require_POST
+
+from rehab.patients.visits import SOON_DAYS, Visit, plan_visit, usual_time
+from rehab.people.access import for_roles, person
+from rehab.people.models import Patient
+from rehab.people.roles import Role
+from rehab.sessions.formatting import at_clinic
+
+FARTHEST = timedelta(days=366)
+
+
+class WrongDay(ValueError):
+    """A day on which nobody can be expected; the message says what to do."""
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_POST
+def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
+    """Plan a visit (``in``: days from today, or ``day`` and ``at``) or remove one (``remove``)."""
+    user = person(request)
+    patient = get_object_or_404(
+        Patient.objects.visible_to(user).select_related("clinic"), pk=patient_id
+    )
+    visits = Visit.objects.visible_to(user).filter(patient=patient)
+    given = request.POST
+    if (removed := given.get("remove", "")).isdecimal():
+        visits.filter(pk=int(removed)).delete()
+        return redirect("patient", patient_id=patient.pk)
+    now = at_clinic(timezone.now(), patient.clinic)
+    try:
+        if (days := given.get("in", "")) in map(str, SOON_DAYS):
+            day = now.date() + timedelta(days=int(days))
+            at = usual_time(user, patient, now) if int(days) else None
+        else:
+            day, at = _read(given.get("day", ""), given.get("at", ""), now.date())
+    except WrongDay as problem:
+        messages.error(request, str(problem))
+    else:
+        visit = plan_visit(patient, day, at)
+        words = format_date(visit.day, "l j F") + (f", {visit.at:%H:%M}" if visit.at else "")
+        said = {"name": patient.nickname, "when": words}
+        messages.success(request, _("%(name)s is expected on %(when)s.") % said)
+    return redirect("patient", patient_id=patient.pk)
+
+
+def _read(day: str, at: str, today: date) -> tuple[date, time | None]:
+    """Read a day and a time, which may be left out. Raises WrongDay."""
+    try:
+        chosen, hour = parse_date(day), parse_time(at) if at else None
+    except ValueError:
+        chosen = hour = None
+    if chosen is None or (at and hour is None):
+        raise WrongDay(_("Choose the day of the visit, and a time such as 10:30 if there is one."))
+    if not today <= chosen <= today + FARTHEST:
+        raise WrongDay(_("Choose a day between today and a year from now."))
+    return chosen, hour

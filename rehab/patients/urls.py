@@ -1,0 +1,19 @@
+"""Addresses of the start list and of a patient's pages."""
+
+from django.urls import path
+
+from rehab.patients.pages import records, start, visits
+
+urlpatterns = [
+    path("start/", start.choose_patient, name="start"),
+    path("patients/new/", start.add_patient, name="new-patient"),
+    path("patients/demo/", start.add_demo, name="demo"),
+    path("patients/<int:patient_id>/", start.show_patient, name="patient"),
+    path("patients/<int:patient_id>/details/", start.mend_patient, name="mend-patient"),
+    path("patients/<int:patient_id>/screen/", start.set_screen, name="screen"),
+    path("patients/<int:patient_id>/visits/", visits.change_visits, name="visits"),
+    path("patients/<int:patient_id>/records/", records.show_records, name="records"),
+    path("patients/<int:patient_id>/end/", records.end, name="end-program"),
+    path("patients/<int:patient_id>/reopen/", records.reopen, name="reopen"),
+    path("patients/<int:patient_id>/erase/", records.erase_patient, name="erase"),
+]

@@ -1,0 +1,73 @@
+"""Admin of the logs: a clinic's lead reads who looked at what, and who changed what."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from django.apps import apps
+from django.contrib import admin
+from django.contrib.admin import RelatedOnlyFieldListFilter
+from django.http import HttpRequest
+from django.utils.translation import gettext as _
+from django.utils.translation import gettext_lazy
+
+from rehab.people.audit.audit_log import AuditEntry
+from rehab.people.audit.history import HistoryEntry
+from rehab.people.roles import Role
+from rehab.people.web.admin_base import ReadOnlyAdmin, rights
+
+
+class LogAdmin(ReadOnlyAdmin):
+    """Pages of a log of the whole clinic, which only its leads look through."""
+
+    date_hierarchy = "at"
+    list_per_page = 100
+
+    def has_module_permission(self, request: HttpRequest) -> bool:
+        """Put it on the leads' front page."""
+        return bool(rights(request, self.model)) and self._leads(request)
+
+    def has_view_permission(self, request: HttpRequest, obj: Any = None) -> bool:
+        """Whether the log may be looked through."""
+        return self._leads(request) and super().has_view_permission(request, obj)
+
+    @staticmethod
+    def _leads(request: HttpRequest) -> bool:
+        return getattr(request.user, "role", "") == Role.LEAD
+
+    @admin.display(description=gettext_lazy("who"), ordering="by")
+    def who(self, entry: Any) -> str:
+        """Give the person, and the program or device by which."""
+        names = [str(entry.by)] if entry.by else []
+        names += [entry.through] if entry.through else []
+        return " · ".join(names) or _("the server")
+
+
+@admin.register(AuditEntry)
+class AuditAdmin(LogAdmin):
+    """Who looked at patients' data, took it out, or gave a robot orders."""
+
+    list_display = ("at", "who", "act", "patient", "about", "address")
+    list_filter: ClassVar[Any] = (
+        "act",
+        ("by", RelatedOnlyFieldListFilter),
+        ("patient", RelatedOnlyFieldListFilter),
+    )
+    search_fields = ("patient__nickname", "patient__code", "by__username", "about")
+    list_select_related = ("by", "patient")
+
+
+@admin.register(HistoryEntry)
+class HistoryAdmin(LogAdmin):
+    """Who changed what of people and settings. Each row's own page shows its changes in words."""
+
+    list_display = ("at", "who", "kind", "noun", "row", "what")
+    list_filter: ClassVar[Any] = ("kind", "noun", ("by", RelatedOnlyFieldListFilter))
+    list_select_related = ("by",)
+
+    @admin.display(description=gettext_lazy("fields"))
+    def what(self, entry: HistoryEntry) -> str:
+        """Name the fields."""
+        fields = apps.get_model("rehab", entry.noun)._meta.get_fields()
+        names = {field.name: str(getattr(field, "verbose_name", field.name)) for field in fields}
+        return ", ".join(names.get(name, name) for name in entry.values)

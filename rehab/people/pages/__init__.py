@@ -1,0 +1,1 @@
+"""The pages about people: front page, sign-in, account, consent."""

@@ -1,0 +1,51 @@
+"""The own account."""
+
+from __future__ import annotations
+
+from django.contrib import messages
+from django.contrib.auth import update_session_auth_hash
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import redirect, render
+from django.utils.translation import gettext as _
+from django.views.decorators.cache import never_cache
+from django.views.decorators.debug import sensitive_post_parameters
+from django.views.decorators.http import require_http_methods, require_safe
+
+from rehab.people.access import for_roles, person
+from rehab.people.models import LANGUAGES
+from rehab.people.roles import Role
+from rehab.people.sign_in import factors, passkeys
+from rehab.people.sign_in.forms import NewPasswordForm
+
+
+@for_roles(*Role, patients=False)
+@never_cache
+@require_safe
+def show_account(request: HttpRequest) -> HttpResponse:
+    """Show what signs the person in."""
+    user = person(request)
+    context = {
+        "owner": user,
+        "languages": LANGUAGES,
+        "authenticators": factors.authenticators_of(user),
+        "is_required": factors.is_required(user),
+        "codes_left": factors.recovery_codes_left(user),
+        "passkeys": passkeys.are_possible(request),
+    }
+    return render(request, "people/account.html", context)
+
+
+@for_roles(*Role, patients=False)
+@never_cache
+@sensitive_post_parameters()
+@require_http_methods(["GET", "HEAD", "POST"])
+def change_password(request: HttpRequest) -> HttpResponse:
+    """Replace the own password. All other sign-ins of the account end."""
+    user = person(request)
+    form = NewPasswordForm(request, user, request.POST if request.method == "POST" else None)
+    if form.is_valid():
+        form.save()
+        update_session_auth_hash(request, user)
+        messages.success(request, _("Your password is changed."))
+        return redirect("account")
+    return render(request, "people/new_password.html", {"form": form})

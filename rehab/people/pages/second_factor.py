@@ -1,0 +1,156 @@
+"""Setting up a second factor, from the own account or before the clinic lets somebody in."""
+
+from __future__ import annotations
+
+import segno
+from django.contrib import messages
+from django.core.exceptions import PermissionDenied
+from django.http import Http404, HttpRequest, HttpResponse
+from django.shortcuts import redirect, render
+from django.urls import reverse
+from django.utils import timezone
+from django.utils.translation import gettext as _
+from django.views.decorators.cache import never_cache
+from django.views.decorators.debug import sensitive_post_parameters
+from django.views.decorators.http import require_http_methods, require_safe
+
+from rehab.people.access import for_roles, person
+from rehab.people.models import User
+from rehab.people.roles import Role
+from rehab.people.sign_in import factors, flow, passkeys, totp
+from rehab.people.sign_in.forms import WRONG_FIRST_CODE, AppForm, OwnPasswordForm
+
+SECRET = "app_secret"  # noqa: S105 (its name in the browser session, until the app has proven it)
+
+
+def owner(request: HttpRequest) -> User:
+    """Give whose account is set up. Raises PermissionDenied for a stranger."""
+    if isinstance(request.user, User):
+        return request.user
+    user = flow.setting_up(request, timezone.now())
+    if user is None:
+        raise PermissionDenied
+    return user
+
+
+@for_roles(*Role, setting_up=True, patients=False)
+@never_cache
+@require_safe
+def choose(request: HttpRequest) -> HttpResponse:
+    """Offer what can be a second factor here."""
+    user = owner(request)
+    context = {
+        "owner": user,
+        "is_required": factors.is_required(user),
+        "passkeys": passkeys.are_possible(request),
+    }
+    return render(request, "people/set_up.html", context)
+
+
+@for_roles(*Role, setting_up=True, patients=False)
+@never_cache
+@sensitive_post_parameters()
+@require_http_methods(["GET", "HEAD", "POST"])
+def add_app(request: HttpRequest) -> HttpResponse:
+    """Show an app its secret, and keep it once the app shows the right code."""
+    user = owner(request)
+    secret: str = request.session.setdefault(SECRET, totp.new_secret())
+    form = AppForm(request.POST if request.method == "POST" else None)
+    if form.is_valid():
+        new = factors.add_app(user, secret, form.cleaned_data["code"], timezone.now())
+        if new is not None:
+            del request.session[SECRET]
+            return _added(request, user, new)
+        form.add_error("code", WRONG_FIRST_CODE)
+    drawing = segno.make(totp.address(secret, user.username), micro=False)
+    spaced = " ".join(secret[start : start + 4] for start in range(0, len(secret), 4))
+    context = {"form": form, "qr": drawing.svg_inline(omitsize=True, border=2), "secret": spaced}
+    return render(request, "people/add_app.html", context)
+
+
+@for_roles(*Role, setting_up=True, patients=False)
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def add_passkey(request: HttpRequest) -> HttpResponse:
+    """Have the browser make a passkey, and keep it."""
+    user = owner(request)
+    if not passkeys.are_possible(request):
+        raise Http404
+    problem = ""
+    if request.method == "POST":
+        name = request.POST.get("name", "").strip()[:64] or _("Passkey")
+        try:
+            return _added(
+                request, user, passkeys.keep(request, user, name, request.POST["passkey"])
+            )
+        except (KeyError, passkeys.NotProven):
+            problem = _("This passkey was not accepted. Try again.")
+    context = {"problem": problem, "passkey": passkeys.ask_to_make(request, user)}
+    return render(request, "people/add_passkey.html", context)
+
+
+def _added(request: HttpRequest, user: User, new: list[str]) -> HttpResponse:
+    """Go on with a new authenticator: whoever was halfway is in; first the recovery codes."""
+    then = reverse("account")
+    if request.user.is_authenticated:
+        request.session[flow.PROVEN] = True
+    else:
+        then = flow.finish(request, user, timezone.now(), proven=True)
+    if not new:
+        messages.success(request, _("Added."))
+        return redirect(then)
+    return _show(request, new, then)
+
+
+@for_roles(*Role, patients=False)
+@never_cache
+@sensitive_post_parameters()
+@require_http_methods(["GET", "HEAD", "POST"])
+def renew_codes(request: HttpRequest) -> HttpResponse:
+    """Make new recovery codes, for whoever knows the password and has a second factor."""
+    user = person(request)
+    if not factors.authenticators_of(user).exists():
+        return redirect("account")
+    form = OwnPasswordForm(request, user, request.POST if request.method == "POST" else None)
+    if form.is_valid():
+        return _show(request, factors.renew_recovery_codes(user), reverse("account"))
+    context = {
+        "form": form,
+        "title": _("New recovery codes"),
+        "words": _("They replace the old ones, which then open nothing."),
+        "act": _("Make new codes"),
+    }
+    return render(request, "people/ask_password.html", context)
+
+
+def _show(request: HttpRequest, new: list[str], then: str) -> HttpResponse:
+    return render(request, "people/recovery_codes.html", {"codes": new, "then": then})
+
+
+@for_roles(*Role, patients=False)
+@never_cache
+@sensitive_post_parameters()
+@require_http_methods(["GET", "HEAD", "POST"])
+def remove(request: HttpRequest) -> HttpResponse:
+    """Remove one of the own authenticators, for whoever knows the password."""
+    user = person(request)
+    which = request.GET.get("which", "")
+    own = factors.authenticators_of(user).filter(pk=int(which) if which.isdecimal() else 0).first()
+    if own is None:
+        return redirect("account")
+    form = OwnPasswordForm(request, user, request.POST if request.method == "POST" else None)
+    if form.is_valid():
+        if factors.remove(user, own.pk):
+            messages.success(request, _("%(name)s is removed.") % {"name": own})
+        else:
+            messages.error(
+                request, _("Your clinic asks for a second factor. Add another one first.")
+            )
+        return redirect("account")
+    context = {
+        "form": form,
+        "title": _("Remove %(name)s") % {"name": own},
+        "words": _("It then no longer signs you in."),
+        "act": _("Remove"),
+    }
+    return render(request, "people/ask_password.html", context)

@@ -1,0 +1,88 @@
+"""Coming in and going out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.contrib import messages
+from django.contrib.auth import logout
+from django.contrib.auth.views import LoginView
+from django.http import HttpRequest, HttpResponse, HttpResponseRedirect
+from django.shortcuts import redirect, render
+from django.urls import reverse
+from django.utils import timezone
+from django.utils.translation import gettext as _
+from django.views.decorators.cache import never_cache
+from django.views.decorators.debug import sensitive_post_parameters
+from django.views.decorators.http import require_http_methods, require_POST
+
+from rehab.people.access import public
+from rehab.people.models import User
+from rehab.people.roles import Role
+from rehab.people.sign_in import factors, flow, passkeys
+from rehab.people.sign_in.forms import CodeForm, SignInForm
+
+
+def first_page(user: User) -> str:
+    """Give where somebody begins who asked for no page."""
+    return reverse("start" if user.role in {Role.LEAD, Role.PT} else "admin:index")
+
+
+class SignIn(LoginView):
+    """Name and password."""
+
+    template_name = "people/sign_in.html"
+    authentication_form = SignInForm
+
+    def form_valid(self, form: Any) -> HttpResponse:
+        """Let somebody in, or go on to the second factor."""
+        user: User = form.get_user()
+        then = self.get_redirect_url() or first_page(user)
+        if flow.begin(self.request, user, then, timezone.now()):
+            return HttpResponseRedirect(then)
+        has_one = factors.authenticators_of(user).exists()
+        return redirect("second-factor" if has_one else "set-up-second-factor")
+
+
+sign_in = public(SignIn.as_view())
+
+
+@public
+@never_cache
+@sensitive_post_parameters()
+@require_http_methods(["GET", "HEAD", "POST"])
+def prove(request: HttpRequest) -> HttpResponse:
+    """Take a code or a passkey of somebody whose password was right. Anyone else starts over."""
+    now = timezone.now()
+    user = flow.halfway(request, now)
+    if user is None:
+        return redirect("sign-in")
+    answer = request.POST.get("passkey", "")
+    form = CodeForm(request, user, None if answer or request.method != "POST" else request.POST)
+    problem = ""
+    if answer:
+        try:
+            passkeys.take(request, user, answer, now)
+        except passkeys.NotProven:
+            problem = _("This passkey was not accepted. Try again, or type a code.")
+        else:
+            return HttpResponseRedirect(flow.finish(request, user, now, proven=True))
+    elif form.is_valid():
+        return HttpResponseRedirect(flow.finish(request, user, now, proven=True))
+    own = factors.authenticators_of(user)
+    context = {
+        "form": form,
+        "problem": problem,
+        "has_app": own.filter(kind=factors.Authenticator.Kind.APP).exists(),
+        "passkey": passkeys.ask_to_sign(request, user),
+    }
+    return render(request, "people/second_factor.html", context)
+
+
+@public
+@require_POST
+def sign_out(request: HttpRequest) -> HttpResponse:
+    """End the sign-in of this browser."""
+    logout(request)
+    messages.success(request, _("You are signed out."))
+    return redirect("sign-in")

@@ -1,1 +1,0 @@
-"""Pages about people: the front page, coming in, the own account."""

@@ -1,0 +1,65 @@
+"""The PT's page of a running session."""
+
+from __future__ import annotations
+
+from django.contrib import messages
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.utils.text import capfirst
+from django.utils.translation import gettext as _
+from django.views.decorators.http import require_safe
+
+from rehab.people.access import for_roles, person
+from rehab.people.consent.models import may_be_watched
+from rehab.people.models import Patient
+from rehab.people.networks import client_address
+from rehab.people.roles import Role
+from rehab.sessions.formatting import LEVELS
+from rehab.sessions.live.messages import BORG_MAX
+from rehab.sessions.log import EVENTS, Remark
+from rehab.sessions.models import TrainingSession
+from rehab.training.plans import ROBOT_LEVELS
+
+# What is noted with one tap, with its icon.
+ICONS = {
+    Remark.REST: "rest",
+    Remark.PAIN: "pain",
+    Remark.DIZZINESS: "dizzy",
+    Remark.NEAR_FALL: "nearfall",
+    Remark.FALL: "fall",
+    Remark.HANDRAIL: "rail",
+    Remark.VERBAL_CUE: "voice",
+    Remark.BORG: "borg",
+}
+
+
+def ask_for_consent(request: HttpRequest, patient: Patient) -> HttpResponse:
+    """Lead whoever would watch from elsewhere to the page where it can be agreed to."""
+    said = _(
+        "You are not in the clinic, and %(patient)s has not agreed to remote view. Ask first, and "
+        "note it here."
+    )
+    messages.error(request, said % {"patient": patient.nickname})
+    return redirect("consent", patient_id=patient.pk)
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_safe
+def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
+    """Show and steer a session; everything on it comes by its socket."""
+    sessions = TrainingSession.objects.visible_to(person(request))
+    session = get_object_or_404(
+        sessions.select_related("patient__clinic", "station", "measure"), pk=session_id
+    )
+    if not may_be_watched(session.patient, client_address(request)):
+        return ask_for_consent(request, session.patient)
+    context = {
+        "session": session,
+        "remarks": [
+            {"slug": what.value, "label": capfirst(EVENTS[what]), "icon": icon}
+            for what, icon in ICONS.items()
+        ],
+        "borg": range(BORG_MAX + 1),
+        "levels": [(capfirst(LEVELS[name]), share) for name, share in ROBOT_LEVELS.items()],
+    }
+    return render(request, "sessions/monitor.html", context)

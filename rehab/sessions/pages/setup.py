@@ -1,0 +1,69 @@
+"""How a session is set up."""
+
+from __future__ import annotations
+
+from django.contrib import messages
+from django.core.exceptions import ValidationError
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
+from django.utils.translation import gettext
+from django.views.decorators.http import require_http_methods
+
+from rehab.feedback.valences import valences_of
+from rehab.people.access import for_roles, person
+from rehab.people.models import Patient
+from rehab.people.roles import Role
+from rehab.sessions.forms import SessionForm, like_last_time, minutes_of
+from rehab.sessions.preset_form import keep_preset
+from rehab.sessions.presets import Preset
+from rehab.sessions.protocols import Protocol
+from rehab.stations.builtin import first_station
+
+# Where the person who set the session up goes on.
+PLACES = ("walk", "monitor")
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_http_methods(["GET", "HEAD", "POST"])
+def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
+    """Show the set-up, beginning like last time or with a preset; create the session.
+
+    What stands in it may also be kept as a preset.
+    """
+    user = person(request)
+    patient = get_object_or_404(Patient.objects.visible_to(user), pk=patient_id)
+    first_station(patient.clinic)
+    presets = list(Preset.objects.visible_to(user).select_related("protocol"))
+    chosen = next((one for one in presets if str(one.pk) == request.GET.get("preset")), None)
+    wanted = request.POST.get("then")
+    name = request.POST.get("preset_name", "").strip()
+    if request.method == "POST":
+        form = SessionForm(request.POST, patient=patient, by=user)
+        if wanted == "preset":
+            try:
+                kept = keep_preset(request.POST, patient, user, name)
+            except ValidationError as problem:
+                form.errors.clear()
+                form.add_error(None, problem.messages)
+            else:
+                words = gettext("Saved as preset “%(name)s”. It is renamed or deleted in Admin.")
+                messages.success(request, words % {"name": kept.name})
+                return redirect(f"{reverse('setup', args=[patient.pk])}?preset={kept.pk}")
+        elif (session := form.create()) is not None:
+            return redirect(wanted if wanted in PLACES else PLACES[0], session_id=session.pk)
+    else:
+        initial = like_last_time(patient, user) | (chosen.to_choices(user) if chosen else {})
+        form = SessionForm(initial=initial, patient=patient, by=user)
+    protocols = Protocol.objects.visible_to(user).prefetch_related("phases")
+    lengths = {row.pk: minutes_of(row) for row in protocols}
+    context = {
+        "patient": patient,
+        "form": form,
+        "valences": valences_of(patient.clinic_id).values(),
+        "lengths": lengths,
+        "presets": presets,
+        "preset": chosen,
+        "preset_name": name,
+    }
+    return render(request, "sessions/setup.html", context)

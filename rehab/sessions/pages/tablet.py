@@ -1,0 +1,103 @@
+"""The tablet at a treadmill: shows a code until it is paired, then whatever its station does."""
+
+from __future__ import annotations
+
+import segno
+from django.http import HttpRequest, HttpResponse, JsonResponse
+from django.shortcuts import redirect, render
+from django.templatetags.static import static
+from django.urls import reverse
+from django.utils import timezone
+from django.utils.translation import gettext as _
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_safe
+
+from rehab.people.access import public, tablet_of
+from rehab.people.networks import client_address
+from rehab.sessions.models import TrainingSession
+from rehab.stations import pairing, tablets
+from rehab.stations.models import Device
+from rehab.training.changes import OPEN
+
+SECRET = "garry_pairing"  # noqa: S105 (the cookie's name)
+
+
+def open_session(tablet: Device) -> TrainingSession | None:
+    """Give the newest open session at the tablet's station."""
+    sessions = TrainingSession.objects.visible_to(tablet)
+    return sessions.filter(state__in=[state.value for state in OPEN]).first()
+
+
+@public
+@never_cache
+@require_safe
+def show_tablet(request: HttpRequest) -> HttpResponse:
+    """Show the code of a new tablet; a paired one waits for its station's next session."""
+    tablet = tablet_of(request)
+    if tablet is not None:
+        session = open_session(tablet)
+        if session is not None:
+            return redirect("walk", session_id=session.pk)
+        return render(request, "sessions/tablet.html", {"station": tablet.station})
+    now = timezone.now()
+    begun = pairing.find(request.COOKIES.get(SECRET, ""), now)
+    if begun is not None and begun.device is None:
+        return _show_code(request, begun.code)
+    try:
+        begun, secret = pairing.begin(client_address(request), now)
+    except pairing.PairingRefused as refused:
+        status = 429 if isinstance(refused, pairing.PairingFlooded) else 503
+        return render(request, "sessions/tablet.html", {"problem": refused}, status=status)
+    response = _show_code(request, begun.code)
+    tablets.remember(response, SECRET, secret, pairing.LIFETIME.total_seconds())
+    return response
+
+
+def _show_code(request: HttpRequest, code: str) -> HttpResponse:
+    place = request.build_absolute_uri(f"{reverse('pair')}?code={code}")
+    drawing = segno.make(place, micro=False).svg_inline(omitsize=True, border=2)
+    context = {"code": code, "qr": drawing, "place": request.build_absolute_uri(reverse("pair"))}
+    return render(request, "sessions/tablet.html", context)
+
+
+@public
+@require_safe
+def describe_app(request: HttpRequest) -> JsonResponse:
+    """Let the tablet's browser install its page as an app that fills the screen."""
+    mark = {"src": static("img/mark.svg"), "type": "image/svg+xml", "sizes": "any"}
+    app = {
+        "name": _("GARRY tablet"),
+        "short_name": "GARRY",
+        "id": reverse("tablet"),
+        "start_url": reverse("tablet"),
+        "scope": "/",
+        "display": "fullscreen",
+        "background_color": "#E6F0E7",
+        "theme_color": "#E6F0E7",
+        "icons": [mark],
+    }
+    return JsonResponse(app, content_type="application/manifest+json")
+
+
+@public
+@never_cache
+@require_safe
+def tell_tablet(request: HttpRequest) -> HttpResponse:
+    """Tell a tablet where to go: nowhere yet, to its code's successor, or to a session."""
+    tablet = tablet_of(request)
+    if tablet is not None:
+        session = open_session(tablet)
+        there = reverse("walk", kwargs={"session_id": session.pk}) if session else ""
+        response = JsonResponse({"paired": True, "go": there})
+        if token := request.COOKIES.get(tablets.COOKIE):
+            tablets.remember(response, tablets.COOKIE, token, tablets.COOKIE_AGE_S)
+        return response
+    begun = pairing.find(request.COOKIES.get(SECRET, ""), timezone.now())
+    if begun is None:
+        return JsonResponse({"paired": False, "go": reverse("tablet")})  # for a new code
+    token = pairing.collect(begun)
+    response = JsonResponse({"paired": token is not None, "go": reverse("tablet") if token else ""})
+    if token is not None:
+        tablets.remember(response, tablets.COOKIE, token, tablets.COOKIE_AGE_S)
+        response.delete_cookie(SECRET)
+    return response

@@ -1,0 +1,44 @@
+"""The patient's page during a session."""
+
+from __future__ import annotations
+
+from csp.constants import SELF
+from csp.decorators import csp_replace
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
+from django.views.decorators.clickjacking import xframe_options_sameorigin
+
+from rehab.people.access import actor_of, for_roles
+from rehab.people.consent.models import may_be_watched
+from rehab.people.networks import client_address
+from rehab.people.roles import Role
+from rehab.people.web.language import speak_to
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.pages.monitor import ask_for_consent
+from rehab.training.changes import ENDED, State
+
+
+@for_roles(Role.LEAD, Role.PT, tablets=True)
+@xframe_options_sameorigin  # the therapist's page mirrors this one in a frame, to be looked at only
+@csp_replace({"frame-ancestors": [SELF]})  # type: ignore[arg-type]  # knows no views with arguments
+def show_walk(request: HttpRequest, session_id: int) -> HttpResponse:
+    """Show a session as the patient sees it; one that has ended shows its scores."""
+    sessions = TrainingSession.objects.visible_to(actor_of(request)).select_related(
+        "patient__clinic", "station"
+    )
+    session = get_object_or_404(sessions, pk=session_id)
+    alone = not request.user.is_authenticated
+    if not alone and not may_be_watched(session.patient, client_address(request)):
+        return ask_for_consent(request, session.patient)
+    mirror = "mirror" in request.GET
+    speak_to(session.patient)
+    if State(session.state) in ENDED and not mirror:
+        return redirect("scores", session_id=session.pk)
+    context = {
+        "session": session,
+        "mirror": mirror,
+        "tablet": alone,
+        "leave_to": reverse("start") if alone else reverse("patient", args=[session.patient_id]),
+    }
+    return render(request, "sessions/walk.html", context)

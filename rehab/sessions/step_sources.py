@@ -1,0 +1,42 @@
+"""Where a session's steps can come from, as offered in the set-up."""
+
+from __future__ import annotations
+
+import secrets
+from pathlib import Path
+
+from django.conf import settings
+
+from rehab.people.models import Patient
+from rehab.sessions.formatting import RECORDING, SIMULATED
+from rehab.sources.recording.source import holds_signals
+from rehab.sources.synthetic import PROFILES
+
+LIVE = "live"
+
+
+def list_recordings() -> list[Path]:
+    """Give the recordings on this machine. None on a hosted server: they belong to no clinic."""
+    folder: Path = settings.DATA_DIR / "recordings"
+    return [] if settings.HOSTED or not folder.is_dir() else sorted(folder.glob("*.csv"))
+
+
+def list_sources() -> list[tuple[str, str]]:
+    """Give what steps can come from, with the words that a session keeps (`words.say_source`)."""
+    simulated = [(f"synthetic {name}", f"{SIMULATED}{name}") for name in PROFILES]
+    recordings = [
+        (f"recording {file.name}", f"{RECORDING}{file.name}") for file in list_recordings()
+    ]
+    return [(LIVE, "Live sensor"), *simulated, *recordings]
+
+
+def source_arguments(kind: str, name: str, patient: Patient) -> list[str]:
+    """Give what the server runs as `python -m rehab.sources` for a choice of ``list_sources``."""
+    match kind:
+        case "synthetic":
+            return ["synthetic", "--profile", name, "--seed", str(secrets.randbelow(2**31))]
+        case "recording":
+            file = settings.DATA_DIR / "recordings" / name
+            mass = ["--mass", str(patient.body_mass_kg)] if holds_signals(file) else []
+            return ["recording", str(file), *mass]
+    return []

@@ -1,0 +1,491 @@
+"""Boards of several patients: who stands on them, who sees what, and what nobody is shown."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+
+from rehab.boards import entries
+from rehab.boards.figures import read_figures
+from rehab.boards.models import BoardEntry, Leaderboard
+from rehab.boards.showing import Viewer, show_after, show_waiting
+from rehab.people.models import Clinic, Patient
+from rehab.sessions.log import SessionMetric
+from rehab.sessions.models import TrainingSession
+from rehab.stations.models import Device, Station
+from rehab.training.changes import Change, ChangeKind
+from rehab.training.phases import make_phase
+from tests.support.boards import board_of, patient_of, people_of, see, told, walk_down
+from tests.support.walks import strides, walk
+from tests.support.world import NOW
+
+pytestmark = pytest.mark.django_db
+
+
+def walk_two_types(patient: Patient, **how) -> TrainingSession:
+    """Begin with positive feedback and go on with negative; hit every step."""
+    change = [Change(ChangeKind.VALENCE, "negative"), Change(ChangeKind.PHASE, 1)]
+    phases = (make_phase("training"), make_phase("training", "Later"))
+    walked = [*strides(10, 0), *change, *strides(10, 0)]
+    return walk(patient, "positive", walked, phases=phases, **how)
+
+
+@pytest.mark.parametrize(
+    ("fields", "stands"),
+    [
+        ({"types": "all", "metric": "hit_rate"}, True),
+        ({"types": "same", "metric": "hit_rate"}, False),
+        ({"types": "chosen", "valences": ["positive"], "metric": "hit_rate"}, False),
+        ({"types": "same", "metric": "score"}, False),
+        ({"types": "same", "metric": "hit_rate", "tie_breaker": "score"}, False),
+    ],
+)
+def test_a_session_of_two_types_stands_on_no_board_of_points_or_of_one_type(clinic, fields, stands):
+    board = board_of(clinic, **fields)
+    people = people_of(clinic, 6)
+    walk_down(people[1:])
+    session = walk_two_types(people[0])
+    assert (session.valence, session.changed_to) == ("positive", "negative")
+    assert BoardEntry.everywhere.filter(board=board, patient=people[0]).exists() == stands
+    entries.refresh(board, now=NOW)
+    assert BoardEntry.everywhere.filter(board=board, patient=people[0]).exists() == stands
+
+
+@pytest.mark.parametrize("language", ["en", "es"])
+def test_a_session_of_two_types_is_compared_by_its_hits_alone(clinic, language):
+    person = patient_of(clinic, "A", language=language)
+    device = Device(
+        clinic=clinic,
+        station=Station.everywhere.create(clinic=clinic, name="S"),
+        kind="tablet",
+        name="t",
+    )
+    token = device.new_token()
+    device.save()
+    plain, mixed = walk(person, "positive", strides(9, 1)), walk_two_types(person)
+    TrainingSession.everywhere.update(station=device.station)
+    tablet = Client(headers={"Authorization": f"Bearer {token}"})
+    boards = tablet.get(reverse("scores", args=[mixed.pk])).context["boards"]
+    assert [(board.slug, len(board.rows)) for board in boards] == [("all", 2)]
+    boards = tablet.get(reverse("scores", args=[plain.pk])).context["boards"]
+    assert [(board.slug, len(board.rows)) for board in boards] == [("same", 1), ("all", 2)]
+
+
+# --- who stands on a board ----------------------------------------------------------------------
+
+
+def test_neighbors_with_pseudonyms_after_a_session(clinic):
+    board_of(clinic)
+    people = people_of(clinic, 11)
+    sessions = walk_down(people)
+    shown = see(sessions[3])
+    assert told(shown) == [
+        (2, "95%", False),
+        (3, "90%", False),
+        (4, "85%", True),
+        (5, "80%", False),
+        (6, "75%", False),
+    ]
+    assert shown.rows[0].skips
+    names = [row.title for row in shown.rows]
+    assert names == [person.alias for person in people[1:6]]
+    assert len(set(names)) == 5
+    assert not any(
+        person.nickname in name or person.code in name for person in people for name in names
+    )
+
+
+def test_no_sessions_and_the_first_ever(clinic):
+    board = board_of(clinic)
+    person = patient_of(clinic, "A")
+    assert Viewer(board, NOW, person).show().rows == []
+    session = walk(person, "positive", strides(3, 1))
+    shown = see(session)
+    assert not shown.shared
+    assert shown.note == "Fewer than 5 people so far. These are your own sessions."
+    assert told(shown) == [(1, "75%", True)]
+
+
+def test_the_newest_session_is_the_worst_of_a_hundred_own_ones(clinic):
+    Leaderboard.everywhere.create(clinic=clinic, name="Own", period="all", min_valid_strides=1)
+    person = patient_of(clinic, "A", "own")
+    for number in range(99):
+        walk(person, "positive", strides(2, 1), days_ago=number + 1)
+    shown = see(walk(person, "positive", strides(1, 9)))
+    assert told(shown) == [(1, "67%", False), (1, "67%", False), (100, "10%", True)]
+    assert shown.rows[0].skips
+
+
+def test_four_participants_see_their_own_sessions_and_why_five_see_the_board(clinic):
+    board_of(clinic)
+    people = people_of(clinic, 5)
+    sessions = walk_down(people[:4])
+    before = see(sessions[0])
+    assert not before.shared
+    assert "Fewer than 5 people" in before.note
+    walk(people[4], "positive", strides(1, 9))
+    after = see(sessions[0])
+    assert after.shared
+    assert len(after.rows) == 3
+
+
+def test_simulated_patients_hide_no_person(clinic):
+    board = board_of(clinic, types="all", include_simulated=True, display="top", names="code")
+    simulated = [patient_of(clinic, f"S{number}", simulated=True) for number in range(5)]
+    sessions = [walk(one, "positive", strides(8, 2), simulated=True) for one in simulated]
+    tried = see(sessions[0])  # alone they are shown: whoever tries GARRY sees a board
+    assert tried.shared
+    assert tried.facts == "5 patients on it now."
+    people = people_of(clinic, 5)
+    walk(people[0], "positive", strides(9, 1))
+    for viewer in (Viewer(board, NOW, simulated[0]), Viewer(board, NOW, people[0])):
+        for made in (None, list(read_figures(board, NOW))):
+            shown = replace(viewer, made=made).show()
+            assert not shown.shared
+            assert "C-0" not in [row.title for row in shown.rows]
+            assert shown.facts.startswith("1 patient on it now. Under 5")
+    walk_down(people[1:])
+    for made in (None, list(read_figures(board, NOW))):
+        shown = Viewer(board, NOW, people[0], made=made).show()
+        assert shown.shared
+        assert shown.facts == "10 patients on it now."
+
+
+def test_nobody_is_shown_in_the_last_half_and_who_is_there_sees_the_own_sessions(clinic):
+    board = board_of(clinic)
+    sessions = walk_down(people_of(clinic, 9))
+    assert [row.rank for row in see(sessions[4]).rows] == [3, 4, 5]
+    worst = see(sessions[8])
+    assert not worst.shared
+    assert told(worst) == [(1, "60%", True)]
+    board.display = "top_and_me"
+    board.save()
+    last = see(sessions[8])
+    assert told(last)[-1] == (None, "60%", True)
+    assert last.rows[-1].skips
+    assert [row.rank for row in last.rows[:-1]] == [1, 2, 3, 4, 5]
+
+
+def test_ties_at_the_cut_are_all_shown(clinic):
+    board = board_of(clinic, display="top", top_n=2)
+    people = people_of(clinic, 8)
+    sessions = [
+        walk(one, "positive", strides(hits, 10 - hits), days_ago=9 - day)
+        for day, (one, hits) in enumerate(zip(people, (9, 7, 7, 7, 5, 4, 3, 2), strict=True))
+    ]
+    assert [row[:2] for row in told(see(sessions[0]))] == [
+        (1, "90%"),
+        (2, "70%"),
+        (2, "70%"),
+        (2, "70%"),
+    ]
+    assert [row.title for row in see(sessions[0]).rows] == [one.alias for one in people[:4]]
+    for ties, ranks in (("dense", [1, 2, 2, 2]), ("earlier", [1, 2])):
+        board.ties = ties
+        board.save()
+        assert [row.rank for row in see(sessions[0]).rows] == ranks
+
+
+def test_a_tie_breaker_comes_before_the_earlier_date(clinic):
+    board_of(clinic, display="top", top_n=3, ties="earlier", tie_breaker="steps")
+    people = people_of(clinic, 6)
+    counts = (10, 20, 30, 10, 10, 10)
+    sessions = [
+        walk(one, "positive", strides(count, 0), days_ago=9 - day)
+        for day, (one, count) in enumerate(zip(people, counts, strict=True))
+    ]
+    assert [row.title for row in see(sessions[0]).rows] == [
+        people[2].alias,
+        people[1].alias,
+        people[0].alias,
+    ]
+
+
+def test_kept_points_break_ties_and_reward_no_short_walk(clinic):
+    board_of(
+        clinic,
+        types="chosen",
+        valences=["negative"],
+        tie_breaker="score",
+        display="top",
+        ties="earlier",
+    )
+    people = people_of(clinic, 6)
+    sessions = [
+        walk(one, "negative", strides(9 * tens, tens), days_ago=9 - tens)
+        for one, tens in zip(people, (1, 2, 3, 4, 5, 6), strict=True)
+    ]
+    walked_most = [one.alias for one in people[:2:-1]]
+    assert [row.title for row in see(sessions[5]).rows] == walked_most
+
+
+@pytest.mark.parametrize(
+    "gone", [{"steps"}, {"steps", "hit_rate", "active_minutes"}], ids=["no steps", "points alone"]
+)
+def test_lost_points_without_a_stake_are_told_to_nobody(clinic, gone):
+    """Sessions that were imported have their points, and may have nothing else."""
+    board = board_of(
+        clinic, metric="score", types="chosen", valences=["negative"], min_valid_strides=0
+    )
+    people = people_of(clinic, 6)
+    sessions = walk_down(people, "negative")
+    imported = SessionMetric.everywhere.filter(session=sessions[0])
+    imported.filter(slug__in=gone).delete()
+    entries.refresh(board, now=NOW)
+    assert set(BoardEntry.everywhere.values_list("patient", flat=True)) == {
+        one.pk for one in people[1:]
+    }
+    assert "−" not in page_of(sessions[0]).split('id="board-')[1].split("</section>")[0]
+
+
+def test_a_patient_with_mixed_types_has_a_row_on_each_list(clinic):
+    board = board_of(clinic, metric="score")
+    people = people_of(clinic, 5)
+    positive = walk_down(people)
+    binary = walk_down(people, "binary")
+    negative = walk_down(people, "negative")
+    assert told(see(positive[0]))[0] == (1, "20", True)
+    assert told(see(binary[1]))[1] == (2, "18", True)
+    kept = see(negative[1])
+    assert kept.kept
+    assert [(row.rank, row.value, row.stake) for row in kept.rows] == [
+        (None, "20", "20"),
+        (None, "19", "20"),
+        (None, "18", "20"),
+    ]
+    assert BoardEntry.everywhere.filter(board=board).count() == 15
+    explicit = walk(people[0], "explicit", strides(9, 1))
+    assert see(explicit).rows == []
+
+
+def test_negative_points_are_told_as_kept_never_as_a_loss(clinic):
+    board_of(clinic, metric="score", types="chosen", valences=["negative"])
+    people = people_of(clinic, 6)
+    session = walk(people[0], "negative", strides(288, 12))
+    walk_down(people[1:], "negative")
+    page = page_of(session)
+    assert "<small>kept</small> 288 <small>of 300</small>" in page
+    assert "−" not in page
+    assert 'class="rank"' not in page.split('id="board-')[1].split("</section>")[0]
+
+
+# --- agreeing, and no longer ----------------------------------------------------------------------
+
+
+def page_of(session: TrainingSession, client: Client | None = None) -> str:
+    if client is None:
+        station, _ = Station.everywhere.get_or_create(clinic=session.clinic, name="One")
+        TrainingSession.everywhere.filter(pk=session.pk).update(station=station)
+        client = tablet_at(station)
+    answer = client.get(reverse("scores", kwargs={"session_id": session.pk}))
+    assert answer.status_code == 200
+    return answer.content.decode()
+
+
+def tablet_at(station: Station) -> Client:
+    tablet = Device(clinic=station.clinic, station=station, kind="tablet", name="T")
+    token = tablet.new_token()
+    tablet.save()
+    return Client(headers={"Authorization": f"Bearer {token}"})
+
+
+def test_who_has_not_agreed_stands_on_none_and_sees_none(clinic):
+    board = board_of(clinic)
+    sessions = walk_down(people_of(clinic, 6))
+    alone = patient_of(clinic, "S", "own")
+    shown = see(walk(alone, "positive", strides(20, 0)))
+    assert (shown.shared, shown.note) == (False, "These are your own sessions.")
+    assert not BoardEntry.everywhere.filter(board=board, patient=alone).exists()
+    assert see(sessions[0]).rows[0].rank == 1
+    totals_only = patient_of(clinic, "T", "total")
+    assert not see(walk(totals_only, "positive", strides(20, 0))).shared
+
+
+def test_taken_back_on_the_tablet_it_is_gone_with_the_next_view_of_two_tablets(clinic):
+    board_of(clinic, display="top", top_n=3)
+    people = people_of(clinic, 7)
+    sessions = walk_down(people)
+    stations = [Station.everywhere.create(clinic=clinic, name=name) for name in ("East", "West")]
+    for session, station in zip(sessions, stations, strict=False):
+        TrainingSession.everywhere.filter(pk=session.pk).update(station=station)
+    tablets = [tablet_at(station) for station in stations]
+    east, west = (page_of(s, t) for s, t in zip(sessions, tablets, strict=False))
+    first, second = people[0].alias, people[1].alias
+    assert f"<b>You</b> {first}" in east
+    assert f"<b>You</b> {second}" in west
+    assert first in west
+    assert second in east
+    leave = reverse("leave-boards", kwargs={"session_id": sessions[0].pk})
+    assert tablets[1].post(leave).status_code == 404
+    assert tablets[0].post(leave).status_code == 302
+    assert first not in page_of(sessions[1], tablets[1])
+    own = page_of(sessions[0], tablets[0])
+    assert "These are your own sessions." in own
+    assert second not in own
+    assert see(sessions[1]).rows[0].you
+
+
+def test_taken_back_behind_our_back_the_row_is_not_shown_either(clinic):
+    board_of(clinic, display="top", top_n=3)
+    people = people_of(clinic, 8)
+    sessions = walk_down(people)
+    Patient.everywhere.filter(pk=people[0].pk).update(boards="own")
+    assert people[0].alias not in [row.title for row in see(sessions[1]).rows]
+
+
+def test_in_a_blinded_study_there_is_no_board_and_no_score(clinic):
+    board = board_of(clinic)
+    people = people_of(clinic, 6)
+    sessions = walk_down(people)
+    people[0].blinded = True
+    people[0].save()
+    sessions[0].refresh_from_db()
+    assert show_after(sessions[0], NOW) == []
+    page = page_of(sessions[0])
+    assert "This walk is over." in page
+    assert 'class="value"' not in page
+    assert not BoardEntry.everywhere.filter(board=board, patient=people[0]).exists()
+
+
+def test_initials_and_codes_are_unique_on_what_is_shown(clinic):
+    board = board_of(clinic, names="initials", display="top", top_n=3)
+    people = people_of(clinic, 5)
+    sessions = walk_down(people)
+    assert [row.title for row in see(sessions[0]).rows] == ["N.C.", "N.C. 2", "N.C. 3"]
+    board.names = "code"
+    board.save()
+    assert [row.title for row in see(sessions[0]).rows] == ["C-0", "C-1", "C-2"]
+
+
+def test_a_new_animal_name_is_seen_at_once(clinic):
+    board_of(clinic, display="top", top_n=1)
+    people = people_of(clinic, 5)
+    sessions = walk_down(people)
+    old = people[0].alias
+    people[0].draw_alias()
+    people[0].save(update_fields=["alias"])
+    assert people[0].alias != old
+    assert see(sessions[1]).rows[0].title == people[0].alias
+
+
+# --- clinics --------------------------------------------------------------------------------------
+
+
+def test_clinic_a_never_sees_b(clinic):
+    other = Clinic.everywhere.create(name="Oak")
+    board_of(clinic, display="top")
+    board_of(other, display="top")
+    mine, theirs = walk_down(people_of(clinic, 5)), walk_down(people_of(other, 9))
+    assert len(see(mine[0]).rows) == 3
+    assert len(see(theirs[0]).rows) == 5
+    assert not {row.title for row in see(mine[0]).rows} & {row.title for row in see(theirs[0]).rows}
+
+
+def test_across_clinics_stand_those_who_agreed_of_clinics_that_take_part(clinic):
+    oak = Clinic.everywhere.create(name="Oak", boards_across=True)
+    elsewhere = Clinic.everywhere.create(name="Yew")
+    board = board_of(None, among="across", display="top")
+    for place in (clinic, oak, elsewhere):
+        walk_down(people_of(place, 3, boards="across"))
+    walk(patient_of(clinic, "X", "clinic"), "positive", strides(30, 0))
+    assert BoardEntry.everywhere.filter(board=board).count() == 6
+    session = TrainingSession.everywhere.filter(clinic=oak).first()
+    assert see(session).shared
+    assert show_after(TrainingSession.everywhere.filter(clinic=elsewhere).first(), NOW) == []
+    oak.boards_across = False
+    oak.save()
+    assert BoardEntry.everywhere.filter(board=board).count() == 3
+
+
+def test_a_group_compares_the_chosen_alone(clinic):
+    people = people_of(clinic, 9)
+    sessions = walk_down(people)
+    board = board_of(clinic, among="group", display="top")
+    assert not see(sessions[0]).shared
+    board.group.set(people[2:8])
+    assert [row.title for row in see(sessions[2]).rows] == [one.alias for one in people[2:5]]
+    assert not see(sessions[0]).shared
+
+
+# --- figures --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("entry", "value"), [("best", "80%"), ("latest", "40%"), ("mean", "55%")])
+def test_what_stands_in_a_row(clinic, entry, value):
+    board = board_of(clinic, entry=entry, mean_of=2)
+    person = patient_of(clinic, "A")
+    for days_ago, hits in ((3, 8), (2, 7), (1, 4)):
+        walk(person, "positive", strides(hits, 10 - hits), days_ago=days_ago)
+    (row,) = BoardEntry.everywhere.filter(board=board)
+    assert f"{row.figure}%" == value
+
+
+def test_only_sessions_that_are_long_enough_ended_and_walked_count(clinic):
+    board = board_of(clinic, min_valid_strides=10, entry="sum", metric="attended", types="all")
+    person = patient_of(clinic, "A")
+    walk(person, "positive", strides(9, 0))
+    walk(person, "positive", strides(90, 0), simulated=True)
+    walk(person, "positive", strides(90, 0), end=ChangeKind.ABORT)
+    walk(person, "positive", strides(90, 0), end=None)
+    assert not BoardEntry.everywhere.exists()
+    walk(person, "binary", strides(10, 0))
+    assert BoardEntry.everywhere.get().figure == 1
+    board.min_minutes = 1
+    board.include_simulated = True
+    board.save()
+    assert BoardEntry.everywhere.get().figure == 2
+    walk(person, "positive", strides(70, 0), phases=(make_phase("washout"),))
+    assert BoardEntry.everywhere.get().figure == 3
+
+
+def test_minutes_of_a_day_are_counted_up_to_an_hour_and_targets_by_the_day(clinic):
+    minutes = board_of(clinic, entry="sum", metric="active_minutes", types="all")
+    days = board_of(clinic, name="Days", entry="sum", metric="target_met", types="all")
+    person = patient_of(clinic, "A")
+    for _ in range(2):
+        walk(person, "positive", strides(2400, 0), days_ago=2, wanted=0.5)
+    walk(person, "positive", strides(600, 0), days_ago=1, wanted=0.5)
+    walk(person, "positive", strides(0, 600), wanted=0.5)
+    assert BoardEntry.everywhere.get(board=minutes).figure == 60 + 10 + 10
+    assert BoardEntry.everywhere.get(board=days).figure == 2
+
+
+def test_a_total_is_reached_together_and_hidden_below_five(clinic):
+    board_of(clinic, display="total", entry="sum", metric="steps", types="all", total_goal=200)
+    people = people_of(clinic, 5, boards="total")
+    sessions = walk_down(people[:4])
+    alone = see(sessions[1])
+    assert (alone.total, alone.rows[0].value, alone.rows[0].you) == (None, "20", True)
+    walk(people[4], "positive", strides(20, 0))
+    total = see(sessions[0]).total
+    assert (total.value, total.goal, total.bar, total.people) == ("100", "200", 50, 5)
+    assert total.mine == "20"
+
+
+def test_lower_may_be_better(clinic):
+    board_of(clinic, higher_is_better=False, display="top")
+    people = people_of(clinic, 5)
+    sessions = walk_down(people)
+    assert told(see(sessions[4])) == [(1, "80%", True), (2, "85%", False), (3, "90%", False)]
+
+
+# --- tablets --------------------------------------------------------------------------------------
+
+
+def test_a_waiting_tablet_shows_the_clinics_board_once_there_are_enough(clinic):
+    board_of(clinic, moment="waiting", display="top", types="all")
+    people = people_of(clinic, 6)
+    walk_down(people[:4])
+    tablet = tablet_at(Station.everywhere.create(clinic=clinic, name="East"))
+    url = reverse("waiting-board")
+    assert tablet.get(url).status_code == 204
+    walk_down(people[4:])
+    page = tablet.get(url).content.decode()
+    assert re.findall(r"</b> |<span class=\"day\">(\w+ \w+)", page)[0] in {p.alias for p in people}
+    assert "You" not in page
+    assert show_waiting(clinic, NOW)
+    assert Client().get(url).status_code == 302

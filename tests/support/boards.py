@@ -1,0 +1,57 @@
+"""Patients, boards and walks for tests of boards."""
+
+from __future__ import annotations
+
+from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.boards.showing import show_after
+from rehab.people.models import Clinic, Patient
+from rehab.sessions.models import TrainingSession
+from tests.support.walks import strides, walk
+from tests.support.world import NOW, agreeing
+
+COMMON = {"among": "clinic", "entry": "best", "min_valid_strides": 1, "period": "all"}
+
+
+def patient_of(clinic: Clinic, code: str, boards: str = "clinic", **fields) -> Patient:
+    patient = Patient.everywhere.create(
+        clinic=clinic,
+        code=code,
+        nickname=f"Nick {code}",
+        paretic_side="left",
+        boards=boards,
+        **fields,
+    )
+    return agreeing(patient)
+
+
+def people_of(clinic: Clinic, count: int, **fields) -> list[Patient]:
+    return [patient_of(clinic, f"C-{number}", **fields) for number in range(count)]
+
+
+def board_of(clinic: Clinic | None, **fields) -> Leaderboard:
+    board = Leaderboard(clinic=clinic, **{"name": "Board"} | COMMON | fields)
+    board.full_clean()
+    board.save()
+    return board
+
+
+def walk_down(people: list[Patient], valence: str = "positive", **how) -> list[TrainingSession]:
+    """Let each patient hit a little less often than the one before: 20 of 20, 19 of 20, …"""
+    return [walk(one, valence, strides(20 - n, n), **how) for n, one in enumerate(people)]
+
+
+def see(session: TrainingSession, now=NOW):
+    """Look at the only board after a session, with what is stored and with what is counted anew."""
+    (shown,) = show_after(session, now)
+    return shown
+
+
+def told(shown) -> list[tuple[int | None, str, bool]]:
+    return [(row.rank, row.value.replace("\N{NO-BREAK SPACE}", ""), row.you) for row in shown.rows]
+
+
+def everything() -> tuple[list[str], list[tuple[int, str, int, int]]]:
+    fields = ("board", "patient", "valence", "figure", "stake", "key", "stale_on")
+    rows = sorted(map(str, BoardEntry.everywhere.values_list(*fields)))
+    counts = sorted(BoardCount.everywhere.values_list("board", "valence", "figure", "rows"))
+    return rows, counts

@@ -1,0 +1,70 @@
+"""Fill a server's database with running sessions: `python -m tests.support.live_seed COUNT`."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from typing import Any
+
+import django
+
+
+def seed(count: int) -> list[dict[str, Any]]:
+    """Make so many running sessions, each with its station and devices; give ids and tokens."""
+    from importlib import import_module
+
+    from django.conf import settings
+    from django.contrib.auth import BACKEND_SESSION_KEY, HASH_SESSION_KEY, SESSION_KEY
+    from django.db import transaction
+    from django.utils import timezone
+
+    from rehab.people.models import Patient, User
+    from rehab.people.roles import Role
+    from rehab.people.sign_in.first_start import first_clinic, prepare_database
+    from rehab.people.sign_in.flow import BACKEND
+    from rehab.sessions.live.actor import SessionActor
+    from rehab.sessions.services import create_session
+    from rehab.stations.models import Device, Station
+    from rehab.training.changes import Change, ChangeKind
+    from rehab.training.goals import GoalRule
+    from rehab.training.phases import make_phase
+    from tests.support.world import store
+
+    prepare_database()
+    clinic = first_clinic()
+    person = User.everywhere.create_user(f"pt{os.getpid()}", role=Role.PT, clinic=clinic)
+    cookies = import_module(settings.SESSION_ENGINE).SessionStore()
+    cookies[SESSION_KEY] = str(person.pk)
+    cookies[BACKEND_SESSION_KEY] = BACKEND
+    cookies[HASH_SESSION_KEY] = person.get_session_auth_hash()
+    cookies.save()
+    made = []
+    with transaction.atomic():
+        for index in range(count):
+            name = f"{os.getpid()}-{index}"
+            station = Station.everywhere.create(clinic=clinic, name=name)
+            patient = Patient.everywhere.create(
+                clinic=clinic, code=name, nickname=name[:32], paretic_side="left"
+            )
+            tokens = {}
+            for kind in Device.Kind.values:
+                device = Device(clinic=clinic, station=station, kind=kind, name=kind)
+                tokens[kind] = device.new_token()
+                device.save()
+            session = create_session(
+                patient,
+                valence="binary",
+                goal=GoalRule(value=3.0),
+                phases=(make_phase("training"),),
+                station=station,
+            )
+            actor = SessionActor(session)
+            store(actor, actor.change(Change(ChangeKind.START), None, timezone.now()))
+            made.append({"session": session.pk, "cookie": cookies.session_key, **tokens})
+    return made
+
+
+if __name__ == "__main__":
+    django.setup()
+    print(json.dumps(seed(int(sys.argv[1]))))

@@ -1,0 +1,73 @@
+"""A real server for tests: its own process, port and folder."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+
+@dataclass
+class Server:
+    """A running `manage.py serve`."""
+
+    port: int
+    folder: Path
+    process: subprocess.Popen[str]
+    said: str
+
+    @property
+    def url(self) -> str:
+        """Its address."""
+        return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def password(self) -> str:
+        """The first account's password, as the server told it."""
+        return self.said.split("with the password ")[1].split()[0]
+
+
+def free_port() -> int:
+    """Give a port that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def clean_environment(folder: Path, port: int) -> dict[str, str]:
+    """Give this process's environment with none of its GARRY settings."""
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("GARRY_")}
+    return clean | {"GARRY_DATA_DIR": str(folder), "GARRY_PORT": str(port)}
+
+
+@contextmanager
+def serve(folder: Path, *arguments: str) -> Iterator[Server]:
+    """Run `manage.py serve` on a folder of its own until the block ends."""
+    port = free_port()
+    process = subprocess.Popen(
+        [sys.executable, "manage.py", "serve", *arguments],
+        cwd=ROOT,
+        env=clean_environment(folder, port),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    assert process.stdout is not None
+    said = ""
+    try:
+        for line in process.stdout:
+            said += line
+            if line.startswith("Ready"):
+                break
+        yield Server(port, folder, process, said)
+    finally:
+        process.kill()
+        process.wait(10)
+        process.stdout.close()

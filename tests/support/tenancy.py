@@ -1,0 +1,239 @@
+"""Finds every address of the site by itself, opens it as everyone, and says what leaks."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+from django.contrib import admin
+from django.contrib.contenttypes.models import ContentType
+from django.db.models import Model
+from django.test import Client, RequestFactory
+from django.urls import URLPattern, URLResolver, get_resolver, reverse
+
+from rehab.boards.models import Leaderboard
+from rehab.people.models import Patient
+from rehab.people.roles import Role
+from rehab.sessions.models import TrainingSession
+from tests.support.archives import words_of
+from tests.support.world import Actor, World, mark, scoped_models
+
+# What a role reads in the pages of its own clinic, by the marks of tests/support/world.py.
+# Researchers see no patient; a host sees clinics and accounts and nothing else.
+HOST_SEES = {"Clinic", "User"}
+
+# Parameters of addresses, the model that they name a row of, and by what.
+KEYS: dict[str, tuple[type[Model], str]] = {
+    "board_id": (Leaderboard, "pk"),
+    "code": (Patient, "code"),
+    "patient_id": (Patient, "pk"),
+    "session_id": (TrainingSession, "pk"),
+}
+
+
+def may_read(actor: Actor, model: type[Model], clinic: str) -> bool:
+    """Say, independently of the code under test, whether an actor may read a clinic's rows."""
+    if actor.role == "host":
+        return model.__name__ in HOST_SEES
+    if actor.clinic != clinic:
+        return False
+    if model.__name__ in {"ApiToken", "AuditEntry"}:
+        return actor.role == "lead"
+    if actor.role == "researcher":  # the world's change is one of a patient
+        hidden = {
+            "Patient",
+            "User",
+            "Clinic",
+            "Station",
+            "Device",
+            "Consent",
+            "ConsentText",
+            "Visit",
+        }
+        return model.__name__ not in {*hidden, "HistoryEntry"}
+    return actor.role in {"lead", "pt"}
+
+
+@dataclass(frozen=True)
+class Route:
+    """An address of the site with everything filled in."""
+
+    name: str
+    url: str
+    owner: str | None = None  # the clinic whose row the address names
+    model: type[Model] | None = None
+
+
+def walk_patterns(
+    resolver: URLResolver, names: tuple[str, ...] = (), route: str = ""
+) -> Iterator[tuple[str, str, URLPattern]]:
+    for entry in resolver.url_patterns:
+        here = route + str(entry.pattern)
+        if isinstance(entry, URLResolver):
+            inner = (*names, entry.namespace) if entry.namespace else names
+            yield from walk_patterns(entry, inner, here)
+        else:
+            yield ":".join((*names, entry.name or "")), here, entry
+
+
+def all_routes(worlds: tuple[World, ...]) -> Iterator[Route]:
+    """Give every address that the site knows, for the rows of every clinic."""
+    for name, _, pattern in walk_patterns(get_resolver()):
+        wanted = set(pattern.pattern.converters) or set(
+            getattr(pattern.pattern, "regex", None).groupindex
+            if hasattr(pattern.pattern, "regex") and not pattern.pattern.converters
+            else ()
+        )
+        yield from fill(name, wanted, pattern, worlds)
+
+
+def fill(
+    name: str, wanted: set[str], pattern: URLPattern, worlds: tuple[World, ...]
+) -> Iterator[Route]:
+    """Fill an address in. Fails for a parameter that it does not know: teach it the new one."""
+    model = model_of_admin_route(name)
+    if name == "admin:":  # Django's redirect from a bare object address to its change page
+        return
+    if name == "admin:autocomplete":
+        for target in scoped_models():
+            for related in target._meta.concrete_fields:
+                if related.is_relation:
+                    asked = f"app_label=rehab&model_name={target._meta.model_name}"
+                    yield Route(name, f"{reverse(name)}?{asked}&field_name={related.name}&term=zq")
+        return
+    if not wanted and name.startswith("admin:") and name.endswith("_changelist"):
+        assert model is not None
+        yield Route(name, reverse(name))
+        yield Route(name, f"{reverse(name)}?q=zq")
+        for field in model._meta.concrete_fields:
+            if field.is_relation and field.related_model in worlds[0].rows:
+                for world in worlds:
+                    key = world.rows[field.related_model].pk
+                    yield Route(name, f"{reverse(name)}?{field.name}__id__exact={key}")
+        return
+    if not wanted:
+        assert name, f"the route {pattern} has no name, so it cannot be checked"
+        yield Route(name, reverse(name))
+        return
+    for world in worlds:
+        if wanted == {"object_id"} and model is not None:
+            key = world.rows[model].pk
+            yield Route(name, reverse(name, kwargs={"object_id": key}), world.name, model)
+        elif wanted == {"id"} and name == "admin:auth_user_password_change":
+            user = world.people[Role.PT]
+            yield Route(name, reverse(name, kwargs={"id": user.pk}), world.name, type(user))
+        elif wanted == {"content_type_id", "object_id"}:
+            for kind, row in world.rows.items():
+                type_id = ContentType.objects.get_for_model(kind).pk
+                kwargs = {"content_type_id": type_id, "object_id": row.pk}
+                yield Route(name, reverse(name, kwargs=kwargs), world.name, kind)
+        elif len(wanted) == 1 and (parameter := min(wanted)) in KEYS:
+            target, by = KEYS[parameter]
+            key = getattr(world.rows[target], by)
+            yield Route(name, reverse(name, kwargs={parameter: key}), world.name, target)
+        elif wanted == {"app_label"}:
+            yield Route(name, reverse(name, kwargs={"app_label": "rehab"}))
+            return
+        elif wanted == {"language"}:
+            yield Route(name, reverse(name, kwargs={"language": "es"}))
+            return
+        elif wanted == {"url"}:
+            yield Route(name, reverse("admin:index") + "no-such-page")
+            return
+        else:
+            pytest.fail(f"the matrix does not know how to fill {name or pattern} {wanted}")
+
+
+def model_of_admin_route(name: str) -> type[Any] | None:
+    for model in admin.site._registry:
+        meta = model._meta
+        if name.startswith(f"admin:{meta.app_label}_{meta.model_name}_"):
+            return model
+    return None
+
+
+def enter(actor: Actor, worlds: tuple[World, ...]) -> Client:
+    if actor.role == "device":
+        token = next(world.token for world in worlds if world.name == actor.clinic)
+        return Client(headers={"Authorization": f"Bearer {token}"}, raise_request_exception=False)
+    client = Client(raise_request_exception=False)
+    if actor.role != "stranger" or actor.label == "switched off":
+        client.force_login(actor.subject)
+    return client
+
+
+def find_leaks(
+    worlds: tuple[World, ...], actors: list[Actor], under: str = "/"
+) -> tuple[list[str], Counter[str]]:
+    """Open every address as every actor. Give what they should not have got, and counts."""
+    leaks: list[str] = []
+    counts: Counter[str] = Counter()
+    routes = [r for r in dict.fromkeys(all_routes(worlds)) if r.url.startswith(under)]
+    for actor in actors:
+        client = enter(actor, worlds)
+        for route in routes:
+            if route.name == "admin:logout":
+                continue
+            response = client.get(route.url)
+            counts[actor.label] += 1
+            leaks += what_leaks(actor, route, response, worlds)
+    return leaks, counts
+
+
+def what_leaks(
+    actor: Actor, route: Route, response: Any, worlds: tuple[World, ...]
+) -> Iterator[str]:
+    """Give what is wrong with an answer: a foreign mark, an open door, a failure."""
+    body = words_of(response)
+    if response.status_code >= 500:
+        yield f"{actor.label}: {route.url} fails with {response.status_code}"
+    for world in worlds:
+        for model in scoped_models():
+            if mark(world.name, model) in body and not may_read_mark(actor, model, world):
+                yield f"{actor.label}: {route.url} shows {model.__name__} of {world.name}"
+    is_open = response.status_code == 200 and route.owner and route.model
+    if is_open and not may_read(actor, route.model, route.owner):
+        yield f"{actor.label}: {route.url} opens"
+
+
+def may_read_mark(actor: Actor, model: type[Model], world: World) -> bool:
+    """Names of accounts and stations may stand beside a session that an actor may read."""
+    beside = {"User", "Station", "Clinic"}
+    if actor.role == "researcher" and actor.clinic == world.name and model.__name__ in beside:
+        return True
+    return may_read(actor, model, world.name)
+
+
+def find_offers(worlds: tuple[World, ...], actors: list[Actor]) -> tuple[list[str], int]:
+    """Look at the pickers of every admin form, in pages and inlines, for everyone who may open one.
+
+    Give the rows of other clinics that they offer, and how many pickers there are.
+    """
+    leaks, checked = [], 0
+    for actor in actors:
+        if actor.role not in Role.values:
+            continue
+        request = RequestFactory().get("/")
+        request.user = actor.subject
+        for options in admin.site._registry.values():
+            if not options.has_add_permission(request):
+                continue
+            forms = [options.get_form(request)]
+            forms += [i.get_formset(request).form for i in options.get_inline_instances(request)]
+            for name, field in [pair for form in forms for pair in form.base_fields.items()]:
+                rows = getattr(field, "queryset", None)
+                if rows is None:
+                    continue
+                checked += 1
+                kind, of = rows.model, options.model.__name__
+                leaks += [
+                    f"{actor.label}: {of}.{name} offers {kind.__name__} of {world.name}"
+                    for world in worlds
+                    if world.name != actor.clinic
+                    and kind.__name__ not in HOST_SEES
+                    and rows.filter(pk=world.rows[kind].pk).exists()
+                ]
+    return leaks, checked

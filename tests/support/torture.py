@@ -1,0 +1,230 @@
+"""Sources and viewers that outlive a server which is killed again and again.
+
+Each source keeps what is not acknowledged and resends it; each viewer connects again with the last
+step it has. At the end the log must hold every acknowledged step, once, and every viewer must have
+seen every step, once.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import random
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
+
+from tests.support.servers import ROOT, clean_environment, free_port
+
+GONE = (ConnectionClosed, InvalidHandshake, OSError, EOFError, TimeoutError)
+
+
+@dataclass
+class Walk:
+    """One session's source and viewer, and what each of them knows."""
+
+    row: dict[str, Any]
+    port: int
+    rate: float
+    made: int = 0
+    unacknowledged: dict[int, str] = field(default_factory=dict)
+    acknowledged: int = 0
+    seen: list[int] = field(default_factory=list)
+    stopping: bool = False
+
+    async def dial(self, path: str, token: str) -> ClientConnection:
+        return await connect(
+            f"ws://127.0.0.1:{self.port}{path}",
+            additional_headers={"Authorization": f"Bearer {token}"},
+            open_timeout=5,
+            max_queue=None,
+        )
+
+    async def send(self) -> None:
+        """Walk, and never lose a step that was not acknowledged."""
+        while not (self.stopping and not self.unacknowledged):
+            try:
+                async with await self.dial("/ws/source/", self.row["source"]) as socket:
+                    await self._send_over(socket)
+            except GONE:
+                await asyncio.sleep(0.05)
+
+    async def _send_over(self, socket: ClientConnection) -> None:
+        hello = {"type": "hello", "version": 1, "run": "torture", "last": self.made}
+        await socket.send(json.dumps(hello))
+        welcome = json.loads(await socket.recv())
+        assert welcome["type"] == "welcome", welcome
+        self._acknowledge(welcome["next"] - 1)
+        for text in list(self.unacknowledged.values()):
+            await socket.send(text)
+        hearing = asyncio.create_task(self._hear(socket))
+        try:
+            while not (self.stopping and not self.unacknowledged):
+                if hearing.done():
+                    await hearing
+                    return
+                if not self.stopping and len(self.unacknowledged) < 200:
+                    await socket.send(self._next_step())
+                await asyncio.sleep(1 / self.rate)
+        finally:
+            hearing.cancel()
+
+    def _next_step(self) -> str:
+        self.made += 1
+        step = {
+            "type": "step",
+            "number": self.made,
+            "time_s": round(self.made * 1.1, 3),
+            "side": "left",
+            "value": 2.0 + (self.made * 7919 % 200) / 100,
+        }
+        self.unacknowledged[self.made] = json.dumps(step)
+        return self.unacknowledged[self.made]
+
+    async def _hear(self, socket: ClientConnection) -> None:
+        async for text in socket:
+            message = json.loads(text)
+            assert message["type"] != "error", message
+            if message["type"] == "ack":
+                self._acknowledge(message["number"])
+
+    def _acknowledge(self, number: int) -> None:
+        for one in range(self.acknowledged + 1, number + 1):
+            self.unacknowledged.pop(one, None)
+        self.acknowledged = max(self.acknowledged, number)
+
+    async def watch(self) -> None:
+        """See every step, across all deaths of the server."""
+        path = f"/ws/session/{self.row['session']}/patient/"
+        while True:
+            after = self.seen[-1] if self.seen else 0
+            try:
+                async with await self.dial(f"{path}?after={after}", self.row["tablet"]) as socket:
+                    async for text in socket:
+                        message = json.loads(text)
+                        for step in message.get("steps", []) if "frame" in message else []:
+                            self.seen.append(step["number"])
+                        for event in message.get("events", []):
+                            if event["kind"] in ("step", "missing"):
+                                self.seen.append(event["number"])
+                        if "frame" in message:
+                            await socket.send(
+                                json.dumps({"type": "seen", "frame": message["frame"]})
+                            )
+            except GONE:
+                await asyncio.sleep(0.05)
+
+
+class Torture:
+    """A server that dies, and those who must not notice."""
+
+    def __init__(self, folder: Path, seed: int, rate: float = 40.0) -> None:
+        self.folder = folder
+        self.random = random.Random(seed)
+        self.port = free_port()
+        self.rate = rate
+        self.walks: list[Walk] = []
+        self.environment = clean_environment(folder, self.port) | {
+            "DJANGO_SETTINGS_MODULE": "garry_site.settings"
+        }
+
+    def run_python(self, *arguments: str) -> str:
+        """Run Python beside the server, on its database."""
+        result = subprocess.run(
+            [sys.executable, *arguments],
+            cwd=ROOT,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert result.returncode == 0, result.stderr
+        return result.stdout
+
+    async def start_server(self) -> asyncio.subprocess.Process:
+        process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            "manage.py",
+            "serve",
+            cwd=ROOT,
+            env=self.environment,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.DEVNULL,
+        )
+        assert process.stdout is not None
+        async for line in process.stdout:
+            if line.startswith(b"Ready"):
+                break
+        return process
+
+    async def resume(self, walk: Walk) -> None:
+        """Do what the PT does: a session comes back paused, and a person lets it go on."""
+        origin = f"http://127.0.0.1:{self.port}"
+        cookie = f"sessionid={walk.row['cookie']}"
+        async with await connect(
+            f"ws://127.0.0.1:{self.port}/ws/session/{walk.row['session']}/monitor/",
+            additional_headers={"Cookie": cookie, "Origin": origin},
+            max_queue=None,
+        ) as socket:
+            await socket.send('{"type":"change","kind":"resume","id":"r"}')
+            async for text in socket:
+                answer = json.loads(text)
+                if answer.get("id") == "r":
+                    assert answer["type"] == "done", answer
+                    return
+
+    async def run(self, sessions: int, rounds: int) -> dict[str, Any]:
+        """Kill the server so many times; give what the log and the viewers ended with."""
+        server = await self.start_server()
+        rows = json.loads(self.run_python("-m", "tests.support.live_seed", str(sessions)))
+        self.walks = [Walk(row, self.port, self.rate) for row in rows]
+        senders = [asyncio.create_task(walk.send()) for walk in self.walks]
+        watchers = [asyncio.create_task(walk.watch()) for walk in self.walks]
+        for _ in range(rounds):
+            await asyncio.sleep(self.random.uniform(0.2, 1.5))
+            server.send_signal(signal.SIGKILL)
+            await server.wait()
+            server = await self.start_server()
+            await asyncio.gather(*(self.resume(walk) for walk in self.walks))
+        await asyncio.sleep(1.0)
+        for walk in self.walks:
+            walk.stopping = True
+        await asyncio.wait_for(asyncio.gather(*senders), 60)
+        await self._until_seen()
+        for watcher in watchers:
+            watcher.cancel()
+        server.send_signal(signal.SIGTERM)
+        status = await asyncio.wait_for(server.wait(), 20)
+        ids = ",".join(str(row["session"]) for row in rows)
+        log = json.loads(self.run_python("-m", "tests.support.live_log", ids))
+        return {"status": status, "log": log}
+
+    async def _until_seen(self) -> None:
+        for _ in range(200):
+            if all(walk.seen and walk.seen[-1] >= walk.made for walk in self.walks):
+                return
+            await asyncio.sleep(0.05)
+
+    def find_faults(self, ended: dict[str, Any]) -> list[str]:
+        """Give everything that must not have happened."""
+        faults = [] if ended["status"] == 0 else [f"the server ended with {ended['status']}"]
+        for walk in self.walks:
+            name = f"session {walk.row['session']}"
+            log = ended["log"][str(walk.row["session"])]
+            if log["numbers"] != list(range(1, walk.made + 1)):
+                faults.append(f"{name}: log has {len(log['numbers'])} of {walk.made} steps")
+            if walk.acknowledged > len(log["numbers"]):
+                faults.append(f"{name}: an acknowledged step is lost")
+            if walk.seen != sorted(set(walk.seen)):
+                faults.append(f"{name}: a viewer saw a step twice or out of order")
+            if set(walk.seen) != set(range(1, walk.made + 1)):
+                faults.append(f"{name}: a viewer missed {walk.made - len(set(walk.seen))} steps")
+            if not log["refolds"]:
+                faults.append(f"{name}: a fresh fold differs from the log")
+        return faults

@@ -1,0 +1,155 @@
+"""Put sessions to walk into a server's database: `python -m tests.support.walk_seed JSON`.
+
+JSON is a list of sessions: {"valence", "name", "phases": [{"kind", …}], "goal", "minutes",
+"screen": {"screen_side", …}, "pin"}, where anything may be left out. Each gets a station of its own
+with tokens for its devices.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import django
+from websockets.sync.client import ClientConnection, connect
+
+from tests.support.servers import ROOT, Server, clean_environment
+
+GOAL = 4.0
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A session that is ready to be walked."""
+
+    session: int
+    cookie: str
+    source: str
+    robot: str
+    tablet: str
+
+    @property
+    def path(self) -> str:
+        """The address of its patient's page."""
+        return f"/sessions/{self.session}/"
+
+
+class Feet:
+    """A source that sends what a test tells it to, and returns when it is stored."""
+
+    def __init__(self, socket: ClientConnection, hello: dict[str, Any]) -> None:
+        self._socket = socket
+        self.say({"type": "hello", "version": 1, "run": str(id(self)), "last": 0} | hello)
+        self.number: int = self.hear("welcome")["next"] - 1
+
+    def say(self, message: dict[str, Any]) -> None:
+        """Send a frame."""
+        self._socket.send(json.dumps(message))
+
+    def hear(self, kind: str) -> dict[str, Any]:
+        """Give the next message of a type."""
+        while True:
+            message: dict[str, Any] = json.loads(self._socket.recv(10))
+            if message["type"] == kind:
+                return message
+
+    def walk(self, *performances: float | None) -> None:
+        """Take steps of these shares of the goal; None for one that was not measured."""
+        steps = []
+        for performance in performances:
+            self.number += 1
+            value = None if performance is None else performance * GOAL
+            time_s = self.number * 1.07
+            steps.append({"number": self.number, "time_s": time_s, "side": "left", "value": value})
+        self.say({"type": "steps", "steps": steps})
+        while self.hear("ack")["number"] < self.number:
+            pass
+
+
+@contextmanager
+def feet_of(server: Server, walk: Walk, **hello: Any) -> Iterator[Feet]:
+    """Connect a session's source, which says this of itself; unless told, it is never late."""
+    url = f"ws://127.0.0.1:{server.port}/ws/source/"
+    with connect(url, additional_headers={"Authorization": f"Bearer {walk.source}"}) as socket:
+        yield Feet(socket, hello or {"speed": None})
+
+
+def make_walks(server: Server, *wanted: dict[str, Any]) -> list[Walk]:
+    """Make sessions in a running server's database."""
+    made = subprocess.run(
+        [sys.executable, "-m", "tests.support.walk_seed", json.dumps(wanted)],
+        cwd=ROOT,
+        env=clean_environment(server.folder, server.port)
+        | {"DJANGO_SETTINGS_MODULE": "garry_site.settings"},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    return [Walk(**row) for row in json.loads(made.stdout)]
+
+
+def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Make the sessions, and one PT who may see them all."""
+    from importlib import import_module
+
+    from django.conf import settings
+    from django.contrib.auth import BACKEND_SESSION_KEY, HASH_SESSION_KEY, SESSION_KEY
+
+    from rehab.people.models import Patient, User
+    from rehab.people.roles import Role
+    from rehab.people.sign_in.first_start import first_clinic
+    from rehab.people.sign_in.flow import BACKEND
+    from rehab.sessions.services import create_session
+    from rehab.stations.models import Device, Station
+    from rehab.stations.pins import set_pin
+    from rehab.training.goals import GoalRule, Target
+    from rehab.training.phases import make_phase
+
+    clinic = first_clinic()
+    count = User.everywhere.count()
+    person = User.everywhere.create_user(f"walker{count}", role=Role.PT, clinic=clinic)
+    cookies = import_module(settings.SESSION_ENGINE).SessionStore()
+    cookies[SESSION_KEY] = str(person.pk)
+    cookies[BACKEND_SESSION_KEY] = BACKEND
+    cookies[HASH_SESSION_KEY] = person.get_session_auth_hash()
+    cookies.save()
+    made = []
+    for index, wish in enumerate(wanted):
+        name = f"{count}-{index}"
+        station = Station(clinic=clinic, name=name)
+        set_pin(station, wish.get("pin", ""))
+        station.save()
+        patient = Patient.everywhere.create(
+            clinic=clinic,
+            code=name,
+            nickname=wish.get("name", "Rosa"),
+            paretic_side="left",
+            **wish.get("screen", {}),
+        )
+        tokens = {}
+        for kind in Device.Kind.values:
+            device = Device(clinic=clinic, station=station, kind=kind, name=kind)
+            tokens[kind] = device.new_token()
+            device.save()
+        phases = wish.get("phases", [{"kind": "training"}])
+        session = create_session(
+            patient,
+            valence=wish.get("valence", "positive"),
+            goal=GoalRule(value=wish.get("goal", GOAL)),
+            phases=[make_phase(**phase) for phase in phases],
+            target=Target(duration_s=60 * wish.get("minutes", 10)),
+            station=station,
+            created_by=person,
+        )
+        made.append({"session": session.pk, "cookie": cookies.session_key, **tokens})
+    return made
+
+
+if __name__ == "__main__":
+    django.setup()
+    print(json.dumps(seed(json.loads(sys.argv[1]))))

@@ -1,0 +1,117 @@
+"""Whole sessions for tests of pages: walked here and now, from a list of values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+
+from rehab.people.models import Patient
+from rehab.sessions.live.actor import SessionActor
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.services import create_session
+from rehab.sources.synthetic import PROFILES, SyntheticWalker
+from rehab.training.changes import Change, ChangeKind
+from rehab.training.goals import GoalRule, Target
+from rehab.training.phases import Phase, make_phase
+from rehab.training.steps import Measurement, Side
+from tests.support.world import NOW, store
+
+HIT, MISS = 2.5, 1.5  # against the goal of 2 W/kg
+GOAL = 2.0
+LEFT, RIGHT = Side.LEFT, Side.RIGHT
+
+# A stride's value, a change between strides, or a stride with its side.
+Walked = float | None | Change | tuple[Side, float]
+
+
+def walk(
+    patient: Patient,
+    valence: str,
+    walked: Sequence[Walked],
+    *,
+    end: ChangeKind | None = ChangeKind.FINISH,
+    days_ago: int = 0,
+    now: datetime = NOW,
+    phases: tuple[Phase, ...] | None = None,
+    simulated: bool = False,
+    wanted: float | None = None,
+) -> TrainingSession:
+    """Create a session, walk it and end it. Strides follow each other by a second."""
+    began = now - timedelta(days=days_ago)
+    session = create_session(
+        patient,
+        valence=valence,
+        goal=GoalRule(value=GOAL),
+        phases=phases or (make_phase("training"),),
+        trained_side=LEFT,
+        target=Target(hit_rate=wanted),
+        simulated=simulated,
+    )
+    TrainingSession.everywhere.filter(pk=session.pk).update(created_at=began)
+    session.created_at = began
+    actor = SessionActor(session)
+    rows = list(actor.change(Change(ChangeKind.START), None, began))
+    for each in walked:
+        at = began + timedelta(seconds=actor.fold.last_number)
+        if isinstance(each, Change):
+            rows += actor.change(each, None, at)
+            continue
+        side, value = each if isinstance(each, tuple) else (LEFT, each)
+        number = actor.fold.last_number + 1
+        rows.append(actor.take(Measurement(number, float(number), side, value), at))
+    if end is not None:
+        rows += actor.change(Change(end), None, at_end(began, actor))
+    store(actor, rows)
+    session.refresh_from_db()
+    return session
+
+
+def visit(
+    patient: Patient, valence: str, seed: int, days_ago: int, count: int = 420, now: datetime = NOW
+) -> TrainingSession:
+    """Let a simulated patient walk a whole visit, with all phases, two goal changes and a pause."""
+    began = now - timedelta(days=days_ago, seconds=1.2 * count)
+    half = (count - 54 - 12 - 40) // 2
+    session = create_session(
+        patient,
+        valence=valence,
+        goal=GoalRule(percent_of_baseline=97),
+        phases=(
+            make_phase("baseline", strides=54),
+            make_phase("training", strides=half),
+            make_phase("catch", strides=12),
+            make_phase("training", "Training 85 %", gain=0.85, strides=half),
+            make_phase("washout"),
+        ),
+        trained_side=LEFT,
+        target=Target(hit_rate=0.6, duration_s=600),
+    )
+    TrainingSession.everywhere.filter(pk=session.pk).update(created_at=began)
+    session.created_at = began
+    walker = SyntheticWalker(PROFILES["good"], seed, LEFT)
+    actor = SessionActor(session)
+    rows = list(actor.change(Change(ChangeKind.START), None, began))
+    for number in range(1, count + 1):
+        at = began + timedelta(seconds=1.1 * number)
+        if number in {count // 2, 3 * count // 4}:
+            goal = round(1.05 * (actor.fold.goal or GOAL), 2)
+            rows += actor.change(Change(ChangeKind.GOAL, goal), None, at)
+        if number == 2 * count // 3:
+            rows += actor.change(Change(ChangeKind.PAUSE), None, at)
+            rows += actor.change(Change(ChangeKind.RESUME), None, at + timedelta(seconds=30))
+        rows.append(actor.take(walker.next_stride(actor.fold.phase), at))
+    rows += actor.change(Change(ChangeKind.FINISH), None, now - timedelta(days=days_ago))
+    store(actor, rows)
+    session.refresh_from_db()
+    return session
+
+
+def at_end(began: datetime, actor: SessionActor) -> datetime:
+    """Give the moment after the last stride."""
+    return began + timedelta(seconds=actor.fold.last_number + 1)
+
+
+def strides(hits: int, misses: int) -> list[Walked]:
+    """Give so many hits and misses, in turn as long as both last."""
+    both = [value for _ in range(min(hits, misses)) for value in (HIT, MISS)]
+    return [*both, *[HIT] * (hits - misses), *[MISS] * (misses - hits)]

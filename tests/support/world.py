@@ -1,0 +1,300 @@
+"""A small world to test in: clinics with one row of every model, each row marked as theirs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from django.apps import apps
+from django.contrib.auth.models import AnonymousUser
+from django.db.models import Model
+from django.test import Client
+
+from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.feedback.models import FeedbackBand, FeedbackType
+from rehab.gestures.models import Gesture, GestureStep
+from rehab.patients.visits import Visit
+from rehab.people.audit.audit_log import AuditEntry
+from rehab.people.audit.history import HistoryEntry
+from rehab.people.consent.models import Consent, ConsentText, Purpose, give
+from rehab.people.consent.tombstones import ErasedOriginal
+from rehab.people.models import Boards, Clinic, Patient, User
+from rehab.people.roles import Role
+from rehab.people.sign_in.factors import Authenticator, RecoveryCode
+from rehab.people.sign_in.tokens import ApiToken
+from rehab.sessions.corrections import SessionCorrection
+from rehab.sessions.live.actor import Row, SessionActor
+from rehab.sessions.live.writer import Job, commit
+from rehab.sessions.log import SessionEvent, SessionMetric, Step
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.presets import Preset
+from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase
+from rehab.sessions.services import create_session
+from rehab.stations.models import Device, LeaveTries, Pairing, Station
+from rehab.training.changes import Change, ChangeKind
+from rehab.training.goals import GoalRule
+from rehab.training.steps import Measurement, Side
+from tests.support.clock import START
+
+NOW = START  # the moment at which a test begins
+
+
+def mark(clinic: str, model: type[Model]) -> str:
+    """Give the text that marks a clinic's rows of a model, and stands nowhere else."""
+    return f"zq{clinic}{model.__name__.lower()}qz"
+
+
+@dataclass
+class World:
+    """One clinic and everything in it."""
+
+    name: str
+    clinic: Clinic
+    people: dict[Role, User]
+    device: Device
+    token: str
+    rows: dict[type[Model], Any] = field(default_factory=dict)
+
+    @property
+    def patient(self) -> Patient:
+        """The clinic's patient."""
+        patient: Patient = self.rows[Patient]
+        return patient
+
+    @property
+    def session(self) -> TrainingSession:
+        """The clinic's finished session."""
+        session: TrainingSession = self.rows[TrainingSession]
+        return session
+
+
+def scoped_models() -> list[type[Any]]:
+    """Give every model of the app, found by itself."""
+    return list(apps.get_app_config("rehab").get_models())
+
+
+def agreeing(patient: Patient) -> Patient:
+    """Give a patient who agrees to stand on the boards that are set."""
+    if patient.boards != Boards.OWN:
+        give(patient, Purpose.BOARDS, None, NOW, patient.boards)
+    return patient
+
+
+def store(actor: SessionActor, rows: list[Row]) -> None:
+    """Commit rows of a session here and now, without the live path's threads."""
+    commit(
+        [Job(actor, actor.session.pk, actor.session.epoch, rows, actor.summary(), lambda _: None)]
+    )
+
+
+def build_world(name: str) -> World:
+    """Build a clinic with people of every role and one row of every model."""
+    clinic = Clinic.everywhere.create(name=mark(name, Clinic))
+    people = {
+        role: User.everywhere.create_user(
+            f"{mark(name, User)}-{role.value}",
+            role=role,
+            clinic=clinic,
+        )
+        for role in (Role.LEAD, Role.PT, Role.RESEARCHER)
+    }
+    station = Station.everywhere.create(clinic=clinic, name=mark(name, Station))
+    device = Device(
+        clinic=clinic, station=station, kind=Device.Kind.SOURCE, name=mark(name, Device)
+    )
+    token = device.new_token()
+    device.save()
+    measure = Measure.everywhere.create(
+        clinic=clinic,
+        slug=f"m-{name}",
+        name=mark(name, Measure),
+        unit="m",
+        value_min=0,
+        value_max=2,
+        goal_min=0,
+        goal_max=2,
+    )
+    protocol = Protocol.everywhere.create(
+        clinic=clinic, name=mark(name, Protocol), description=mark(name, Protocol)
+    )
+    phase = ProtocolPhase.everywhere.create(
+        protocol=protocol,
+        position=1,
+        kind="training",
+        name=mark(name, ProtocolPhase),
+        feedback=True,
+    )
+    gesture = Gesture.everywhere.create(clinic=clinic, name=mark(name, Gesture))
+    step = GestureStep.everywhere.create(gesture=gesture, position=1, hold_s=1.0)
+    feedback = FeedbackType.everywhere.create(
+        clinic=clinic, slug="negative", hit_points=0, miss_points=-1, cue_below="droop"
+    )
+    said = {"en": mark(name, FeedbackType)}
+    FeedbackBand.everywhere.create(feedback_type=feedback, from_percent=0, words=said)
+    band = FeedbackBand.everywhere.create(
+        feedback_type=feedback, from_percent=100, words={"en": mark(name, FeedbackBand)}
+    )
+    patient = Patient.everywhere.create(
+        clinic=clinic,
+        code=mark(name, Patient),
+        nickname=mark(name, Patient),
+        paretic_side="left",
+        boards="clinic",
+    )
+    text = ConsentText.everywhere.create(clinic=clinic, version=1, text=mark(name, ConsentText))
+    for purpose in (Purpose.BOARDS, Purpose.RESEARCH):
+        level = patient.boards if purpose == Purpose.BOARDS else ""
+        give(patient, purpose, people[Role.PT], NOW, level)
+    session = create_session(
+        patient,
+        valence="positive",
+        goal=GoalRule(value=1.0),
+        protocol=protocol,
+        measure=measure,
+        station=station,
+        created_by=people[Role.PT],
+        source=mark(name, TrainingSession),
+    )
+    actor = SessionActor(session)
+    store(actor, actor.change(Change(ChangeKind.START), people[Role.PT], NOW))
+    for number in range(1, 11):
+        reasons = (mark(name, Step),) if number == 3 else ()
+        value = 0.5 + number / 10
+        stride = Measurement(number, number * 1.1, Side.LEFT, value, reasons)
+        store(actor, [actor.take(stride, NOW)])
+    store(actor, actor.change(Change(ChangeKind.FINISH), people[Role.PT], NOW))
+    board = Leaderboard.everywhere.create(
+        clinic=clinic,
+        name=mark(name, Leaderboard),
+        among="clinic",
+        entry="best",
+        display="top",
+        names="code",
+        period="all",
+        min_valid_strides=1,
+    )
+    world = World(name, clinic, people, device, token)
+    for row in (
+        clinic,
+        people[Role.PT],
+        station,
+        device,
+        measure,
+        protocol,
+        phase,
+        gesture,
+        step,
+        feedback,
+        band,
+        patient,
+        session,
+        SessionCorrection.everywhere.create(
+            session=session,
+            part="note",
+            new=mark(name, SessionCorrection),
+            reason=mark(name, SessionCorrection),
+            by=people[Role.PT],
+            at=NOW,
+        ),
+        Preset.everywhere.create(
+            clinic=clinic,
+            name=mark(name, Preset),
+            valence="binary",
+            goal_value=1.5,
+            protocol=protocol,
+        ),
+        Step.everywhere.get(session=session, number=3),
+        SessionEvent.everywhere.filter(session=session).first(),
+        SessionMetric.everywhere.filter(session=session).first(),
+        board,
+        BoardEntry.everywhere.get(board=board),
+        BoardCount.everywhere.get(board=board),
+        text,
+        Consent.everywhere.filter(patient=patient).last(),
+        AuditEntry.everywhere.create(clinic=clinic, act="view", about=mark(name, AuditEntry)),
+        HistoryEntry.everywhere.get(noun="Patient", row=patient.pk),
+        ApiToken.everywhere.create(
+            clinic=clinic,
+            user=people[Role.PT],
+            name=mark(name, ApiToken),
+            role=Role.PT,
+            token_hash=f"program-{name}",
+        ),
+        Authenticator.everywhere.create(
+            user=people[Role.PT], kind="app", name=mark(name, Authenticator), material="-"
+        ),
+        RecoveryCode.everywhere.create(user=people[Role.PT], digest=mark(name, RecoveryCode)),
+        LeaveTries.everywhere.create(station=station, who=f"tablet {device.pk}", open_at=NOW),
+        ErasedOriginal.everywhere.create(clinic=clinic, mark=mark(name, ErasedOriginal)),
+        Visit.everywhere.create(clinic=clinic, patient=patient, day=NOW.date()),
+        Pairing.everywhere.create(
+            code=f"P{clinic.pk}",
+            secret_hash=f"pairing-{name}",
+            expires_at=NOW,
+            device=device,
+        ),
+    ):
+        world.rows[type(row)] = row
+    return world
+
+
+def fill_board(world: World) -> None:
+    """Let four more patients of a clinic walk, so that there are enough for its board."""
+    session, shared = world.session, {"id", "patient_id", "clinic_id"}
+    session.refresh_from_db()
+    columns = [f.attname for f in TrainingSession._meta.concrete_fields if f.attname not in shared]
+    for number in range(2, 6):
+        patient = agreeing(
+            Patient.everywhere.create(
+                clinic=world.clinic,
+                code=f"{mark(world.name, Patient)}{number}",
+                nickname=mark(world.name, Patient),
+                paretic_side="left",
+                boards="clinic",
+            )
+        )
+        walked = TrainingSession.everywhere.create(
+            clinic=world.clinic,
+            patient=patient,
+            **{column: getattr(session, column) for column in columns},
+        )
+        for figure in session.metrics.all():
+            SessionMetric.everywhere.create(
+                session=walked, slug=figure.slug, value=figure.value - number / 100
+            )
+
+
+def signed_in(user: User, **options: Any) -> Client:
+    """Give a browser in which somebody is signed in."""
+    client = Client(**options)
+    client.force_login(user)
+    return client
+
+
+def client_of(world: World, role: Role = Role.PT, **options: Any) -> Client:
+    """Give the browser of a clinic's person of that role."""
+    return signed_in(world.people[role], **options)
+
+
+@dataclass(frozen=True)
+class Actor:
+    """Someone who tries: a person, a device or a stranger."""
+
+    label: str
+    subject: Any
+    clinic: str | None = None
+    role: str = "stranger"
+
+
+def all_actors(*worlds: World) -> list[Actor]:
+    """Give every role of every clinic, a host, a stranger, and an account that is switched off."""
+    host = User.everywhere.create_user("host", role=Role.HOST)
+    actors = [Actor("stranger", AnonymousUser()), Actor("host", host, None, "host")]
+    for world in worlds:
+        actors += [
+            Actor(f"{role.value} of {world.name}", person, world.name, role.value)
+            for role, person in world.people.items()
+        ]
+        actors.append(Actor(f"device of {world.name}", world.device, world.name, "device"))
+    off = User.everywhere.create_user("off", role=Role.PT, clinic=worlds[0].clinic, is_active=False)
+    return [*actors, Actor("switched off", off)]
