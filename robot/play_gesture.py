@@ -1,6 +1,6 @@
 """`python -m robot gesture NAME --base BASE`: plays a gesture without a server.
 
-For trying a base and its place. Whoever types it arms a real base by that: stand at its switch.
+For trying a base and its place. Running it arms a real base: stand at its switch.
 Exit status: 0 it was played; 1 it ended otherwise, or the base does not answer; 2 the command line
 cannot be used; 130 Ctrl-C.
 """

@@ -49,7 +49,7 @@ SOUNDS = {Indication.MOVING: Melody.BUTTON, Indication.STOPPED: Melody.ERROR}
 
 
 class KobukiBase(MobileBase):
-    """Drives a Kobuki and integrates its odometry. A lost port is reopened for ever."""
+    """Drives a Kobuki and integrates its odometry. A lost port is reopened forever."""
 
     name: ClassVar[str] = "kobuki"
     abilities = Abilities(simulated=False, moves=True, announces=True, real_time=True, bumpers=True)

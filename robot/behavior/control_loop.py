@@ -15,8 +15,8 @@ def control_loop(
 ) -> Iterator[float]:
     """Tick a performer 50 times a second.
 
-    Whoever iterates lets the time pass, by sleeping, by awaiting, or by moving a virtual clock, and
-    may look at the performer meanwhile.
+    The caller lets the time pass, by sleeping, by awaiting, or by moving a virtual clock, and may
+    look at the performer meanwhile.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ class Performer:
 
     @property
     def reports(self) -> deque[Report]:
-        """What is to be sent, oldest first; whoever sends takes them from the left."""
+        """Reports to send, oldest first; the sender pops them from the left."""
         return self.status.reports
 
     @property

@@ -17,7 +17,7 @@ from robot.motion.limits import ORDER_HOLDS_S
 from robot.motion.pose import HOME
 from robot.motion.twist import Twist
 
-# Light and sound come so long before a gesture [s]: a sudden motion may startle whoever walks.
+# Light and sound come so long before a gesture [s]: a sudden motion may startle the walker.
 ANNOUNCE_S = 0.5
 
 # Nothing heard of the base for so long [s]. The reference takes 0.1 s

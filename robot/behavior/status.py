@@ -28,7 +28,7 @@ class StatusReporter:
     Attributes
     ----------
     reports
-        What is to be sent, oldest first; whoever sends takes them from the left.
+        Reports to send, oldest first; the sender pops them from the left.
     """
 
     def __init__(self, base: MobileBase) -> None:

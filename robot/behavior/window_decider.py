@@ -93,7 +93,7 @@ class WindowDecider:
         Parameters
         ----------
         time_s
-            The source's clock [s]. One that is earlier than the open window begins anew.
+            The source's clock [s]. One that is earlier than the open window starts over.
         performance
             Shown value over goal, finite.
         """

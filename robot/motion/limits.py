@@ -14,7 +14,7 @@ TICK_S = 0.02  # between two orders to a base: 50 Hz, as often as a Kobuki tells
 LONGEST_STEP_S = 0.1
 
 # A base stands still by itself when its last order is older than this [s]: it may have no firmware
-# watchdog, and whoever gave the order may hang (docs/reference/kobuki.md#orders).
+# watchdog, and the program that gave the order may hang (docs/reference/kobuki.md#orders).
 ORDER_HOLDS_S = 0.25
 
 # No limits may be set above these: a base of 7 kg stops within 9 cm from 0.2 m/s, and a Kobuki's

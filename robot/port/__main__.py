@@ -1,6 +1,6 @@
 """`python -m robot.port`: owns a serial port, and stops the base on it when orders stop coming.
 
-A base may go on with its last setpoint for ever (docs/reference/kobuki.md#watchdogs). So a small
+A base may go on with its last setpoint forever (docs/reference/kobuki.md#watchdogs). So a small
 process of its own sends it, 50 times a second, what was ordered last, and the stop frame as soon as
 that is older than 0.25 s, the pipe of the orders closes, or anything at all goes wrong here. It
 knows no base, only bytes. Orders come on standard input, what was received goes to standard output,

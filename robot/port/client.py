@@ -149,7 +149,7 @@ class PortClient:
             self._counted = Counter()
             self._openings_before = self._openings
             self._word_s, self._has_spoken = self._monotonic(), False
-            self.problem = "The process that owns the port died, and is started anew."
+            self.problem = "The process that owns the port died, and is restarted."
             self._process = self._start()
             if self._closing.is_set():  # closed meanwhile: nobody else knows of this one
                 self._process.kill()

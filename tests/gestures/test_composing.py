@@ -9,8 +9,8 @@ import pytest
 from django.test import Client
 
 from rehab.gestures.models import Gesture
-from tests.support.world import World, build_world, client_of
 from robot.motion.dry_run import validate_gesture
+from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 

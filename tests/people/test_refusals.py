@@ -24,9 +24,9 @@ from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.valences import VALENCES, Cue, edit_valence
-from tests.feedback.test_types import form as feedback_form
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gesture_spec import Move, build_gesture
+from tests.feedback.test_types import form as feedback_form
 from tests.gestures.test_composing import filled as gesture_form
 from tests.sessions.test_two_at_once import choices
 from tests.support.programs import program_of

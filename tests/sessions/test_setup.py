@@ -16,9 +16,9 @@ from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import Cue
-from tests.support.world import World, build_world, client_of
 from robot.motion.gesture_spec import parse_gesture
 from robot.motion.pose import HOME
+from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 

@@ -19,7 +19,7 @@ TURN_BOUND_DEG_S = 300.0
 SLACK_S = 0.01  # half a frame: sensors are read some time before their time stamp
 # A base's clock may run ahead of ours by so much since the frame before [s]: frames come in bursts.
 AHEAD_S = 0.1
-# After a longer silence [s] the base may have been switched off, and its counters begin anew
+# After a longer silence [s] the base may have been switched off, and its counters start over
 # (docs/reference/kobuki.md#odometry-and-gyro).
 GAP_S = 1.0
 

@@ -27,7 +27,7 @@ GREETING_S = 3.0  # a bridge that is there has said by then where the base is
 
 
 class RosbridgeBase(MobileBase):
-    """Orders a base by way of a rosbridge. A connection that is lost is made again for ever.
+    """Orders a base by way of a rosbridge. A connection that is lost is made again forever.
 
     It cannot stop the base once the connection is gone: the base's own driver has to, by a timeout
     of its own (docs/robot.md). Every connection begins with an order to stand still.

@@ -10,7 +10,7 @@ from robot.motion.pose import HOME, Pose, advance, wrap
 from robot.motion.twist import STILL, Twist
 
 # From one odometry to the next a base comes no further [m, rad], at our ceilings and with a second
-# between them: it was started anew, or another program has set its odometry.
+# between them: it was restarted, or another program has set its odometry.
 JUMP_M, JUMP_RAD = 0.3, 1.8
 
 FELT_S = 0.1  # what was felt counts for so long [s]: no look in between misses it

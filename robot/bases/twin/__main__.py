@@ -164,7 +164,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with camera:
             Twin(firmware, port).run(orders, answer, over.is_set)
     except BrokenPipeError:
-        pass  # whoever listened to the answers is gone
+        pass  # the reader of the answers is gone
     finally:
         port.close()
     return 0

@@ -7,9 +7,9 @@ import pytest
 
 from rehab.sources.recording import read_recording
 from robot.bases import BASES
-from tests.support.data import recording
 from robot.behavior.performer import Performer
 from robot.motion.limits import TICK_S
+from tests.support.data import recording
 
 CUE = {
     "above": "celebrate",

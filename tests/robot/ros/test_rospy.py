@@ -24,8 +24,8 @@ from tests.support.fake_ros import (
     release,
     wait_until,
 )
-from tests.support.wire import Wire
 from tests.support.real_ros import RosMaster, why_missing
+from tests.support.wire import Wire
 
 pytestmark = [pytest.mark.ros, pytest.mark.realtime]
 

@@ -20,9 +20,9 @@ from rehab.sessions.live.session import NotStored
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.valences import Cue
+from robot.motion.dry_run import validate_gesture
 from tests.support.callers import Message, change, turns
 from tests.support.world import NOW
-from robot.motion.dry_run import validate_gesture
 
 STATUS = {
     "kind": "status",

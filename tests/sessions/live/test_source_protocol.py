@@ -17,9 +17,9 @@ from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
 from robot.bases.kinematic import KinematicBase
+from robot.behavior.performer import Performer
 from tests.support.callers import SourceCaller, a_step, change, turns
 from tests.support.world import NOW
-from robot.behavior.performer import Performer
 
 
 @sync_to_async
