@@ -65,7 +65,7 @@ def test_a_name_is_short_and_plain(name):
 
 
 def test_values_nest_so_deep_and_no_deeper():
-    value = 1.0
+    value: object = 1.0
     for _ in range(MAX_NESTING):
         value = [value]
     check_values(value)
