@@ -374,7 +374,7 @@ async def test_a_step_carries_the_feedback_of_its_valence(place, begun, valence)
 
 
 async def test_a_robot_hears_its_cue_states_and_steps(place, begun, ready, monkeypatch):
-    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.005)
+    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.005)
     session = await begun(place)
     robot = await place.robot().dial()
     welcome = await robot.hello()
@@ -407,7 +407,7 @@ async def test_a_robot_waits_for_a_session_at_its_station(place, ready):
 
 
 async def test_pages_hear_a_heartbeat(place, begun, monkeypatch):
-    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.002)
     session = await begun(place)
     tablet = place.tablet(session)
     await tablet.watch()
@@ -415,7 +415,7 @@ async def test_pages_hear_a_heartbeat(place, begun, monkeypatch):
 
 
 async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch):
-    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.002)
     disk, database = threading.Event(), asyncio.Event()
     waiting: set[str] = set()
 
@@ -453,7 +453,7 @@ async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch)
 
 
 async def test_heartbeats_and_housekeeping_go_on_whatever_fails(place, begun, monkeypatch, caplog):
-    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.002)
     failed: Counter[str] = Counter()
 
     def fail(what: str) -> Callable[..., None]:
@@ -596,7 +596,7 @@ async def test_a_switched_off_account_opens_nothing(place, begun):
 
 
 async def test_open_sockets_end_with_their_token_or_sign_in(place, begun, monkeypatch):
-    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.002)
     session = await begun(place)
     source, robot = await place.source().dial(), await place.robot().dial()
     await source.hello()
@@ -626,14 +626,14 @@ async def test_open_sockets_end_with_their_token_or_sign_in(place, begun, monkey
 
 
 async def test_idle_sessions_leave_memory_but_not_while_someone_comes(place, ready, monkeypatch):
-    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.001)
+    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.001)
     session = await ready(place)
     runtime = runtimes.current()
     live = await runtime.session(session.pk)
     while session.pk in runtime.sessions:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
     assert (await runtime.session(session.pk)) is not live
-    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 60)
+    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 60)
     tablet = place.tablet(session)
     await tablet.watch()
     await change(session, "start")
