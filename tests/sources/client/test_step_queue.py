@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rehab.sources.client import (
-    WINDOW,
     LiveFeed,
     StepQueue,
     StepsLost,
@@ -16,6 +15,7 @@ from rehab.sources.client import (
     write_step,
 )
 from rehab.training.steps import Measurement, Side
+from robot.wire.limits import MAX_STEPS
 
 
 def stride(number=1, value=4.0, **more):
@@ -129,10 +129,10 @@ def test_an_ack_covers_all_steps_up_to_its_number():
 def test_no_more_than_the_window_is_on_the_way():
     queue = outbox_with(1000)
 
-    assert take_numbers(queue) == list(range(1, WINDOW + 1))
+    assert take_numbers(queue) == list(range(1, MAX_STEPS + 1))
     queue.acknowledge(10)
-    assert take_numbers(queue) == list(range(WINDOW + 1, WINDOW + 11))
-    assert queue.in_flight == WINDOW
+    assert take_numbers(queue) == list(range(MAX_STEPS + 1, MAX_STEPS + 11))
+    assert queue.in_flight == MAX_STEPS
 
 
 def test_steps_with_much_to_say_are_spread_over_frames():
@@ -248,7 +248,7 @@ def test_whatever_happens_every_step_is_stored_once_and_in_order(happenings):
             case "crash":
                 seen = committed
                 queue.join(7, seen + 1)
-        assert queue.in_flight <= WINDOW
+        assert queue.in_flight <= MAX_STEPS
     queue.join(7, seen + 1)
     while frame := queue.next_frame():
         deliver(frame)
