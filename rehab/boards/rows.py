@@ -14,7 +14,7 @@ from rehab.boards.figures import SHARES, standing_on
 from rehab.boards.models import Leaderboard
 from rehab.people.aliases import say_alias
 from rehab.people.models import Clinic
-from rehab.sessions.formatting import SPACE, at_clinic, say_day, say_duration, say_number
+from rehab.sessions.formatting import SPACE, clinic_time, format_day, format_duration, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.training.metrics import METRICS
 
@@ -39,7 +39,7 @@ class Row:
 def say_figure(slug: str, value: int) -> str:
     """Write a metric's figure as boards show it."""
     unit = "%" if slug in SHARES else METRICS[slug].unit
-    return say_number(value, 0) + (f"{SPACE}{unit}" if unit in UNITS else "")
+    return format_number(value, 0) + (f"{SPACE}{unit}" if unit in UNITS else "")
 
 
 def write(board: Leaderboard, chosen: Sequence[Chosen]) -> list[Row]:
@@ -50,7 +50,7 @@ def write(board: Leaderboard, chosen: Sequence[Chosen]) -> list[Row]:
             value=say_figure(board.metric, each.row.figure),
             bar=share(each.row.figure, each.row.stake or full),
             rank=each.row.rank if tells_place(board, each) else None,
-            stake="" if each.row.stake is None else say_number(each.row.stake, 0),
+            stake="" if each.row.stake is None else format_number(each.row.stake, 0),
             skips=each.skips,
             session_id=each.row.session_id,
         )
@@ -103,19 +103,19 @@ def date_rows(
     """Give rows of own sessions with the day of each, and how long was walked."""
     rows = list(rows)
     began = {
-        pk: at_clinic(session.started_at or session.created_at, clinic)
+        pk: clinic_time(session.started_at or session.created_at, clinic)
         for pk, session in sessions.items()
     }
     a_day: Counter[date] = Counter(began[row.session_id or 0].date() for row in rows)
-    today = at_clinic(timezone.now(), clinic).date()
+    today = clinic_time(timezone.now(), clinic).date()
     dated: list[Row] = []
     for row in rows:
         start = began[row.session_id or 0]
-        walked = say_duration(sessions[row.session_id or 0].active_s)
+        walked = format_duration(sessions[row.session_id or 0].active_s)
         dated.append(
             replace(
                 row,
-                title=say_day(start.date(), today).replace(" ", SPACE),
+                title=format_day(start.date(), today).replace(" ", SPACE),
                 detail=f"{start:%H:%M} · {walked}" if a_day[start.date()] > 1 else walked,
                 you=at_hand is not None and row.session_id == at_hand.pk,
             )

@@ -20,7 +20,7 @@ from rehab.people.consent.models import Purpose, withdraw
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.web.language import speak_to
-from rehab.sessions.formatting import SPACE, say_number
+from rehab.sessions.formatting import SPACE, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN, State
 
@@ -130,8 +130,8 @@ def write_rows(entries: list[Entry], by: By) -> list[Row]:
             Row(
                 session_id=entry.session_id,
                 rank=None if by is By.KEPT else entry.rank,
-                value=say_number(entry.value, 0) + (f"{SPACE}%" if by is By.RATE else ""),
-                stake="" if entry.stake is None else say_number(entry.stake, 0),
+                value=format_number(entry.value, 0) + (f"{SPACE}%" if by is By.RATE else ""),
+                stake="" if entry.stake is None else format_number(entry.stake, 0),
                 bar=share(entry.value, entry.stake or full if by is By.KEPT else full),
                 skips=entry.place != expected,
             )

@@ -21,7 +21,7 @@ from rehab.people.web.api_base import (
     cut,
 )
 from rehab.sessions.api import ORDERS, sessions_of
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.schemas import FeedbackType
 
 router = Router(tags=["The paper's calls"])
@@ -93,7 +93,7 @@ def list_user_sessions(
 
 def in_paper_words(session: Any) -> dict[str, Any]:
     """Tell a session by the paper's attributes, its date by the clinic's clock."""
-    start = at_clinic(session.started_at or session.created_at, session.clinic)
+    start = clinic_time(session.started_at or session.created_at, session.clinic)
     return {
         "session_id": session.pk,
         "participant_id": session.patient.code,

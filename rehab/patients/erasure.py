@@ -21,7 +21,7 @@ from rehab.people.consent.models import Purpose, withdraw
 from rehab.people.consent.tombstones import keep_away
 from rehab.people.models import Clinic, Erasing, Patient, User, new_pseudonym
 from rehab.sessions.corrections import forget_patient as forget_corrections
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import Remark, SessionEvent
 from rehab.sessions.models import TrainingSession
 
@@ -72,7 +72,7 @@ def overdue(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
         return patients.none()
     last = Greatest(Coalesce(Max("sessions__created_at"), "created_at"), "created_at")
     before = months_before(now, clinic.keep_months)
-    today = at_clinic(now, clinic).date()
+    today = clinic_time(now, clinic).date()
     expected = Visit.everywhere.filter(patient=OuterRef("pk"), day__gte=today)
     kept = patients.annotate(last_here=last).filter(last_here__lt=before)
     return kept.exclude(Exists(expected)).order_by("pk")

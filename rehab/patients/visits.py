@@ -14,7 +14,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.scope import ClinicRow, Scope
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN, State
 
@@ -96,7 +96,7 @@ def usual_time(user: User, patient: Patient, now: datetime) -> time | None:
     began = sessions.order_by("-created_at").values_list("created_at", flat=True).first()
     if began is None:
         return planned.at if planned else None
-    began = at_clinic(began, patient.clinic)
+    began = clinic_time(began, patient.clinic)
     minutes = round((began.hour * 60 + began.minute) / QUARTER_MIN) * QUARTER_MIN
     return time(minutes // 60 % 24, minutes % 60)
 

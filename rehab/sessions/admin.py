@@ -16,7 +16,7 @@ from rehab.people.access import person
 from rehab.people.roles import Role
 from rehab.people.web.admin_base import ReadOnlyAdmin, ScopedAdmin
 from rehab.sessions.corrections import SessionCorrection, may_correct, tell_corrections
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.search import Finder
@@ -122,14 +122,14 @@ class TrainingSessionAdmin(ScopedAdmin):
     @admin.display(description=_("date"), ordering="created_at")
     def date(self, session: TrainingSession) -> Any:
         """Give the day of the session by the clinic's clock."""
-        return at_clinic(session.started_at or session.created_at, session.clinic).date()
+        return clinic_time(session.started_at or session.created_at, session.clinic).date()
 
     @admin.display(description=_("start time"), ordering="started_at")
     def start_time(self, session: TrainingSession) -> str | None:
         """Give the time of day that it began."""
         if session.started_at is None:
             return None
-        return f"{at_clinic(session.started_at, session.clinic):%H:%M:%S}"
+        return f"{clinic_time(session.started_at, session.clinic):%H:%M:%S}"
 
     @admin.display(description=_("duration"), ordering="active_s")
     def duration(self, session: TrainingSession) -> str:
@@ -188,7 +188,7 @@ class TrainingSessionAdmin(ScopedAdmin):
                     told["old"] or "–",
                     told["new"] or "–",
                     told["row"].by or "–",
-                    f"{at_clinic(told['row'].at, session.clinic):%Y-%m-%d %H:%M}",
+                    f"{clinic_time(told['row'].at, session.clinic):%Y-%m-%d %H:%M}",
                     told["row"].reason,
                 )
                 for told in session.told

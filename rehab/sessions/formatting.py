@@ -13,34 +13,34 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
 
-NOTHING = "–"
-SPACE = "\N{NO-BREAK SPACE}"
+MISSING = "–"
+NBSP = "\N{NO-BREAK NBSP}"
 
 
-def say_rate(rate: float | None) -> str:
+def format_rate(rate: float | None) -> str:
     """Write a ratio as whole percent."""
-    return NOTHING if rate is None else f"{say_number(100 * rate, 0)}{SPACE}%"
+    return MISSING if rate is None else f"{format_number(100 * rate, 0)}{NBSP}%"
 
 
-def say_number(value: float | None, places: int = 2) -> str:
+def format_number(value: float | None, places: int = 2) -> str:
     """Write a number with a true minus sign."""
     if value is None:
-        return NOTHING
+        return MISSING
     written = number_format(round(value, places) + 0.0, places, force_grouping=True)
     return written.replace("-", "−")
 
 
-def say_quantity(value: float | None, unit: str) -> str:
+def format_quantity(value: float | None, unit: str) -> str:
     """Write a value with its unit."""
-    return NOTHING if value is None else f"{say_number(value)}{SPACE}{unit}"
+    return MISSING if value is None else f"{format_number(value)}{NBSP}{unit}"
 
 
-def say_duration(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """Write a time span, to the second below a minute, else to the minute."""
-    return f"{seconds:.0f}{SPACE}s" if seconds < 59.5 else f"{seconds / 60:.0f}{SPACE}min"
+    return f"{seconds:.0f}{NBSP}s" if seconds < 59.5 else f"{seconds / 60:.0f}{NBSP}min"
 
 
-def say_day(day: date, today: date) -> str:
+def format_day(day: date, today: date) -> str:
     """Write a day as it is spoken of today."""
     if day == today:
         return gettext("today")
@@ -48,25 +48,25 @@ def say_day(day: date, today: date) -> str:
 
 
 # How lively a robot is (`training.plans.ROBOT_LEVELS`).
-LEVELS: dict[str, Any] = {"normal": _("normal"), "gentle": _("gentle"), "off": _("off"), "": ""}
+ROBOT_LEVEL_LABELS: dict[str, Any] = {"normal": _("normal"), "gentle": _("gentle"), "off": _("off"), "": ""}
 # What `list_sources` gives and a session keeps, in English.
-SOURCES = (
+SOURCE_LABELS = (
     gettext_noop("Live sensor"),
     gettext_noop("Simulated patient, good"),
     gettext_noop("Simulated patient, poor"),
     gettext_noop("Simulated patient, fatiguing"),
     gettext_noop("Simulated patient, dropout"),
 )
-SIMULATED, RECORDING = "Simulated patient, ", "Recording "
+SIMULATED_PREFIX, RECORDING_PREFIX = "Simulated patient, ", "Recording "
 
 
-def say_source(source: str) -> str:
+def format_source(source: str) -> str:
     """Say where steps come from."""
-    if source.startswith(RECORDING):
-        return gettext("Recording %(name)s") % {"name": source.removeprefix(RECORDING)}
+    if source.startswith(RECORDING_PREFIX):
+        return gettext("Recording %(name)s") % {"name": source.removeprefix(RECORDING_PREFIX)}
     return gettext(source) if source else ""
 
 
-def at_clinic(moment: datetime, clinic: Clinic) -> datetime:
+def clinic_time(moment: datetime, clinic: Clinic) -> datetime:
     """Give a moment by the clinic's own clock."""
     return moment.astimezone(ZoneInfo(clinic.time_zone))

@@ -15,7 +15,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.models import SIDES, Patient, User
 from rehab.people.web.refusals import in_words
 from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
-from rehab.sessions.formatting import LEVELS, say_source
+from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_source
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocols import Protocol
@@ -65,7 +65,7 @@ class SessionForm(forms.Form):
     source = forms.ChoiceField(widget=forms.RadioSelect)
     trained_side = forms.ChoiceField(choices=SIDES, widget=forms.RadioSelect)
     robot = forms.ChoiceField(
-        choices=[(level, capfirst(LEVELS[level])) for level in ROBOT_LEVELS],
+        choices=[(level, capfirst(ROBOT_LEVEL_LABELS[level])) for level in ROBOT_LEVELS],
         widget=forms.RadioSelect,
     )
     robot_above = forms.ChoiceField()
@@ -77,7 +77,7 @@ class SessionForm(forms.Form):
         fields: dict[str, Any] = self.fields
         fields["protocol"].queryset = Protocol.objects.visible_to(by)
         fields["station"].queryset = Station.objects.visible_to(by)
-        fields["source"].choices = [(name, say_source(words)) for name, words in list_sources()]
+        fields["source"].choices = [(name, format_source(words)) for name, words in list_sources()]
         fields["robot_above"].choices = fields["robot_below"].choices = list_gestures(by)
 
     def clean_station(self) -> Station:
@@ -197,7 +197,7 @@ def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
             "protocol": protocol,
             "station": _free(stations),
             "source": (source := "synthetic good" if patient.simulated else LIVE),
-            "source_words": say_source(words[source]),
+            "source_words": format_source(words[source]),
             "trained_side": patient.paretic_side or Side.LEFT.value,
             "robot": "normal",
             "robot_above": USUAL,
@@ -219,7 +219,7 @@ def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
         "protocol": last.protocol,
         "station": last.station or _free(stations),
         "source": source,
-        "source_words": say_source(words[source]),
+        "source_words": format_source(words[source]),
         "trained_side": last.trained_side,
         "robot": name_robot_level(_last_intensity(last, by)),
         "robot_above": above,

@@ -15,7 +15,12 @@ from rehab.people.models import Clinic, User
 from rehab.people.scope import ClinicRow, Scope
 from rehab.people.web.refusals import in_words
 from rehab.sessions.cues import USUAL, name_gestures
-from rehab.sessions.formatting import LEVELS, SIMULATED, say_quantity, say_rate
+from rehab.sessions.formatting import (
+    ROBOT_LEVEL_LABELS,
+    SIMULATED_PREFIX,
+    format_quantity,
+    format_rate,
+)
 from rehab.sessions.protocols import Protocol
 from rehab.sessions.step_sources import LIVE
 from rehab.sources.synthetic import PROFILES
@@ -66,7 +71,7 @@ class Preset(ClinicRow):
     robot = models.CharField(
         _("robot"),
         max_length=16,
-        choices=[(level, capfirst(LEVELS[level])) for level in ROBOT_LEVELS],
+        choices=[(level, capfirst(ROBOT_LEVEL_LABELS[level])) for level in ROBOT_LEVELS],
         default="normal",
     )
     robot_above = models.CharField(_("after five strong seconds"), max_length=64, default=USUAL)
@@ -78,7 +83,7 @@ class Preset(ClinicRow):
         choices=[
             ("", _("As last time")),
             (LIVE, _("Live sensor")),
-            *((f"synthetic {name}", _(SIMULATED + name)) for name in PROFILES),
+            *((f"synthetic {name}", _(SIMULATED_PREFIX + name)) for name in PROFILES),
         ],
     )
 
@@ -127,8 +132,8 @@ class Preset(ClinicRow):
     def goal_words(self) -> str:
         """Say the goal."""
         if self.goal_by == "value":
-            return say_quantity(self.goal_value, A2.unit)
-        share = say_rate(self.goal_percent / 100 if self.goal_percent else None)
+            return format_quantity(self.goal_value, A2.unit)
+        share = format_rate(self.goal_percent / 100 if self.goal_percent else None)
         return gettext("%(share)s of baseline") % {"share": share}
 
     @property

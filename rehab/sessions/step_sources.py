@@ -8,7 +8,7 @@ from pathlib import Path
 from django.conf import settings
 
 from rehab.people.models import Patient
-from rehab.sessions.formatting import RECORDING, SIMULATED
+from rehab.sessions.formatting import RECORDING_PREFIX, SIMULATED_PREFIX
 from rehab.sources.recording.source import holds_signals
 from rehab.sources.synthetic import PROFILES
 
@@ -22,10 +22,10 @@ def list_recordings() -> list[Path]:
 
 
 def list_sources() -> list[tuple[str, str]]:
-    """Give what steps can come from, with the words that a session keeps (`words.say_source`)."""
-    simulated = [(f"synthetic {name}", f"{SIMULATED}{name}") for name in PROFILES]
+    """Give what steps can come from, with the words that a session keeps (`formatting.format_source`)."""
+    simulated = [(f"synthetic {name}", f"{SIMULATED_PREFIX}{name}") for name in PROFILES]
     recordings = [
-        (f"recording {file.name}", f"{RECORDING}{file.name}") for file in list_recordings()
+        (f"recording {file.name}", f"{RECORDING_PREFIX}{file.name}") for file in list_recordings()
     ]
     return [(LIVE, "Live sensor"), *simulated, *recordings]
 

@@ -6,7 +6,7 @@ from django.utils.html import format_html
 from django.utils.safestring import SafeString
 from django.utils.translation import gettext as _
 
-from rehab.sessions.formatting import LEVELS, say_duration, say_source
+from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_duration, format_source
 from rehab.training.valences import VALENCES
 
 register = template.Library()
@@ -28,8 +28,8 @@ def leg(side: str) -> str:
     return {"left": _("left leg"), "right": _("right leg")}.get(side, "")
 
 
-register.filter("duration", say_duration)
-register.filter("source", say_source)
+register.filter("duration", format_duration)
+register.filter("source", format_source)
 
 
 @register.filter
@@ -41,4 +41,4 @@ def type_name(slug: str) -> str:
 @register.filter
 def level(name: str) -> str:
     """Say how lively a robot is."""
-    return str(LEVELS[name])
+    return str(ROBOT_LEVEL_LABELS[name])

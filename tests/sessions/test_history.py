@@ -16,7 +16,13 @@ from django.utils import timezone
 from rehab.people.consent.models import Purpose, give
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.formatting import at_clinic, say_day, say_duration, say_number, say_rate
+from rehab.sessions.formatting import (
+    clinic_time,
+    format_day,
+    format_duration,
+    format_number,
+    format_rate,
+)
 from rehab.sessions.log import RobotEntry, SessionEvent, Step
 from rehab.sessions.reports.trend import SESSIONS, read_trend
 from rehab.training.changes import Change, ChangeKind
@@ -366,15 +372,15 @@ def test_who_may_look(world, patient):
 
 
 def test_figures_are_written_the_same_everywhere():
-    assert [plain(say_rate(rate)) for rate in (0.712, 0, 1, -0.02, None)] == [
+    assert [plain(format_rate(rate)) for rate in (0.712, 0, 1, -0.02, None)] == [
         "71 %",
         "0 %",
         "100 %",
         "−2 %",
         "–",
     ]
-    assert [say_number(value, 0) for value in (1234.4, -5, -0.2)] == ["1,234", "−5", "0"]
-    assert [plain(say_duration(s)) for s in (0, 59.4, 59.6, 1234)] == [
+    assert [format_number(value, 0) for value in (1234.4, -5, -0.2)] == ["1,234", "−5", "0"]
+    assert [plain(format_duration(s)) for s in (0, 59.4, 59.6, 1234)] == [
         "0 s",
         "59 s",
         "1 min",
@@ -385,11 +391,11 @@ def test_figures_are_written_the_same_everywhere():
 def test_days_follow_the_clinics_own_clock(world):
     late = datetime(2026, 11, 20, 23, 30, tzinfo=UTC)
     world.clinic.time_zone = "Europe/Madrid"
-    there = at_clinic(late, world.clinic).date()
+    there = clinic_time(late, world.clinic).date()
     assert there == date(2026, 11, 21)
-    assert say_day(there, date(2026, 11, 21)) == "today"
-    assert say_day(there, date(2026, 11, 25)) == "Nov 21"
-    assert say_day(there, date(2027, 1, 2)) == "Nov 21, 2026"
+    assert format_day(there, date(2026, 11, 21)) == "today"
+    assert format_day(there, date(2026, 11, 25)) == "Nov 21"
+    assert format_day(there, date(2027, 1, 2)) == "Nov 21, 2026"
 
 
 def test_a_change_of_type_and_gain_is_told_wherever_the_session_is(client, patient):

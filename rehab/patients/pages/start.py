@@ -19,7 +19,7 @@ from rehab.patients.visits import SOON_DAYS, Visit, read_today, usual_time
 from rehab.people.access import clinic_of, for_roles, person
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.forms import SessionForm, like_last_time
 from rehab.sessions.models import TrainingSession
 from rehab.stations.builtin import first_station
@@ -50,7 +50,7 @@ def open_sessions(user: User) -> QuerySet[TrainingSession]:
 
 def list_everybody(user: User, words: str = "") -> dict[str, Any]:
     """Give both lists of the start page: who is expected today, and all patients."""
-    now = at_clinic(timezone.now(), clinic_of(user))
+    now = clinic_time(timezone.now(), clinic_of(user))
     patients = patients_of(user)
     if words:
         patients = patients.filter(Q(nickname__icontains=words) | Q(code__icontains=words))

@@ -17,7 +17,7 @@ from rehab.patients.visits import SOON_DAYS, Visit, plan_visit, usual_time
 from rehab.people.access import for_roles, person
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 
 FARTHEST = timedelta(days=366)
 
@@ -39,7 +39,7 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
     if (removed := given.get("remove", "")).isdecimal():
         visits.filter(pk=int(removed)).delete()
         return redirect("patient", patient_id=patient.pk)
-    now = at_clinic(timezone.now(), patient.clinic)
+    now = clinic_time(timezone.now(), patient.clinic)
     try:
         if (days := given.get("in", "")) in map(str, SOON_DAYS):
             day = now.date() + timedelta(days=int(days))

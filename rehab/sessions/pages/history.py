@@ -20,7 +20,13 @@ from rehab.people.access import for_roles, person
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.corrections import CorrectionForm, Part, may_correct, tell_corrections
-from rehab.sessions.formatting import at_clinic, say_day, say_duration, say_number, say_rate
+from rehab.sessions.formatting import (
+    clinic_time,
+    format_day,
+    format_duration,
+    format_number,
+    format_rate,
+)
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.review import review_session, sum_up
 from rehab.sessions.reports.trend import draw_trend, figures_of, read_trend, sum_up_all
@@ -94,7 +100,7 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
     rows = list(page.object_list)
     figures = figures_of(user, rows)
     trend = read_trend(user, mine.filter(simulated=simulated))
-    today = at_clinic(timezone.now(), patient.clinic)
+    today = clinic_time(timezone.now(), patient.clinic)
     chart = draw_trend(trend, today)
     context = {
         "patient": patient,
@@ -115,15 +121,15 @@ def write_line(
     session: TrainingSession, figures: dict[str, float], patient: Patient, now: datetime
 ) -> Line:
     """Put a session into words."""
-    start = at_clinic(session.started_at or session.created_at, patient.clinic)
+    start = clinic_time(session.started_at or session.created_at, patient.clinic)
     return Line(
         session=session,
-        day=say_day(start.date(), now.date()).capitalize(),
+        day=format_day(start.date(), now.date()).capitalize(),
         time=f"{start:%H:%M}",
-        duration=say_duration(session.active_s),
-        goal=say_number(session.goal),
-        score=say_number(figures.get("score"), 0),
-        hit_rate=say_rate(figures.get("hit_rate")),
+        duration=format_duration(session.active_s),
+        goal=format_number(session.goal),
+        score=format_number(figures.get("score"), 0),
+        hit_rate=format_rate(figures.get("hit_rate")),
         state=gettext("imported")
         if session.original_id is not None
         else str(STATES[State(session.state)]),
@@ -142,19 +148,19 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
     review = review_session(user, session)
     corrections = tell_corrections(session, user)
     by_name = user.role != Role.RESEARCHER
-    start = at_clinic(session.started_at or session.created_at, session.clinic)
-    now = at_clinic(timezone.now(), session.clinic)
+    start = clinic_time(session.started_at or session.created_at, session.clinic)
+    now = clinic_time(timezone.now(), session.clinic)
     context = {
         "session": session,
         "by_name": by_name,
         "who": session.patient.nickname if by_name else session.patient.pseudonym,
-        "day": say_day(start.date(), now.date()).capitalize(),
+        "day": format_day(start.date(), now.date()).capitalize(),
         "time": f"{start:%H:%M}",
         "state": STATES[State(session.state)],
         "open": State(session.state) in OPEN,
         "may_correct": by_name and may_correct(session),
         "corrections": [
-            told | {"at": at_clinic(told["row"].at, session.clinic)} for told in corrections
+            told | {"at": clinic_time(told["row"].at, session.clinic)} for told in corrections
         ],
         "note": next((told["new"] for told in corrections if told["row"].part == Part.NOTE), ""),
         "review": review,
@@ -162,15 +168,15 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         "phases": [
             phase
             | {
-                "hit_rate_words": say_rate(phase["hit_rate"]),
-                "mean_words": say_number(phase["mean"]),
-                "performance_words": say_rate(phase["mean_performance"]),
+                "hit_rate_words": format_rate(phase["hit_rate"]),
+                "mean_words": format_number(phase["mean"]),
+                "performance_words": format_rate(phase["mean_performance"]),
                 "type_words": gettext(VALENCES[phase["valence"]].label) if phase["valence"] else "",
             }
             for phase in review.figures["phases"]
         ],
         "moments": [
-            (moment, f"{at_clinic(moment.event.at, session.clinic):%H:%M:%S}")
+            (moment, f"{clinic_time(moment.event.at, session.clinic):%H:%M:%S}")
             for moment in review.moments
         ],
     }

@@ -14,7 +14,7 @@ from rehab.people.consent.models import may_be_watched
 from rehab.people.models import Patient
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
-from rehab.sessions.formatting import LEVELS
+from rehab.sessions.formatting import ROBOT_LEVEL_LABELS
 from rehab.sessions.live.messages import BORG_MAX
 from rehab.sessions.log import EVENTS, Remark
 from rehab.sessions.models import TrainingSession
@@ -60,6 +60,8 @@ def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
             for what, icon in ICONS.items()
         ],
         "borg": range(BORG_MAX + 1),
-        "levels": [(capfirst(LEVELS[name]), share) for name, share in ROBOT_LEVELS.items()],
+        "levels": [
+            (capfirst(ROBOT_LEVEL_LABELS[name]), share) for name, share in ROBOT_LEVELS.items()
+        ],
     }
     return render(request, "sessions/monitor.html", context)

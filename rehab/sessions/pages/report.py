@@ -9,7 +9,7 @@ from django.views.decorators.http import require_safe
 
 from rehab.people.access import for_roles, person
 from rehab.people.roles import Role
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.report import moment_of, write_report
 
@@ -27,7 +27,7 @@ def show_report(request: HttpRequest, session_id: int) -> HttpResponse:
         "session": session,
         "by_name": user.role != Role.RESEARCHER,
         "began": moment_of(session),
-        "now": at_clinic(timezone.now(), session.clinic),
+        "now": clinic_time(timezone.now(), session.clinic),
         "report": write_report(user, session),
     }
     return render(request, "sessions/report.html", context)

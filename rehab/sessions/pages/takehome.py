@@ -11,7 +11,7 @@ from rehab.people.access import for_roles, person
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.people.web.language import speak_to
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.takehome import sum_up_for_home
 
@@ -28,7 +28,7 @@ def show_take_home(request: HttpRequest, patient_id: int) -> HttpResponse:
     sessions = TrainingSession.objects.visible_to(user).filter(
         patient=patient, simulated=patient.simulated
     )
-    now = at_clinic(timezone.now(), patient.clinic)
+    now = clinic_time(timezone.now(), patient.clinic)
     told = sum_up_for_home(user, sessions, now)
     context = {"patient": patient, "told": told, "today": now.date()}
     return render(request, "sessions/takehome.html", context)

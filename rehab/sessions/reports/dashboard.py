@@ -15,7 +15,7 @@ from django.utils.translation import gettext
 from rehab.people.access import clinic_of
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Right, Role, rights_of
-from rehab.sessions.formatting import at_clinic, say_duration, say_number, say_rate
+from rehab.sessions.formatting import clinic_time, format_duration, format_number, format_rate
 from rehab.sessions.live import runtime
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.log import SessionMetric, Step
@@ -62,10 +62,10 @@ class Walked:
     def words(self) -> dict[str, str]:
         """Give the figures as they are written."""
         return {
-            "minutes": say_duration(60 * self.minutes),
-            "strides": say_number(self.strides, 0),
-            "hit_rate": say_rate(self.hit_rate),
-            "wanted": say_rate(self.wanted),
+            "minutes": format_duration(60 * self.minutes),
+            "strides": format_number(self.strides, 0),
+            "hit_rate": format_rate(self.hit_rate),
+            "wanted": format_rate(self.wanted),
         }
 
 
@@ -126,7 +126,7 @@ def look(user: User, now: datetime) -> dict[str, Any]:
     places = list(read_places(user, open_now, now)) if _sees(user, Station) else []
     return {
         "clinic": clinic,
-        "now": at_clinic(now, clinic),
+        "now": clinic_time(now, clinic),
         "today": today,
         "walking": sum(line.session.state == State.RUNNING for line in today),
         "week": read_week(user, clinic, now),
@@ -142,7 +142,7 @@ def _sees(user: User, model: type) -> bool:
 
 def read_today(user: User, clinic: Clinic, now: datetime) -> list[Today]:
     """Give today's sessions by the clinic's clock, and every open one, those that run on top."""
-    midnight = at_clinic(now, clinic).replace(hour=0, minute=0, second=0, microsecond=0)
+    midnight = clinic_time(now, clinic).replace(hour=0, minute=0, second=0, microsecond=0)
     is_open = Q(state__in=[state.value for state in OPEN])
     begun = Q(created_at__gte=midnight) | Q(started_at__gte=midnight)
     sessions = TrainingSession.objects.visible_to(user).filter(is_open | begun).defer("plan")
@@ -158,10 +158,10 @@ def read_today(user: User, clinic: Clinic, now: datetime) -> list[Today]:
         Today(
             session=row,
             who=row.patient.nickname if by_name else row.patient.pseudonym,
-            time=_say_time(at_clinic(row.started_at or row.created_at, clinic), midnight),
+            time=_say_time(clinic_time(row.started_at or row.created_at, clinic), midnight),
             state=row.get_state_display(),
             open=State(row.state) in OPEN,
-            walked=say_duration(row.active_s),
+            walked=format_duration(row.active_s),
             hit_rate=_say_hits(row),
         )
         for row in rows
@@ -171,10 +171,10 @@ def read_today(user: User, clinic: Clinic, now: datetime) -> list[Today]:
 def _say_hits(row: Any) -> str:
     """Give the hit rate; of an open session as it stands by now, where this process runs it."""
     if State(row.state) not in OPEN:
-        return say_rate(row.metric_hit_rate)
+        return format_rate(row.metric_hit_rate)
     running = _find_running(row)
     rate = running.actor.fold.feedback.hit_rate if running else None
-    return "" if rate is None else say_rate(rate)
+    return "" if rate is None else format_rate(rate)
 
 
 def _find_running(session: TrainingSession) -> LiveSession | None:
@@ -189,7 +189,7 @@ def _say_time(moment: datetime, midnight: datetime) -> str:
 
 def read_week(user: User, clinic: Clinic, now: datetime) -> Week:
     """Give the figures of the clinic's week so far: of what people walked, corrections heeded."""
-    here = at_clinic(now, clinic)
+    here = clinic_time(now, clinic)
     monday = (here - timedelta(days=here.weekday())).replace(
         hour=0, minute=0, second=0, microsecond=0
     )
@@ -212,7 +212,7 @@ def read_week(user: User, clinic: Clinic, now: datetime) -> Week:
     strides = _count_strides(user, begun.filter(left_out=False, simulated=simulated))
     minutes = [0.0] * 7
     for row in counted:
-        minutes[at_clinic(row["started_at"], clinic).weekday()] += row["active_s"] / 60
+        minutes[clinic_time(row["started_at"], clinic).weekday()] += row["active_s"] / 60
     return Week(
         total=_sum_up("", "", counted, sum(strides.values())),
         types=[

@@ -12,7 +12,13 @@ from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
 
 from rehab.people.models import User
-from rehab.sessions.formatting import at_clinic, say_duration, say_number, say_quantity, say_rate
+from rehab.sessions.formatting import (
+    clinic_time,
+    format_duration,
+    format_number,
+    format_quantity,
+    format_rate,
+)
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.review import Review, review_session
@@ -55,33 +61,35 @@ def _sum_up(plan: SessionPlan, review: Review, point: Point | None) -> list[tupl
     walked, baseline = (point.walked, point.baseline) if point else (None, None)
     unit, lost = plan.measure.unit, figures["missing"] + figures["invalid"]
     scored = plan.valence.has_points or figures["score"] is not None
-    wanted = _("wanted %(rate)s") % {"rate": say_rate(target.hit_rate)} if target.hit_rate else ""
+    wanted = (
+        _("wanted %(rate)s") % {"rate": format_rate(target.hit_rate)} if target.hit_rate else ""
+    )
     planned = ""
     if target.duration_s:
-        planned = _("planned %(time)s") % {"time": say_duration(target.duration_s)}
+        planned = _("planned %(time)s") % {"time": format_duration(target.duration_s)}
     against = _("no baseline")
     if baseline and point:
         gain = point.gain
-        change = say_rate(gain) if gain is None or gain <= 0 else f"+{say_rate(gain)}"
-        said = {"mean": say_quantity(baseline.mean, unit), "change": change}
+        change = format_rate(gain) if gain is None or gain <= 0 else f"+{format_rate(gain)}"
+        said = {"mean": format_quantity(baseline.mean, unit), "change": change}
         against = _("baseline %(mean)s, %(change)s") % said
     left_out = ngettext("%(count)s does not count", "%(count)s do not count", lost)
     return [
-        (_("Hit rate"), say_rate(figures["hit_rate"]), wanted),
+        (_("Hit rate"), format_rate(figures["hit_rate"]), wanted),
         (
             _("Mean with feedback"),
-            say_quantity(walked.mean if walked else None, unit),
+            format_quantity(walked.mean if walked else None, unit),
             against,
         ),
         (
             _("Strides, trained leg"),
-            say_number(figures["strides"], 0),
-            left_out % {"count": say_number(lost, 0)} if lost else "",
+            format_number(figures["strides"], 0),
+            left_out % {"count": format_number(lost, 0)} if lost else "",
         ),
-        (_("Walked"), say_duration(figures["active_s"]), planned),
+        (_("Walked"), format_duration(figures["active_s"]), planned),
         (
             _("Score"),
-            say_number(figures["score"], 0) if scored else "–",
+            format_number(figures["score"], 0) if scored else "–",
             _("points") if scored else _("this type has no points"),
         ),
     ]
@@ -95,27 +103,27 @@ def _tell_goals(plan: SessionPlan, review: Review, session: TrainingSession) -> 
         first = changes[0].event.old
     unit = plan.measure.unit
     if first is not None:
-        told = [say_quantity(first, unit)]
+        told = [format_quantity(first, unit)]
     elif plan.goal.percent_of_baseline:
-        percent = {"percent": say_number(plan.goal.percent_of_baseline, 0)}
+        percent = {"percent": format_number(plan.goal.percent_of_baseline, 0)}
         told = [_("%(percent)s %% of baseline") % percent]
     else:
         told = []
     for moment in changes[:GOALS]:
-        at = at_clinic(moment.event.at, session.clinic)
-        told.append(f"{say_quantity(moment.event.value, unit)} ({at:%H:%M})")
+        at = clinic_time(moment.event.at, session.clinic)
+        told.append(f"{format_quantity(moment.event.value, unit)} ({at:%H:%M})")
     left = len(changes) - GOALS
     if left > 0:
         more = ngettext("%(count)s change more", "%(count)s changes more", left)
-        told += [f"… {more % {'count': left}} …", say_quantity(review.figures["goal"], unit)]
+        told += [f"… {more % {'count': left}} …", format_quantity(review.figures["goal"], unit)]
     return told
 
 
 def _tell_phase(phase: dict[str, Any]) -> dict[str, Any]:
     return phase | {
-        "hit_rate_words": say_rate(phase["hit_rate"]),
-        "mean_words": say_number(phase["mean"]),
-        "performance_words": say_rate(phase["mean_performance"]),
+        "hit_rate_words": format_rate(phase["hit_rate"]),
+        "mean_words": format_number(phase["mean"]),
+        "performance_words": format_rate(phase["mean_performance"]),
     }
 
 
@@ -124,9 +132,9 @@ def _tell_remarks(events: list[SessionEvent], session: TrainingSession) -> list[
     times: defaultdict[Remark, list[str]] = defaultdict(list)
     for event in events:
         if event.kind in REMARKS:
-            words = f"{at_clinic(event.at, session.clinic):%H:%M}"
+            words = f"{clinic_time(event.at, session.clinic):%H:%M}"
             if event.kind == Remark.BORG:
-                words = f"{say_number(event.value, 0)} ({words})"
+                words = f"{format_number(event.value, 0)} ({words})"
             times[Remark(event.kind)].append(words)
     order = sorted(times, key=lambda kind: (kind not in ADVERSE, list(Remark).index(kind)))
     return [
@@ -246,4 +254,4 @@ def _even_values(top: float) -> list[float]:
 
 def moment_of(session: TrainingSession) -> datetime:
     """Give when a session began, by the clinic's clock."""
-    return at_clinic(session.started_at or session.created_at, session.clinic)
+    return clinic_time(session.started_at or session.created_at, session.clinic)

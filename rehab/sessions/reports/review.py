@@ -11,7 +11,13 @@ from django.utils.translation import gettext, ngettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
-from rehab.sessions.formatting import LEVELS, say_duration, say_number, say_quantity, say_rate
+from rehab.sessions.formatting import (
+    ROBOT_LEVEL_LABELS,
+    format_duration,
+    format_number,
+    format_quantity,
+    format_rate,
+)
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.payloads import MARKED_CHANGES
@@ -99,17 +105,19 @@ def say_event(event: SessionEvent, plan: SessionPlan) -> str:
     name = NAMES.get(event.kind, event.get_kind_display().capitalize())  # type: ignore[call-overload]
     match event.kind:
         case ChangeKind.GOAL:
-            old, new = event.old, say_quantity(event.value, plan.measure.unit)
-            return f"{name} {new}" if old is None else f"{name} {say_number(old)} → {new}"
+            old, new = event.old, format_quantity(event.value, plan.measure.unit)
+            return f"{name} {new}" if old is None else f"{name} {format_number(old)} → {new}"
         case ChangeKind.GAIN:
-            return f"{name} {say_number(event.old)} → {say_number(event.value)}"
+            return f"{name} {format_number(event.old)} → {format_number(event.value)}"
         case ChangeKind.ACTIVATION_THRESHOLD:
-            return f"{name} {say_rate(event.old)} → {say_rate(event.value)}"
+            return f"{name} {format_rate(event.old)} → {format_rate(event.value)}"
         case ChangeKind.ROBOT_INTENSITY:
-            levels = [LEVELS[name_robot_level(each)] for each in (event.old, event.value)]
+            levels = [
+                ROBOT_LEVEL_LABELS[name_robot_level(each)] for each in (event.old, event.value)
+            ]
             return f"{name} {levels[0]} → {levels[1]}"
         case Remark.BORG:
-            return f"{name} {say_number(event.value, 0)}"
+            return f"{name} {format_number(event.value, 0)}"
         case ChangeKind.PHASE:
             return f"{name}: {gettext(plan.phases[int(event.value or 0)].name)}"
         case ChangeKind.VALENCE:
@@ -137,34 +145,34 @@ def sum_up(plan: SessionPlan, review: Review) -> list[dict[str, str]]:
     entries = [
         (
             gettext("Hit rate"),
-            say_rate(figures["hit_rate"]),
-            gettext("wanted %(rate)s") % {"rate": say_rate(target.hit_rate)}
+            format_rate(figures["hit_rate"]),
+            gettext("wanted %(rate)s") % {"rate": format_rate(target.hit_rate)}
             if target.hit_rate
             else "",
         ),
         (
             gettext("Score"),
-            say_number(figures["score"], 0),
+            format_number(figures["score"], 0),
             gettext("points")
             if plan.valence.has_points or figures["score"] is not None
             else gettext("this type has no points"),
         ),
         (
             gettext("Goal"),
-            say_number(figures["goal"]),
+            format_number(figures["goal"]),
             plan.measure.unit
             + (gettext(", changed %(count)s ×") % {"count": changes} if changes else ""),
         ),
         (
             gettext("Walked"),
-            say_duration(figures["active_s"]),
-            gettext("planned %(time)s") % {"time": say_duration(target.duration_s)}
+            format_duration(figures["active_s"]),
+            gettext("planned %(time)s") % {"time": format_duration(target.duration_s)}
             if target.duration_s
             else "",
         ),
         (
             gettext("Strides"),
-            say_number(figures["strides"], 0),
+            format_number(figures["strides"], 0),
             ngettext("%(count)s does not count", "%(count)s do not count", lost) % {"count": lost}
             if lost
             else "",

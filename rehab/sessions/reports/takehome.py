@@ -10,7 +10,13 @@ from django.db.models import Count, F, Max, Q, QuerySet, Sum
 from django.utils.translation import gettext as _
 
 from rehab.people.models import User
-from rehab.sessions.formatting import at_clinic, say_day, say_duration, say_number, say_rate
+from rehab.sessions.formatting import (
+    clinic_time,
+    format_day,
+    format_duration,
+    format_number,
+    format_rate,
+)
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.trend import Point, read_trend
@@ -54,13 +60,13 @@ def sum_up_for_home(
     )
     return {
         "count": totals["pk__count"],
-        "minutes": say_duration(totals["active_s__sum"] or 0.0),
-        "steps": say_number(steps.filter(side=F("session__trained_side")).count(), 0),
+        "minutes": format_duration(totals["active_s__sum"] or 0.0),
+        "steps": format_number(steps.filter(side=F("session__trained_side")).count(), 0),
         "bars": _draw(points, now),
         "development": _develop(points),
         "last_hits": _of_ten(points[-1].hit_rate) if points else None,
         "best_hits": _of_ten(best["rate"]),
-        "streak": say_number(best["streak"], 0) if best["streak"] else "",
+        "streak": format_number(best["streak"], 0) if best["streak"] else "",
         "measure": last.measure if last else None,
     }
 
@@ -77,8 +83,8 @@ def _draw(points: list[Point], now: datetime) -> list[Bar]:
     labels = (_("First session"), _("Last session"))
     return [
         Bar(
-            f"{label}, {say_day(_begun(point, now).date(), now.date())}",
-            f"{say_number(mean)} {point.session.measure.unit}",
+            f"{label}, {format_day(_begun(point, now).date(), now.date())}",
+            f"{format_number(mean)} {point.session.measure.unit}",
             round(100 * mean / longest, 1),
         )
         for label, point, mean in zip(labels, points, means, strict=True)
@@ -87,7 +93,7 @@ def _draw(points: list[Point], now: datetime) -> list[Bar]:
 
 def _begun(point: Point, now: datetime) -> datetime:
     moment = point.session.started_at or point.session.created_at
-    return at_clinic(moment, point.session.clinic).astimezone(now.tzinfo)
+    return clinic_time(moment, point.session.clinic).astimezone(now.tzinfo)
 
 
 def _develop(points: list[Point]) -> str:
@@ -103,10 +109,10 @@ def _develop(points: list[Point]) -> str:
     name = _("Your push-off") if is_push else _("Your %(measure)s") % {"measure": measure.name}
     said = {
         "what": name,
-        "before": say_number(before.mean),
-        "after": say_number(after.mean),
+        "before": format_number(before.mean),
+        "after": format_number(after.mean),
         "unit": measure.unit,
-        "change": say_rate(abs(change)),
+        "change": format_rate(abs(change)),
     }
     if abs(change) < SAME:
         return _("%(what)s stayed the same: %(after)s %(unit)s.") % said

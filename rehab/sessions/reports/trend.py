@@ -12,7 +12,13 @@ from typing import Any
 from django.db.models import Avg, Count, F, OuterRef, QuerySet, Subquery
 
 from rehab.people.models import User
-from rehab.sessions.formatting import say_day, say_duration, say_number, say_quantity, say_rate
+from rehab.sessions.formatting import (
+    format_day,
+    format_duration,
+    format_number,
+    format_quantity,
+    format_rate,
+)
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.training.phases import Phase
@@ -134,14 +140,14 @@ def sum_up_all(
     means = ""
     if last and last.walked and last.baseline:
         unit = last.session.measure.unit
-        means = f"{say_number(last.baseline.mean)} → {say_quantity(last.walked.mean, unit)}"
+        means = f"{format_number(last.baseline.mean)} → {format_quantity(last.walked.mean, unit)}"
     return {
-        "hit_rate": say_rate(last.hit_rate if last else None),
-        "wanted": say_rate(last.wanted) if last and last.wanted else "",
-        "gain": ("+" if gain and gain > 0 else "") + say_rate(gain),
+        "hit_rate": format_rate(last.hit_rate if last else None),
+        "wanted": format_rate(last.wanted) if last and last.wanted else "",
+        "gain": ("+" if gain and gain > 0 else "") + format_rate(gain),
         "means": means,
         "measure": last.session.measure.name if last else "",
-        "walked": say_duration(sum(group["walked"] for group in counted)),
+        "walked": format_duration(sum(group["walked"] for group in counted)),
         "count": sum(group["pk__count"] for group in counted),
         "left_out": 0
         if simulated
@@ -166,7 +172,7 @@ def draw_trend(trend: list[Point], now: datetime) -> dict[str, Any]:
 
     def day(point: Point) -> str:
         start = begun[point.session.pk]
-        words = say_day(start.date(), now.date()).capitalize()
+        words = format_day(start.date(), now.date()).capitalize()
         return f"{words} {start:%H:%M}" if a_day[start.date()] > 1 else words
 
     alike = [point for point in trend if point.session.measure == measure]
