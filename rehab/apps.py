@@ -18,9 +18,9 @@ class RehabConfig(AppConfig):
         from rehab.models import TRACKED
         from rehab.people.audit.history import track
         from rehab.sessions.defaults import install_defaults
-        from rehab.sessions.feedback_text_updates import listen
+        from rehab.sessions.feedback_text_updates import connect_signals
 
         post_migrate.connect(install_defaults, sender=self)
         watch()
         track(*TRACKED)
-        listen()
+        connect_signals()

@@ -14,7 +14,7 @@ from rehab.boards.figures import SHARES, standing_on
 from rehab.boards.models import Leaderboard
 from rehab.people.aliases import say_alias
 from rehab.people.models import Clinic
-from rehab.sessions.formatting import SPACE, clinic_time, format_day, format_duration, format_number
+from rehab.sessions.formatting import NBSP, clinic_time, format_day, format_duration, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.training.metrics import METRICS
 
@@ -39,7 +39,7 @@ class Row:
 def say_figure(slug: str, value: int) -> str:
     """Write a metric's figure as boards show it."""
     unit = "%" if slug in SHARES else METRICS[slug].unit
-    return format_number(value, 0) + (f"{SPACE}{unit}" if unit in UNITS else "")
+    return format_number(value, 0) + (f"{NBSP}{unit}" if unit in UNITS else "")
 
 
 def write(board: Leaderboard, chosen: Sequence[Chosen]) -> list[Row]:
@@ -115,7 +115,7 @@ def date_rows(
         dated.append(
             replace(
                 row,
-                title=format_day(start.date(), today).replace(" ", SPACE),
+                title=format_day(start.date(), today).replace(" ", NBSP),
                 detail=f"{start:%H:%M} · {walked}" if a_day[start.date()] > 1 else walked,
                 you=at_hand is not None and row.session_id == at_hand.pk,
             )

@@ -20,7 +20,7 @@ from rehab.people.consent.models import Purpose, withdraw
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.web.language import speak_to
-from rehab.sessions.formatting import SPACE, format_number
+from rehab.sessions.formatting import NBSP, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN, State
 
@@ -130,7 +130,7 @@ def write_rows(entries: list[Entry], by: By) -> list[Row]:
             Row(
                 session_id=entry.session_id,
                 rank=None if by is By.KEPT else entry.rank,
-                value=format_number(entry.value, 0) + (f"{SPACE}%" if by is By.RATE else ""),
+                value=format_number(entry.value, 0) + (f"{NBSP}%" if by is By.RATE else ""),
                 stake="" if entry.stake is None else format_number(entry.stake, 0),
                 bar=share(entry.value, entry.stake or full if by is By.KEPT else full),
                 skips=entry.place != expected,

@@ -14,7 +14,7 @@ from django.db.models.signals import m2m_changed, post_delete, post_save, pre_sa
 from rehab.boards import building, entries
 from rehab.boards.models import Leaderboard
 from rehab.people.models import Clinic, Patient
-from rehab.sessions.corrections import Part, SessionCorrection
+from rehab.sessions.corrections import CorrectedField, SessionCorrection
 from rehab.sessions.log import SessionMetric, figures_stored
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
@@ -94,7 +94,7 @@ def on_session(instance: TrainingSession, created: bool = False, **_signal: Any)
 @unless_restored
 def on_correction(instance: SessionCorrection, **_signal: Any) -> None:
     """A session was given to whoever walked it: the one whom it was put down to has one less."""
-    if instance.part == Part.PATIENT:
+    if instance.field == CorrectedField.PATIENT:
         before = Patient.everywhere.filter(pseudonym=instance.old)
         entries.refresh_patients(set(before.values_list("pk", flat=True)), corrected=True)
 

@@ -20,7 +20,7 @@ from rehab.people.web.api_base import (
     caller,
     cut,
 )
-from rehab.sessions.api import ORDERS, sessions_of
+from rehab.sessions.api import ORDERS, visible_sessions
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.schemas import FeedbackType
 
@@ -84,14 +84,14 @@ def list_user_sessions(
     """List a user's sessions by non-ascending score; those without a score come last."""
     user = caller(request)
     patient = get_object_or_404(Patient.objects.visible_to(user), code=code)
-    sessions = sessions_of(user).filter(patient=patient).select_related("clinic")
+    sessions = visible_sessions(user).filter(patient=patient).select_related("clinic")
     if wanted.feedback_type:
         sessions = sessions.filter(valence=wanted.feedback_type)
     page = cut(sessions.order_by(*ORDERS["best"]), wanted)
-    return page | {"items": [in_paper_words(session) for session in page["items"]]}
+    return page | {"items": [to_paper_session(session) for session in page["items"]]}
 
 
-def in_paper_words(session: Any) -> dict[str, Any]:
+def to_paper_session(session: Any) -> dict[str, Any]:
     """Tell a session by the paper's attributes, its date by the clinic's clock."""
     start = clinic_time(session.started_at or session.created_at, session.clinic)
     return {

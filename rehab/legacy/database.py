@@ -36,16 +36,16 @@ LONGEST_S = 24 * 3600.0
 HIGHEST_SCORE = 1e9
 
 
-class Damaged(ValueError):
+class InvalidDatabase(ValueError):
     """A file that is no whole database of the original GARRY; the message says why."""
 
 
-class Unreadable(ValueError):
+class InvalidRow(ValueError):
     """A row that cannot be understood; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)
-class OriginalSession:
+class LegacySession:
     """A session of the original. ``row`` has it word for word; ``start`` is by the wall clock."""
 
     id: int
@@ -59,7 +59,7 @@ class OriginalSession:
 
 
 @dataclass(slots=True)
-class Original:
+class LegacyDatabase:
     """All that a file says. ``faults`` tells of sessions that cannot be understood, by their ids,
     and ``nameless`` of participants who have none that is a number.
 
@@ -68,42 +68,44 @@ class Original:
 
     participants: list[int]
     named: int
-    sessions: list[OriginalSession] = field(default_factory=list)
+    sessions: list[LegacySession] = field(default_factory=list)
     faults: dict[int | str, str] = field(default_factory=dict)
     nameless: dict[int | str, str] = field(default_factory=dict)
 
 
-def read_original(file: Path) -> Original:
-    """Read a database of the original GARRY. Raises Damaged."""
+def read_database(file: Path) -> LegacyDatabase:
+    """Read a database of the original GARRY. Raises InvalidDatabase."""
     if not file.is_file():
-        raise Damaged(f"There is no file {file}.")
+        raise InvalidDatabase(f"There is no file {file}.")
     try:
         with closing(sqlite3.connect(f"file:{quote(str(file))}?mode=ro", uri=True)) as database:
             database.text_factory = lambda text: text.decode(errors="replace")
             health = database.execute("PRAGMA quick_check(1)").fetchone()
             if health != ("ok",):
-                raise Damaged(f"{file.name} is damaged: {health and health[0]}. Find a whole copy.")
+                raise InvalidDatabase(
+                    f"{file.name} is damaged: {health and health[0]}. Find a whole copy."
+                )
             people = _read(database, "Participants", PARTICIPANTS)
             rows = _read(database, "Sessions", SESSIONS)
     except sqlite3.Error as problem:
-        raise Damaged(
+        raise InvalidDatabase(
             f"{file.name} cannot be read as a SQLite database: {problem}. Find a whole copy."
         ) from problem
-    original = Original([], named=sum(bool(row["name"]) for row in people))
+    original = LegacyDatabase([], named=sum(bool(row["name"]) for row in people))
     for place, row in enumerate(people, 1):
         try:
             original.participants.append(_whole(row, "participant_id"))
-        except Unreadable as problem:
+        except InvalidRow as problem:
             words = f"{problem}. Give it a number of its own, in both tables"
             original.nameless[f"in row {place}"] = words
     known = set(original.participants)
     for place, row in enumerate(rows, 1):
         try:
-            session = read_session(row)
+            session = parse_session(row)
             if session.participant not in known:
-                raise Unreadable(f"participant {session.participant} is not in the file")
+                raise InvalidRow(f"participant {session.participant} is not in the file")
             original.sessions.append(session)
-        except Unreadable as problem:
+        except InvalidRow as problem:
             key = row["session_id"]
             original.faults[key if isinstance(key, int) else f"in row {place}"] = str(problem)
     return original
@@ -112,12 +114,14 @@ def read_original(file: Path) -> Original:
 def _read(
     database: sqlite3.Connection, table: str, columns: tuple[str, ...]
 ) -> list[dict[str, Any]]:
-    """Give a table's rows by their keys. Raises Damaged where table or column is missing."""
+    """Return a table's rows as dicts. Raises InvalidDatabase for a missing table or column."""
     there = [row[1].lower() for row in database.execute(f"PRAGMA table_info({table})")]
     if not there:
-        raise Damaged(f"There is no table {table}: this is no data.db of the original GARRY.")
+        raise InvalidDatabase(
+            f"There is no table {table}: this is no data.db of the original GARRY."
+        )
     if missing := [name for name in columns if name not in there]:
-        raise Damaged(
+        raise InvalidDatabase(
             f"The table {table} lacks {', '.join(missing)}: this is no whole data.db of the "
             "original GARRY."
         )
@@ -125,15 +129,15 @@ def _read(
     return [dict(zip(columns, row, strict=True)) for row in database.execute(query)]
 
 
-def read_session(row: dict[str, Any]) -> OriginalSession:
-    """Understand a row. Raises Unreadable."""
+def parse_session(row: dict[str, Any]) -> LegacySession:
+    """Understand a row. Raises InvalidRow."""
     if any(isinstance(value, bytes) for value in row.values()):
-        raise Unreadable("it holds bytes where text or numbers belong")
+        raise InvalidRow("it holds bytes where text or numbers belong")
     valence = str(row["feedback_type"]).strip().lower()
     if valence not in VALENCES:
-        raise Unreadable(f"feedback type {row['feedback_type']!r} is none of {', '.join(VALENCES)}")
+        raise InvalidRow(f"feedback type {row['feedback_type']!r} is none of {', '.join(VALENCES)}")
     score = row["score"]
-    return OriginalSession(
+    return LegacySession(
         id=_whole(row, "session_id"),
         participant=_whole(row, "participant_id"),
         start=_start(row),
@@ -151,14 +155,14 @@ def _number(row: dict[str, Any], name: str, most: float) -> float:
     except (TypeError, ValueError):
         number = math.nan
     if not abs(number) <= most:
-        raise Unreadable(f"{name} {row[name]!r} is no number")
+        raise InvalidRow(f"{name} {row[name]!r} is no number")
     return number
 
 
 def _whole(row: dict[str, Any], name: str) -> int:
     number = _number(row, name, 2.0**53)
     if number != int(number):
-        raise Unreadable(f"{name} {row[name]!r} is no whole number")
+        raise InvalidRow(f"{name} {row[name]!r} is no whole number")
     return int(number)
 
 
@@ -171,7 +175,7 @@ def _start(row: dict[str, Any]) -> datetime:
     except (ValueError, OverflowError):
         stored = date.min
     if stored.year not in YEARS:
-        raise Unreadable(f"year {year}, month {month}, day {day} is no date")
+        raise InvalidRow(f"year {year}, month {month}, day {day} is no date")
     text = str(row["start_time"]).strip()
     try:
         clock = time.fromisoformat(text).replace(tzinfo=None)
@@ -179,7 +183,7 @@ def _start(row: dict[str, Any]) -> datetime:
         try:
             start = datetime.fromisoformat(text).replace(tzinfo=None)
         except ValueError:
-            raise Unreadable(f"start_time {row['start_time']!r} is no time of day") from None
+            raise InvalidRow(f"start_time {row['start_time']!r} is no time of day") from None
         if stored - start.date() == timedelta(days=1):
             return start
         clock = start.time()
@@ -195,5 +199,5 @@ def _duration(given: Any) -> float:
     else:
         total = _number({"duration": given}, "duration", LONGEST_S)
     if not 0 <= total <= LONGEST_S:
-        raise Unreadable(f"duration {given!r} is no duration")
+        raise InvalidRow(f"duration {given!r} is no duration")
     return total

@@ -6,7 +6,7 @@ from collections import Counter
 from datetime import timedelta
 from zoneinfo import ZoneInfo
 
-from rehab.legacy.database import Original, OriginalSession
+from rehab.legacy.database import LegacyDatabase, LegacySession
 from rehab.people.consent.tombstones import is_kept_away
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
@@ -20,13 +20,13 @@ from rehab.training.plans import SessionPlan
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES, find_valence
 
-SOURCE = "Original GARRY"
+SOURCE = "LegacyDatabase GARRY"
 
 
-class TakeOver:
+class Importer:
     """Takes a file's rows over into a clinic, each once; keeps count of what became of them."""
 
-    def __init__(self, clinic: Clinic, original: Original) -> None:
+    def __init__(self, clinic: Clinic, original: LegacyDatabase) -> None:
         self.clinic = clinic
         self.original = original
         self.taken: Counter[str] = Counter()
@@ -77,9 +77,9 @@ class TakeOver:
             original_id=pk,
         )
 
-    def _take_session(self, found: OriginalSession, patient: Patient) -> None:
+    def _take_session(self, found: LegacySession, patient: Patient) -> None:
         before = TrainingSession.everywhere.filter(clinic=self.clinic, original_id=found.id).first()
-        if before is not None and before.original == found.row:
+        if before is not None and before.legacy_row == found.row:
             self.here["sessions"] += 1
             return
         if before is not None:
@@ -95,7 +95,7 @@ class TakeOver:
         else:
             self.taken["sessions"] += 1
 
-    def _store(self, found: OriginalSession, patient: Patient) -> None:
+    def _store(self, found: LegacySession, patient: Patient) -> None:
         """Store a finished session without steps. Raises InvalidSetting for a goal that is none."""
         plan = SessionPlan(
             measure=self._measure.to_rule(),
@@ -120,7 +120,7 @@ class TakeOver:
             ended_at=start + timedelta(seconds=found.duration_s),
             active_s=found.duration_s,
             original_id=found.id,
-            original=found.row,
+            legacy_row=found.row,
         )
         if plan.valence.has_points and found.score is not None:
             SessionMetric.everywhere.create(session=session, slug="score", value=found.score)

@@ -16,17 +16,17 @@ from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN
 
 
-class StillOpen(ValueError):
+class SessionStillOpen(ValueError):
     """A patient whose time cannot end while a session is open."""
 
 
 def end_program(patient: Patient, because: Ending, now: datetime) -> None:
     """Take a patient off the lists; nothing can be started until it is reopened.
 
-    Raises StillOpen.
+    Raises SessionStillOpen.
     """
     with transaction.atomic():
-        hold_closed(patient)
+        lock_without_open_session(patient)
         if patient.erased_at is None:
             patient.ended_at, patient.ended_because = now, because
             patient.save(update_fields=["ended_at", "ended_because"])
@@ -41,12 +41,12 @@ def reopen_program(patient: Patient) -> None:
             patient.save(update_fields=["ended_at", "ended_because"])
 
 
-def hold_closed(patient: Patient) -> None:
-    """Hold the patient's row. Raises StillOpen where a session could still go on."""
+def lock_without_open_session(patient: Patient) -> None:
+    """Hold the patient's row. Raises SessionStillOpen where a session could still go on."""
     patient.hold()
     sessions = TrainingSession.everywhere.filter(
         patient=patient, state__in=[state.value for state in OPEN]
     )
     if sessions.exists():
         said = _("%(patient)s still has an open session. End it first.")
-        raise StillOpen(said % {"patient": patient.nickname})
+        raise SessionStillOpen(said % {"patient": patient.nickname})

@@ -12,7 +12,7 @@ from django.db.models import Exists, F, Max, OuterRef, QuerySet
 from django.db.models.functions import Coalesce, Greatest
 from django.utils.translation import gettext as _
 
-from rehab.patients.closure import hold_closed
+from rehab.patients.closure import lock_without_open_session
 from rehab.patients.visits import Visit
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
@@ -20,16 +20,16 @@ from rehab.people.audit.history import HistoryEntry, forget_values
 from rehab.people.consent.models import Purpose, withdraw
 from rehab.people.consent.tombstones import keep_away
 from rehab.people.models import Clinic, Erasing, Patient, User, new_pseudonym
-from rehab.sessions.corrections import forget_patient as forget_corrections
+from rehab.sessions.corrections import anonymize_corrections
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import Remark, SessionEvent
 from rehab.sessions.models import TrainingSession
 
 
 def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) -> None:
-    """Erase all that leads to a person, for good and once. Raises StillOpen."""
+    """Erase all that leads to a person, for good and once. Raises SessionStillOpen."""
     with transaction.atomic():
-        hold_closed(patient)
+        lock_without_open_session(patient)
         if patient.erased_at is not None:
             return  # somebody was quicker
         withdraw(patient, Purpose.BOARDS, by, now)
@@ -43,13 +43,14 @@ def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) ->
         patient.erased_at, patient.erased_because = now, because
         patient.save()
         sessions = TrainingSession.everywhere.filter(patient=patient)
-        sessions.update(source="", runs=[], original=None)  # names of files, rows of the original
+        # Sources may be files that are named after a person.
+        sessions.update(source="", source_args=[], legacy_row=None)
         # It still says that the session was imported, but no longer from where.
         sessions.filter(original_id__isnull=False).update(original_id=-1 * F("pk"))
         SessionEvent.everywhere.filter(
             session__patient=patient, kind__in=[remark.value for remark in Remark]
         ).update(data={})
-        forget_corrections(patient, known_as)
+        anonymize_corrections(patient, known_as)
         Visit.everywhere.filter(patient=patient).delete()
         forget_values("Patient", patient.pk)
         LogEntry.objects.filter(
@@ -61,7 +62,7 @@ def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) ->
         )
 
 
-def overdue(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
+def patients_past_retention(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
     """Give the patients whom a clinic has kept for as long as it wants to.
 
     It counts from the last session, or from the day on which the patient was taken in: sessions
@@ -78,7 +79,7 @@ def overdue(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
     return kept.exclude(Exists(expected)).order_by("pk")
 
 
-def let_logs_go(clinic: Clinic, now: datetime) -> int:
+def delete_old_logs(clinic: Clinic, now: datetime) -> int:
     """Delete what is older than a clinic keeps its logs; give how many entries."""
     before = months_before(now, clinic.keep_log_months)
     changes, _each = HistoryEntry.everywhere.filter(clinic=clinic, at__lt=before).delete()

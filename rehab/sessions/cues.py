@@ -18,35 +18,38 @@ from rehab.training.valences import Cue
 from robot.gestures import GESTURES, ORIGINALS, BadGesture
 from robot.trial import admit_gesture
 
-USUAL, NOTHING = "(usual)", "(nothing)"  # choices beside gestures, none of which has such a name
+DEFAULT_GESTURE, NO_GESTURE = (
+    "(usual)",
+    "(nothing)",
+)  # choices beside gestures, none of which has such a name
 
 
-def list_gestures(by: User) -> list[tuple[str, Any]]:
+def robot_gesture_choices(by: User) -> list[tuple[str, Any]]:
     """Give the choices with their words."""
     return [
-        (USUAL, _("As usual for the feedback type")),
-        (NOTHING, _("Nothing")),
+        (DEFAULT_GESTURE, _("As usual for the feedback type")),
+        (NO_GESTURE, _("Nothing")),
         *gesture_choices(by),
     ]
 
 
-def name_gestures(by: User) -> set[str]:
+def known_gesture_choices(by: User) -> set[str]:
     """Give every choice that can be made, without its words."""
     composed = Gesture.objects.visible_to(by).values_list("name", flat=True)
-    return {USUAL, NOTHING, *GESTURES, *ORIGINALS, *composed}
+    return {DEFAULT_GESTURE, NO_GESTURE, *GESTURES, *ORIGINALS, *composed}
 
 
-def to_cue(above: str, below: str, valence: str, patient: Patient) -> Cue:
+def cue_from_choices(above: str, below: str, valence: str, patient: Patient) -> Cue:
     """Give the cue for two choices, by what is usual in the patient's clinic."""
     usual = valences_of(patient.clinic_id)[valence].cue
     return Cue(_gesture(above, usual.above), _gesture(below, usual.below))
 
 
 def _gesture(choice: str, usual: str | None) -> str | None:
-    return usual if choice == USUAL else None if choice == NOTHING else choice
+    return usual if choice == DEFAULT_GESTURE else None if choice == NO_GESTURE else choice
 
 
-def to_choices(cue: Cue, valence: str, patient: Patient, by: User) -> tuple[str, str]:
+def choices_from_cue(cue: Cue, valence: str, patient: Patient, by: User) -> tuple[str, str]:
     """Give the choices for a cue; the usual one for a gesture that is not to be had any more."""
     usual = valences_of(patient.clinic_id)[valence].cue
     composed = Gesture.objects.visible_to(by).values_list("name", flat=True)
@@ -56,11 +59,11 @@ def to_choices(cue: Cue, valence: str, patient: Patient, by: User) -> tuple[str,
 
 def _choice(gesture: str | None, usual: str | None, known: set[str | None]) -> str:
     if gesture == usual or gesture not in known:
-        return USUAL
-    return gesture or NOTHING
+        return DEFAULT_GESTURE
+    return gesture or NO_GESTURE
 
 
-def find_composed(patient: Patient, cue: Cue) -> Iterator[dict[str, Any]]:
+def composed_gestures(patient: Patient, cue: Cue) -> Iterator[dict[str, Any]]:
     """Give the gestures of the patient's clinic that a cue names, as they travel to a robot.
 
     Raises InvalidSetting for a gesture that nobody knows, and for one that no robot would play.
@@ -84,7 +87,7 @@ def find_composed(patient: Patient, cue: Cue) -> Iterator[dict[str, Any]]:
         yield data
 
 
-def quiet_cue(cue: Cue, usual: Cue, chosen: Cue) -> Cue:
+def silence_cue(cue: Cue, usual: Cue, chosen: Cue) -> Cue:
     """Give the cue of a type that a session may be changed to.
 
     What was silenced for the session, where its type would usually have a gesture, stays silent:

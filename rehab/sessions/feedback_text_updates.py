@@ -24,12 +24,12 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.valences import Valence, bands_to_json
 
 
-def listen() -> None:
+def connect_signals() -> None:
     """Listen, from the start of the process on."""
-    words_edited.connect(on_words_edited)
+    words_edited.connect(update_open_sessions)
 
 
-def on_words_edited(
+def update_open_sessions(
     row: FeedbackType | None, clinic_id: int, slug: str, by: User, **_signal: Any
 ) -> list[str]:
     """Reword the clinic's open sessions; give what could not be reached, in words."""
@@ -41,20 +41,20 @@ def on_words_edited(
         language = session.to_plan().language
         worded = row.to_valence(language) if row is not None else usual_valence(slug, language)
         try:
-            async_to_sync(_reword)(session.pk, worded, by)
+            async_to_sync(_update_session)(session.pk, worded, by)
         except (InvalidSetting, OwnedElsewhere, NotStored) as problem:
             problems.append(
                 _("The open session of %(patient)s keeps its words: %(problem)s")
-                % {"patient": session.patient.nickname, "problem": _say(problem)}
+                % {"patient": session.patient.nickname, "problem": _describe_problem(problem)}
             )
     return problems
 
 
-def _say(problem: Exception) -> str:
+def _describe_problem(problem: Exception) -> str:
     return in_words(problem) if isinstance(problem, InvalidSetting) else str(problem)
 
 
-async def _reword(session_id: int, worded: Valence, by: User) -> None:
+async def _update_session(session_id: int, worded: Valence, by: User) -> None:
     """Change the words of one session, unless it has them or cannot come to that type."""
     serves = runtime.peek() is not None
     here = runtime.current()

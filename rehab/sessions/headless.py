@@ -91,7 +91,9 @@ def robot_steps(session: TrainingSession, fold: SessionFold) -> Iterator[tuple[f
             yield time_s, performance
 
 
-def compare_with_flags(session: TrainingSession, recording: Recording) -> dict[int, dict[str, int]]:
+def compare_with_recording(
+    session: TrainingSession, recording: Recording
+) -> dict[int, dict[str, int]]:
     """Compare our rule with the recording's own flags; phase → counts.
 
     ``compared`` counts the rows with a recorded value and flag, valid or not; ``agree`` those where
@@ -120,7 +122,7 @@ def report(
     """Give the JSON that `runsession` prints; ``robot`` is what a robot did, if one answered."""
     figures = describe_session(fold)
     if recording is not None:
-        counts = compare_with_flags(session, recording)
+        counts = compare_with_recording(session, recording)
         figures["recorded_success"] = _sum_counts(list(counts.values()))
         for phase in figures["phases"]:
             phase["recorded_success"] = _sum_counts(

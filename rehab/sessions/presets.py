@@ -14,7 +14,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.models import Clinic, User
 from rehab.people.scope import ClinicRow, Scope
 from rehab.people.web.refusals import in_words
-from rehab.sessions.cues import USUAL, name_gestures
+from rehab.sessions.cues import DEFAULT_GESTURE, known_gesture_choices
 from rehab.sessions.formatting import (
     ROBOT_LEVEL_LABELS,
     SIMULATED_PREFIX,
@@ -74,8 +74,12 @@ class Preset(ClinicRow):
         choices=[(level, capfirst(ROBOT_LEVEL_LABELS[level])) for level in ROBOT_LEVELS],
         default="normal",
     )
-    robot_above = models.CharField(_("after five strong seconds"), max_length=64, default=USUAL)
-    robot_below = models.CharField(_("after five weak seconds"), max_length=64, default=USUAL)
+    robot_above = models.CharField(
+        _("after five strong seconds"), max_length=64, default=DEFAULT_GESTURE
+    )
+    robot_below = models.CharField(
+        _("after five weak seconds"), max_length=64, default=DEFAULT_GESTURE
+    )
     source = models.CharField(
         _("steps come from"),
         max_length=64,
@@ -126,10 +130,10 @@ class Preset(ClinicRow):
     @property
     def about(self) -> str:
         """Say in a few words what it sets."""
-        return " · ".join(filter(None, (self.get_valence_display(), self.goal_words, self.length)))
+        return " · ".join(filter(None, (self.get_valence_display(), self.goal_label, self.length)))
 
     @property
-    def goal_words(self) -> str:
+    def goal_label(self) -> str:
         """Say the goal."""
         if self.goal_by == "value":
             return format_quantity(self.goal_value, A2.unit)
@@ -141,9 +145,9 @@ class Preset(ClinicRow):
         """Say how long is planned."""
         return gettext("%(count)s min") % {"count": self.minutes} if self.minutes else ""
 
-    def to_choices(self, by: User) -> dict[str, Any]:
+    def to_initial(self, by: User) -> dict[str, Any]:
         """Give what it sets of the set-up; a gesture that is gone becomes the usual one."""
-        known = name_gestures(by)
+        known = known_gesture_choices(by)
         chosen: dict[str, Any] = {
             "valence": self.valence,
             "goal_by": self.goal_by,
@@ -151,8 +155,8 @@ class Preset(ClinicRow):
             "minutes": self.minutes,
             "protocol": self.protocol,
             "robot": self.robot,
-            "robot_above": self.robot_above if self.robot_above in known else USUAL,
-            "robot_below": self.robot_below if self.robot_below in known else USUAL,
+            "robot_above": self.robot_above if self.robot_above in known else DEFAULT_GESTURE,
+            "robot_below": self.robot_below if self.robot_below in known else DEFAULT_GESTURE,
         }
         goal = {"goal_value": self.goal_value, "goal_percent": self.goal_percent}
         chosen |= {name: value for name, value in goal.items() if value is not None}

@@ -17,7 +17,7 @@ from rehab.training import measures as rules
 from rehab.training.phases import PHASE_KINDS, Phase
 
 
-def say_shared(row: Measure | Protocol) -> str:
+def display_name(row: Measure | Protocol) -> str:
     """Give the name of a row; one that all clinics share is said in the page's language."""
     return row.name if row.clinic_id else gettext(row.name)
 
@@ -65,7 +65,7 @@ class Measure(ClinicRow):
         ]
 
     def __str__(self) -> str:
-        return f"{say_shared(self)} [{self.unit}]"
+        return f"{display_name(self)} [{self.unit}]"
 
     def to_rule(self) -> rules.Measure:
         """Give the measure as the rules know it."""
@@ -111,7 +111,7 @@ class Protocol(ClinicRow):
         ]
 
     def __str__(self) -> str:
-        return say_shared(self)
+        return display_name(self)
 
     def to_rules(self) -> tuple[Phase, ...]:
         """Give the phases as the rules know them."""

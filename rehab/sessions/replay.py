@@ -22,7 +22,7 @@ def fold_log(fold: SessionFold, session: TrainingSession) -> SessionFold:
     then, and a log that is refused for it would shut everyone out of all else that it holds.
     """
     passed_over: list[str] = []
-    for entry in read_log(session):
+    for entry in log_entries(session):
         try:
             if isinstance(entry, Change):
                 fold.change(entry)
@@ -40,7 +40,7 @@ def fold_log(fold: SessionFold, session: TrainingSession) -> SessionFold:
     return fold
 
 
-def read_log(session: TrainingSession) -> Iterator[Measurement | Change]:
+def log_entries(session: TrainingSession) -> Iterator[Measurement | Change]:
     """Give a session's committed steps and changes in the order in which they took effect."""
     changes = SessionEvent.everywhere.filter(session=session, kind__in=list(ChangeKind))
     events = list(changes.order_by("pk"))

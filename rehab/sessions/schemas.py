@@ -25,19 +25,19 @@ FeedbackType = Annotated[
 ]
 
 
-def read_kind(kind: str) -> ChangeKind:
+def parse_change_kind(kind: str) -> ChangeKind:
     """Give the change of that name. Raises ValueError for one that is not made here."""
     if kind not in ASKED:
         raise ValueError(f"A change is one of: {', '.join(ASKED)}.")
     return ChangeKind(kind)
 
 
-AskedKind = Annotated[
-    str, AfterValidator(read_kind), Field(json_schema_extra={"enum": list(ASKED)})
+RequestedChangeKind = Annotated[
+    str, AfterValidator(parse_change_kind), Field(json_schema_extra={"enum": list(ASKED)})
 ]
 
 
-class Choice(Schema):
+class NamedRow(Schema):
     """Something that a session can be built with."""
 
     id: int
@@ -52,7 +52,7 @@ class SessionOut(Schema):
     state: str
     feedback_type: str = Field(alias="valence", description="The one that it began with.")
     changed_to: list[str] = Field(
-        alias="later_types", description="Types that it was changed to on its way, in order."
+        alias="later_valences", description="Types that it was changed to on its way, in order."
     )
     goal: float | None
     measure: str = Field(alias="measure.name")
@@ -62,7 +62,7 @@ class SessionOut(Schema):
     station: str | None = Field(None, alias="station.name")
     source: str | None = Field(description="Null for researchers: files may be named after people.")
     simulated: bool
-    left_out: bool = Field(description="Corrected: in no figure, board or trend.")
+    excluded: bool = Field(description="Corrected: in no figure, board or trend.")
     imported: bool = Field(description="From the original GARRY, without steps.")
     created_at: datetime
     started_at: datetime | None
@@ -99,7 +99,7 @@ class SessionFilter(Paging):
     order: Literal["newest", "oldest", "best"] = "newest"
 
 
-class SessionGiven(Given):
+class SessionRequestBody(Given):
     """A new session. What is left out is like the patient's last time."""
 
     patient: Key
@@ -117,10 +117,10 @@ class SessionGiven(Given):
     robot_below: Words = left_out(description="Gesture after a window below it.")
 
 
-class ChangeGiven(Given):
+class ChangeRequestBody(Given):
     """What is to be changed of a session, as on the therapist's page."""
 
-    kind: AskedKind
+    kind: RequestedChangeKind
     value: float | str | None = Field(
         None,
         description="The new goal, gain, threshold, intensity or phase; 1 or 0 for words shown; "

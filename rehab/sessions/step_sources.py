@@ -21,8 +21,8 @@ def list_recordings() -> list[Path]:
     return [] if settings.HOSTED or not folder.is_dir() else sorted(folder.glob("*.csv"))
 
 
-def list_sources() -> list[tuple[str, str]]:
-    """Give what steps can come from, with the words that a session keeps (`formatting.format_source`)."""
+def source_choices() -> list[tuple[str, str]]:
+    """Return the sources of steps as (choice, text that a session stores); see `format_source`."""
     simulated = [(f"synthetic {name}", f"{SIMULATED_PREFIX}{name}") for name in PROFILES]
     recordings = [
         (f"recording {file.name}", f"{RECORDING_PREFIX}{file.name}") for file in list_recordings()
@@ -30,8 +30,8 @@ def list_sources() -> list[tuple[str, str]]:
     return [(LIVE, "Live sensor"), *simulated, *recordings]
 
 
-def source_arguments(kind: str, name: str, patient: Patient) -> list[str]:
-    """Give what the server runs as `python -m rehab.sources` for a choice of ``list_sources``."""
+def build_source_args(kind: str, name: str, patient: Patient) -> list[str]:
+    """Give what the server runs as `python -m rehab.sources` for a choice of ``source_choices``."""
     match kind:
         case "synthetic":
             return ["synthetic", "--profile", name, "--seed", str(secrets.randbelow(2**31))]

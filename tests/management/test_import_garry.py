@@ -139,8 +139,8 @@ def test_ids_dates_scores_types_and_goals_are_those_of_the_original(file, clinic
         assert (session.valence, session.goal, session.state) == (kind.lower(), goal, "finished")
         assert session.to_plan().goal.value == goal
         assert scores.get(pk) == (None if kind == "Explicit" else score)
-        assert session.original["score"] == score
-        assert session.original["threshold"] == goal
+        assert session.legacy_row["score"] == score
+        assert session.legacy_row["threshold"] == goal
     assert not Step.everywhere.exists()
 
 

@@ -152,7 +152,7 @@ def multiply(world: World) -> None:
         patient = patient_of(world, f"More {number}")
         session = walk(patient, "positive", strides(3, 1), days_ago=number)
         SessionCorrection.everywhere.create(
-            session=session, part="note", reason="why", by=world.people[Role.PT], at=NOW
+            session=session, field="note", reason="why", by=world.people[Role.PT], at=NOW
         )
         Leaderboard.everywhere.create(clinic=world.clinic, name=f"More {number}")
         station = Station.everywhere.create(clinic=world.clinic, name=f"More {number}")

@@ -24,7 +24,7 @@ from rehab.sessions.formatting import (
     format_rate,
 )
 from rehab.sessions.log import RobotEntry, SessionEvent, Step
-from rehab.sessions.reports.trend import SESSIONS, read_trend
+from rehab.sessions.reports.trend import SESSIONS, load_trend
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.walks import GOAL, HIT, MISS, RIGHT, Walked, strides, walk
@@ -149,15 +149,15 @@ def test_the_trend_equals_the_stored_strides(world, client, patient):
         2.2,
     ]
     session = walk(patient, "positive", walked, phases=phases, wanted=0.6)
-    (point,) = read_trend(world.people[Role.PT], type(session).everywhere.filter(pk=session.pk))
+    (point,) = load_trend(world.people[Role.PT], type(session).everywhere.filter(pk=session.pk))
     steps = Step.everywhere.filter(session=session, side="left", valid=True)
     trained = [step.value for step in steps if step.phase in {1, 3}]
     before = [step.value for step in steps if step.phase == 0]
-    assert point.walked.count == len(trained) == 6
-    assert point.walked.mean == pytest.approx(statistics.mean(trained))
-    assert point.walked.deviation == pytest.approx(statistics.pstdev(trained))
+    assert point.with_feedback.count == len(trained) == 6
+    assert point.with_feedback.mean == pytest.approx(statistics.mean(trained))
+    assert point.with_feedback.deviation == pytest.approx(statistics.pstdev(trained))
     assert point.baseline.mean == pytest.approx(statistics.mean(before)) == 1.5
-    assert point.gain == pytest.approx(statistics.mean(trained) / 1.5 - 1)
+    assert point.change == pytest.approx(statistics.mean(trained) / 1.5 - 1)
     chart = read_json(history(client, patient), "trend")
     assert chart["hits"]["wanted"] == [60.0]
     judged = [step.hit for step in steps if step.phase in {1, 3}]
@@ -171,7 +171,7 @@ def test_the_trend_has_the_newest_sessions_oldest_first(world, patient):
     for index in range(SESSIONS + 3):
         walk(patient, "positive", strides(index % 5 + 1, 2), days_ago=index)
     walk(patient, "positive", strides(9, 0), end=ChangeKind.ABORT)
-    trend = read_trend(world.people[Role.PT], patient.sessions.all())
+    trend = load_trend(world.people[Role.PT], patient.sessions.all())
     dates = [point.session.created_at for point in trend]
     assert len(trend) == SESSIONS
     assert dates == sorted(dates)
@@ -230,16 +230,18 @@ def test_the_chart_holds_every_stride_of_the_trained_leg(client, patient):
 
 def test_strides_before_the_goal_is_known_are_drawn_unjudged(client, world, patient):
     from rehab.sessions.live.actor import SessionActor
-    from rehab.sessions.services import create_session
+    from rehab.sessions.services import SessionRequest, create_session
     from rehab.training.goals import GoalRule
     from rehab.training.steps import Measurement, Side
     from tests.support.world import NOW, store
 
     session = create_session(
-        patient,
-        valence="binary",
-        goal=GoalRule(percent_of_baseline=100),
-        phases=(make_phase("baseline", strides=60), make_phase("training")),
+        SessionRequest(
+            patient=patient,
+            valence="binary",
+            goal=GoalRule(percent_of_baseline=100),
+            phases=(make_phase("baseline", strides=60), make_phase("training")),
+        )
     )
     actor = SessionActor(session)
     rows = [*actor.change(Change(ChangeKind.START), None, NOW)]

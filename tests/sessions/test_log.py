@@ -17,7 +17,7 @@ from rehab.sessions.live.actor import SessionActor, StepRow
 from rehab.sessions.live.writer import STEP_COLUMNS
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
 from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind, Refused
 from rehab.training.goals import GoalRule
@@ -40,7 +40,9 @@ def patient() -> Patient:
 
 def begin(patient: Patient, valence: str = "binary", **settings: Any) -> SessionActor:
     defaults: dict[str, Any] = {"goal": GoalRule(value=3.0), "phases": TRAINING}
-    actor = SessionActor(create_session(patient, valence=valence, **defaults | settings))
+    actor = SessionActor(
+        create_session(SessionRequest(patient=patient, valence=valence, **defaults | settings))
+    )
     change(actor, ChangeKind.START)
     return actor
 

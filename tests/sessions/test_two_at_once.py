@@ -15,7 +15,7 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.defaults import install_defaults
-from rehab.sessions.forms import SessionForm
+from rehab.sessions.forms.session import SessionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocols import Protocol
 from rehab.sessions.services import StationTaken

@@ -8,7 +8,7 @@ import pytest
 from django.test import Client
 from django.utils import timezone
 
-from rehab.patients.visits import Progress, Visit, plan_visit, read_today, usual_time
+from rehab.patients.visits import Progress, Visit, patients_today, plan_visit, suggested_time
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
@@ -47,7 +47,7 @@ def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):
     walk(dora, "positive", [HIT] * 3, end=None)  # came without a plan, and walks
     walk(emil, "positive", [HIT], days_ago=1)
     walk(emil, "positive", [HIT], simulated=True)  # nobody was here
-    listed = read_today(world.people[Role.PT], NOW + timedelta(hours=1))
+    listed = patients_today(world.people[Role.PT], NOW + timedelta(hours=1))
     assert [(row.patient.nickname, row.at, row.progress) for row in listed] == [
         ("Dora", time(10, 0), Progress.WALKING),
         ("Ana", time(11, 0), Progress.EXPECTED),
@@ -61,7 +61,7 @@ def test_a_day_is_the_clinics_own(world):
     rosa = patient(world, "Rosa")
     plan_visit(rosa, NOW.date(), None)
     late = datetime(2026, 11, 21, 23, 30, tzinfo=UTC)
-    assert read_today(world.people[Role.PT], late)
+    assert patients_today(world.people[Role.PT], late)
     world.clinic.time_zone = "Asia/Tokyo"
     world.clinic.save()
     Visit.everywhere.all().delete()
@@ -75,7 +75,7 @@ def test_the_next_visit_is_one_tap_at_the_usual_time(world):
     session = walk(rosa, "positive", [HIT])
     began = datetime(2026, 11, 20, 10, 8, tzinfo=UTC)
     TrainingSession.everywhere.filter(pk=session.pk).update(created_at=began)
-    assert usual_time(world.people[Role.PT], rosa, NOW) == time(10, 15)
+    assert suggested_time(world.people[Role.PT], rosa, NOW) == time(10, 15)
     client, today = pt_of(world), timezone.now().date()
     page = client.get(f"/patients/{rosa.pk}/").content.decode()
     assert "In a week" in page

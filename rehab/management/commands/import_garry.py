@@ -9,8 +9,8 @@ from typing import Any
 from django.core.management import BaseCommand, CommandError
 from django.db import transaction
 
-from rehab.legacy.database import Damaged, read_original
-from rehab.legacy.importing import TakeOver
+from rehab.legacy.database import InvalidDatabase, read_database
+from rehab.legacy.importing import Importer
 from rehab.people.models import Clinic
 from rehab.people.sign_in.first_start import first_clinic, prepare_database
 
@@ -32,12 +32,12 @@ class Command(BaseCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Import. Raises CommandError where nothing was changed because of what could not be."""
         try:
-            original = read_original(options["file"])
-        except Damaged as problem:
+            original = read_database(options["file"])
+        except InvalidDatabase as problem:
             raise CommandError(f"{problem} Nothing was changed.") from problem
         prepare_database()
         with transaction.atomic():
-            work = TakeOver(find_clinic(options["clinic"]), original)
+            work = Importer(find_clinic(options["clinic"]), original)
             work.run()
             goes_on = work.is_whole or options["partial"]
             if options["dry_run"] or not goes_on:

@@ -9,8 +9,8 @@ from django.core.management.base import BaseCommand
 from django.db import transaction
 from django.utils import timezone
 
-from rehab.patients.closure import StillOpen
-from rehab.patients.erasure import erase, let_logs_go, overdue
+from rehab.patients.closure import SessionStillOpen
+from rehab.patients.erasure import delete_old_logs, erase, patients_past_retention
 from rehab.people.models import Clinic, Erasing
 
 
@@ -28,17 +28,17 @@ class Command(BaseCommand):
         now = timezone.now()
         for clinic in Clinic.everywhere.order_by("pk"):
             erased = 0
-            for patient in overdue(clinic, now):
+            for patient in patients_past_retention(clinic, now):
                 if dry_run:
                     self.stdout.write(f"{clinic}: would erase {patient.code}")
                     continue
                 try:
                     erase(patient, Erasing.RETENTION, None, now)
                     erased += 1
-                except StillOpen as problem:
+                except SessionStillOpen as problem:
                     self.stderr.write(f"{clinic}, {patient.code}: {problem}")
             with transaction.atomic():
-                gone = let_logs_go(clinic, now)
+                gone = delete_old_logs(clinic, now)
                 transaction.set_rollback(dry_run)
             would = "would let go" if dry_run else "let go"
             self.stdout.write(f"{clinic}: {erased} patient(s) erased, {would} {gone} log entries.")

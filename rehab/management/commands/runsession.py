@@ -18,7 +18,7 @@ from rehab.people.sign_in.first_start import first_clinic, prepare_database
 from rehab.sessions.headless import Pace, report, robot_steps, run_session, simulate_strides
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.payloads import describe_cue
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
 from rehab.sources.recording import Recording, RecordingError, read_recording
 from rehab.sources.synthetic import PROFILES, SyntheticWalker
 from rehab.training.fold import SessionFold
@@ -119,13 +119,15 @@ class Command(BaseCommand):
         phases, goal = recorded_plan(recording, options) if recording else synthetic_plan(options)
         began = time.perf_counter()
         session = create_session(
-            find_patient(options, side),
-            valence=options["valence"],
-            goal=goal,
-            phases=phases,
-            trained_side=side,
-            source=name_source(recording, options),
-            simulated=recording is None,
+            SessionRequest(
+                patient=find_patient(options, side),
+                valence=options["valence"],
+                goal=goal,
+                phases=phases,
+                trained_side=side,
+                source=name_source(recording, options),
+                simulated=recording is None,
+            )
         )
 
         def strides(fold: SessionFold) -> Iterator[Measurement]:

@@ -15,12 +15,12 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from rehab.patients.forms import PatientForm, ScreenForm
-from rehab.patients.visits import SOON_DAYS, Visit, read_today, usual_time
+from rehab.patients.visits import SOON_DAYS, Visit, patients_today, suggested_time
 from rehab.people.access import clinic_of, for_roles, person
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
-from rehab.sessions.forms import SessionForm, like_last_time
+from rehab.sessions.forms.session import SessionForm, initial_choices
 from rehab.sessions.models import TrainingSession
 from rehab.stations.builtin import first_station
 from rehab.training.changes import OPEN
@@ -29,7 +29,7 @@ SHOWN = 60  # patients on one page, those who were here last first
 DEMO_CODE = "demo"
 
 
-def patients_of(user: User) -> QuerySet[Patient]:
+def patients_by_last_visit(user: User) -> QuerySet[Patient]:
     """Give the patients of somebody's clinic, those who were here last first."""
     return (
         Patient.objects.visible_to(user)
@@ -48,10 +48,10 @@ def open_sessions(user: User) -> QuerySet[TrainingSession]:
     )
 
 
-def list_everybody(user: User, words: str = "") -> dict[str, Any]:
+def start_lists(user: User, words: str = "") -> dict[str, Any]:
     """Give both lists of the start page: who is expected today, and all patients."""
     now = clinic_time(timezone.now(), clinic_of(user))
-    patients = patients_of(user)
+    patients = patients_by_last_visit(user)
     if words:
         patients = patients.filter(Q(nickname__icontains=words) | Q(code__icontains=words))
     else:  # whose program has ended is found by name or code
@@ -59,7 +59,7 @@ def list_everybody(user: User, words: str = "") -> dict[str, Any]:
     shown = list(patients[: SHOWN + 1])
     return {
         "now": now,
-        "today": read_today(user, now),
+        "today": patients_today(user, now),
         "patients": shown[:SHOWN],
         "more": len(shown) > SHOWN,
         "open": open_sessions(user),
@@ -72,7 +72,7 @@ def list_everybody(user: User, words: str = "") -> dict[str, Any]:
 def choose_patient(request: HttpRequest) -> HttpResponse:
     """List who is expected today, then all patients."""
     words = request.GET.get("q", "").strip()
-    context = list_everybody(person(request), words) | {"q": words}
+    context = start_lists(person(request), words) | {"q": words}
     return render(request, "sessions/start.html", context)
 
 
@@ -82,10 +82,10 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
 def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Offer a patient the session like last time, another one, the past ones, the next visit."""
     user = person(request)
-    patient = get_object_or_404(patients_of(user), pk=patient_id)
+    patient = get_object_or_404(patients_by_last_visit(user), pk=patient_id)
     first_station(patient.clinic)
-    initial = like_last_time(patient, user)
-    lists = list_everybody(user)
+    initial = initial_choices(patient, user)
+    lists = start_lists(user)
     today = lists["now"].date()
     visits = Visit.objects.visible_to(user).filter(patient=patient, day__gte=today)
     context = lists | {
@@ -99,7 +99,7 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
             for days in SOON_DAYS
             if days or all(row.patient != patient for row in lists["today"])
         ],
-        "at": usual_time(user, patient, lists["now"]),
+        "at": suggested_time(user, patient, lists["now"]),
     }
     return render(request, "sessions/start.html", context)
 
@@ -120,7 +120,7 @@ def add_patient(request: HttpRequest) -> HttpResponse:
 def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Mend what was written of a patient."""
     user = person(request)
-    patient = get_object_or_404(patients_of(user), pk=patient_id)
+    patient = get_object_or_404(patients_by_last_visit(user), pk=patient_id)
     form = PatientForm(request.POST or None, by=user, instance=patient)
     if request.method == "POST" and form.keep():
         return redirect("patient", patient_id=patient.pk)
@@ -132,7 +132,7 @@ def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
 @require_http_methods(["GET", "HEAD", "POST"])
 def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Fit the patient's page to this patient's eyes and ears."""
-    patient = get_object_or_404(patients_of(person(request)), pk=patient_id)
+    patient = get_object_or_404(patients_by_last_visit(person(request)), pk=patient_id)
     form = ScreenForm(request.POST or None, instance=patient)
     if request.method == "POST" and form.keep():
         return redirect("patient", patient_id=patient.pk)

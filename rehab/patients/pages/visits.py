@@ -13,16 +13,16 @@ from django.utils.dateparse import parse_date, parse_time
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST
 
-from rehab.patients.visits import SOON_DAYS, Visit, plan_visit, usual_time
+from rehab.patients.visits import SOON_DAYS, Visit, plan_visit, suggested_time
 from rehab.people.access import for_roles, person
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
 
-FARTHEST = timedelta(days=366)
+MAX_DAYS_AHEAD = timedelta(days=366)
 
 
-class WrongDay(ValueError):
+class InvalidVisitDay(ValueError):
     """A day on which nobody can be expected; the message says what to do."""
 
 
@@ -43,10 +43,10 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
     try:
         if (days := given.get("in", "")) in map(str, SOON_DAYS):
             day = now.date() + timedelta(days=int(days))
-            at = usual_time(user, patient, now) if int(days) else None
+            at = suggested_time(user, patient, now) if int(days) else None
         else:
             day, at = _read(given.get("day", ""), given.get("at", ""), now.date())
-    except WrongDay as problem:
+    except InvalidVisitDay as problem:
         messages.error(request, str(problem))
     else:
         visit = plan_visit(patient, day, at)
@@ -57,13 +57,15 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
 
 
 def _read(day: str, at: str, today: date) -> tuple[date, time | None]:
-    """Read a day and a time, which may be left out. Raises WrongDay."""
+    """Read a day and a time, which may be left out. Raises InvalidVisitDay."""
     try:
         chosen, hour = parse_date(day), parse_time(at) if at else None
     except ValueError:
         chosen = hour = None
     if chosen is None or (at and hour is None):
-        raise WrongDay(_("Choose the day of the visit, and a time such as 10:30 if there is one."))
-    if not today <= chosen <= today + FARTHEST:
-        raise WrongDay(_("Choose a day between today and a year from now."))
+        raise InvalidVisitDay(
+            _("Choose the day of the visit, and a time such as 10:30 if there is one.")
+        )
+    if not today <= chosen <= today + MAX_DAYS_AHEAD:
+        raise InvalidVisitDay(_("Choose a day between today and a year from now."))
     return chosen, hour

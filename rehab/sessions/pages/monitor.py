@@ -33,7 +33,7 @@ ICONS = {
 }
 
 
-def ask_for_consent(request: HttpRequest, patient: Patient) -> HttpResponse:
+def redirect_to_consent(request: HttpRequest, patient: Patient) -> HttpResponse:
     """Lead whoever would watch from elsewhere to the page where it can be agreed to."""
     said = _(
         "You are not in the clinic, and %(patient)s has not agreed to remote view. Ask first, and "
@@ -52,7 +52,7 @@ def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
         sessions.select_related("patient__clinic", "station", "measure"), pk=session_id
     )
     if not may_be_watched(session.patient, client_address(request)):
-        return ask_for_consent(request, session.patient)
+        return redirect_to_consent(request, session.patient)
     context = {
         "session": session,
         "remarks": [

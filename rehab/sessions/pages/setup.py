@@ -14,8 +14,8 @@ from rehab.feedback.valences import valences_of
 from rehab.people.access import for_roles, person
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.forms import SessionForm, like_last_time, minutes_of
-from rehab.sessions.preset_form import keep_preset
+from rehab.sessions.forms.preset import save_preset
+from rehab.sessions.forms.session import SessionForm, initial_choices, protocol_minutes
 from rehab.sessions.presets import Preset
 from rehab.sessions.protocols import Protocol
 from rehab.stations.builtin import first_station
@@ -42,7 +42,7 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
         form = SessionForm(request.POST, patient=patient, by=user)
         if wanted == "preset":
             try:
-                kept = keep_preset(request.POST, patient, user, name)
+                kept = save_preset(request.POST, patient, user, name)
             except ValidationError as problem:
                 form.errors.clear()
                 form.add_error(None, problem.messages)
@@ -53,10 +53,10 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
         elif (session := form.create()) is not None:
             return redirect(wanted if wanted in PLACES else PLACES[0], session_id=session.pk)
     else:
-        initial = like_last_time(patient, user) | (chosen.to_choices(user) if chosen else {})
+        initial = initial_choices(patient, user) | (chosen.to_initial(user) if chosen else {})
         form = SessionForm(initial=initial, patient=patient, by=user)
     protocols = Protocol.objects.visible_to(user).prefetch_related("phases")
-    lengths = {row.pk: minutes_of(row) for row in protocols}
+    lengths = {row.pk: protocol_minutes(row) for row in protocols}
     context = {
         "patient": patient,
         "form": form,

@@ -22,7 +22,7 @@ from rehab.training.changes import OPEN
 SECRET = "garry_pairing"  # noqa: S105 (the cookie's name)
 
 
-def open_session(tablet: Device) -> TrainingSession | None:
+def current_session(tablet: Device) -> TrainingSession | None:
     """Give the newest open session at the tablet's station."""
     sessions = TrainingSession.objects.visible_to(tablet)
     return sessions.filter(state__in=[state.value for state in OPEN]).first()
@@ -35,7 +35,7 @@ def show_tablet(request: HttpRequest) -> HttpResponse:
     """Show the code of a new tablet; a paired one waits for its station's next session."""
     tablet = tablet_of(request)
     if tablet is not None:
-        session = open_session(tablet)
+        session = current_session(tablet)
         if session is not None:
             return redirect("walk", session_id=session.pk)
         return render(request, "sessions/tablet.html", {"station": tablet.station})
@@ -62,7 +62,7 @@ def _show_code(request: HttpRequest, code: str) -> HttpResponse:
 
 @public
 @require_safe
-def describe_app(request: HttpRequest) -> JsonResponse:
+def web_app_manifest(request: HttpRequest) -> JsonResponse:
     """Let the tablet's browser install its page as an app that fills the screen."""
     mark = {"src": static("img/mark.svg"), "type": "image/svg+xml", "sizes": "any"}
     app = {
@@ -82,11 +82,11 @@ def describe_app(request: HttpRequest) -> JsonResponse:
 @public
 @never_cache
 @require_safe
-def tell_tablet(request: HttpRequest) -> HttpResponse:
+def tablet_state(request: HttpRequest) -> HttpResponse:
     """Tell a tablet where to go: nowhere yet, to its code's successor, or to a session."""
     tablet = tablet_of(request)
     if tablet is not None:
-        session = open_session(tablet)
+        session = current_session(tablet)
         there = reverse("walk", kwargs={"session_id": session.pk}) if session else ""
         response = JsonResponse({"paired": True, "go": there})
         if token := request.COOKIES.get(tablets.COOKIE):

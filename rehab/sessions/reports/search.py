@@ -21,7 +21,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.access import person
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.forms import NumberField
+from rehab.sessions.forms.session import NumberField
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Station
 
@@ -34,7 +34,7 @@ NO_DAY = _("Give a day of the years 1900 to 2999.")
 DAYS = [MinValueValidator(FIRST_DAY, NO_DAY), MaxValueValidator(LAST_DAY, NO_DAY)]
 
 
-class FindForm(forms.Form):
+class SessionSearchForm(forms.Form):
     """What sessions are looked for by. Everything may be left empty."""
 
     first = forms.DateField(required=False, validators=DAYS, label=_("From"))
@@ -106,7 +106,7 @@ def _midnight(day: Any, zone: str) -> datetime:
     return datetime.combine(day, time(), ZoneInfo(zone))
 
 
-class Finder(ListFilter):
+class SessionSearchFilter(ListFilter):
     """The form as the admin's filter. What it cannot read it says, and then gives nothing."""
 
     title = _("what was walked")
@@ -122,10 +122,10 @@ class Finder(ListFilter):
         super().__init__(request, params, model, model_admin)
         user = person(request)
         self.zone = user.clinic.time_zone if user.clinic else settings.TIME_ZONE
-        names = [name for name in FindForm(by=user).fields if name in params]
+        names = [name for name in SessionSearchForm(by=user).fields if name in params]
         given = {name: params.pop(name)[-1].strip() for name in names}
         self.used_parameters = {name: words for name, words in given.items() if words}
-        self.form = FindForm(given or None, by=user)
+        self.form = SessionSearchForm(given or None, by=user)
         self.others: list[tuple[str, str]] = []
 
     def has_output(self) -> bool:

@@ -22,7 +22,7 @@ from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.live.backlog import PAGE
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.log import Remark, SessionEvent
-from rehab.sessions.services import change_session, create_session
+from rehab.sessions.services import SessionRequest, change_session, create_session
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
@@ -493,11 +493,13 @@ async def test_a_page_of_the_site_may_create_and_change_sessions(place, elsewher
 
     def view():
         session = create_session(
-            place.patient,
-            valence="positive",
-            goal=GoalRule(value=3.0),
-            phases=PHASES,
-            station=place.station,
+            SessionRequest(
+                patient=place.patient,
+                valence="positive",
+                goal=GoalRule(value=3.0),
+                phases=PHASES,
+                station=place.station,
+            )
         )
         change_session(session, ChangeKind.START, by=place.pt)
         change_session(session, ChangeKind.GOAL, 4.0, by=place.pt)

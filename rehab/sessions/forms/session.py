@@ -14,13 +14,23 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import SIDES, Patient, User
 from rehab.people.web.refusals import in_words
-from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
+from rehab.sessions.cues import (
+    DEFAULT_GESTURE,
+    choices_from_cue,
+    cue_from_choices,
+    robot_gesture_choices,
+)
 from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_source
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocols import Protocol
-from rehab.sessions.services import StationTaken, check_station, create_session
-from rehab.sessions.step_sources import LIVE, list_sources, source_arguments
+from rehab.sessions.services import (
+    SessionRequest,
+    StationTaken,
+    check_station_is_free,
+    create_session,
+)
+from rehab.sessions.step_sources import LIVE, build_source_args, source_choices
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
 from rehab.stations.models import Station
@@ -77,14 +87,16 @@ class SessionForm(forms.Form):
         fields: dict[str, Any] = self.fields
         fields["protocol"].queryset = Protocol.objects.visible_to(by)
         fields["station"].queryset = Station.objects.visible_to(by)
-        fields["source"].choices = [(name, format_source(words)) for name, words in list_sources()]
-        fields["robot_above"].choices = fields["robot_below"].choices = list_gestures(by)
+        fields["source"].choices = [
+            (name, format_source(words)) for name, words in source_choices()
+        ]
+        fields["robot_above"].choices = fields["robot_below"].choices = robot_gesture_choices(by)
 
     def clean_station(self) -> Station:
         """Refuse a station where somebody else may be walking right now."""
         station: Station = self.cleaned_data["station"]
         try:
-            check_station(station)
+            check_station_is_free(station)
         except StationTaken as problem:
             raise ValidationError(in_words(problem)) from problem
         return station
@@ -118,24 +130,29 @@ class SessionForm(forms.Form):
         hits, minutes = data["wanted_hits"], data["minutes"]
         kind, _between, name = data["source"].partition(" ")
         return create_session(
-            self.patient,
-            valence=data["valence"],
-            goal=GoalRule(
-                value=data["goal_value"] if by_value else None,
-                percent_of_baseline=None if by_value else data["goal_percent"],
-            ),
-            protocol=data["protocol"],
-            trained_side=Side(data["trained_side"]),
-            target=Target(
-                hit_rate=hits / 100 if hits else None, duration_s=minutes * 60 if minutes else None
-            ),
-            cue=to_cue(data["robot_above"], data["robot_below"], data["valence"], self.patient),
-            robot_intensity=ROBOT_LEVELS[data["robot"]],
-            station=data["station"],
-            created_by=self.by,
-            source=dict(list_sources()).get(data["source"], ""),
-            simulated=kind == "synthetic",
-            runs=source_arguments(kind, name, self.patient),
+            SessionRequest(
+                patient=self.patient,
+                valence=data["valence"],
+                goal=GoalRule(
+                    value=data["goal_value"] if by_value else None,
+                    percent_of_baseline=None if by_value else data["goal_percent"],
+                ),
+                protocol=data["protocol"],
+                trained_side=Side(data["trained_side"]),
+                target=Target(
+                    hit_rate=hits / 100 if hits else None,
+                    duration_s=minutes * 60 if minutes else None,
+                ),
+                cue=cue_from_choices(
+                    data["robot_above"], data["robot_below"], data["valence"], self.patient
+                ),
+                robot_intensity=ROBOT_LEVELS[data["robot"]],
+                station=data["station"],
+                created_by=self.by,
+                source=dict(source_choices()).get(data["source"], ""),
+                simulated=kind == "synthetic",
+                source_args=build_source_args(kind, name, self.patient),
+            )
         )
 
     def create(self) -> TrainingSession | None:
@@ -155,7 +172,7 @@ class SessionForm(forms.Form):
 STRIDE_S = 1.1
 
 
-def minutes_of(protocol: Protocol | None) -> int | None:
+def protocol_minutes(protocol: Protocol | None) -> int | None:
     """Give how long a protocol takes; None where a phase lasts until the PT moves on."""
     total_s = 0.0
     for phase in () if protocol is None else protocol.to_rules():
@@ -167,16 +184,16 @@ def minutes_of(protocol: Protocol | None) -> int | None:
     return math.ceil(total_s / 60) or None
 
 
-def _free(stations: QuerySet[Station]) -> Station | None:
+def _first_free_station(stations: QuerySet[Station]) -> Station | None:
     """Give the first station where nobody has an open session, or else the first."""
     taken = stations.filter(sessions__state__in=[state.value for state in OPEN])
     return stations.exclude(pk__in=taken.values("pk")).first() or stations.first()
 
 
-def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
+def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
     """Give what the set-up begins with: the patient's last session, or sensible first values."""
     stations = Station.objects.visible_to(by)
-    words = dict(list_sources())
+    words = dict(source_choices())
     last = (
         TrainingSession.objects.visible_to(by)
         .filter(patient=patient, protocol__isnull=False)
@@ -193,22 +210,22 @@ def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
             "goal_value": FIRST_GOAL_W_KG,
             "goal_percent": 100,
             "wanted_hits": WANTED_HITS_PERCENT,
-            "minutes": minutes_of(protocol) or PLANNED_MINUTES,
+            "minutes": protocol_minutes(protocol) or PLANNED_MINUTES,
             "protocol": protocol,
-            "station": _free(stations),
+            "station": _first_free_station(stations),
             "source": (source := "synthetic good" if patient.simulated else LIVE),
             "source_words": format_source(words[source]),
             "trained_side": patient.paretic_side or Side.LEFT.value,
             "robot": "normal",
-            "robot_above": USUAL,
-            "robot_below": USUAL,
+            "robot_above": DEFAULT_GESTURE,
+            "robot_below": DEFAULT_GESTURE,
         }
     plan = last.to_plan()
     source = next((name for name, label in words.items() if label == last.source), LIVE)
-    if last.runs and not patient.simulated:
+    if last.source_args and not patient.simulated:
         source = LIVE  # one trial with a simulator makes nobody a simulated patient
     hits, seconds = plan.target.hit_rate, plan.target.duration_s
-    above, below = to_choices(plan.valence.cue, last.valence, patient, by)
+    above, below = choices_from_cue(plan.valence.cue, last.valence, patient, by)
     return {
         "valence": last.valence,
         "goal_by": "percent" if plan.goal.needs_baseline else "value",
@@ -217,7 +234,7 @@ def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
         "wanted_hits": round(100 * hits) if hits else None,
         "minutes": round(seconds / 60) if seconds else None,
         "protocol": last.protocol,
-        "station": last.station or _free(stations),
+        "station": last.station or _first_free_station(stations),
         "source": source,
         "source_words": format_source(words[source]),
         "trained_side": last.trained_side,

@@ -10,14 +10,14 @@ from django.utils.translation import gettext
 
 from rehab.people.access import clinic_of
 from rehab.people.models import Patient, User
-from rehab.sessions.forms import SessionForm
+from rehab.sessions.forms.session import SessionForm
 from rehab.sessions.presets import NAME_TAKEN, Preset
 
 # Not of a preset: they belong to the person and the place.
 PERSONAL = ("station", "trained_side")
 
 
-def keep_preset(data: Any, patient: Patient, by: User, name: str) -> Preset:
+def save_preset(data: Any, patient: Patient, by: User, name: str) -> Preset:
     """Keep what stands in a set-up under a name; without one, under words that say what it is.
 
     Raises ValidationError for what could not be walked, and for a name that is taken.

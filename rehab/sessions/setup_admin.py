@@ -18,10 +18,10 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import person
 from rehab.people.web.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
-from rehab.sessions.cues import list_gestures
-from rehab.sessions.forms import STRIDE_S, minutes_of
+from rehab.sessions.cues import robot_gesture_choices
+from rehab.sessions.forms.session import STRIDE_S, protocol_minutes
 from rehab.sessions.presets import Preset
-from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase, say_shared
+from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase, display_name
 
 PARKED = 10_000  # where phases wait while they change places; no protocol has as many
 
@@ -32,7 +32,7 @@ class SharedAdmin(ScopedAdmin):
     @admin.display(description=_("name"), ordering="name")
     def named(self, row: Measure | Protocol) -> str:
         """Say its name."""
-        return say_shared(row)
+        return display_name(row)
 
     @admin.display(description=_("belongs to"), ordering="clinic")
     def whose(self, row: Measure | Protocol) -> str:
@@ -123,7 +123,7 @@ class ProtocolAdmin(SharedAdmin):
     @admin.display(description=_("takes"))
     def length(self, protocol: Protocol) -> str:
         """Say how long it takes, where every phase ends by itself."""
-        minutes = minutes_of(protocol)
+        minutes = protocol_minutes(protocol)
         return gettext("open end") if minutes is None else f"{minutes} min"
 
     def render_change_form(
@@ -184,7 +184,7 @@ class ProtocolAdmin(SharedAdmin):
 class PresetAdmin(ScopedAdmin):
     """What the set-up offers as one tap."""
 
-    list_display = ("name", "valence", "goal_words", "wanted_hits", "minutes", "protocol", "robot")
+    list_display = ("name", "valence", "goal_label", "wanted_hits", "minutes", "protocol", "robot")
     list_filter = ("valence", "robot")
     list_select_related = ("protocol",)
     search_fields = ("name", "protocol__name")
@@ -211,11 +211,12 @@ class PresetAdmin(ScopedAdmin):
         """Offer the gestures that this clinic has."""
         if db_field.name in {"robot_above", "robot_below"}:
             return forms.ChoiceField(
-                choices=list_gestures(person(request)), label=capfirst(db_field.verbose_name)
+                choices=robot_gesture_choices(person(request)),
+                label=capfirst(db_field.verbose_name),
             )
         return super().formfield_for_dbfield(db_field, request, **kwargs)
 
     @admin.display(description=_("goal"))
-    def goal_words(self, preset: Preset) -> str:
+    def goal_label(self, preset: Preset) -> str:
         """Say the goal."""
-        return preset.goal_words
+        return preset.goal_label
