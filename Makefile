@@ -27,7 +27,7 @@ run_tests = { $(1) -m pytest $(2) -m '$(3) and not realtime' \
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help run test test-main test-postgres test-pure check format bench screenshots pictures messages setup \
+.PHONY: help run test test-main test-postgres test-pure test-clocks check format bench screenshots pictures messages setup \
 	constraints clean
 
 help: ## Say what can be made
@@ -49,6 +49,9 @@ test-postgres: setup
 	    GARRY_DATABASE_URL=$$url; export GARRY_DATABASE_URL; \
 	    $(call run_tests,$(PYTHON),,database and not bench and not screenshots); \
 	else echo "Database tests on PostgreSQL: skipped, none answers at $${url##*@} (DATABASE_URL)"; fi
+
+test-clocks: setup ## Run the database tests by other clocks than today's
+	$(PYTHON) -m tests.support.clocks -n auto --maxprocesses 4 --dist loadfile $(ARGS)
 
 # No Django there: what pytest cannot know of this project is no error.
 test-pure: $(NEWER)/.test

@@ -49,6 +49,7 @@ def words(name: str, default: str, about: str) -> list[str]:
 HOSTED = flag("GARRY_HOSTED", False, "many clinics on one server, behind TLS")
 DEBUG = flag("GARRY_DEBUG", False, "Django's debug pages; for developers only")
 DATA_DIR = Path(text("GARRY_DATA_DIR", str(BASE_DIR / "var"), "folder of database and secrets"))
+BACKUP_KEYS = words("GARRY_BACKUP_KEYS", "", "public keys that backups are encrypted to (age1…)")
 HOST = text("GARRY_HOST", "127.0.0.1", "address that the server listens on")
 PORT = number("GARRY_PORT", 8000, "port that the server listens on", low=1, high=65535)
 ALLOWED_HOSTS = words(
@@ -105,6 +106,7 @@ MIDDLEWARE = [
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "rehab.stations.tablets.TabletMiddleware",
     "rehab.people.web.language.LanguageMiddleware",
+    "rehab.people.web.local_time.LocalTimeMiddleware",
     "rehab.people.access.AccessMiddleware",
     "axes.middleware.AxesMiddleware",
 ]
@@ -143,7 +145,8 @@ except ValueError as problem:
     ) from problem
 if DATABASES["default"]["ENGINE"].endswith("sqlite3"):
     DATA_DIR.mkdir(parents=True, exist_ok=True)
-    # FULL keeps acknowledged steps through a power cut, not only through a crash (stack.md, T3).
+    # FULL keeps acknowledged steps through a power cut, not only through a crash
+    # (docs/reference/stack.md#durability).
     DATABASES["default"]["OPTIONS"] = {
         "transaction_mode": "IMMEDIATE",
         "timeout": 20,
@@ -166,7 +169,7 @@ DEFAULT_AUTO_FIELD = "django.db.models.BigAutoField"
 REDIS_URL = text("GARRY_REDIS_URL", "", "channel layer between several server processes")
 CHANNEL_LAYERS = {
     "default": {
-        # Pub/sub, not the core layer: stack.md, T2.
+        # Pub/sub, not the core layer: docs/reference/stack.md#several-processes.
         "BACKEND": "channels_redis.pubsub.RedisPubSubChannelLayer",
         "CONFIG": {"hosts": [REDIS_URL]},
     }

@@ -38,7 +38,8 @@ HOME_M = 0.005
 HOME_RAD = math.radians(2)
 
 # A step without a time of its own gets so much of what it needs, some twice the shortest possible
-# (kobuki.md 5.3), and a moment [s] for the last millimeters of a very short one.
+# (docs/reference/kobuki.md#beside-a-person), and a moment [s] for the last millimeters of a very
+# short one.
 GENEROUS, MOMENT_S = 1.4, 0.5
 
 

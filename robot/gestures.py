@@ -1,7 +1,8 @@
 """Gestures: places to go to, one after the other, and home again.
 
 A gesture says where, never for how long: timed ones end rotated and displaced as soon as a base
-speeds up gently (kobuki.md 2.5). Here are the gestures that we bring along, and what makes one.
+speeds up gently (docs/reference/kobuki.md#timed-gestures). Here are the gestures that we bring
+along, and what makes one.
 """
 
 from __future__ import annotations
@@ -14,18 +15,20 @@ from robot.legs import Drive, Leg, lies_on, plan_legs
 from robot.motion import DEFAULT_LIMITS, HOME, Limits, Pose
 
 # A base never leaves this circle around its home [m]; gestures keep 5 cm away from its edge
-# (kobuki.md 5.3).
+# (docs/reference/kobuki.md#beside-a-person).
 TETHER_M = 0.30
 REACH_M = 0.25
 
-# How near to its goal a base has to come [m, rad] (kobuki.md 5.3 asks for 1 cm and 2°).
+# How near to its goal a base has to come [m, rad] (docs/reference/kobuki.md#beside-a-person asks
+# for 1 cm and 2°).
 NEAR_M = 0.004
 NEAR_RAD = 0.02
 
 GESTURE_MAX_S = 16.0  # the paper's longest, with slack
 GOALS_MAX = 32
 TURN_MAX_RAD = math.tau  # a longer cable than this winds up
-LEAST_PACE = 0.2  # slower turns stick and shake (kobuki.md 3: below 0.33 rad/s)
+# Slower turns stick and shake (docs/reference/kobuki.md#what-users-report: below 0.33 rad/s).
+LEAST_PACE = 0.2
 SLACK = 1.5  # a goal's time over its shortest possible: odometry, grip and latency cost some
 
 
@@ -277,8 +280,8 @@ SWAY = Gesture(
 
 GESTURES: dict[str, Gesture] = {gesture.name: gesture for gesture in (CELEBRATE, DROOP, NOD, SWAY)}
 
-# The original's three sequences (gesture_generation.py of 2024; kobuki.md 1.13, 2.5), for
-# replications. It ordered 0.2 m/s and 1.8 rad/s for 1 or 2 s each, without ramps; here are the
+# The original's three sequences (gesture_generation.py of 2024; docs/reference/original.md#robot),
+# for replications. It ordered 0.2 m/s and 1.8 rad/s for 1 or 2 s each, without ramps; here are the
 # places that these come to, at our limits, so they take longer. Its binary one ended 0.09 m behind
 # home; ours goes on home from there.
 _OUT_M, _SPIN_RAD = 0.2, 3.6

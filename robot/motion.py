@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 TICK_S = 0.02  # between two orders to a base: 50 Hz, as often as a Kobuki tells where it is
 
 # Longer than this between two orders [s], a limiter counts no more: what hung may not lurch
-# (kobuki.md 5.2, rule 4).
+# (docs/reference/kobuki.md#orders).
 LONGEST_STEP_S = 0.1
 
 # A base stands still by itself when its last order is older than this [s]: it may have no firmware
-# watchdog, and whoever gave the order may hang (kobuki.md 1.6 and 5.2, rule 1).
+# watchdog, and whoever gave the order may hang (docs/reference/kobuki.md#orders).
 ORDER_HOLDS_S = 0.25
 
 # No limits may be set above these: a base of 7 kg stops within 9 cm from 0.2 m/s, and a Kobuki's
-# gyro is calibrated up to 1.75 rad/s (kobuki.md 1.7, 4, 5.3).
+# gyro is calibrated up to 1.75 rad/s (docs/reference/kobuki.md#beside-a-person).
 CEILING_M_S = 0.30
 CEILING_RAD_S = 1.8
 
@@ -96,8 +96,8 @@ class Limits:
 
     Notes
     -----
-    Sources of the defaults: kobuki.md 1.9 and 5.3. Slowing down may be quicker than speeding up, so
-    that a base that was told to stop does.
+    Sources of the defaults: docs/reference/kobuki.md#beside-a-person. Slowing down may be quicker
+    than speeding up, so that a base that was told to stop does.
     """
 
     v_m_s: float = 0.20

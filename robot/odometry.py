@@ -7,8 +7,8 @@ import math
 from robot.motion import HOME, Pose
 
 # A gyro that turns slower than this [rad/s] while both wheels stand still drifts: "a couple of
-# degrees a minute at worst" (kobuki.md 1.7), 30 times less. A base that is turned by hand turns its
-# wheels; one that is lifted turns faster.
+# degrees a minute at worst" (docs/reference/kobuki.md#odometry-and-gyro), 30 times less. A base
+# that is turned by hand turns its wheels; one that is lifted turns faster.
 DRIFT_RAD_S = math.radians(1.0)
 WHEEL_STILL_M = 1e-9
 

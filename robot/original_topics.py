@@ -1,8 +1,8 @@
 """The topics of the original GARRY, published beside any base, so that its ROS nodes keep working.
 
-Types and values are those that its nodes of 2024 expect (kobuki.md 1.13). What an event is, a step
-or a window, is published at once or never; the feedback type is what holds, and is published again
-on every connection.
+Types and values are those that its nodes of 2024 expect (docs/reference/original.md#robot). What an
+event is, a step or a window, is published at once or never; the feedback type is what holds, and is
+published again on every connection.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """`python -m robot.port`: owns a serial port, and stops what hangs on it when nobody orders it.
 
-A base may go on with its last setpoint for ever (kobuki.md 1.6). So a small process of its own
-sends it, 50 times a second, what was ordered last, and the stop frame as soon as that is older than
-0.25 s, the pipe of the orders closes, or anything at all goes wrong here. It knows no base, only
-bytes. Orders come on standard input, what was heard goes to standard output, a JSON line each:
+A base may go on with its last setpoint for ever (docs/reference/kobuki.md#watchdogs). So a small
+process of its own sends it, 50 times a second, what was ordered last, and the stop frame as soon as
+that is older than 0.25 s, the pipe of the orders closes, or anything at all goes wrong here. It
+knows no base, only bytes. Orders come on standard input, what was heard goes to standard output, a
+JSON line each:
 
     {"number": 7, "sent_s": 12.34, "frame": "aa55…", "once": "aa55…"}
     {"at_s": 12.35, "opened": 1, "bytes": "aa55…", "problem": "", "counters": {…}}
@@ -33,7 +34,7 @@ PUMP_S = 0.02
 READ_S = 0.005  # how long a read waits: a stop is on its way within that
 WRITE_S = 0.1  # a port that takes nothing for so long is lost
 WORD_S = 0.1  # so often it says that it lives
-STOPS = 3  # frames; one may be damaged on its way (kobuki.md 5.2, rule 3)
+STOPS = 3  # frames; one may be damaged on its way (docs/reference/kobuki.md#orders)
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.2, 2.0  # before the port is opened again
 MOST_BYTES = 4096
 LINES_KEPT = 25  # of what was heard, while nobody reads it: half a second

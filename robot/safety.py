@@ -3,7 +3,8 @@
 There are two kinds of no. A *latch* stops the base at once and holds until a person arms it again:
 what the base felt, what it did that nobody ordered, a person's stop. An *obstacle* keeps the next
 gesture from starting as long as it lasts. Numbers without a source of their own are those of
-kobuki.md 5.2 and 5.3; no standard gives any for a base of this size (kobuki.md 4).
+docs/reference/kobuki.md#beside-a-person; no standard gives any for a base of this size
+(docs/reference/kobuki.md#standards).
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ from robot.motion import HOME, ORDER_HOLDS_S, Twist
 # Light and sound come so long before a gesture [s]: a sudden motion may startle whoever walks.
 ANNOUNCE_S = 0.5
 
-# Nothing heard of the base for so long [s]. The reference takes 0.1 s (kobuki.md 1.6); twice that
-# forgives a busy computer (largest gap measured: 0.03 s) and keeps the whole within 0.35 s.
+# Nothing heard of the base for so long [s]. The reference takes 0.1 s
+# (docs/reference/kobuki.md#watchdogs); twice that forgives a busy computer (largest gap measured:
+# 0.03 s) and keeps the whole within 0.35 s.
 BASE_SILENT_S = 0.2
 # A computer that hung for so long [s] while the base was to move: the base has stopped by itself,
 # and what was interrupted does not go on by itself (rule 2, ISO 13850).
@@ -27,11 +29,12 @@ LAPSED_S = ORDER_HOLDS_S
 # A wheel that moves so much otherwise than ordered [m/s], for so long [s]: held, lifted or pushed.
 ASTRAY_M_S = 0.1
 ASTRAY_S = 0.5
-HALF_TRACK_M = 0.115  # from a Kobuki's middle to a wheel (kobuki.md 1.7)
+# From a Kobuki's middle to a wheel (docs/reference/kobuki.md#odometry-and-gyro).
+HALF_TRACK_M = 0.115
 SLIP_RAD = 0.175  # 10°: wheels and gyro disagree about a gesture's turns
 
-# Of four lithium cells [V] (kobuki.md 1.9 and 3). A battery that was low has to come back to WARN:
-# at rest it recovers by itself, and would be low again with the next gesture.
+# Of four lithium cells [V] (docs/reference/kobuki.md#battery). A battery that was low has to come
+# back to WARN: at rest it recovers by itself, and would be low again with the next gesture.
 BATTERY_FULL_V = 16.5
 BATTERY_WARN_V = 14.0
 BATTERY_LOW_V = 13.5
@@ -74,7 +77,7 @@ PLACE_UNKNOWN = "place_unknown"  # such a base has to be looked at, and armed
 
 
 def battery_share(battery_v: float) -> float:
-    """Give how full a battery of that voltage [V] is, 0 to 1 (kobuki.md 1.9)."""
+    """Give how full a battery of that voltage [V] is, 0 to 1 (docs/reference/kobuki.md#battery)."""
     share = (battery_v - BATTERY_EMPTY_V) / (BATTERY_FULL_V - BATTERY_EMPTY_V)
     return min(max(0.05 + 0.95 * share, 0.0), 1.0)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from robot.motion import ORDER_HOLDS_S
 
 EARLY_S = 0.05  # an order from further in the future was made up
-LONGEST_FRAME = 64  # a Kobuki's buffer for commands [bytes] (kobuki.md 1.2)
+LONGEST_FRAME = 64  # a Kobuki's buffer for commands [bytes] (docs/reference/kobuki.md#framing)
 
 
 class BadOrder(ValueError):

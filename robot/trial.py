@@ -11,7 +11,8 @@ from robot.gestures import TETHER_M, BadGesture, Gesture, Marked
 from robot.motion import DEFAULT_LIMITS, HOME, TICK_S, Limits, Pose, advance
 from robot.player import DONE, Player
 
-# Where it has to end [m, rad] (kobuki.md 5.3 asks for 1 cm and 2°; a player is nearer than that).
+# Where it has to end [m, rad] (docs/reference/kobuki.md#beside-a-person asks for 1 cm and 2°; a
+# player is nearer than that).
 END_M = 0.01
 END_RAD = 0.035
 

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-# A Kobuki's USB chip; the serial number tells it from any other FTDI cable (kobuki.md 1.1).
+# A Kobuki's USB chip; the serial number tells it from any other FTDI cable
+# (docs/reference/kobuki.md#serial-link).
 VENDOR, PRODUCT, SERIAL = 0x0403, 0x6001, "kobuki"
 DEFAULT_PORT = "/dev/kobuki"  # what the udev rule makes
 LATENCY_MS = 1  # the chip's timer; as it comes from the shop it waits 16 ms

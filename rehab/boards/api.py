@@ -81,4 +81,4 @@ def list_session_boards(request: HttpRequest, session_id: Path[Key]) -> list[Sho
     """Show the boards that the patient sees after a session."""
     sessions = TrainingSession.objects.visible_to(caller(request))
     session = get_object_or_404(sessions.select_related("patient", "clinic"), pk=session_id)
-    return show_after(session)
+    return show_after(session, timezone.now())

@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Callable
 from datetime import datetime
+from functools import partial
 
 from django.db import connection, transaction
 from django.utils import timezone
@@ -30,7 +31,8 @@ PAUSE_S = 0.025
 FIRST, FEWEST, MOST = 20, 10, 1_000  # patients a batch
 
 
-Step = Callable[[int], bool]  # works off so many patients at most; gives whether there are more
+# Works off so many patients at most, as of now; gives whether there are more.
+Step = Callable[[int, datetime], bool]
 
 
 class Builder:
@@ -77,7 +79,7 @@ class Builder:
                     self._thread = None
                     return None
                 self._is_wanted = False
-            step = find_step()
+            step = find_step(timezone.now())
             if step is not None:
                 with self._lock:
                     self._is_wanted = True  # there may be more after it
@@ -87,7 +89,7 @@ class Builder:
         most, more = FIRST, True
         while more and not self._ends.is_set():
             began = time.perf_counter()
-            more = step(most)
+            more = step(most, timezone.now())
             held_s = time.perf_counter() - began
             most = max(FEWEST, min(MOST, round(most * min(2.0, HOLD_S / held_s))))
             self._ends.wait(max(held_s, PAUSE_S))
@@ -95,14 +97,14 @@ class Builder:
             entries.tidy()
 
 
-def find_step() -> Step | None:
+def find_step(now: datetime) -> Step | None:
     """Give what works off so many patients of a board that is to be built, or caught up with."""
     board_id = entries.find_unbuilt()
     if board_id is not None:
-        return lambda most: entries.advance(board_id, most, timezone.now())
-    outdated = entries.find_outdated(timezone.now(), FEW)
+        return partial(entries.advance, board_id)
+    outdated = entries.find_outdated(now, FEW)
     if outdated is not None:
-        return lambda most: entries.refresh_stale(outdated, most, timezone.now())
+        return partial(entries.refresh_stale, outdated)
     return None
 
 
@@ -110,27 +112,26 @@ builder = Builder()
 atexit.register(builder.stop)
 
 
-def rebuild(board: Leaderboard) -> None:
+def rebuild(board: Leaderboard, now: datetime) -> None:
     """Have a board's rows made anew: those of a few patients here and now, more beside."""
     if len(entries.next_patients(board, 0, FEW + 1)) <= FEW:
-        entries.refresh(board)
+        entries.refresh(board, now=now)
     else:
         _begin(board)
 
 
-def follow(board: Leaderboard, patients: set[int] | None = None) -> None:
+def follow(board: Leaderboard, now: datetime, patients: set[int] | None = None) -> None:
     """Let a board follow what decides who may stand on it: for some patients, or (None) all."""
     if patients is not None and len(patients) <= FEW:
-        entries.refresh(board, patients)
-    elif entries.is_snapshot(board, timezone.now()):
+        entries.refresh(board, patients, now=now)
+    elif entries.is_snapshot(board, now):
         entries.thin_out(board)
     else:
-        rebuild(board)
+        rebuild(board, now)
 
 
-def heal(patients: set[int]) -> None:
+def heal(patients: set[int], now: datetime) -> None:
     """Have the boards built that did not follow what some patients walked."""
-    now = timezone.now()
     for board in entries.boards_of(entries.clinics_of(patients)):
         if not entries.is_snapshot(board, now):
             _begin(board)
@@ -145,7 +146,7 @@ def catch_up(board: Leaderboard, now: datetime) -> bool:
         builder.wake()
         return False
     if stale:
-        entries.refresh(board, stale, now, corrected=True)
+        entries.refresh(board, stale, now=now, corrected=True)
     return True
 
 

@@ -19,7 +19,6 @@ from datetime import datetime
 
 from django.db import connection, transaction
 from django.db.models import Count, Q, QuerySet
-from django.utils import timezone
 
 from rehab.boards.figures import Figure, read_figures, standing_on
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
@@ -43,19 +42,17 @@ def clinics_of(patients: Collection[int]) -> set[int]:
     return set(Patient.everywhere.filter(pk__in=patients).values_list("clinic_id", flat=True))
 
 
-def refresh_patients(
-    patients: Collection[int], now: datetime | None = None, *, corrected: bool = False
-) -> None:
+def refresh_patients(patients: Collection[int], *, now: datetime, corrected: bool = False) -> None:
     """Bring the rows of some patients up to date, on every board that they can be on."""
     for board in boards_of(clinics_of(patients)):
-        refresh(board, patients, now, corrected=corrected)
+        refresh(board, patients, now=now, corrected=corrected)
 
 
 def refresh(
     board: Leaderboard,
     patients: Collection[int] | None = None,
-    now: datetime | None = None,
     *,
+    now: datetime,
     corrected: bool = False,
 ) -> None:
     """Bring a board's rows up to date: those of some patients, or (None) all.
@@ -63,7 +60,6 @@ def refresh(
     One at a time for each board, so that no two writers count the same row. ``corrected``: what
     the rows are made of was wrong, so that those of a snapshot follow.
     """
-    now = now or timezone.now()
     if patients is None:
         begin(board)
         while advance(board.pk, AT_ONCE, now):
@@ -181,7 +177,7 @@ def refresh_stale(board_id: int, most: int, now: datetime) -> bool:
     board = Leaderboard.everywhere.filter(pk=board_id).first()
     patients = find_stale(board, now, most) if board else set()
     if board and patients:
-        refresh(board, patients, now, corrected=True)
+        refresh(board, patients, now=now, corrected=True)
     return bool(patients)
 
 

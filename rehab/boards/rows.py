@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from datetime import date
-
-from django.utils import timezone
+from datetime import date, datetime
 
 from rehab.boards.choosing import Chosen
 from rehab.boards.figures import SHARES, standing_on
 from rehab.boards.models import Leaderboard
 from rehab.people.aliases import say_alias
-from rehab.people.models import Clinic
-from rehab.sessions.formatting import NBSP, clinic_time, format_day, format_duration, format_number
+from rehab.sessions.formatting import NBSP, format_day, format_duration, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.training.metrics import METRICS
 
@@ -98,16 +95,18 @@ def date_rows(
     rows: Iterable[Row],
     sessions: dict[int, TrainingSession],
     at_hand: TrainingSession | None,
-    clinic: Clinic,
+    now: datetime,
 ) -> list[Row]:
-    """Give rows of own sessions with the day of each, and how long was walked."""
+    """Return rows of own sessions with the day of each, and how long was walked.
+
+    ``now`` is the clinic's clock.
+    """
     rows = list(rows)
     began = {
-        pk: clinic_time(session.started_at or session.created_at, clinic)
+        pk: (session.started_at or session.created_at).astimezone(now.tzinfo)
         for pk, session in sessions.items()
     }
     a_day: Counter[date] = Counter(began[row.session_id or 0].date() for row in rows)
-    today = clinic_time(timezone.now(), clinic).date()
     dated: list[Row] = []
     for row in rows:
         start = began[row.session_id or 0]
@@ -115,7 +114,7 @@ def date_rows(
         dated.append(
             replace(
                 row,
-                title=format_day(start.date(), today).replace(" ", NBSP),
+                title=format_day(start.date(), now.date()).replace(" ", NBSP),
                 detail=f"{start:%H:%M} · {walked}" if a_day[start.date()] > 1 else walked,
                 you=at_hand is not None and row.session_id == at_hand.pk,
             )

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 
-from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_noop, ngettext
 
@@ -17,6 +16,7 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.rows import Row, date_rows, name_rows, say_figure, share, write
 from rehab.boards.standings import Listed, Placed, Standings, Stored
 from rehab.people.models import Clinic, Patient
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 
 OWN = gettext_noop("These are your own sessions.")
@@ -63,19 +63,17 @@ def boards_at(moment: Leaderboard.Moment, clinic: Clinic) -> list[Leaderboard]:
     return list(of_clinic | boards.filter(clinic=None) if clinic.boards_across else of_clinic)
 
 
-def show_after(session: TrainingSession, now: datetime | None = None) -> list[Shown]:
+def show_after(session: TrainingSession, now: datetime) -> list[Shown]:
     """Give the boards that are shown after a session; none in a blinded study."""
     if session.patient.blinded:
         return []
     boards = boards_at(Leaderboard.Moment.AFTER_SESSION, session.clinic)
-    now = now or timezone.now()
     return [Viewer(board, now, session.patient, session).show() for board in boards]
 
 
-def show_waiting(clinic: Clinic, now: datetime | None = None) -> list[Shown]:
+def show_waiting(clinic: Clinic, now: datetime) -> list[Shown]:
     """Give the boards that a waiting tablet shows: those on which there are enough patients."""
     boards = boards_at(Leaderboard.Moment.WAITING, clinic)
-    now = now or timezone.now()
     shown = [Viewer(board, now).show() for board in boards]
     return [board for board in shown if board.shared]
 
@@ -181,7 +179,8 @@ class Viewer:
         rows = write(board, choose(board if board.is_own else self._alone(), listed, me))
         sessions = TrainingSession.everywhere.only("created_at", "started_at", "active_s")
         found = sessions.in_bulk([row.session_id for row in rows])
-        dated = date_rows(rows, found, self.session, patient.clinic)
+        now = clinic_time(self.now, patient.clinic)
+        dated = date_rows(rows, found, self.session, now)
         return self._shown(rows=dated, note=note, facts=facts)
 
     def _alone(self) -> Leaderboard:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from datetime import datetime
 
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
@@ -20,7 +20,7 @@ from rehab.people.consent.models import Purpose, withdraw
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.web.language import speak_to
-from rehab.sessions.formatting import NBSP, format_number
+from rehab.sessions.formatting import NBSP, clinic_time, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN, State
 
@@ -44,9 +44,10 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
     speak_to(session.patient)
     if State(session.state) in OPEN:
         return redirect("walk", session_id=session.pk)
-    boards = (
-        [] if session.patient.blinded else [*show_after(session), *own_boards(request, session)]
-    )
+    boards: list[Shown] = []
+    if not session.patient.blinded:
+        now = timezone.now()
+        boards = [*show_after(session, now), *own_boards(request, session, now)]
     context = {
         "session": session,
         "boards": boards,
@@ -71,10 +72,11 @@ def leave_boards(request: HttpRequest, session_id: int) -> HttpResponse:
 @require_safe
 def show_waiting_board(request: HttpRequest) -> HttpResponse:
     """Show a board of the clinic on a tablet that waits, each in its turn; nothing without one."""
-    boards = show_waiting(actor_of(request).clinic)
+    now = timezone.now()
+    boards = show_waiting(actor_of(request).clinic, now)
     if not boards:
         return HttpResponse(status=204)
-    turn = int(time.time() // SHOWN_S) % len(boards)
+    turn = int(now.timestamp() // SHOWN_S) % len(boards)
     return render(request, "boards/waiting.html", {"board": boards[turn]})
 
 
@@ -84,7 +86,7 @@ def find_session(request: HttpRequest, session_id: int) -> TrainingSession:
     return get_object_or_404(sessions.select_related("patient", "clinic"), pk=session_id)
 
 
-def own_boards(request: HttpRequest, session: TrainingSession) -> list[Shown]:
+def own_boards(request: HttpRequest, session: TrainingSession, now: datetime) -> list[Shown]:
     """Give the boards that are always there: own sessions of this type, and of all types.
 
     A session whose type was changed on its way is of no type, and stands on the second alone.
@@ -99,6 +101,7 @@ def own_boards(request: HttpRequest, session: TrainingSession) -> list[Shown]:
         ranked = rank(same, by, -(valence.miss_points or 0))
         places["same", pgettext("board", "This type"), by] = ranked
     places["all", pgettext("board", "All types"), By.RATE] = rank(figures, By.RATE)
+    here = clinic_time(now, session.clinic)
     shown = {key: cut(entries, session.pk) for key, entries in places.items()}
     wanted = {entry.session_id for entries in shown.values() for entry in entries}
     facts = {
@@ -113,7 +116,7 @@ def own_boards(request: HttpRequest, session: TrainingSession) -> list[Shown]:
             slug=slug,
             title=str(TITLES[kind]),
             label=label,
-            rows=date_rows(write_rows(entries, kind), facts, session, session.clinic),
+            rows=date_rows(write_rows(entries, kind), facts, session, here),
             kept=kind is By.KEPT,
         )
         for (slug, label, kind), entries in shown.items()

@@ -1,4 +1,4 @@
-"""What alters boards: says so to `entries` the moment that it happens."""
+"""What alters boards: tells `entries` the moment that it happens, and what time it is."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 from django.db import transaction
 from django.db.models import Model
 from django.db.models.signals import m2m_changed, post_delete, post_save, pre_save
+from django.utils import timezone
 
 from rehab.boards import building, entries
 from rehab.boards.models import Leaderboard
@@ -58,17 +59,17 @@ def on_figures(sessions: set[int], **_signal: Any) -> None:
 
     Where that fails, figures are kept all the same, and the boards are built anew.
     """
-    patients = patients_of(sessions)
+    patients, now = patients_of(sessions), timezone.now()
     try:
         with transaction.atomic():
-            entries.refresh_patients(patients)
+            entries.refresh_patients(patients, now=now)
     except Exception:
         log.exception(
             "Boards did not follow sessions %s. They are built anew; if they stay away, run "
             "manage.py rebuildboards",
             sessions,
         )
-        transaction.on_commit(partial(building.heal, patients), robust=True)
+        transaction.on_commit(partial(building.heal, patients, now), robust=True)
 
 
 def patients_of(sessions: set[int]) -> set[int]:
@@ -81,14 +82,15 @@ def patients_of(sessions: set[int]) -> set[int]:
 def on_patient(instance: Patient, created: bool, update_fields: Any = None, **_signal: Any) -> None:
     """A patient has agreed to more or less, or has entered or left a blinded study."""
     if not created and (update_fields is None or not STANDING.isdisjoint(update_fields)):
-        entries.refresh_patients({instance.pk})
+        entries.refresh_patients({instance.pk}, now=timezone.now())
 
 
 @unless_restored
 def on_session(instance: TrainingSession, created: bool = False, **_signal: Any) -> None:
     """A session was corrected or removed, or came from elsewhere."""
     if instance.state == State.FINISHED:
-        entries.refresh_patients({instance.patient_id}, corrected=not created)
+        patients = {instance.patient_id}
+        entries.refresh_patients(patients, now=timezone.now(), corrected=not created)
 
 
 @unless_restored
@@ -96,13 +98,15 @@ def on_correction(instance: SessionCorrection, **_signal: Any) -> None:
     """A session was given to whoever walked it: the one whom it was put down to has one less."""
     if instance.field == CorrectedField.PATIENT:
         before = Patient.everywhere.filter(pseudonym=instance.old)
-        entries.refresh_patients(set(before.values_list("pk", flat=True)), corrected=True)
+        patients = set(before.values_list("pk", flat=True))
+        entries.refresh_patients(patients, now=timezone.now(), corrected=True)
 
 
 @unless_restored
 def on_figure(instance: SessionMetric, created: bool = False, **_signal: Any) -> None:
     """A figure was corrected or removed, or came from elsewhere."""
-    entries.refresh_patients(patients_of({instance.session_id}), corrected=not created)
+    patients = patients_of({instance.session_id})
+    entries.refresh_patients(patients, now=timezone.now(), corrected=not created)
 
 
 @unless_restored
@@ -116,13 +120,13 @@ def on_board(instance: Leaderboard, **_signal: Any) -> None:
     """A board was made, or its rows are others now: how they are shown alters none."""
     before: Leaderboard | None = vars(instance).pop(BEFORE, None)
     if before is None or before.makings != instance.makings:
-        building.rebuild(instance)
+        building.rebuild(instance, timezone.now())
 
 
 def on_group(instance: Leaderboard, action: str, pk_set: set[int] | None, **_signal: Any) -> None:
     """Patients were taken into a board's group or out of it."""
     if instance.has_group and action.startswith("post_"):
-        building.follow(instance, pk_set)
+        building.follow(instance, timezone.now(), pk_set)
 
 
 @unless_restored
@@ -135,4 +139,4 @@ def on_clinic(instance: Clinic, **_signal: Any) -> None:
     moves = before.time_zone != instance.time_zone
     for board in entries.boards_of([instance.pk]) if joins or moves else ():
         if joins if board.clinic_id is None else moves:
-            building.follow(board)
+            building.follow(board, timezone.now())

@@ -1,16 +1,18 @@
 """A whole installation as one file, and back: on SQLite or PostgreSQL, whichever it came from.
 
-The content is lines of JSON, compressed and sealed: a header with the version of the tables and the
-count of rows, then every row.
+The content is lines of JSON, compressed by gzip and encrypted by age: a header with the version of
+the tables and the count of rows, then every row. `age -d -i KEY FILE | gunzip` shows them.
 """
 
 from __future__ import annotations
 
+import gzip
 import json
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
+from itertools import islice
 from typing import BinaryIO
 
 from django.apps import apps
@@ -18,8 +20,9 @@ from django.core import serializers
 from django.core.management.color import no_style
 from django.db import connection, models, transaction
 from django.db.migrations.recorder import MigrationRecorder
+from pyrage.x25519 import Identity, Recipient
 
-from rehab.exports.sealed import Sealer, unseal
+from rehab.exports.encryption import decrypt, encrypt
 from rehab.people.models import User
 
 FORMAT = 1
@@ -33,6 +36,7 @@ LEFT_OUT = {
 }
 APPS_LEFT_OUT = {"axes"}  # who failed to sign in, for some hours
 A_TIME = 2000  # rows held in memory
+GZIP = 31  # zlib's window and header for the gzip format
 
 
 class CannotRestore(ValueError):
@@ -80,56 +84,51 @@ def one_moment() -> Iterator[None]:
                 cursor.execute("ROLLBACK")
 
 
-class _Packer:
-    """Text that is written to it goes compressed into a sealed file."""
-
-    def __init__(self, file: BinaryIO, passphrase: str) -> None:
-        self._sealer, self._packer = Sealer(file, passphrase), zlib.compressobj()
-
-    def write(self, text: str) -> None:
-        """Take more text."""
-        self._sealer.write(self._packer.compress(text.encode()))
-
-    def close(self) -> None:
-        """Write what is left."""
-        self._sealer.write(self._packer.flush())
-        self._sealer.close()
-
-
-def write_backup(file: BinaryIO, passphrase: str, now: datetime) -> dict[str, int]:
-    """Write everything into a file; give how many rows of each model."""
-    packer, kept = _Packer(file, passphrase), backed_up()
+def write_backup(file: BinaryIO, recipients: Sequence[Recipient], now: datetime) -> dict[str, int]:
+    """Write everything into a file; return how many rows of each model."""
+    counts: dict[str, int] = {}
     with one_moment():
-        counts = {model._meta.label_lower: model._base_manager.count() for model in kept}
-        header = {"format": FORMAT, "made_at": now.isoformat(), "tables": tables_version()}
-        packer.write(json.dumps(header | {"counts": counts}) + "\n")
-        for model in kept:
-            rows = model._base_manager.order_by("pk").iterator(chunk_size=A_TIME)
-            names = [field.name for field in model._meta.concrete_fields]
-            serializers.serialize("jsonl", rows, stream=packer, fields=names)
-    packer.close()
+        encrypt(_compress(_lines(counts, now)), file, recipients)
     return counts
 
 
-def read_lines(file: BinaryIO, passphrase: str) -> Iterator[str]:
-    """Give a backup's lines. Raises CannotUnseal."""
-    unpacker, rest = zlib.decompressobj(), b""
-    for chunk in unseal(file, passphrase):
-        *lines, rest = (rest + unpacker.decompress(chunk)).split(b"\n")
-        yield from (line.decode() for line in lines)
+def _lines(counts: dict[str, int], now: datetime) -> Iterator[str]:
+    """Yield the header, then every row. Counts are filled in."""
+    kept = backed_up()
+    counts.update({model._meta.label_lower: model._base_manager.count() for model in kept})
+    header = {"format": FORMAT, "made_at": now.isoformat(), "tables": tables_version()}
+    yield json.dumps(header | {"counts": counts}) + "\n"
+    for model in kept:
+        names = [field.name for field in model._meta.concrete_fields]
+        rows = model._base_manager.order_by("pk").iterator(chunk_size=A_TIME)
+        while some := list(islice(rows, A_TIME)):
+            yield serializers.serialize("jsonl", some, fields=names)
 
 
-def restore_backup(file: BinaryIO, passphrase: str) -> dict[str, int]:
-    """Take a backup into an installation that nobody has used; give how many rows of each model.
+def _compress(texts: Iterable[str]) -> Iterator[bytes]:
+    packer = zlib.compressobj(wbits=GZIP)
+    for text in texts:
+        yield packer.compress(text.encode())
+    yield packer.flush()
 
-    All of it or nothing. Raises CannotUnseal and CannotRestore.
+
+def read_lines(file: BinaryIO, identities: Sequence[Identity]) -> Iterator[str]:
+    """Yield a backup's lines. Raises CannotDecrypt."""
+    with decrypt(file, identities) as content, gzip.open(content, "rt", encoding="utf-8") as lines:
+        yield from lines
+
+
+def restore_backup(file: BinaryIO, identities: Sequence[Identity]) -> dict[str, int]:
+    """Restore a backup into an installation that nobody has used; return the rows of each model.
+
+    All of it or nothing. Raises CannotDecrypt and CannotRestore.
     """
     if User.everywhere.exists():
         raise CannotRestore(
             "This installation has accounts already. Restore into a new one: an empty "
             "GARRY_DATA_DIR, or an empty database."
         )
-    lines = read_lines(file, passphrase)
+    lines = read_lines(file, identities)
     header = json.loads(next(lines))
     if header["format"] != FORMAT or header["tables"] != tables_version():
         raise CannotRestore(

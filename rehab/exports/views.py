@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Any
 
 from django.http import HttpRequest, HttpResponse
@@ -27,9 +28,9 @@ def give_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Give all that is kept of one patient as a file."""
     user, now = person(request), timezone.now()
     patient = get_patient(user, patient_id)
-    note_export(request, patient)
+    note_export(request, now, patient)
     name = f"garry-{patient.pseudonym}-{now:%Y-%m-%d}.zip"
-    return _send(patient_files(user, patient, now), name, now)
+    return _send(patient_files(user, patient, now), name)
 
 
 @for_roles(Role.LEAD, Role.RESEARCHER, patients=False)
@@ -51,11 +52,11 @@ def show_export(request: HttpRequest) -> HttpResponse:
 def give_sessions(request: HttpRequest) -> HttpResponse:
     """Give all sessions that somebody may see, by pseudonyms."""
     user, now = person(request), timezone.now()
-    note_export(request)
-    return _send(session_files(user, now), f"garry-sessions-{now:%Y-%m-%d}.zip", now)
+    note_export(request, now)
+    return _send(session_files(user, now), f"garry-sessions-{now:%Y-%m-%d}.zip")
 
 
-def note_export(request: HttpRequest, patient: Patient | None = None) -> None:
+def note_export(request: HttpRequest, now: datetime, patient: Patient | None = None) -> None:
     """Tell the audit log. Where it cannot be kept, nothing is given out."""
     audit_log.note(
         Act.EXPORT,
@@ -63,8 +64,9 @@ def note_export(request: HttpRequest, patient: Patient | None = None) -> None:
         patient=None if patient is None else patient.pk,
         about=request.path,
         address=client_address(request),
+        now=now,
     )
 
 
-def _send(files: Any, name: str, now: Any) -> HttpResponse:
-    return ZipResponse(files, name, now)  # type: ignore[return-value]  # its body comes bit by bit
+def _send(files: Any, name: str) -> HttpResponse:
+    return ZipResponse(files, name)  # type: ignore[return-value]  # its body comes bit by bit

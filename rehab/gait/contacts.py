@@ -11,10 +11,11 @@ import numpy as np
 from rehab.gait.filters import Floats, find_highest, find_middle
 from rehab.gait.samples import FORCE, TIME, LegBuffer
 
-# Force is not filtered here: 20 Hz of causal filter would move both events by 10 ms (gait.md 2.1).
-CONTACT_N = 30.0  # 6 times the noise of an unloaded treadmill plate (4.5 N sd, gait.md 2.1)
+# Force is not filtered here: 20 Hz of causal filter would move both events by 10 ms
+# (docs/reference/gait.md#contacts).
+CONTACT_N = 30.0  # 6 times the noise of an unloaded treadmill plate (4.5 N sd)
 RELEASE_N = 20.0
-STEP_PEAK = 0.25  # of body weight; a contact that never bears more is no step (gait.md 2.1)
+STEP_PEAK = 0.25  # of body weight; a contact that never bears more is no step
 BOUNCE_S = 0.15  # no foot swings faster; a contact sooner than that goes on with the last stance
 LOOK_BACK_S = 0.05  # loading takes less from release to contact threshold
 OFFSET_MAX = 0.15  # of body weight; a plate that reads more in swing needs its own zero button

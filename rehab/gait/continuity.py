@@ -17,7 +17,7 @@ from rehab.gait.kinetics import PushOff
 from rehab.gait.samples import ANGLE, FORCE, MOMENT, TIME
 from rehab.gait.strides import Reason
 
-GAP_S = 0.05  # bridged by a straight line up to here (gait.md 2.1)
+GAP_S = 0.05  # bridged by a straight line up to here (docs/reference/gait.md#time-base)
 RATE_TOLERANCE = 0.2
 # One value for so long is no measurement. The moment changes all through stance; the angle rests
 # where the ankle turns, but not to the last digit.

@@ -18,7 +18,8 @@ class ZeroPhaseFilter:
     Parameters
     ----------
     cutoff_hz
-        Of one run. 6 Hz is the custom for ankle power of walking (Winter 1991; gait.md 2.1).
+        Of one run. 6 Hz is the custom for ankle power of walking (Winter 1991;
+        docs/reference/gait.md#filters).
     rate_hz
         Of the samples.
     """

@@ -1,8 +1,8 @@
 """When the foot meets and leaves the floor, from a gyroscope on foot or shank.
 
 While a leg swings, foot and shank turn toes-up; both contacts lie where that turning begins and
-ends (Catalfamo 2010, Jasiewicz 2006; gait.md 2.2). After a stroke a foot sensor finds more of them
-than one on the shank.
+ends (Catalfamo 2010, Jasiewicz 2006; docs/reference/gait.md#gyroscopes). After a stroke a foot
+sensor finds more of them than one on the shank.
 """
 
 from __future__ import annotations

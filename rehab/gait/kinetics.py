@@ -10,10 +10,13 @@ from numpy.typing import ArrayLike
 from rehab.gait.filters import Floats, ZeroPhaseFilter, find_highest, find_slope, refine_peak
 from rehab.gait.grid import EvenStance
 
-COP_FORCE_N = 40.0  # below, the center of pressure is a division by about nothing (gait.md 2.1)
+# Below, the center of pressure is a division by about nothing
+# (docs/reference/gait.md#center-of-pressure).
+COP_FORCE_N = 40.0
 COP_REACH_M = 0.35  # from the ankle; no shoe is longer
 CUTOFF_HZ = 6.0
-PUSH_OFF_FROM = 0.4  # of stance; the peak comes at 0.88-0.90 of it (gait.md 2.1)
+# Of stance; the peak comes at 0.88-0.90 of it (docs/reference/gait.md#push-off).
+PUSH_OFF_FROM = 0.4
 # What the ankle is taken to do after the last sample, where the filter needs to know: its
 # plantarflexion brakes evenly, so that it ends about 60 ms after the foot left the floor (56 and
 # 62 ms on the legs of moore2013), turns back for 30 ms and goes on as fast; its moment stays as
@@ -35,7 +38,8 @@ def find_ankle_moment(
     """Give the ankle moment of the force under the foot [Nm, plantarflexion positive].
 
     ``M = (cop − ankle) × F`` in the sagittal plane; the foot's own weight and inertia are left out
-    (quasi-static; against full inverse dynamics of one walker r = .99, 5.5 Nm rms, gait.md 2.1).
+    (quasi-static; against full inverse dynamics of one walker r = .99, 5.5 Nm rms,
+    docs/reference/gait.md#push-off).
 
     Parameters
     ----------

@@ -20,8 +20,9 @@ from rehab.gait.strides import Flag, Reason, Stride
 
 CHANNELS = ("t_s", *(f"{side} {name}" for side in ("left", "right") for name in NAMES))
 
-# Mean force of both plates over a cycle, by body weight (gait.md 2.3): a handrail takes some of it,
-# a harness up to half; nothing adds any, so that more tells of a wrong mass, unit or plate.
+# Mean force of both plates over a cycle, by body weight (docs/reference/gait.md#bad-signals): a
+# handrail takes some of it, a harness up to half; nothing adds any, so that more tells of a wrong
+# mass, unit or plate.
 SUPPORTED_BELOW = 0.95
 WEIGHT_MIN, WEIGHT_MAX = 0.5, 1.1
 ALONE_MAX = 0.8  # of stance; 0.5-0.72 from slow to fast walking, 1 at its change to running

@@ -20,7 +20,8 @@ FORCE_MAX = 2.0  # of body weight; fast walking reaches 1.5
 # what two may carry (``legs``) and, as the sound leg carries more after a stroke (60 ± 7 % when
 # standing, PMC4777057), rather more than half of the weight. Pounds for kilograms give 0.23.
 LOAD_MIN, LOAD_MAX = 0.25, 0.75
-# Nm/kg. Healthy people reach 0.8-2.0 (gait.md 6), after a stroke 0.3; a fast runner 3.5.
+# Nm/kg. Healthy people reach 0.8-2.0 (docs/reference/gait.md#usual-values), after a stroke 0.3; a
+# fast runner 3.5.
 MOMENT_MIN = 0.1  # below, the force passes within 1 cm of the ankle all through stance
 MOMENT_MAX = 3.5
 MOMENT_SWING = 0.4  # of the stance's peak, at any moment of the swing before

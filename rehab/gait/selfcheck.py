@@ -22,8 +22,8 @@ OFTEN = 0.2  # of the strides; what is wrong with fewer is the walker's, not the
 WEIGHT_ABOVE = 1.05  # shoes and instrumentation weigh up to 3 % (moore2013)
 USUAL_LOAD = (0.42, 0.58)  # of body weight on one leg; 0.52 on each of moore2013's
 OWN_LAG_S = 0.003  # against the person's own mark
-USUAL_MOMENT = (0.8, 2.0)  # Nm/kg, healthy (gait.md 6)
-USUAL_A2 = (0.3, 7.0)  # W/kg (gait.md 6)
+USUAL_MOMENT = (0.8, 2.0)  # Nm/kg, healthy (docs/reference/gait.md#usual-values)
+USUAL_A2 = (0.3, 7.0)  # W/kg (docs/reference/gait.md#usual-values)
 
 CURES = {
     Reason.TIME_BACKWARDS: "The clock stands still or jumps back. Send the sensors' own times.",

@@ -1,7 +1,8 @@
 """The original GARRY's database (`data.db`): what it says, checked whole and never written to.
 
-Its columns are typed INTEGER but hold text and decimals as the app sent them (product.md, rows 21
-and 50): numbers as text, a duration as 0:01:22.5, the start as a date with a time.
+Its columns are typed INTEGER but hold text and decimals as the app sent them
+(docs/reference/original.md#database): numbers as text, a duration as 0:01:22.5, the start as a date
+with a time.
 """
 
 from __future__ import annotations

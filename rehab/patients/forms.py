@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Any, ClassVar
 
 from django import forms
 from django.core.exceptions import ValidationError
 from django.db import transaction
-from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
@@ -23,10 +23,10 @@ class PatientForm(PatientRowForm):
         model = Patient
         fields: ClassVar = ["nickname", "code", "paretic_side", "body_mass_kg"]
 
-    def __init__(self, *args: Any, by: User, **options: Any) -> None:
+    def __init__(self, *args: Any, by: User, now: datetime, **options: Any) -> None:
         super().__init__(*args, **options)
         self.instance.clinic = clinic_of(by)
-        self._by = by
+        self._by, self._now = by, now
         self.fields["paretic_side"].required = True
         self.fields["nickname"].widget.attrs["autofocus"] = True
         if self.instance.is_new:
@@ -55,9 +55,9 @@ class PatientForm(PatientRowForm):
             patient = super().save(commit)
             for purpose in map(Purpose, self.cleaned_data.get("agrees", [])):
                 if purpose is Purpose.BOARDS:
-                    join_boards(patient, Boards.CLINIC, self._by, timezone.now())
+                    join_boards(patient, Boards.CLINIC, self._by, self._now)
                 else:
-                    give(patient, purpose, self._by, timezone.now())
+                    give(patient, purpose, self._by, self._now)
         return patient
 
 

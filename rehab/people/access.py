@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import PermissionDenied
 from django.http import HttpRequest, HttpResponseBase
+from django.utils import timezone
 from django.utils.cache import patch_cache_control
 
 from rehab.people.audit import access_log, history
@@ -100,7 +101,7 @@ class AccessMiddleware:
         """Pass the request on; what it changes is its doing, and what it shows is noted."""
         with history.acting(request):
             response = self.get_response(request)
-        access_log.note_request(request, response)
+        access_log.note_request(request, response, timezone.now())
         if _is_guarded(request):
             _forbid_keeping(response)
         return response
@@ -125,7 +126,7 @@ class AccessMiddleware:
             return None
         if getattr(view, "tablets", False) and tablet_of(request) is not None:
             return None
-        if getattr(view, "setting_up", False) and flow.setting_up(request) is not None:
+        if getattr(view, "setting_up", False) and flow.setting_up(request, timezone.now()):
             return None
         if not user.is_authenticated:
             return redirect_to_login(request.get_full_path())

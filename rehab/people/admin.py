@@ -16,6 +16,7 @@ from django.db.models import Count, Max, QuerySet
 from django.http import HttpRequest, HttpResponseBase
 from django.shortcuts import redirect
 from django.urls import reverse
+from django.utils import timezone
 from django.utils.html import format_html
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
@@ -106,7 +107,8 @@ class AccountAdmin(ScopedOptions, RowAdmin, UserAdmin):
         """Let the chosen accounts try again at once."""
         for account in accounts:
             with transaction.atomic():
-                note_safety(Act.UNLOCK, person(request), account, client_address(request))
+                by, address = person(request), client_address(request)
+                note_safety(Act.UNLOCK, by, account, address, timezone.now())
                 lockout.forgive(account)
         words = gettext("Accounts that may try again: %(count)s.")
         messages.success(request, words % {"count": accounts.count()})
@@ -118,7 +120,8 @@ class AccountAdmin(ScopedOptions, RowAdmin, UserAdmin):
         """Take the chosen accounts back to their passwords alone."""
         for account in accounts:
             with transaction.atomic():
-                note_safety(Act.FACTORS, person(request), account, client_address(request))
+                by, address = person(request), client_address(request)
+                note_safety(Act.FACTORS, by, account, address, timezone.now())
                 factors.forget_all(account)
         words = gettext(
             "%(count)s account(s) sign in by password alone now, or set up a new second "

@@ -18,8 +18,9 @@ def _catch(strides: int = 12) -> Phase:
     return make_phase("catch", strides=strides)
 
 
-# The lab's sessions 2 and 3 (gait.md 1.3): a baseline of about a minute, training at full display,
-# then ever longer blocks shown at 85 % with catch blocks between them, ten minutes of washout.
+# The lab's sessions 2 and 3 (docs/reference/gait.md#protocol): a baseline of about a minute,
+# training at full display, then ever longer blocks shown at 85 % with catch blocks between them,
+# ten minutes of washout.
 LAB_PROTOCOL: tuple[Phase, ...] = (
     make_phase("baseline", strides=54),
     make_phase("training", gettext_noop("Training 100 %"), seconds=57),

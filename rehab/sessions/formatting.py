@@ -96,3 +96,11 @@ def format_state(state: str) -> str:
 def clinic_time(moment: datetime, clinic: Clinic) -> datetime:
     """Return a moment in the clinic's time zone."""
     return moment.astimezone(ZoneInfo(clinic.time_zone))
+
+
+def midnight_of(moment: datetime) -> datetime:
+    """Return the moment at which a local moment's day began.
+
+    Where clocks go back at midnight's hour (Havana), there are two midnights: the first counts.
+    """
+    return moment.replace(hour=0, minute=0, second=0, microsecond=0, fold=0)

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from rehab.sources.intake import Intake, IntakeSettings, add_signal_arguments
 from rehab.sources.source import LiveSource, Say, Unusable
 
-LOOK_S = 1.0  # for streams; one on the same network answers within 0.7 s (gait.md 5)
+# For streams; one on the same network answers within 0.7 s (docs/reference/gait.md#streaming).
+LOOK_S = 1.0
 PULL_S = 0.2
 SILENT_S = 1.0
 CORRECT_EVERY_S = 5.0

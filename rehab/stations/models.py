@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import ClassVar
 
 from django.db import models
@@ -107,6 +108,6 @@ class LeaveTries(ScopedModel):
         return "Tries"
 
 
-def find_device(token: str) -> Device | None:
+def find_device(token: str, now: datetime) -> Device | None:
     """Give the device that this token belongs to; None for an unknown or revoked one."""
-    return find_holder(Device, token)
+    return find_holder(Device, token, now)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import datetime
 
 from django.conf import settings
 from django.http import HttpRequest, HttpResponseBase
+from django.utils import timezone
 
 from rehab.stations.models import Device, find_device
 
@@ -13,9 +15,9 @@ COOKIE = "garry_tablet"
 COOKIE_AGE_S = 400 * 24 * 3600  # the longest that browsers keep one; each visit renews it
 
 
-def find_tablet(token: str | None) -> Device | None:
+def find_tablet(token: str | None, now: datetime) -> Device | None:
     """Give the tablet that this token belongs to; None for any other device."""
-    device = find_device(token) if token and token.isascii() else None
+    device = find_device(token, now) if token and token.isascii() else None
     return device if device is not None and device.kind == Device.Kind.TABLET else None
 
 
@@ -43,5 +45,5 @@ class TabletMiddleware:
         kind, _, given = request.headers.get("Authorization", "").partition(" ")
         if token is None and kind.lower() == "bearer":
             token = given.strip()
-        request.tablet = find_tablet(token)  # type: ignore[attr-defined]
+        request.tablet = find_tablet(token, timezone.now())  # type: ignore[attr-defined]
         return self.get_response(request)

@@ -6,7 +6,8 @@ delay tells most.
 
 from __future__ import annotations
 
-# DESIGN.md section 4: a step later than this is stored and counted, but never shown as live.
+# A step later than this is stored and counted, but never shown as live
+# (docs/reference/scoring.md#late-steps).
 LATE_S = 5.0
 # How much slower than ours a clock may run. A ceramic resonator, the worst that times a sensor, is
 # off by ±0.5 % when it is made and ±0.2 % by temperature (Murata, CERALOCK catalog P16E), a quartz

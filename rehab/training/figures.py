@@ -27,9 +27,10 @@ def describe_session(fold: SessionFold) -> dict[str, Any]:
     """Give the figures of a session.
 
     ``strides``, ``valid``, ``invalid`` and ``missing`` count the trained leg in every phase;
-    ``hits``, ``hit_rate`` and ``score`` only feedback phases (DESIGN.md section 5). ``phases`` has
-    one entry for all that are alike in name, kind, feedback, gain and valence (of feedback), with
-    its single blocks: a phase in which the gain was changed has as many entries as it had gains.
+    ``hits``, ``hit_rate`` and ``score`` only feedback phases (docs/reference/scoring.md#totals).
+    ``phases`` has one entry for all that are alike in name, kind, feedback, gain and valence (of
+    feedback), with its single blocks: a phase in which the gain was changed has as many entries as
+    it had gains.
     """
     whole, feedback = describe_tally(fold.trained), describe_tally(fold.feedback)
     return {

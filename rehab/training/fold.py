@@ -40,7 +40,7 @@ from rehab.training.valences import Valence, bands_from_json
 
 # Strides further apart than this were not walked without a break, or a clock jumped: no more than
 # so much counts as walked. Recorded strides last 1-2 s, gaps between recorded trials 3.2-5.2 s
-# (gait.md 1.3).
+# (docs/reference/gait.md#protocol).
 MAX_GAP_S = 10.0
 
 

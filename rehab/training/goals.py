@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from rehab.training.measures import InvalidSetting, Measure
 
-# The lab's goal is the mean of the 54-55 usable baseline strides of a session (gait.md 1.2, 1.3).
+# The lab's goal is the mean of the 54-55 usable baseline strides of a session
+# (docs/reference/gait.md#protocol).
 MIN_BASELINE_STRIDES = 50
 
 

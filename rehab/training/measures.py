@@ -64,8 +64,9 @@ class Measure:
         return float(goal)
 
 
-# Bounds: DESIGN.md section 5. Healthy A2 lies at 2-6 W/kg; recorded outliers reach 13.75 W/kg
-# (HEBB_03, force-plate faults), so 20 W/kg is a bound that only a wrong unit passes.
+# These bounds are those of docs/reference/scoring.md#bounds. Healthy A2 lies at 2-6 W/kg; recorded
+# outliers reach 13.75 W/kg (HEBB_03, force-plate faults), so 20 W/kg is a bound that only a wrong
+# unit passes.
 A2 = Measure(
     slug="a2",
     name=gettext_noop("ankle push-off power A2"),

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from rehab.training.fold import SessionFold
 from rehab.training.marking import gettext_noop
 
-# Below this share of the baseline a gain is within a walker's own noise (CV 6.5-12 %, gait.md 1.4,
-# standard error of a 50-stride mean 1-2 %), and a share of it would mean nothing.
+# Below this share of the baseline a gain is within a walker's own noise (CV 6.5-12 %,
+# standard error of a 50-stride mean 1-2 %: docs/reference/gait.md#phases), and a share of it would
+# mean nothing.
 MIN_TRAINED_GAIN = 0.03
 # A change relative to (nearly) nothing means nothing; this share of the largest value is nothing.
 MIN_BASELINE_SHARE = 1e-6

@@ -28,7 +28,8 @@ def judge(measure: Measure, value: float, gain: float, goal: float) -> Verdict:
     ``shown = gain × value``; ``performance = shown / goal``, within ±PERFORMANCE_MAX; a hit is
     performance ≥ 1, which is shown ≥ goal exactly, since IEEE division rounds to nearest. Where
     lower is better, ``performance = goal / shown`` and a hit is shown ≤ goal.
-    Source: DESIGN.md section 5; agrees with the recorded flags of all 4,576 strides at hand.
+    Source: docs/reference/scoring.md#words; agrees with the recorded flags of all 4,576 strides at
+    hand.
     """
     shown = gain * value
     if measure.higher_is_better:

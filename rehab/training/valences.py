@@ -141,7 +141,8 @@ class Valence:
         )
 
 
-# Band limits: product.md 4.1 (they split the recorded strides usefully; the original's did not).
+# Band limits: docs/reference/scoring.md#bands (they split the recorded strides usefully; the
+# original's did not).
 POSITIVE = Valence(
     slug="positive",
     label=gettext_noop("Positive"),

@@ -31,7 +31,7 @@ from robot.usb import find_port
 WHEELS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
 STOP_FRAME = encode_commands(STOP)
 
-FIRMWARE_MAJOR = 1  # what the reference driver takes (kobuki.md 1.10)
+FIRMWARE_MAJOR = 1  # what the reference driver takes (docs/reference/kobuki.md#firmware)
 ASK_EVERY_S = 0.1  # for the versions, until they are known
 LIGHT_EVERY_S = 1.0  # lights again, for a base that was switched off meanwhile
 # A hazard counts for so long [s] after it was felt last: no look in between misses it.

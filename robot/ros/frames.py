@@ -1,7 +1,8 @@
 """Frames of rosbridge v2: the six operations that are said, and the two that are heard.
 
-A bridge complains of nothing that it is told (kobuki.md 2.6): what matters has to come back from
-it. So nothing is sent here that waits in a queue anywhere: publishers and subscriptions keep one.
+A bridge complains of nothing that it is told (docs/reference/rosbridge.md#behavior): what matters
+has to come back from it. So nothing is sent here that waits in a queue anywhere: publishers and
+subscriptions keep one.
 """
 
 from __future__ import annotations
@@ -105,7 +106,8 @@ def read_frame(text: str | bytes) -> Heard:
         case {"op": "publish", "topic": str(topic), "msg": dict(message)}:
             return Publication(topic, message)
         case {"op": "service_response", "id": str(question), **rest}:
-            # A failure puts its words where the values would be (kobuki.md 5.4).
+            # A failure puts its words where the values would be
+            # (docs/reference/rosbridge.md#messages).
             values = rest.get("values") if rest.get("result") is True else None
             return Answer(question, values if isinstance(values, dict) else None)
     raise BadFrame('A frame that is heard has the "op" publish or service_response.')

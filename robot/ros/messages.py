@@ -1,7 +1,8 @@
 """Messages of ROS 1 as JSON: those that are published, and those that are believed.
 
 Every number that comes in is checked: a bridge passes on NaN, text and whatever else it is given
-(kobuki.md 2.6). Axes are those of motion.py, which are those of ROS (REP 103).
+(docs/reference/rosbridge.md#behavior). Axes are those of motion.py, which are those of ROS (REP
+103).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 import pytest
@@ -18,6 +18,7 @@ from rehab.stations.models import Station
 from rehab.training.goals import GoalRule
 from rehab.training.metrics import METRICS
 from rehab.training.phases import make_phase
+from tests.support.clock import HERE
 from tests.support.programs import Program, program_of
 from tests.support.world import World, build_world, client_of
 
@@ -51,7 +52,7 @@ def walked(patient: Patient, valence: str, score: float | None, day: int) -> Tra
             phases=[make_phase("training")],
         )
     )
-    session.created_at = session.started_at = datetime(2026, 5, day, 9, 30, tzinfo=UTC)
+    session.created_at = session.started_at = datetime(2026, 5, day, 9, 30, tzinfo=HERE.tzinfo)
     session.state, session.active_s = "finished", 61.5
     session.save()
     if score is not None:

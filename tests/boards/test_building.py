@@ -229,9 +229,9 @@ def test_of_a_group_only_those_are_made_anew_who_come_or_go(sessions, monkeypatc
     made: list[set[int]] = []
     real = entries.refresh
 
-    def refresh(board, patients=None, now=None, **how):
+    def refresh(board, patients=None, **how):
         made.append(patients)
-        real(board, patients, now, **how)
+        real(board, patients, **how)
 
     monkeypatch.setattr(entries, "refresh", refresh)
     board.group.set(people[:4])

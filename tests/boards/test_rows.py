@@ -101,7 +101,7 @@ def test_rows_are_those_of_the_board_as_it_is_not_as_it_was_read(clinic):
     board = Leaderboard.everywhere.get()
     board.metric = "steps"
     board.save()
-    entries.refresh(read, {person.pk}, NOW)
+    entries.refresh(read, {person.pk}, now=NOW)
     assert BoardEntry.everywhere.get().figure == 10
 
 
@@ -111,7 +111,7 @@ def test_a_patients_rows_are_made_of_no_other_patients_figures(clinic):
     person = patient_of(clinic, "A")
     walk(person, "positive", strides(9, 1))
     with CaptureQueriesContext(connection) as asked:
-        entries.refresh_patients({person.pk, *range(900, 960)}, NOW)
+        entries.refresh_patients({person.pk, *range(900, 960)}, now=NOW)
     (query,) = [one["sql"] for one in asked.captured_queries if "sessionmetric" in one["sql"]]
     if connection.vendor == "sqlite":
         with connection.cursor() as cursor:
@@ -140,7 +140,7 @@ def test_everyone_locks_boards_in_one_order_and_each_once(clinic, monkeypatch):
         return real(board_id)
 
     monkeypatch.setattr(entries, "_lock", lock)
-    entries.refresh_patients(both)
+    entries.refresh_patients(both, now=NOW)
     assert locked == [board.pk for board in boards]
 
 

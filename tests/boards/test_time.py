@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from django.core.management import call_command
@@ -19,6 +19,7 @@ from tests.support.walks import strides, walk
 from tests.support.world import NOW
 
 pytestmark = pytest.mark.django_db
+SATURDAY = datetime(2026, 11, 21, 10, tzinfo=UTC)
 
 
 def test_what_leaves_the_period_leaves_the_board_by_itself(clinic):
@@ -41,11 +42,11 @@ def test_what_leaves_the_period_leaves_the_board_by_itself(clinic):
     [("week", 6, True), ("week", 7, False), ("month", 21, True), ("month", 22, False)],
 )
 def test_weeks_and_months_begin_by_the_clinics_calendar(period, days_ago, counts):
-    """NOW is Saturday, November 21, 10:00 UTC; 14 h further east Sunday has just begun."""
+    """14 h east of Saturday, 10:00 UTC, Sunday has just begun."""
     clinic = Clinic.everywhere.create(name="Kiritimati", time_zone="Pacific/Kiritimati")
     board = board_of(clinic, period=period)
-    walk(patient_of(clinic, "A"), "positive", strides(3, 0), days_ago=days_ago)
-    entries.refresh(board, now=NOW)
+    walk(patient_of(clinic, "A"), "positive", strides(3, 0), days_ago=days_ago, now=SATURDAY)
+    entries.refresh(board, now=SATURDAY)
     assert BoardEntry.everywhere.exists() == counts
 
 
@@ -68,13 +69,14 @@ def test_dates_and_a_frozen_board_stay_as_they_were(clinic):
 
 @pytest.mark.parametrize("period", ["dates", "all"])
 def test_another_time_zone_is_another_day_at_once(period):
-    clinic = Clinic.everywhere.create(name="Elm", boards_across=True)
-    began = {"period_from": NOW.date(), "period_to": NOW.date()} if period == "dates" else {}
+    clinic = Clinic.everywhere.create(name="Elm", boards_across=True, time_zone="UTC")
+    day = SATURDAY.date()
+    began = {"period_from": day, "period_to": day} if period == "dates" else {}
     how = {"metric": "active_minutes", "entry": "sum", "types": "all"}
     board_of(clinic, period=period, **began, **how)
     person = patient_of(clinic, "A")
     for hours in (8, 8, 1):  # the first two are Friday's in California
-        walk(person, "positive", strides(2400, 0), now=NOW - timedelta(hours=hours))
+        walk(person, "positive", strides(2400, 0), now=SATURDAY - timedelta(hours=hours))
     before = everything()
     assert BoardEntry.everywhere.get().figure == 60
     clinic.time_zone = "America/Los_Angeles"
@@ -167,16 +169,17 @@ def test_another_measure_of_a_frozen_board_is_another_snapshot(clinic, snapshot)
 
 
 def test_what_left_the_period_before_the_freeze_is_not_in_it(clinic):
-    day = NOW.date()
+    now = timezone.now()  # signals keep the rows up by the clock
+    day = now.date()
     people = people_of(clinic, 6)
     board = board_of(clinic, types="all", display="top", frozen_on=day, names="code")
-    old = walk_down(people[:3], days_ago=20)
-    walk_down(people[3:], days_ago=3)
+    old = walk_down(people[:3], days_ago=20, now=now)
+    walk_down(people[3:], days_ago=3, now=now)
     board.period = "days_30"
     board.save()
     assert BoardEntry.everywhere.count() == 6
     Leaderboard.everywhere.update(frozen_on=day + timedelta(days=12))
-    after = NOW + timedelta(days=40)  # nobody looked meanwhile
+    after = now + timedelta(days=40)  # nobody looked meanwhile
     assert not show_after(old[0], after)[0].shared
     assert set(BoardEntry.everywhere.values_list("patient", flat=True)) == {
         one.pk for one in people[3:]

@@ -51,7 +51,7 @@ def test_a_session_of_two_types_stands_on_no_board_of_points_or_of_one_type(clin
     session = walk_two_types(people[0])
     assert (session.valence, session.changed_to) == ("positive", "negative")
     assert BoardEntry.everywhere.filter(board=board, patient=people[0]).exists() == stands
-    entries.refresh(board)
+    entries.refresh(board, now=NOW)
     assert BoardEntry.everywhere.filter(board=board, patient=people[0]).exists() == stands
 
 
@@ -235,7 +235,7 @@ def test_lost_points_without_a_stake_are_told_to_nobody(clinic, gone):
     sessions = walk_down(people, "negative")
     imported = SessionMetric.everywhere.filter(session=sessions[0])
     imported.filter(slug__in=gone).delete()
-    entries.refresh(board)
+    entries.refresh(board, now=NOW)
     assert set(BoardEntry.everywhere.values_list("patient", flat=True)) == {
         one.pk for one in people[1:]
     }
@@ -344,7 +344,7 @@ def test_in_a_blinded_study_there_is_no_board_and_no_score(clinic):
     people[0].blinded = True
     people[0].save()
     sessions[0].refresh_from_db()
-    assert show_after(sessions[0]) == []
+    assert show_after(sessions[0], NOW) == []
     page = page_of(sessions[0])
     assert "This walk is over." in page
     assert 'class="value"' not in page
@@ -395,7 +395,7 @@ def test_across_clinics_stand_those_who_agreed_of_clinics_that_take_part(clinic)
     assert BoardEntry.everywhere.filter(board=board).count() == 6
     session = TrainingSession.everywhere.filter(clinic=oak).first()
     assert see(session).shared
-    assert show_after(TrainingSession.everywhere.filter(clinic=elsewhere).first()) == []
+    assert show_after(TrainingSession.everywhere.filter(clinic=elsewhere).first(), NOW) == []
     oak.boards_across = False
     oak.save()
     assert BoardEntry.everywhere.filter(board=board).count() == 3

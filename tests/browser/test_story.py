@@ -26,6 +26,11 @@ STORIES = EVERYWHERE if "CI" in os.environ else EVERYWHERE[:1]
 STRIDES = 10
 PATIENCE_MS = 40_000
 
+# How long each may take on a busy machine [s]; what hangs is found by PATIENCE_MS, well before.
+BEGIN_S, TAP_S, STRIDE_S = 60, 4, 3  # server and browser; a tap or a look at a page; a stride
+TAPS = 40  # and looks, from the first page of a story to its last
+LIMIT_S = BEGIN_S + len(STORIES) * (TAPS * TAP_S + 2 * STRIDES * STRIDE_S)
+
 SEED = """
 from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
@@ -182,6 +187,7 @@ def end(story: Story, server: Server) -> None:
     expect(page.locator(".huge")).to_contain_text("Like last time")
 
 
+@pytest.mark.timeout(LIMIT_S)
 def test_a_session_from_start_to_scores(stories: list[Story], server: Server) -> None:
     for story in stories:
         begin(story)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import os
+import re
+import shutil
 import sqlite3
 import stat
 import subprocess
@@ -20,8 +23,9 @@ from django.core import serializers
 from django.core.management import CommandError, call_command
 from django.db import connection
 
-from rehab.exports import backup, sealed
+from rehab.exports import backup
 from rehab.exports.backup import LEFT_OUT, backed_up, read_lines, write_backup
+from rehab.exports.encryption import generate_key, read_identities, read_recipients
 from rehab.people.models import Clinic, Patient, User
 from rehab.sessions.log import Step
 from tests.support.servers import ROOT, clean_environment
@@ -30,13 +34,20 @@ from tests.support.world import NOW, build_world
 
 pytestmark = pytest.mark.django_db
 
-PASSPHRASE = "correct horse battery staple"
+SECRET, PUBLIC = generate_key()
+IDENTITIES, RECIPIENTS = read_identities(SECRET), read_recipients([PUBLIC])
 
 
 @pytest.fixture(autouse=True)
-def passphrase(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("GARRY_BACKUP_PASSPHRASE", PASSPHRASE)
-    monkeypatch.setattr(sealed, "SCRYPT_N", 2)  # what a guess costs is not what is tried here
+def public_key(settings) -> None:
+    settings.BACKUP_KEYS = [PUBLIC]
+
+
+@pytest.fixture
+def key(tmp_path: Path) -> Path:
+    path = tmp_path / "key.txt"
+    path.write_text(f"# kept on a stick\n{SECRET}\n")
+    return path
 
 
 @pytest.fixture
@@ -72,13 +83,13 @@ def empty() -> None:
 
 
 @pytest.mark.django_db(transaction=True)
-def test_every_row_comes_back(file):
+def test_every_row_comes_back(file, key):
     fill()
     before = rows()
     call_command("backup", file)
     empty()
     assert rows() != before
-    call_command("restore", file)
+    call_command("restore", file, key=key)
     assert rows() == before
     assert all(before[name] for name in ("rehab.step", "rehab.sessionevent", "rehab.user"))
     # Numbers of new rows go on after those of the old ones.
@@ -109,13 +120,13 @@ def test_a_backup_is_one_moment_and_holds_nobody_up(file, monkeypatch):
     serialize = serializers.serialize
     monkeypatch.setattr(serializers, "serialize", write_meanwhile)
     with file.open("wb") as out:
-        counts = write_backup(out, PASSPHRASE, NOW)
+        counts = write_backup(out, RECIPIENTS, NOW)
     assert changed == [1]
     patient.refresh_from_db()
     assert patient.nickname == "Changed meanwhile"
     assert counts["rehab.step"] == steps
     with file.open("rb") as source:
-        assert "Changed meanwhile" not in "\n".join(read_lines(source, PASSPHRASE))
+        assert "Changed meanwhile" not in "\n".join(read_lines(source, IDENTITIES))
 
 
 def elsewhere(do: Callable[[], int]) -> int:
@@ -134,17 +145,17 @@ def elsewhere(do: Callable[[], int]) -> int:
     return done[0]
 
 
-def test_it_goes_into_a_new_installation_only(file):
+def test_it_goes_into_a_new_installation_only(file, key):
     fill()
     call_command("backup", file)
     before = rows()
     with pytest.raises(CommandError, match="Restore into a new one"):
-        call_command("restore", file)
+        call_command("restore", file, key=key)
     assert rows() == before
 
 
 @pytest.mark.django_db(transaction=True)
-def test_a_damaged_one_changes_nothing(file):
+def test_a_damaged_one_changes_nothing(file, key):
     fill()
     call_command("backup", file)
     data = file.read_bytes()
@@ -154,31 +165,95 @@ def test_a_damaged_one_changes_nothing(file):
         (data[:-1], "damaged"),
         (data[:200], "damaged"),
         (b"", "no backup of GARRY"),
+        (
+            data[:-70_000] + data[-60_000:] if len(data) > 70_000 else data[:-9] + bytes(9),
+            "damaged",
+        ),
+        (b"GARRY sealed 1\n" + data, "Restore it with that version"),
     ):
         file.write_bytes(damaged)
         with pytest.raises(CommandError, match=said):
-            call_command("restore", file)
+            call_command("restore", file, key=key)
         assert rows() == fresh
 
 
 @pytest.mark.django_db(transaction=True)
-def test_one_of_another_version_is_refused(file, monkeypatch):
+def test_one_of_another_version_is_refused(file, key, monkeypatch):
     fill()
     call_command("backup", file)
     empty()
     older = [row for row in backup.tables_version() if row[0] != "rehab"]
     monkeypatch.setattr(backup, "tables_version", lambda: older)
     with pytest.raises(CommandError, match="Install that version, restore, and then update"):
-        call_command("restore", file)
+        call_command("restore", file, key=key)
     assert not User.everywhere.exists()
 
 
-@pytest.mark.parametrize("command", ["backup", "restore"])
-def test_a_passphrase_is_needed(file, monkeypatch, command):
-    monkeypatch.setenv("GARRY_BACKUP_PASSPHRASE", "short")
-    with pytest.raises(CommandError, match="16 characters or more"):
-        call_command(command, file)
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [([], "manage.py backupkey"), (["age1x"], "begins with age1"), ([SECRET], "begins with age1")],
+)
+def test_a_backup_needs_a_public_key(file, settings, keys, said):
+    settings.BACKUP_KEYS = keys
+    with pytest.raises(CommandError, match=said):
+        call_command("backup", file)
     assert not file.exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (b"", "no secret key"),
+        (b"# nothing but a comment\n", "no secret key"),
+        pytest.param(PUBLIC.encode(), "begins with AGE-SECRET-KEY-1", id="public"),
+        (b"\xff\xfe", "no text file"),
+        (None, "cannot be read"),
+    ],
+)
+def test_a_restore_needs_a_secret_key(file, tmp_path, text, said):
+    call_command("backup", file)
+    given = tmp_path / "given.txt"
+    if text is not None:
+        given.write_bytes(text)
+    with pytest.raises(CommandError, match=said):
+        call_command("restore", file, key=given)
+
+
+@pytest.mark.django_db(transaction=True)
+def test_only_its_own_key_opens_it(file, tmp_path):
+    call_command("backup", file)
+    other = tmp_path / "other.txt"
+    other.write_text(generate_key()[0])
+    with pytest.raises(CommandError, match="encrypted to another key"):
+        call_command("restore", file, key=other)
+
+
+def test_what_backupkey_prints_is_a_key_file(file, tmp_path, settings, capsys):
+    call_command("backupkey")
+    printed = capsys.readouterr().out
+    settings.BACKUP_KEYS = [re.search(r"GARRY_BACKUP_KEYS=(\S+)", printed)[1]]
+    call_command("backup", file)
+    with file.open("rb") as source:
+        assert json.loads(next(read_lines(source, read_identities(printed))))["format"] == 1
+
+
+def test_two_keys_open_the_same_backup(file, settings):
+    secret, public = generate_key()
+    settings.BACKUP_KEYS = [PUBLIC, public]
+    call_command("backup", file)
+    for each in (SECRET, secret):
+        with file.open("rb") as source:
+            assert len(list(read_lines(source, read_identities(each)))) > 1
+
+
+@pytest.mark.skipif(shutil.which("age") is None, reason="no age here: apt-get install age")
+def test_the_age_program_opens_it_without_garry(file, key):
+    fill()
+    call_command("backup", file)
+    opened = subprocess.run(["age", "-d", "-i", key, file], capture_output=True, check=True).stdout
+    header, *lines = gzip.decompress(opened).splitlines()
+    assert len(lines) == sum(json.loads(header)["counts"].values())
+    assert {json.loads(line)["model"] for line in lines} >= {"rehab.patient", "rehab.step"}
 
 
 def test_a_backup_that_fails_leaves_the_old_one(file, monkeypatch):
@@ -193,17 +268,17 @@ def test_a_backup_that_fails_leaves_the_old_one(file, monkeypatch):
     assert list(file.parent.iterdir()) == [file]
 
 
-def test_nobody_else_on_the_machine_may_read_it(file):
+def test_nobody_else_on_the_machine_may_read_it(file, key):
     call_command("backup", file)
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
 
 
-def test_from_one_machine_to_another(file, tmp_path):
+def test_from_one_machine_to_another(file, key, tmp_path):
     """The two commands as an administrator runs them, on SQLite, each in a process of its own."""
 
     def run(folder: str, *words: str) -> str:
         environment = clean_environment(tmp_path / folder, 1)
-        environment["GARRY_BACKUP_PASSPHRASE"] = PASSPHRASE
+        environment["GARRY_BACKUP_KEYS"] = PUBLIC
         return subprocess.run(
             [sys.executable, "manage.py", *words],
             cwd=ROOT,
@@ -219,7 +294,7 @@ def test_from_one_machine_to_another(file, tmp_path):
     fill = "from tests.support.world import build_world; build_world('amber')"
     run("old", "shell", "-v0", "-c", f"{prepare}; {fill}")
     assert "1 patients" in run("old", "backup", os.fspath(file))
-    assert "1 patients" in run("new", "restore", os.fspath(file))
+    assert "1 patients" in run("new", "restore", os.fspath(file), "--key", os.fspath(key))
     counts = []
     for folder in ("old", "new"):
         database = sqlite3.connect(tmp_path / folder / "garry.sqlite3")
@@ -228,9 +303,9 @@ def test_from_one_machine_to_another(file, tmp_path):
     assert counts[0] == counts[1] > 0
 
 
-def test_now_stands_in_it(file):
+def test_now_stands_in_it(file, key):
     with file.open("wb") as out:
-        write_backup(out, PASSPHRASE, NOW + timedelta(days=1))
+        write_backup(out, RECIPIENTS, NOW + timedelta(days=1))
     with file.open("rb") as source:
-        header = json.loads(next(read_lines(source, PASSPHRASE)))
-    assert header["made_at"].startswith("2026-11-22")
+        header = json.loads(next(read_lines(source, IDENTITIES)))
+    assert header["made_at"].startswith(f"{NOW + timedelta(days=1):%Y-%m-%d}")

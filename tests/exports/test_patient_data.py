@@ -7,7 +7,7 @@ import io
 import json
 import secrets
 import tracemalloc
-from datetime import UTC, date, datetime, time
+from datetime import date, datetime, time
 from typing import Any
 
 import pytest
@@ -36,9 +36,8 @@ from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.archives import body_of, open_archive, rows_of
 from tests.support.walks import walk
-from tests.support.world import World, build_world, client_of, mark
+from tests.support.world import NOW, World, build_world, client_of, mark
 
-NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 NAMED = {Patient, User, Station}
 
 
@@ -317,7 +316,7 @@ def test_memory_does_not_grow_with_the_number_of_steps():
     row = (1, "P-ABCDEFGH", 1, 1.07, NOW, "left", True, 0.1 + 0.2, 1.0, 1 / 3)
 
     def peak(count: int) -> int:
-        parts = write_zip([("steps.csv", write_csv(["x"] * 10, (row for _ in range(count))))], NOW)
+        parts = write_zip([("steps.csv", write_csv(["x"] * 10, (row for _ in range(count))))])
         tracemalloc.start()
         for _part in parts:
             pass
@@ -337,7 +336,7 @@ async def test_served_by_asgi_it_comes_part_by_part():
             made.append(number)
             yield secrets.token_hex(5_000)
 
-    response = ZipResponse([("steps.csv", texts())], "x.zip", NOW)
+    response = ZipResponse([("steps.csv", texts())], "x.zip")
     first = [part async for part in _few(response, 1)]
     assert first
     assert len(made) < 200

@@ -30,7 +30,7 @@ def run(*arguments: str | int | Path) -> dict[str, Any]:
     return dict(json.loads(out.getvalue()))
 
 
-# gait.md 1.4: mean over usable strides, hit rate over all rows with a value.
+# Mean over usable strides, hit rate over all rows with a value (docs/reference/gait.md#phases).
 TABLE = {
     "SSWS": (54, 1.00, 3.908, 0.44),
     "SSWS_Fam": (30, 1.00, 4.392, 0.97),
@@ -165,7 +165,10 @@ def test_true_cadence_waits_for_each_stride_on_the_given_clock(tmp_path):
     world = build_world("amber")
     session = create_session(
         SessionRequest(
-            patient=world.patient, valence="positive", goal=GoalRule(value=3.0), phases=walk.phases
+            patient=world.patient,
+            valence="positive",
+            goal=GoalRule(value=3.0),
+            phases=walk.phases,
         )
     )
     pace = Pace(2.0, lambda: now[0], sleep)

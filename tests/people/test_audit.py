@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 
 import pytest
 from django.contrib import admin
@@ -23,10 +23,9 @@ from rehab.sessions.protocols import Measure, Protocol
 from rehab.stations.models import Device
 from tests.support.archives import body_of
 from tests.support.tenancy import all_routes, walk_patterns
-from tests.support.world import World, build_world, client_of, mark
+from tests.support.world import NOW, World, build_world, client_of, mark
 
 pytestmark = pytest.mark.django_db
-NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 
 
 @pytest.fixture(autouse=True)
@@ -174,10 +173,10 @@ def test_a_page_costs_at_most_two_statements_more_and_one_that_polls_none(
     request.resolver_match = get_resolver().resolve(request.path)
     response = client.get(request.path)
     with django_assert_num_queries(0):
-        access_log.note_request(request, response)
+        access_log.note_request(request, response, NOW)
     audit_log.recent = Recent()
     with django_assert_max_num_queries(4):  # whose session, the entry, and a savepoint around it
-        access_log.note_request(request, response)
+        access_log.note_request(request, response, NOW)
 
 
 def test_care_goes_on_when_the_log_cannot_be_written_but_nothing_is_given_out(world, monkeypatch):
@@ -197,7 +196,7 @@ def test_care_goes_on_when_the_log_cannot_be_written_but_nothing_is_given_out(wo
 
 
 def test_entries_cannot_be_changed_or_deleted(world):
-    audit_log.note(Act.VIEW, world.people[Role.PT], patient=world.patient.pk)
+    audit_log.note(Act.VIEW, world.people[Role.PT], patient=world.patient.pk, now=NOW)
     entry = entries().get()
     visible = AuditEntry.objects.visible_to(world.people[Role.LEAD])
     for attempt in (
@@ -216,7 +215,9 @@ def test_entries_cannot_be_changed_or_deleted(world):
 
 
 def test_leads_read_it_in_the_admin_and_nobody_writes_there(world):
-    audit_log.note(Act.EXPORT, world.people[Role.PT], patient=world.patient.pk, about="here")
+    audit_log.note(
+        Act.EXPORT, world.people[Role.PT], patient=world.patient.pk, about="here", now=NOW
+    )
     entry = entries().get()
     lead = client_of(world, Role.LEAD)
     changelist = reverse("admin:rehab_auditentry_changelist")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from importlib import import_module
 
 import pytest
@@ -31,10 +30,9 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
-from tests.support.world import World, build_world, client_of
+from tests.support.world import NOW, World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
-NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 LOG = (TrainingSession, Step, SessionEvent, SessionMetric)
 
 

@@ -133,10 +133,10 @@ def test_nobody_agrees_joins_or_walks_for_a_person_who_was_just_erased(world):
 def test_who_no_longer_agrees_stands_on_no_board_whatever_the_row_says(world):
     board = BoardEntry.everywhere.get(patient=world.patient).board
     Consent.everywhere.filter(patient=world.patient).update(withdrawn_at=NOW)
-    entries.refresh(board)
+    entries.refresh(board, now=NOW)
     assert not BoardEntry.everywhere.filter(patient=world.patient).exists()
     Patient.everywhere.filter(pk=world.patient.pk).update(simulated=True)  # agrees to everything
-    entries.refresh(board)
+    entries.refresh(board, now=NOW)
     assert BoardEntry.everywhere.filter(patient=world.patient).exists()
 
 

@@ -1,4 +1,6 @@
-"""A Kobuki of bytes, written from kobuki.md's tables alone, so that it shares no mistake with ours.
+"""A Kobuki of bytes that shares no mistake with ours.
+
+It is written from the tables of docs/reference/kobuki.md#framing alone.
 
 It notes every setpoint with its time, and rolls its wheels as the firmware would.
 """

@@ -1,4 +1,4 @@
-"""A rosbridge, and a base behind it, written from kobuki.md 2.6 alone.
+"""A rosbridge, and a base behind it, written from docs/reference/rosbridge.md#behavior alone.
 
 ``FakeRosbridge`` takes texts and gives texts; ``serve_ros`` puts it behind a real websocket. Like
 the real one it complains of nothing: what is wrong goes into its log and nowhere else. Its graph is

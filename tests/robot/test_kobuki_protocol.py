@@ -58,7 +58,7 @@ from robot.bases.kobuki_protocol import (
 from robot.motion import STILL, Twist
 from tests.robot import damage
 
-# --- Golden frames (kobuki.md 1.4) ---------------------------------------------------------------
+# --- Golden frames (docs/reference/kobuki.md#commands) --------------------------------------------
 
 GOLDEN = [
     (BaseControl(200, 0), "AA 55 06 01 04 C8 00 00 00 CB"),
@@ -245,7 +245,7 @@ def test_a_frame_that_cannot_be_is_not_made():
             frame(bytes(size))
 
 
-# --- Twists and orders (kobuki.md 1.5) -----------------------------------------------------------
+# --- Twists and orders (docs/reference/kobuki.md#speed-and-radius) --------------------------------
 
 
 @pytest.mark.parametrize(

@@ -41,14 +41,14 @@ HAS_PHYSICS = importlib.util.find_spec("pybullet") is not None
 needs_physics = pytest.mark.skipif(not HAS_PHYSICS, reason="pybullet is not installed")
 needs_pty = pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals here")
 
-M_TICK = 1 / 11724.4  # kobuki.md 1.7
+M_TICK = 1 / 11724.4  # docs/reference/kobuki.md#odometry-and-gyro
 
 
 # --- The client ----------------------------------------------------------------------------------
 
 
 def order(speed: int, radius: int) -> bytes:
-    """Give a base control command, by the table of kobuki.md 1.4."""
+    """Give a base control command, by the table of docs/reference/kobuki.md#commands."""
     return framed(struct.pack("<BBhh", 1, 4, speed, radius))
 
 
@@ -222,7 +222,9 @@ def test_it_turns_as_it_is_told(bench, speed, radius, v_m_s, w_rad_s):
 
 
 def test_odometry_tells_the_truth(bench):
-    """On the spot, on a bow and straight: the table in kobuki.md 2.1 has its best model at 0.1 mm.
+    """On the spot, on a bow and straight.
+
+    The best model of docs/reference/kobuki.md#twin is off by 0.1 mm.
 
     Here speeds jump, which costs a little grip.
     """
@@ -250,7 +252,7 @@ def test_odometry_tells_the_truth(bench):
 
 @pytest.mark.parametrize("turning", [False, True], ids=["straight", "on the spot"])
 def test_with_ramps_nothing_slips(physics, turning):
-    """About 1 m, and 400°: kobuki.md 2.1 has 0.1 mm and 0.02° for its best model."""
+    """About 1 m, and 400°: docs/reference/kobuki.md#twin has 0.1 mm and 0.02° at best."""
     top = 172 if turning else 200
     speeds = [top * min(step, 35, 280 - step) // 35 for step in range(281)]
     for speed in speeds:

@@ -327,7 +327,7 @@ def test_a_token_is_renewed_and_revoked_from_the_devices_page(world):
     page = reverse("admin:rehab_device_change", args=[world.device.pk])
     answer = act(world, "device", "renew_tokens", world.device.pk, Role.LEAD)
     assert answer.headers["Location"] == page
-    assert find_device(world.token) is None
+    assert find_device(world.token, NOW) is None
     act(world, "device", "revoke_tokens", world.device.pk, Role.LEAD)
     told = client_of(world, Role.LEAD).get(page).content.decode()
     assert "revoked" in told

@@ -93,7 +93,7 @@ def board_of(world: World) -> Leaderboard:
     board: Leaderboard = world.rows[Leaderboard]
     Leaderboard.everywhere.filter(pk=board.pk).update(types="all", metric="hit_rate")
     board.refresh_from_db()
-    entries.refresh(board)
+    entries.refresh(board, now=NOW)
     return board
 
 
@@ -112,7 +112,7 @@ def agrees_with_a_rebuild(board: Leaderboard) -> None:
         return [list(kept), list(counts.values_list("valence", "figure", "rows"))]
 
     kept_up = told()
-    entries.refresh(board)
+    entries.refresh(board, now=NOW)
     assert kept_up == told()
 
 

@@ -28,10 +28,9 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
-from tests.support.world import World, build_world, client_of, mark, scoped_models
+from tests.support.world import NOW, World, build_world, client_of, mark, scoped_models
 
 pytestmark = pytest.mark.django_db
-NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
 
 
 @pytest.fixture

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import html
 import re
+from datetime import UTC, datetime, timedelta
 
 import pytest
+import time_machine
 
 from rehab.people.consent.models import Purpose, give
 from rehab.people.models import Patient
@@ -16,6 +18,7 @@ from rehab.sessions.reports.report import report_context
 from rehab.sessions.reports.report_chart import draw_chart
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
+from tests.support.clock import HERE
 from tests.support.walks import HIT, MISS, RIGHT, Walked, walk
 from tests.support.world import NOW, World, build_world, client_of
 
@@ -55,14 +58,28 @@ def test_it_says_who_walked_what_and_how_well(world, patient):
     session = walk(patient, "positive", [*walked, None, (RIGHT, HIT)], phases=phases, wanted=0.6)
     words = read(world, session)
     assert "Rosa code B-1" in words
-    assert "Saturday 21 November 2026, 10:00" in words
+    assert f"{HERE:%A} {HERE.day} {HERE:%B %Y, %H:%M}" in words
     assert "Positive · left leg" in words
     assert "Hit rate 75 % wanted 60 %" in words
     assert "Mean with feedback 2.25 W/kg baseline 2.00 W/kg, +12 %" in words
     assert "Strides, trained leg 9 1 does not count" in words
-    assert "Goal 2.00 W/kg → 2.40 W/kg (10:00)" in words
+    changed = (NOW + timedelta(seconds=7)).astimezone(HERE.tzinfo)
+    assert f"Goal 2.00 W/kg → 2.40 W/kg ({changed:%H:%M})" in words
     assert re.search(r"Training yes 1\.00 5 4 3 75 % 2\.25", words)
     assert "Nothing was noted. Robot No robot." in words
+
+
+def test_paper_and_pages_show_the_clinics_clock(world, patient):
+    """Late on Saturday in UTC it is Sunday morning in Auckland."""
+    world.clinic.time_zone = "Pacific/Auckland"
+    world.clinic.save()
+    late = datetime(2026, 11, 21, 23, 30, tzinfo=UTC)
+    session = walk(patient, "positive", [HIT], now=late)
+    assert "Sunday 22 November 2026, 12:30" in read(world, session)
+    with time_machine.travel(late):
+        page = client_of(world).get("/start/").content.decode()
+        assert "printed 22 November 2026" in read(world, session)
+    assert "Sunday 22 November" in page
 
 
 def test_what_was_noted_stands_with_its_times_adverse_first(world, patient):
@@ -74,8 +91,8 @@ def test_what_was_noted_stands_with_its_times_adverse_first(world, patient):
     note(session, "robot_gesture", phase="started")
     note(session, "robot_gesture", phase="ended")
     note(session, "robot_stop")
-    words = read(world, session)
-    assert "! Fall 2 ×: 10:00, 10:00 Rest 1 ×: 10:00 Exertion (Borg): 4 (10:00), 7 (10:00)" in words
+    words, at = read(world, session), f"{HERE:%H:%M}"
+    assert f"! Fall 2 ×: {at}, {at} Rest 1 ×: {at} Exertion (Borg): 4 ({at}), 7 ({at})" in words
     assert (
         "1 gesture, 2 of 3 windows of five seconds at or above its threshold, stopped once."
         in words
@@ -87,8 +104,8 @@ def test_of_many_events_the_count_is_right_and_the_list_short(world, patient):
     session = walk(patient, "positive", [HIT, *changes, HIT])
     for _ in range(400):
         note(session, "pain")
-    words = read(world, session)
-    assert "! Pain 400 ×: 10:00, 10:00, 10:00, 10:00, 10:00, … 394 more …, 10:00" in words
+    words, at = read(world, session), f"{HERE:%H:%M}"
+    assert f"! Pain 400 ×: {at}, {at}, {at}, {at}, {at}, … 394 more …, {at}" in words
     assert "… 24 changes more … → 2.30 W/kg" in words
     assert len(words) < 2_500
 

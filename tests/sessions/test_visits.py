@@ -11,7 +11,10 @@ from django.utils import timezone
 from rehab.patients.visits import Progress, Visit, patients_today, plan_visit, suggested_time
 from rehab.people.models import Patient
 from rehab.people.roles import Role
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports import dashboard
+from tests.support.clock import HERE
 from tests.support.walks import HIT, walk
 from tests.support.world import NOW, World, build_world, client_of
 
@@ -39,17 +42,18 @@ def pt_of(world: World) -> Client:
 def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):
     names = ("Ana", "Bo", "Cleo", "Dora", "Emil", "Fay")
     ana, bo, cleo, dora, emil, fay = (patient(world, name) for name in names)
-    plan_visit(ana, NOW.date(), time(11, 0))
-    plan_visit(bo, NOW.date(), None)
-    plan_visit(cleo, NOW.date(), time(9, 0))
-    plan_visit(fay, NOW.date() + timedelta(1), time(8, 0))
+    today = HERE.date()
+    plan_visit(ana, today, time(11, 0))
+    plan_visit(bo, today, None)
+    plan_visit(cleo, today, time(9, 0))
+    plan_visit(fay, today + timedelta(1), time(8, 0))
     walk(cleo, "positive", [HIT] * 130)
     walk(dora, "positive", [HIT] * 3, end=None)  # came without a plan, and walks
     walk(emil, "positive", [HIT], days_ago=1)
     walk(emil, "positive", [HIT], simulated=True)  # nobody was here
-    listed = patients_today(world.people[Role.PT], NOW + timedelta(hours=1))
+    listed = patients_today(world.people[Role.PT], HERE)
     assert [(row.patient.nickname, row.at, row.progress) for row in listed] == [
-        ("Dora", time(10, 0), Progress.WALKING),
+        ("Dora", HERE.time().replace(second=0), Progress.WALKING),
         ("Ana", time(11, 0), Progress.EXPECTED),
         ("Bo", None, Progress.EXPECTED),
         ("Cleo", time(9, 0), Progress.DONE),
@@ -60,7 +64,7 @@ def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):
 def test_a_day_is_the_clinics_own(world):
     rosa = patient(world, "Rosa")
     plan_visit(rosa, NOW.date(), None)
-    late = datetime(2026, 11, 21, 23, 30, tzinfo=UTC)
+    late = NOW.replace(hour=23, minute=30)
     assert patients_today(world.people[Role.PT], late)
     world.clinic.time_zone = "Asia/Tokyo"
     world.clinic.save()
@@ -70,13 +74,25 @@ def test_a_day_is_the_clinics_own(world):
     assert visit.day == (timezone.now() + timedelta(hours=9)).date()
 
 
+def test_the_first_of_two_midnights_begins_the_day(world):
+    """In Havana the hour after midnight comes twice on November 1, 2026: at 4 and at 5 UTC."""
+    world.clinic.time_zone = "America/Havana"
+    world.clinic.save()
+    pt, first = world.people[Role.PT], datetime(2026, 11, 1, 4, 30, tzinfo=UTC)
+    walked = walk(patient(world, "Rosa"), "positive", [HIT] * 9, now=first)
+    now = clinic_time(first + timedelta(hours=1), world.clinic)  # it is half past twelve again
+    assert [row.patient for row in patients_today(pt, now)] == [walked.patient]
+    listed = dashboard.sessions_today(pt, world.clinic, now)
+    assert walked in [line.session for line in listed]
+
+
 def test_the_next_visit_is_one_tap_at_the_usual_time(world):
     rosa = patient(world, "Rosa")
     session = walk(rosa, "positive", [HIT])
-    began = datetime(2026, 11, 20, 10, 8, tzinfo=UTC)
+    began = datetime(2026, 10, 20, 10, 8, tzinfo=HERE.tzinfo)
     TrainingSession.everywhere.filter(pk=session.pk).update(created_at=began)
-    assert suggested_time(world.people[Role.PT], rosa, NOW) == time(10, 15)
-    client, today = pt_of(world), timezone.now().date()
+    assert suggested_time(world.people[Role.PT], rosa, HERE) == time(10, 15)
+    client, today = pt_of(world), timezone.now().astimezone(HERE.tzinfo).date()
     page = client.get(f"/patients/{rosa.pk}/").content.decode()
     assert "In a week" in page
     assert "10:15" in page
@@ -96,7 +112,7 @@ def test_the_next_visit_is_one_tap_at_the_usual_time(world):
         ({"day": "2020-01-01"}, "between today and a year"),
         ({"day": "2199-01-01"}, "between today and a year"),
         ({"in": "9999999999"}, "Choose the day"),
-        ({"day": f"{timezone.now().date():%Y-%m-%d}", "at": "25:99"}, "a time such as 10:30"),
+        ({"day": f"{HERE:%Y-%m-%d}", "at": "25:99"}, "a time such as 10:30"),
     ],
 )
 def test_a_day_that_cannot_be_says_what_to_do(world, given, said):

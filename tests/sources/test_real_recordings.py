@@ -1,4 +1,4 @@
-"""The lab's recordings, read exactly. Figures: gait.md 1.1 to 1.5."""
+"""The lab's recordings, read exactly. Figures: docs/reference/gait.md#recordings."""
 
 from statistics import mean, pstdev
 
@@ -64,7 +64,7 @@ def test_session_1_in_full(real_recording):
 
 
 # Task: mean and population sd [W/kg] of usable strides, success, shown in % of the goal
-# (gait.md 1.4, where 85A2's 94.48 % of session 2 became .95 by way of 94.5).
+# (docs/reference/gait.md#phases, where 85A2's 94.48 % of session 2 became .95 by way of 94.5).
 FIGURES = {
     SESSION_1: {
         "SSWS": (3.908, 0.255, 0.44, 100),

@@ -1,4 +1,4 @@
-"""The generator against gait.md 1.5, over 20 seeds of the three recorded sessions."""
+"""The generator against docs/reference/gait.md#dynamics: 20 seeds of three sessions."""
 
 from collections import defaultdict
 from dataclasses import replace
@@ -20,7 +20,8 @@ SEEDS = range(20)
 GOAL = GOOD.baseline_w_kg
 TARGET = 3.908  # of session 1, in W/kg
 
-# gait.md 1.4: mean and sd [W/kg] over usable strides, success over all that have a value.
+# Mean and sd [W/kg] over usable strides, success over all that have a value
+# (docs/reference/gait.md#phases).
 PHASES = {
     "baseline 100": (3.908, 0.255, 0.44),
     "familiarization 100": (4.392, 0.376, 0.97),
@@ -34,7 +35,7 @@ PHASES = {
 
 
 # Sessions 2 and 3: who comes back has learned, so that nothing is explored. What differs from GOOD
-# is read off gait.md 1.4 and 1.5; protocol of 1.3, in strides.
+# is read off docs/reference/gait.md#phases and #dynamics; protocol in strides.
 SESSION_2 = [
     make_phase(kind, f"{kind} {percent}", gain=percent / 100, strides=strides)
     for kind, percent, strides in (

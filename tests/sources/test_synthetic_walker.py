@@ -1,4 +1,7 @@
-"""Synthetic walkers: the same for the same seed, and alike to recorded ones (gait.md 1.4, 1.5)."""
+"""Synthetic walkers: the same for the same seed, and alike to recorded ones.
+
+Source: docs/reference/gait.md#dynamics.
+"""
 
 import hashlib
 import tracemalloc
@@ -25,7 +28,8 @@ BASELINE = make_phase("baseline")
 TRAINING = make_phase("training")
 WASHOUT = make_phase("washout")
 
-# The protocol of HEBB_03, session 1 (gait.md 1.3): kind, percent shown, strides.
+# The protocol of HEBB_03, session 1 (docs/reference/gait.md#protocol): kind, percent shown,
+# strides.
 SESSION_1 = [
     make_phase(kind, f"{kind} {percent}", gain=percent / 100, strides=strides)
     for kind, percent, strides in (
@@ -168,7 +172,7 @@ def walks():
     return values
 
 
-# Mean and sd of session 1 in gait.md 1.4, in units of its goal of 3.908 W/kg.
+# Mean and sd of session 1 in docs/reference/gait.md#phases, in units of its goal of 3.908 W/kg.
 @pytest.mark.parametrize(
     ("phase", "value_mean", "value_sd"),
     [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from typing import Any
 
 from django.apps import apps
@@ -35,8 +34,9 @@ from rehab.stations.models import Device, LeaveTries, Pairing, Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.steps import Measurement, Side
+from tests.support.clock import START
 
-NOW = datetime(2026, 11, 21, 10, 0, tzinfo=UTC)
+NOW = START  # the moment at which a test begins
 
 
 def mark(clinic: str, model: type[Model]) -> str:

@@ -1,4 +1,4 @@
-"""What a step earns: DESIGN.md section 5, cell by cell."""
+"""What a step earns: docs/reference/scoring.md#truth-table, cell by cell."""
 
 from __future__ import annotations
 

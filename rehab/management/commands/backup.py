@@ -1,4 +1,4 @@
-"""`manage.py backup`: everything of this installation in one sealed file."""
+"""`manage.py backup`: everything of this installation in one encrypted file."""
 
 from __future__ import annotations
 
@@ -7,33 +7,21 @@ from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
+from django.conf import settings
 from django.core.management import BaseCommand, CommandError
 from django.utils import timezone
 
 from rehab.exports.backup import write_backup
+from rehab.exports.encryption import InvalidKey, read_recipients
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.models import Clinic
-
-PASSPHRASE = "GARRY_BACKUP_PASSPHRASE"  # noqa: S105 (the variable's name)
-SHORTEST = 16
-
-
-def find_passphrase() -> str:
-    """Give the passphrase of the environment. Raises CommandError, with the cure."""
-    passphrase = os.environ.get(PASSPHRASE, "")
-    if len(passphrase) < SHORTEST:
-        raise CommandError(
-            f"A backup holds everything about patients, and only a passphrase opens it. Set "
-            f"{PASSPHRASE} to one of {SHORTEST} characters or more, and keep it elsewhere."
-        )
-    return passphrase
 
 
 class Command(BaseCommand):
     """Writes a backup while sessions go on."""
 
-    help = f"Write everything into FILE, sealed with the passphrase in {PASSPHRASE}."
+    help = "Write everything into FILE, encrypted to the public keys in GARRY_BACKUP_KEYS."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Ask where to."""
@@ -41,11 +29,18 @@ class Command(BaseCommand):
 
     def handle(self, *args: Any, file: Path, **options: Any) -> None:
         """Write it. A file of that name is replaced only by a whole one."""
-        passphrase = find_passphrase()
+        now = timezone.now()
+        try:
+            recipients = read_recipients(settings.BACKUP_KEYS)
+        except InvalidKey as problem:
+            raise CommandError(
+                "A backup holds everything about patients, and is encrypted to a public key in "
+                f"GARRY_BACKUP_KEYS. {problem}"
+            ) from problem
         new = file.with_name(f".{file.name}.new")
         try:
             with os.fdopen(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "wb") as out:
-                counts = write_backup(out, passphrase, timezone.now())
+                counts = write_backup(out, recipients, now)
                 out.flush()
                 os.fsync(out.fileno())
             new.replace(file)
@@ -56,7 +51,7 @@ class Command(BaseCommand):
         finally:
             new.unlink(missing_ok=True)
         for clinic in Clinic.everywhere.all():
-            audit_log.note(Act.BACKUP, None, clinic=clinic.pk, about="manage.py backup")
+            audit_log.note(Act.BACKUP, None, clinic=clinic.pk, about="manage.py backup", now=now)
         size_mb = file.stat().st_size / 1e6
         self.stdout.write(
             f"{file}: {size_mb:.1f} MB, {counts['rehab.patient']} patients, "

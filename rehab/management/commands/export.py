@@ -53,7 +53,7 @@ class Command(BaseCommand):
         try:
             descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
             with os.fdopen(descriptor, "wb") as out:
-                for part in write_zip(files, now):
+                for part in write_zip(files):
                     out.write(part)
         except OSError as problem:
             raise CommandError(

@@ -21,11 +21,12 @@ class Command(BaseCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Rebuild and say how many rows each board has."""
+        now = timezone.now()
         for board in Leaderboard.everywhere.select_related("clinic").order_by("pk"):
-            if is_snapshot(board, timezone.now()):
+            if is_snapshot(board, now):
                 thin_out(board)
             else:
-                refresh(board)
+                refresh(board, now=now)
             if options["verbosity"]:
                 rows = BoardEntry.everywhere.filter(board=board).count()
                 self.stdout.write(f"{board}: {rows} rows")

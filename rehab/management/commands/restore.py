@@ -1,4 +1,4 @@
-"""`manage.py restore`: a backup, taken into a new installation."""
+"""`manage.py restore`: a backup, restored into a new installation."""
 
 from __future__ import annotations
 
@@ -9,29 +9,41 @@ from typing import Any
 from django.core.management import BaseCommand, CommandError, call_command
 
 from rehab.exports.backup import CannotRestore, restore_backup
-from rehab.exports.sealed import CannotUnseal
-from rehab.management.commands.backup import PASSPHRASE, find_passphrase
+from rehab.exports.encryption import CannotDecrypt, InvalidKey, read_identities
 
 
 class Command(BaseCommand):
     """Makes the tables, and takes in everything or nothing."""
 
-    help = f"Take FILE into a new installation, opened with the passphrase in {PASSPHRASE}."
+    help = "Restore FILE into a new installation, decrypted with a secret key."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Ask where from."""
         parser.add_argument("file", type=Path, metavar="FILE")
+        parser.add_argument(
+            "--key",
+            type=Path,
+            required=True,
+            metavar="KEYFILE",
+            help="the file with the secret key that `manage.py backupkey` printed",
+        )
 
-    def handle(self, *args: Any, file: Path, **options: Any) -> None:
+    def handle(self, *args: Any, file: Path, key: Path, **options: Any) -> None:
         """Take it in. Raises CommandError, with the cure."""
-        passphrase = find_passphrase()
+        try:
+            identities = read_identities(key.read_text())
+        except OSError as problem:
+            raise CommandError(f"{key} cannot be read: {problem.strerror}.") from problem
+        except ValueError as problem:  # InvalidKey, or no text at all
+            cure = problem if isinstance(problem, InvalidKey) else "It is no text file."
+            raise CommandError(f"{key}: {cure}") from problem
         call_command("migrate", verbosity=0)
         try:
             with file.open("rb") as source:
-                counts = restore_backup(source, passphrase)
+                counts = restore_backup(source, identities)
         except OSError as problem:
             raise CommandError(f"{file} cannot be read: {problem.strerror}.") from problem
-        except (CannotRestore, CannotUnseal) as problem:
+        except (CannotRestore, CannotDecrypt) as problem:
             raise CommandError(f"{file}: {problem}") from problem
         self.stdout.write(
             f"{counts['rehab.patient']} patients, {counts['rehab.trainingsession']} sessions and "

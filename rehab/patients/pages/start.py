@@ -109,7 +109,7 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
 def add_patient(request: HttpRequest) -> HttpResponse:
     """Take a new patient in."""
     user = person(request)
-    form = PatientForm(request.POST or None, by=user)
+    form = PatientForm(request.POST or None, by=user, now=timezone.now())
     if request.method == "POST" and form.keep():
         return redirect("setup", patient_id=form.instance.pk)
     return render(request, "sessions/patient_form.html", {"form": form})
@@ -121,7 +121,7 @@ def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Mend what was written of a patient."""
     user = person(request)
     patient = get_object_or_404(patients_by_last_visit(user), pk=patient_id)
-    form = PatientForm(request.POST or None, by=user, instance=patient)
+    form = PatientForm(request.POST or None, by=user, now=timezone.now(), instance=patient)
     if request.method == "POST" and form.keep():
         return redirect("patient", patient_id=patient.pk)
     context = {"form": form, "patient": Patient.objects.visible_to(user).get(pk=patient_id)}

@@ -6,6 +6,7 @@ is an admin page of a model that leads to no patient. So a new page is noted wit
 
 from __future__ import annotations
 
+from datetime import datetime
 from functools import cache
 from typing import Any
 
@@ -13,7 +14,6 @@ from django.apps import apps
 from django.db.models import Model
 from django.http import HttpRequest, HttpResponseBase
 from django.urls import ResolverMatch
-from django.utils import timezone
 
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
@@ -30,7 +30,7 @@ SUBJECTS = {
 NO_PATIENTS = {"login", "logout", "jsi18n", "password_change", "password_change_done"}  # of admin
 
 
-def note_request(request: HttpRequest, response: HttpResponseBase) -> None:
+def note_request(request: HttpRequest, response: HttpResponseBase, now: datetime) -> None:
     """Note what was shown or changed, once in some minutes for what is only shown."""
     match, actor = request.resolver_match, _actor_of(request)
     if actor is None or match is None or response.status_code >= 400 or not _shows(request, match):
@@ -40,7 +40,6 @@ def note_request(request: HttpRequest, response: HttpResponseBase) -> None:
         return  # nothing there, or sent on: nothing was shown
     about = match.route if "code" in match.kwargs else request.path
     who = (type(actor).__name__, actor.pk, getattr(actor, "program", ""))
-    now = timezone.now()
     if reads and not audit_log.recent.is_new((*who, match.view_name, request.path), now):
         return
     entry = audit_log.compose(

@@ -159,7 +159,7 @@ def compose(
     about: str = "",
     address: str = "",
     clinic: int | None = None,
-    now: datetime | None = None,
+    now: datetime,
 ) -> AuditEntry:
     """Give an entry. ``actor`` is a person or a device; None the server's own console, whose
     ``clinic`` has to be told.
@@ -169,7 +169,7 @@ def compose(
     home: Any = getattr(actor, "clinic_id", None) or clinic
     return AuditEntry(
         clinic_id=home,
-        at=now or timezone.now(),
+        at=now,
         by=person,
         through=through[:64],
         act=act,
@@ -184,14 +184,14 @@ def note(act: Act, actor: Any, **facts: Any) -> None:
     compose(act, actor, **facts).save()
 
 
-def note_safety(act: Act, actor: User, row: Any, address: str) -> None:
+def note_safety(act: Act, actor: User, row: Any, address: str, now: datetime) -> None:
     """Add an entry of what alters who gets in: an account's, a device's or a program's row."""
     clinic = clinic_id_of(row) or actor.clinic_id
     about = f"{row._meta.verbose_name}: {row}"
     if clinic is None:  # a host's own account: no clinic has a log of it
         log.warning("%s, %s, by %s from %s", act.label, about, actor, shorten(address))
         return
-    note(act, actor, clinic=clinic, about=about, address=address)
+    note(act, actor, clinic=clinic, about=about, address=address, now=now)
 
 
 def try_to_keep(entries: list[AuditEntry]) -> None:

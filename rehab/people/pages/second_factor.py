@@ -25,7 +25,9 @@ SECRET = "app_secret"  # noqa: S105 (its name in the browser session, until the 
 
 def owner(request: HttpRequest) -> User:
     """Give whose account is set up. Raises PermissionDenied for a stranger."""
-    user = request.user if isinstance(request.user, User) else flow.setting_up(request)
+    if isinstance(request.user, User):
+        return request.user
+    user = flow.setting_up(request, timezone.now())
     if user is None:
         raise PermissionDenied
     return user
@@ -93,7 +95,7 @@ def _added(request: HttpRequest, user: User, new: list[str]) -> HttpResponse:
     if request.user.is_authenticated:
         request.session[flow.PROVEN] = True
     else:
-        then = flow.finish(request, user, proven=True)
+        then = flow.finish(request, user, timezone.now(), proven=True)
     if not new:
         messages.success(request, _("Added."))
         return redirect(then)

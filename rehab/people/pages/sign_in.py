@@ -38,7 +38,7 @@ class SignIn(LoginView):
         """Let somebody in, or go on to the second factor."""
         user: User = form.get_user()
         then = self.get_redirect_url() or first_page(user)
-        if flow.begin(self.request, user, then):
+        if flow.begin(self.request, user, then, timezone.now()):
             return HttpResponseRedirect(then)
         has_one = factors.authenticators_of(user).exists()
         return redirect("second-factor" if has_one else "set-up-second-factor")
@@ -53,7 +53,8 @@ sign_in = public(SignIn.as_view())
 @require_http_methods(["GET", "HEAD", "POST"])
 def prove(request: HttpRequest) -> HttpResponse:
     """Take a code or a passkey of somebody whose password was right. Anyone else starts over."""
-    user = flow.halfway(request)
+    now = timezone.now()
+    user = flow.halfway(request, now)
     if user is None:
         return redirect("sign-in")
     answer = request.POST.get("passkey", "")
@@ -61,13 +62,13 @@ def prove(request: HttpRequest) -> HttpResponse:
     problem = ""
     if answer:
         try:
-            passkeys.take(request, user, answer, timezone.now())
+            passkeys.take(request, user, answer, now)
         except passkeys.NotProven:
             problem = _("This passkey was not accepted. Try again, or type a code.")
         else:
-            return HttpResponseRedirect(flow.finish(request, user, proven=True))
+            return HttpResponseRedirect(flow.finish(request, user, now, proven=True))
     elif form.is_valid():
-        return HttpResponseRedirect(flow.finish(request, user, proven=True))
+        return HttpResponseRedirect(flow.finish(request, user, now, proven=True))
     own = factors.authenticators_of(user)
     context = {
         "form": form,

@@ -53,11 +53,11 @@ class SessionStore(db.SessionStore):
         return row
 
 
-def note(request: HttpRequest) -> None:
+def note(request: HttpRequest, now: datetime) -> None:
     """Put off the end of a request's sign-in: somebody is there."""
-    now = timezone.now().timestamp()
-    if now - request.session.get(SEEN_AT, 0) >= NOTED_EVERY.total_seconds():
-        request.session[SEEN_AT] = int(now)  # which saves it, with a new end
+    now_s = now.timestamp()
+    if now_s - request.session.get(SEEN_AT, 0) >= NOTED_EVERY.total_seconds():
+        request.session[SEEN_AT] = int(now_s)  # which saves it, with a new end
 
 
 def keep(keys: Collection[str], now: datetime) -> None:

@@ -6,6 +6,7 @@ Who is halfway is nobody to any page but those that ask for the second factor or
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from datetime import datetime
 from typing import Any, cast
 
 from django.contrib.auth import HASH_SESSION_KEY, SESSION_KEY, login, logout
@@ -22,28 +23,28 @@ PROVEN = "second_factor"  # marks sign-ins that a second factor has proven
 BACKEND = "rehab.people.sign_in.backends.PasswordBackend"
 
 
-def begin(request: HttpRequest, user: User, then: str) -> bool:
+def begin(request: HttpRequest, user: User, then: str, now: datetime) -> bool:
     """Let in whom the password alone lets in; take anyone else halfway, and ``then`` further on.
 
     Gives whether that was all.
     """
     if not factors.is_required(user) and not factors.authenticators_of(user).exists():
-        finish(request, user, proven=False)
+        finish(request, user, now, proven=False)
         return True
     request.session.cycle_key()  # a key that somebody else may know gets nobody halfway
     request.session[HALFWAY] = {
         "then": then,
         "user": user.pk,
         "password": user.get_session_auth_hash(),
-        "at": timezone.now().timestamp(),
+        "at": now.timestamp(),
     }
     return False
 
 
-def halfway(request: HttpRequest) -> User | None:
+def halfway(request: HttpRequest, now: datetime) -> User | None:
     """Give the account whose password was right a moment ago; None where there is none."""
     half = request.session.get(HALFWAY)
-    if half is None or timezone.now().timestamp() - half["at"] > HALFWAY_S:
+    if half is None or now.timestamp() - half["at"] > HALFWAY_S:
         return None
     user = User.everywhere.select_related("clinic").filter(pk=half["user"], is_active=True).first()
     if user and constant_time_compare(half["password"], user.get_session_auth_hash()):
@@ -51,23 +52,22 @@ def halfway(request: HttpRequest) -> User | None:
     return None
 
 
-def setting_up(request: HttpRequest) -> User | None:
+def setting_up(request: HttpRequest, now: datetime) -> User | None:
     """Give the account that is halfway and has no second factor yet, so that it may set one up.
 
     Who has one must prove it: a new one would be a way around.
     """
-    user = halfway(request)
+    user = halfway(request, now)
     return user if user and not factors.authenticators_of(user).exists() else None
 
 
-def finish(request: HttpRequest, user: User, *, proven: bool) -> str:
+def finish(request: HttpRequest, user: User, now: datetime, *, proven: bool) -> str:
     """Sign somebody in. Gives where the way halfway was to lead, "" where there was none."""
     half = request.session.pop(HALFWAY, {})
     login(request, user, backend=BACKEND)
     request.session[PROVEN] = proven
-    now = timezone.now().timestamp()
-    request.session[browser_sessions.SIGNED_IN_AT] = int(now)
-    request.session[browser_sessions.SEEN_AT] = int(now)
+    request.session[browser_sessions.SIGNED_IN_AT] = int(now.timestamp())
+    request.session[browser_sessions.SEEN_AT] = int(now.timestamp())
     lockout.forgive(user)
     return str(half.get("then", ""))
 
@@ -95,7 +95,7 @@ class EntryMiddleware:
         if request.user.is_authenticated:
             data = cast(Mapping[str, Any], request.session)
             if holds(data, request.user):
-                browser_sessions.note(request)
+                browser_sessions.note(request, timezone.now())
             else:
                 logout(request)
         return self.get_response(request)

@@ -9,6 +9,7 @@ from django.contrib.auth import authenticate
 from django.contrib.auth.forms import AuthenticationForm, PasswordChangeForm
 from django.core.exceptions import ValidationError
 from django.http import HttpRequest
+from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
@@ -33,7 +34,8 @@ class SignInForm(AuthenticationForm):
         """Say what is wrong, without telling whether there is such an account."""
         assert self.request is not None  # noqa: S101  (the view gives it)
         name = str(self.cleaned_data["username"])
-        return ValidationError(lockout.wait_of(self.request, username=name) or WRONG)
+        wait = lockout.wait_of(self.request, timezone.now(), username=name)
+        return ValidationError(wait or WRONG)
 
 
 class CodeField(forms.CharField):
@@ -65,7 +67,8 @@ class CodeForm(forms.Form):
         """Refuse a code that is wrong or was used, and any code after too many wrong ones."""
         code: str = self.cleaned_data["code"]
         if authenticate(self.request, username=self.user.username, code=code) is None:
-            wait = lockout.wait_of(self.request, username=self.user.username, code="")
+            username = self.user.username
+            wait = lockout.wait_of(self.request, timezone.now(), username=username, code="")
             raise ValidationError(wait or WRONG_CODE)
         return code
 
@@ -110,6 +113,6 @@ class NewPasswordForm(PasswordChangeForm):
 def check_own_password(request: HttpRequest, user: User, password: str) -> str:
     """Give the password back. Raises ValidationError where it is wrong; guesses are counted."""
     if authenticate(request, username=user.username, password=password) is None:
-        wait = lockout.wait_of(request, username=user.username)
+        wait = lockout.wait_of(request, timezone.now(), username=user.username)
         raise ValidationError(wait or WRONG_PASSWORD)
     return password

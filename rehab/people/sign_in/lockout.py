@@ -7,6 +7,7 @@ Codes are counted by name alone: whoever tries those has the password already.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from datetime import datetime
 from typing import Any
 
 from axes.handlers.proxy import AxesProxyHandler
@@ -15,7 +16,6 @@ from axes.utils import reset
 from django.conf import settings
 from django.db.models import Max
 from django.http import HttpRequest, HttpResponse
-from django.utils import timezone
 from django.utils.translation import ngettext
 
 from rehab.people.models import User
@@ -43,7 +43,7 @@ def answer(request: HttpRequest, response: HttpResponse, credentials: Credential
     return response
 
 
-def wait_of(request: HttpRequest, **credentials: str) -> str:
+def wait_of(request: HttpRequest, now: datetime, **credentials: str) -> str:
     """Say what to do where no more tries are taken; "" where they are."""
     if AxesProxyHandler.is_allowed(request, credentials):
         return ""
@@ -51,8 +51,8 @@ def wait_of(request: HttpRequest, **credentials: str) -> str:
     tries = AccessAttempt.objects.filter(username=name)
     if "code" not in credentials:
         tries = tries.filter(ip_address=client_address(request))
-    last = tries.aggregate(last=Max("attempt_time"))["last"] or timezone.now()
-    left_s = (last + settings.AXES_COOLOFF_TIME - timezone.now()).total_seconds()
+    last = tries.aggregate(last=Max("attempt_time"))["last"] or now
+    left_s = (last + settings.AXES_COOLOFF_TIME - now).total_seconds()
     minutes = max(1, -int(-left_s // 60))
     return ngettext(
         "Too many wrong tries. Try again in a minute, or ask your clinic’s lead to unlock you.",

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-from datetime import timedelta
+from datetime import datetime, timedelta
 from typing import Any, ClassVar, TypeVar
 
 from django.core.exceptions import ValidationError
 from django.db import models
-from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, User
@@ -55,14 +54,14 @@ class TokenRow(ClinicRow):
 T = TypeVar("T", bound=TokenRow)
 
 
-def find_holder(model: type[T], token: str) -> T | None:
+def find_holder(model: type[T], token: str, now: datetime) -> T | None:
     """Give the row that this token belongs to; None for an unknown or revoked one."""
     held = model.everywhere.filter(token_hash=hash_token(token), revoked_at__isnull=True)
     holder: T | None = held.select_related("clinic").first()  # whose language its pages have
-    if holder is not None:
-        now = timezone.now()
-        if holder.last_seen_at is None or now - holder.last_seen_at > SEEN_EVERY:
-            model.everywhere.filter(pk=holder.pk).update(last_seen_at=now)
+    if holder is None:
+        return None
+    if holder.last_seen_at is None or now - holder.last_seen_at > SEEN_EVERY:
+        model.everywhere.filter(pk=holder.pk).update(last_seen_at=now)
     return holder
 
 
@@ -112,13 +111,13 @@ class ApiToken(TokenRow):
             )
 
 
-def find_caller(token: str) -> User | None:
+def find_caller(token: str, now: datetime) -> User | None:
     """Give the person that a program calls as, with the token's role; None for a dead token.
 
     A token dies with its account, and with the account's right to lend its role. The person is for
     this call alone and never saved.
     """
-    holder = find_holder(ApiToken, token)
+    holder = find_holder(ApiToken, token, now)
     if holder is None:
         return None
     user = holder.user

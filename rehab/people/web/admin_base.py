@@ -264,7 +264,8 @@ class TokenAdmin(ScopedAdmin):
         """Replace the tokens of the chosen rows."""
         for holder in holders:
             with transaction.atomic():
-                note_safety(Act.TOKEN, person(request), holder, client_address(request))
+                by, address = person(request), client_address(request)
+                note_safety(Act.TOKEN, by, holder, address, timezone.now())
                 token = holder.new_token()
                 holder.revoked_at = None
                 holder.save()

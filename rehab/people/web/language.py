@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from django.conf import settings
 from django.http import HttpRequest, HttpResponseBase
-from django.utils import translation
+from django.utils import timezone, translation
 from django.utils.cache import patch_vary_headers
 
 from rehab.people.access import tablet_of
@@ -30,7 +30,8 @@ def chosen_language(request: HttpRequest) -> str:
     """Give the language that is known of whoever asks; "" for a stranger."""
     if request.path_info.startswith(FOR_PROGRAMS):
         return settings.LANGUAGE_CODE
-    person = request.user if isinstance(request.user, User) else flow.halfway(request)
+    user = request.user
+    person = user if isinstance(user, User) else flow.halfway(request, timezone.now())
     if person is not None:
         return language_of(person)
     tablet = tablet_of(request)

@@ -41,10 +41,12 @@ from rehab.training.plans import ROBOT_LEVELS, name_robot_level
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES
 
-# The paper's example of a goal for a whole session (product.md 1): 60 % of the steps, ten minutes.
+# The paper's example of a goal for a whole session (docs/reference/original.md#goal-of-a-session):
+# 60 % of the steps, ten minutes.
 WANTED_HITS_PERCENT = 60
 PLANNED_MINUTES = 10
-# Mean A2 of a healthy walk in the recordings (gait.md 1.3): where a first goal begins.
+# Mean A2 of a healthy walk in the recordings (docs/reference/gait.md#protocol): where a first goal
+# begins.
 FIRST_GOAL_W_KG = 3.9
 TRAINING_ONLY, WITH_BASELINE = "Training only", "Baseline, training, washout"
 
@@ -168,7 +170,8 @@ class SessionForm(forms.Form):
         return None
 
 
-# Usual stride time of the recordings (gait.md 1.4), to tell how long a phase of strides takes.
+# Usual stride time of the recordings (docs/reference/gait.md#phases), to tell how long a phase of
+# strides takes.
 STRIDE_S = 1.1
 
 

@@ -8,11 +8,11 @@ import asyncio
 import contextvars
 import logging
 from collections.abc import Mapping
+from datetime import datetime
 from typing import Any, NamedTuple
 
 from channels.db import database_sync_to_async
 from django.db import DatabaseError
-from django.utils import timezone
 
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
@@ -38,9 +38,11 @@ class Notes:
         self._waiting: list[Note] = []
         self._writing: asyncio.Task[None] | None = None
 
-    def add(self, act: Act, actor: Actor, session_id: int, scope: Mapping[str, Any]) -> None:
+    def add(
+        self, act: Act, actor: Actor, session_id: int, scope: Mapping[str, Any], now: datetime
+    ) -> None:
         """Note what was seen or ordered by a socket; what is only seen once in some minutes."""
-        now, path = timezone.now(), scope["path"]
+        path = scope["path"]
         key = (type(actor).__name__, getattr(actor, "pk", None), path)
         if act is Act.VIEW and not audit_log.recent.is_new(key, now):
             return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from datetime import datetime
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -57,16 +58,16 @@ def find_actor(scope: Mapping[str, Any]) -> Actor:
     """Give the device or person at the other end; None for a stranger."""
     token = token_of(scope)
     if token is not None:
-        return find_device(token)
+        return find_device(token, timezone.now())
     if not is_own_page(scope):
         return None
-    return _signed_in(scope) or find_tablet(cookies_of(scope).get(tablets.COOKIE))
+    return _signed_in(scope) or find_tablet(cookies_of(scope).get(tablets.COOKIE), timezone.now())
 
 
 @database_sync_to_async
 def find_device_by(token: str) -> Device | None:
     """Give the device that a token in a first frame belongs to."""
-    return find_device(token) if token.isascii() else None
+    return find_device(token, timezone.now()) if token.isascii() else None
 
 
 def cookies_of(scope: Mapping[str, Any]) -> dict[str, str]:
@@ -91,7 +92,7 @@ def _signed_in(scope: Mapping[str, Any]) -> User | None:
 
 
 @database_sync_to_async
-def find_unwelcome(admitted: Sequence[tuple[Actor, Mapping[str, Any]]]) -> list[int]:
+def find_unwelcome(admitted: Sequence[tuple[Actor, Mapping[str, Any]]], now: datetime) -> list[int]:
     """Say which of these actors, each with its socket's scope, would no longer be let in: devices
     whose token was revoked or renewed, people whose sign-in has ended or no longer holds.
     """
@@ -101,7 +102,7 @@ def find_unwelcome(admitted: Sequence[tuple[Actor, Mapping[str, Any]]]) -> list[
     valid = Device.everywhere.filter(pk__in=devices, revoked_at__isnull=True)
     hashes = dict(valid.values_list("pk", "token_hash"))
     accounts = User.everywhere.select_related("clinic").in_bulk(people)
-    live = Session.objects.filter(session_key__in=keys, expire_date__gt=timezone.now())
+    live = Session.objects.filter(session_key__in=keys, expire_date__gt=now)
     signed_in = {row.session_key: row.get_decoded() for row in live}
 
     def is_welcome(actor: Actor, scope: Mapping[str, Any]) -> bool:
@@ -116,10 +117,10 @@ def find_unwelcome(admitted: Sequence[tuple[Actor, Mapping[str, Any]]]) -> list[
 
 
 @database_sync_to_async
-def keep_signed_in(scopes: Sequence[Mapping[str, Any]]) -> None:
+def keep_signed_in(scopes: Sequence[Mapping[str, Any]], now: datetime) -> None:
     """Put off the end of the sign-ins by which these sockets came in: a training runs there."""
     keys = {key for scope in scopes if (key := session_key_of(scope))}
-    browser_sessions.keep(keys, timezone.now())
+    browser_sessions.keep(keys, now)
 
 
 @database_sync_to_async

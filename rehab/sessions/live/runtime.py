@@ -45,7 +45,8 @@ HEARTBEAT_S = 0.25  # to robots, which stand still after 0.65 s of silence
 SWEEP = 20  # heartbeats; then pages hear one too, idle sessions go, sign-ins are looked at
 CHECKPOINT = 8  # heartbeats
 HEARTBEAT = to_text({"type": "heartbeat"})
-# Python's full collections take 200 ms with 2,000 sockets (stack.md, T4): make them rare.
+# Python's full collections take 200 ms with 2,000 sockets (docs/reference/stack.md#live-path): make
+# them rare.
 GC_THRESHOLDS = (50_000, 50, 100)
 # How long the event loop may keep the interpreter's lock while the writer wants it (default 5 ms).
 SWITCH_S = 0.002
@@ -262,8 +263,9 @@ class Runtime:
         """
         sockets = [socket for socket in self.sockets if socket.actor is not None]
         running = [one.scope for one in sockets if one.live is not None and one.live.is_running]
-        await keep_signed_in(running)
-        for index in await find_unwelcome([(one.actor, one.scope) for one in sockets]):
+        await keep_signed_in(running, timezone.now())
+        admitted = [(one.actor, one.scope) for one in sockets]
+        for index in await find_unwelcome(admitted, timezone.now()):
             sockets[index].send_off()
 
     async def _close(self, live: LiveSession) -> None:

@@ -140,7 +140,10 @@ class LiveServer(Server):  # type: ignore[misc]
         await asyncio.gather(*open_tasks, return_exceptions=True)
 
     async def _until_closed(self) -> None:
-        """Wait for the clients' answers: stopping with a socket open can crash (stack.md)."""
+        """Wait for the clients' answers: stopping with a socket open can crash.
+
+        Source: docs/reference/stack.md#ending.
+        """
         deadline = asyncio.get_running_loop().time() + CLOSE_S
         while asyncio.get_running_loop().time() < deadline:
             if all("disconnected" in details for details in self.connections.values()):

@@ -2,7 +2,7 @@
 
 One thread writes for all sessions of the process. It commits whatever is queued the moment that the
 last commit is done: no timer, so that a fast disk answers at once and a slow one takes larger
-batches (measured against a timer: stack.md, T3).
+batches (measured against a timer: docs/reference/stack.md#durability).
 """
 
 from __future__ import annotations

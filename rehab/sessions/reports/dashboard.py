@@ -13,10 +13,10 @@ from django.utils.translation import gettext
 from rehab.people.access import clinic_of
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Right, Role, rights_of
-from rehab.sessions.formatting import clinic_time, format_duration, format_rate
+from rehab.sessions.formatting import clinic_time, format_duration, format_rate, midnight_of
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.stations import StationStatus, find_live_session, station_statuses
-from rehab.sessions.reports.today import IS_OPEN, start_of_day, todays_sessions
+from rehab.sessions.reports.today import IS_OPEN, todays_sessions
 from rehab.sessions.reports.trend import with_metrics
 from rehab.sessions.reports.week import week_summary
 from rehab.stations.models import Device, Station
@@ -87,7 +87,7 @@ def sessions_today(user: User, clinic: Clinic, now: datetime) -> list[SessionRow
         SessionRow(
             session=row,
             patient=row.patient.nickname if by_name else row.patient.pseudonym,
-            time=_format_time(clinic_time(row.began_at, clinic), start_of_day(local)),
+            time=_format_time(clinic_time(row.began_at, clinic), midnight_of(local)),
             state=row.get_state_display(),
             is_open=State(row.state) in OPEN,
             duration=format_duration(row.active_s),

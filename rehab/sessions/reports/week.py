@@ -12,10 +12,15 @@ from django.utils.dateformat import format as format_date
 from django.utils.translation import gettext
 
 from rehab.people.models import Clinic, User
-from rehab.sessions.formatting import clinic_time, format_duration, format_number, format_rate
+from rehab.sessions.formatting import (
+    clinic_time,
+    format_duration,
+    format_number,
+    format_rate,
+    midnight_of,
+)
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.today import start_of_day
 from rehab.sessions.reports.trend import with_metrics
 from rehab.training.valences import VALENCES
 
@@ -79,7 +84,7 @@ def week_summary(user: User, clinic: Clinic, now: datetime) -> WeekSummary:
     Simulated sessions count only where no person has walked.
     """
     local = clinic_time(now, clinic)
-    monday = start_of_day(local - timedelta(days=local.weekday()))
+    monday = midnight_of(local - timedelta(days=local.weekday()))
     begun = TrainingSession.objects.visible_to(user).filter(
         started_at__gte=monday, started_at__lte=now
     )

@@ -14,8 +14,8 @@ from rehab.training.steps import Measurement, Side
 # Gives the next stride, walked in that phase; None at the end.
 Walk = Callable[[Phase], Measurement | None]
 
-# Nobody begins the next stride before this much of it has passed (gait.md 2.1): there is time to
-# hear of a new phase.
+# Nobody begins the next stride before this much of it has passed
+# (docs/reference/gait.md#plausible-strides): there is time to hear of a new phase.
 STRIDE_MIN_S = 0.5
 # Out of reach of the server somebody may walk on for hours (a day of it takes 80,000 strides).
 KEPT_MAX = 80_000

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 Channel = tuple[str, str]  # side, and one of rehab.gait.columns.CHANNELS
 Samples = tuple[Floats, dict[Channel, Floats]]  # times, and as many values of each channel
 
-HOLD_S = 0.05  # between two samples nothing is known over more (gait.md 2.1)
+HOLD_S = 0.05  # between two samples nothing is known over more (docs/reference/gait.md#time-base)
 WAIT_S = 0.3  # by our clock, for a channel that has fallen silent
 KEEP_S = 60.0  # of samples that wait for others
 

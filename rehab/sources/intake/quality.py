@@ -11,7 +11,7 @@ import numpy as np
 from rehab.sources.intake.alignment import Floats
 from rehab.training.steps import Measurement
 
-GAP_S = 0.05  # a longer one makes its stride invalid (gait.md 2.1)
+GAP_S = 0.05  # a longer one makes its stride invalid (docs/reference/gait.md#time-base)
 
 
 class Quality:

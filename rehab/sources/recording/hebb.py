@@ -10,8 +10,8 @@ from rehab.sources.recording.table import Row, quote
 from rehab.training.phases import PHASE_KINDS, Phase
 from rehab.training.steps import Reason
 
-# hebb03: what each part of the protocol in column Task is for (gait.md 1.2). A number before "A2"
-# is the share of the real value that was shown, in percent: the gain.
+# hebb03: what each part of the protocol in column Task is for (docs/reference/gait.md#columns). A
+# number before "A2" is the share of the real value that was shown, in percent: the gain.
 _TASK_KINDS = {
     "SSWS": "baseline",
     "Fam": "familiarization",
@@ -58,8 +58,8 @@ HEBB03 = Layout(
     hit="iA2_Success",
     read_reasons=_read_use,
     read_phase=_read_task,
-    # Of 63 columns those that studies ask for (gait.md 1.6): timing, symmetry, force, and the two
-    # factors of A2, moment and velocity. Units: docs/recordings.md.
+    # Of 63 columns those that studies ask for (docs/reference/gait.md#outcomes): timing, symmetry,
+    # force, and the two factors of A2, moment and velocity. Units: docs/recordings.md.
     extra=(
         *("iHS2", "iSLS_Time", "iSwing_Time"),
         *("iStep_Length", "cStep_Length", "StepLengthSym"),
@@ -67,8 +67,9 @@ HEBB03 = Layout(
     ),
 )
 
-# A contact whose peak stays below a quarter of body weight is no step (gait.md 2.1, point 3):
-# 0.25 × 9.8 N/kg. Two strides of HEBB_91 are such, and the lab counted them as misses.
+# A contact whose peak stays below a quarter of body weight is no step
+# (docs/reference/gait.md#contacts): 0.25 × 9.8 N/kg. Two strides of HEBB_91 are such, and the lab
+# counted them as misses.
 MIN_CONTACT_N_KG = 2.45
 
 
@@ -88,7 +89,8 @@ HEBB91 = Layout(
     name="hebb91",
     required=("Step Count", "iA2", "A2_Success", "iVGRF_max"),
     number="Step Count",
-    stride_s=1.10,  # no time column; the same lab's walkers take 1.04-1.10 s (gait.md 1.4)
+    # No time column; the same lab's walkers take 1.04-1.10 s (docs/reference/gait.md#phases).
+    stride_s=1.10,
     value="iA2",
     hit="A2_Success",
     read_reasons=_read_contact,

@@ -1,7 +1,7 @@
 """How synthetic walkers walk: what varies, what is learned, what tires and what fails.
 
-Every figure comes from gait.md 1.5 (dynamics of three recorded sessions, in units of the baseline)
-unless its place says otherwise.
+Every figure comes from docs/reference/gait.md#dynamics (dynamics of three recorded sessions, in
+units of the baseline) unless its place says otherwise.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class WalkerProfile:
         Mean A2 of the usual walk [W/kg].
     noise, calm_noise, brief_noise
         White sd from stride to stride: with feedback, without, and in familiarization and catch
-        trials, which last too short to settle (sd .096 to .116 in gait.md 1.4).
+        trials, which last too short to settle (sd .096 to .116 in docs/reference/gait.md#phases).
     slow_sd, calm_slow_sd, slow_phi
         Stationary sd and lag-1 coefficient of the slow AR(1) component.
     familiarization_level, catch_level

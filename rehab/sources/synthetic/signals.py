@@ -75,7 +75,9 @@ class Recording:
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
-    """How a lab measures. Defaults: moore2013's treadmill and motion capture (gait.md 2.1, 4).
+    """How a lab measures. Defaults: moore2013's treadmill and motion capture.
+
+    Source: docs/reference/gait.md#data-sets.
 
     Attributes
     ----------

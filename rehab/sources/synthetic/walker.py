@@ -16,11 +16,12 @@ from rehab.sources.synthetic.profiles import GOOD, WalkerProfile
 from rehab.training.phases import Phase, make_phase
 from rehab.training.steps import Measurement, Reason, Side
 
-# The lab recorded trials of at most two minutes, with 3.2-5.2 s between them (gait.md 1.3).
+# The lab recorded trials of at most two minutes, with 3.2-5.2 s between them
+# (docs/reference/gait.md#protocol).
 TRIAL_S = 120.0
 PAUSE_MIN_S = 3.2
 PAUSE_MAX_S = 5.2
-# Strides outside of this are no walking (gait.md 2.1, point 3).
+# Strides outside of this are no walking (docs/reference/gait.md#plausible-strides).
 STRIDE_MIN_S = 0.5
 STRIDE_MAX_S = 2.5
 
@@ -98,7 +99,7 @@ class SyntheticWalker:
         if phase.kind == "catch":
             return profile.catch_level
         if not phase.feedback:
-            # In one stride, without a ramp (gait.md 1.5).
+            # In one stride, without a ramp (docs/reference/gait.md#dynamics).
             level = 1 + profile.after_effect * (1 - self._unlearned) * self._unwashed
             if phase.kind == "washout":
                 self._unwashed *= 1 - 1 / profile.after_effect_strides

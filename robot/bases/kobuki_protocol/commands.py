@@ -1,4 +1,4 @@
-"""Commands to a Kobuki (kobuki.md 1.4)."""
+"""Commands to a Kobuki (docs/reference/kobuki.md#commands)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Extra(IntFlag):
 
 
 class Output(IntFlag):
-    """Bits of ``GpOutput``, which is always written whole (kobuki.md 1.4).
+    """Bits of ``GpOutput``, which is always written whole (docs/reference/kobuki.md#commands).
 
     POWER is every external rail. A word without it cuts the power of whatever hangs on them, the
     robot's own computer included.

@@ -1,4 +1,4 @@
-"""Feedback of a Kobuki, as it sends it; properties give SI (kobuki.md 1.3)."""
+"""Feedback of a Kobuki, as it sends it; properties give SI (docs/reference/kobuki.md#feedback)."""
 
 from __future__ import annotations
 
@@ -90,7 +90,10 @@ class CliffRaw(NamedTuple):
 
 
 class MotorCurrent(NamedTuple):
-    """Currents of the wheels [10 mA]; one byte each, whatever the table says (kobuki.md 1.3)."""
+    """Currents of the wheels [10 mA]; one byte each, whatever the table says.
+
+    Source: docs/reference/kobuki.md#feedback.
+    """
 
     left: int
     right: int
@@ -178,7 +181,8 @@ _LAYOUTS: dict[int, tuple[str, Any, Struct]] = {
 }
 _HARDWARE, _FIRMWARE, _GYRO = 10, 11, 13
 _SAMPLE = Struct("<hhh")
-FIRST_FIRMWARE = Version(1, 2, 3)  # as firmware 1.0.0 calls itself, in two bytes (kobuki.md 1.3)
+# As firmware 1.0.0 calls itself, in two bytes (docs/reference/kobuki.md#feedback).
+FIRST_FIRMWARE = Version(1, 2, 3)
 _NUMBERS = (1, 3, 4, 5, 6, _HARDWARE, _FIRMWARE, _GYRO, 15, 16, 19, 21)  # of Feedback's fields
 
 

@@ -1,8 +1,8 @@
 """Frames: found in a stream of bytes, and made.
 
 A frame is AA 55, the payload's length, the payload, and the XOR of length and payload; a payload is
-a row of sub-payloads, each its id, its length and its data, little-endian (kobuki.md 1.2). Nothing
-is escaped: AA 55 may stand anywhere.
+a row of sub-payloads, each its id, its length and its data, little-endian
+(docs/reference/kobuki.md#framing). Nothing is escaped: AA 55 may stand anywhere.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ from operator import xor
 from struct import Struct
 from typing import Any, Generic, TypeVar
 
-BAUD = 115200  # 8N1, no flow control (kobuki.md 1.1)
-FRAME_S = 0.02  # between two feedback frames (kobuki.md 1.3)
+BAUD = 115200  # 8N1, no flow control (docs/reference/kobuki.md#serial-link)
+FRAME_S = 0.02  # between two feedback frames (docs/reference/kobuki.md#feedback)
 
 HEADER = b"\xaa\x55"
-SHORTEST = 3  # bytes of a payload: id, length and one byte of data (kobuki.md 1.2)
-# Everything a base can say in one frame is 175 bytes (kobuki.md 1.3). A longer one is a false
-# header, and waiting for its end would hold up the true frames behind it.
+# Bytes of a payload: id, length and one byte of data (docs/reference/kobuki.md#framing).
+SHORTEST = 3
+# Everything a base can say in one frame is 175 bytes (docs/reference/kobuki.md#feedback). A longer
+# one is a false header, and waiting for its end would hold up the true frames behind it.
 LONGEST = 192
 
 T = TypeVar("T")
@@ -41,7 +42,7 @@ class FrameReader(Generic[T]):
     """Finds frames in a stream of bytes, however it is cut up and whatever else is in it.
 
     A frame that does not hold is searched for another one from its second byte on: the header may
-    have been false, and behind it stands a true one (kobuki.md 2.4).
+    have been false, and behind it stands a true one (docs/reference/kobuki.md#lost-bytes).
 
     Parameters
     ----------

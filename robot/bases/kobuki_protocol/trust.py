@@ -12,19 +12,20 @@ from robot.bases.kobuki_protocol.feedback import CoreSensors, Feedback, Inertia,
 from robot.bases.kobuki_protocol.wheels import TICK_M, WHEEL_MAX_M_S
 
 # Between two frames the wheels and the gyro move no further than this: the largest speed and a
-# quarter on top; 250 °/s, where the gyro saturates, and a fifth (kobuki.md 1.7, 1.9).
+# quarter on top; 250 °/s, where the gyro saturates, and a fifth
+# (docs/reference/kobuki.md#odometry-and-gyro).
 WHEEL_BOUND_M_S = 1.25 * WHEEL_MAX_M_S
 TURN_BOUND_DEG_S = 300.0
 SLACK_S = 0.01  # half a frame: sensors are read some time before their time stamp
 # A base's clock may run ahead of ours by so much since the frame before [s]: frames come in bursts.
 AHEAD_S = 0.1
 # After a longer silence [s] the base may have been switched off, and its counters begin anew
-# (kobuki.md 1.7).
+# (docs/reference/kobuki.md#odometry-and-gyro).
 GAP_S = 1.0
 
 BATTERY_NEAR = 2  # tenths of a volt between two frames that agree
 
-DEGREES = 0.01  # one digit of the gyro's angle and rate (kobuki.md 1.3)
+DEGREES = 0.01  # one digit of the gyro's angle and rate (docs/reference/kobuki.md#feedback)
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,8 +213,8 @@ def _passed(before: int, now: int) -> int:
 def _turned(before: int, now: int) -> float:
     """Give how far the gyro has turned [0.01°].
 
-    Its angle is one modulo 360°, in 16 bits (kobuki.md 1.3): it may jump by 360° or by 65536
-    digits, and neither is a turn.
+    Its angle is one modulo 360°, in 16 bits (docs/reference/kobuki.md#feedback): it may jump by
+    360° or by 65536 digits, and neither is a turn.
     """
     return min(math.remainder(now - before, 36_000), _passed(before, now), key=abs)
 

@@ -7,10 +7,11 @@ import math
 from robot.bases.kobuki_protocol.commands import BaseControl
 from robot.motion import STILL, Twist
 
-# kobuki.md 1.7: between the wheels [m], and one tick of an encoder [m].
+# Between the wheels [m], and one tick of an encoder [m]
+# (docs/reference/kobuki.md#odometry-and-gyro).
 WHEELBASE_M = 0.23
 TICK_M = 8.5292090497737556558e-5
-# Neither wheel goes faster [m/s] (kobuki.md 1.9).
+# Neither wheel goes faster [m/s] (docs/reference/kobuki.md#limits).
 WHEEL_MAX_M_S = 0.70
 
 HALF_MM = 1000 * WHEELBASE_M / 2
@@ -23,7 +24,8 @@ STOP = BaseControl(0, 0)
 def slow_to_wheels(twist: Twist) -> Twist:
     """Give a twist on the same curve of which no wheel is too fast; what is not finite is still.
 
-    Clipping one of the two speeds would make it another curve (kobuki.md 1.5, c).
+    Clipping one of the two speeds would make it another curve
+    (docs/reference/kobuki.md#speed-and-radius).
     """
     if not twist.is_finite:
         return STILL
@@ -38,10 +40,10 @@ def control_of(twist: Twist) -> BaseControl:
     Notes
     -----
     The outer wheel's speed carries the sign of v, and the radius that of the turn
-    (kobuki.md 1.5). Four things differ from the reference driver, each as the reference text
-    proposes: curves too wide for the radius are driven straight, or on the widest, whichever is
-    nearer; numbers are rounded, not truncated; too fast a twist keeps its curve; NaN and infinity
-    never reach the wheels.
+    (docs/reference/kobuki.md#speed-and-radius). Four things differ from the reference driver:
+    curves too wide for the radius are driven straight, or on the widest, whichever is nearer;
+    numbers are rounded, not truncated; too fast a twist keeps its curve; NaN and infinity never
+    reach the wheels.
     """
     twist = slow_to_wheels(twist)
     v_mm_s, w_rad_s = 1000 * twist.v_m_s, twist.w_rad_s
@@ -56,7 +58,10 @@ def control_of(twist: Twist) -> BaseControl:
 
 
 def twist_of(control: BaseControl) -> Twist:
-    """Give the twist that an order means, as the firmware reads it (kobuki.md 1.5)."""
+    """Give the twist that an order means, as the firmware reads it.
+
+    Source: docs/reference/kobuki.md#speed-and-radius.
+    """
     speed, radius = control
     if radius == 0:
         return Twist(speed / 1000, 0.0)

@@ -34,7 +34,7 @@ from robot.ros.messages import (
 )
 
 ODOMETRY_EVERY_MS = 20  # as often as orders go out
-LAST_STOPS = 3  # one may be lost (kobuki.md 5.2)
+LAST_STOPS = 3  # one may be lost (docs/reference/kobuki.md#orders)
 
 # rosapi tells whether anybody is there, where it runs; asked so often [s], while the base stands.
 SUBSCRIBERS, PUBLISHERS = "/rosapi/subscribers", "/rosapi/publishers"

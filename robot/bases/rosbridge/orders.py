@@ -10,7 +10,7 @@ from robot.motion import CEILING_M_S, CEILING_RAD_S, ORDER_HOLDS_S, STILL, Limit
 WHEELS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
 
 # Standing still is said so often [s]: once is not enough where a message may be lost, and a mux
-# gives a base to somebody else after 0.2 s without one (kobuki.md 1.6).
+# gives a base to somebody else after 0.2 s without one (docs/reference/kobuki.md#watchdogs).
 STILL_EVERY_S = 0.1
 # Bridges write numbers with 9 digits and more; these are what we order anyhow [m/s, rad/s].
 DIGITS, SAME = 4, 1e-5

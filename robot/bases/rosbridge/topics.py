@@ -67,7 +67,8 @@ class Topics:
 FEELER_OPTIONS = {BUMP: "bumper", "cliff": "cliff", "wheel_drop": "wheel_drop"}
 
 PROFILES = {
-    # What kobuki_node has without remappings, and the original's nodes publish on (kobuki.md 1.13).
+    # What kobuki_node has without remappings, and the original's nodes publish on
+    # (docs/reference/original.md#robot).
     "kobuki": Topics(
         Topic("/mobile_base/commands/velocity", TWIST),
         Topic("/odom", ODOMETRY),

@@ -7,7 +7,8 @@ from typing import NamedTuple, Protocol
 from robot.bases.kobuki_protocol import WHEELBASE_M
 from robot.motion import HOME, Pose, Twist, advance
 
-# Where the floor sensors see the floor they stand on [m]: 10.2 mm and 21.4 mm up (kobuki.md 2.1).
+# Where the floor sensors see the floor they stand on [m]: 10.2 mm and 21.4 mm up
+# (docs/reference/kobuki.md#twin).
 FLOOR_M = 0.0316
 
 

@@ -11,9 +11,10 @@ from robot.bases.kobuki_protocol import Side, Wheel
 from robot.bases.twin.bodies import Touch
 from robot.motion import HOME, Pose, wrap
 
-STEPS = 8  # of 2.5 ms each in a frame: 400 Hz, finer than the 240 Hz of kobuki.md 2.1
+# Of 2.5 ms each in a frame: 400 Hz, finer than the 240 Hz of docs/reference/kobuki.md#twin.
+STEPS = 8
 
-# Measures of the parts: kobuki.md 2.1; the same as in kobuki.urdf.
+# Measures of the parts: docs/reference/kobuki.md#twin; the same as in kobuki.urdf.
 WHEEL_M = 0.035
 TORQUE_MAX_N_M = 1.0
 FRICTION = {"base": 0.3, "left_wheel": 1.0, "right_wheel": 1.0}  # casters: 0

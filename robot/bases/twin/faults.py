@@ -23,7 +23,7 @@ class Faults:
     charger
         As in ``CoreSensors``.
     battery_v
-        Voltage of the battery [V]; 16.7 is full (kobuki.md 1.3).
+        Voltage of the battery [V]; 16.7 is full (docs/reference/kobuki.md#feedback).
     left_scale, right_scale
         How much larger than it believes the wheels are: 1.02 rolls 2 % too far, either way.
     drift_deg_min

@@ -43,18 +43,20 @@ from robot.bases.kobuki_protocol import (
 from robot.bases.twin.bodies import Body
 from robot.bases.twin.faults import Faults
 
-# The newest firmware there is, and the common hardware (kobuki.md 1.10).
+# The newest firmware there is, and the common hardware (docs/reference/kobuki.md#firmware).
 FIRMWARE = Version(1, 2, 0)
 HARDWARE = Version(1, 0, 4)
 LONG_VERSIONS = Version(1, 1, 2)  # from here on in four bytes
 GAINS = Version(1, 2, 0)  # from here on they can be set and asked for
 UDID = Udid(0x47415252, 0x59, 0x5457494E)
 
-CLIFF_M = 0.05  # floor that is further away than this is a cliff (kobuki.md 1.8)
-GYRO_MAX_DEG_S = 250.0  # (kobuki.md 1.7)
-GYRO_DIGIT_DEG_S = 0.00875  # (kobuki.md 1.3)
-# A wheel draws 3 A, where the motor is switched off, at its largest torque; in 10 mA (kobuki.md
-# 1.3, 1.6, 2.1). That it grows in proportion is our own.
+# Floor that is further away than this is a cliff
+# (docs/reference/kobuki.md#bumps-cliffs-wheel-drops).
+CLIFF_M = 0.05
+GYRO_MAX_DEG_S = 250.0  # (docs/reference/kobuki.md#odometry-and-gyro)
+GYRO_DIGIT_DEG_S = 0.00875  # (docs/reference/kobuki.md#feedback)
+# A wheel draws 3 A, where the motor is switched off, at its largest torque; in 10 mA
+# (docs/reference/kobuki.md#watchdogs). That it grows in proportion is our own.
 CURRENT_N_M = 300.0
 ORDERS_KEPT = 1024
 NO_DOCK, NO_INPUT = DockIr(), GpInput()
@@ -80,7 +82,7 @@ class Firmware:
         What it says it is. Before 1.1.2 it says so in two bytes, before 1.2.0 it has no gains.
     watchdog_s
         After so long without a setpoint it stops. None, as a real one, for which no watchdog is
-        documented (kobuki.md 1.6).
+        documented (docs/reference/kobuki.md#watchdogs).
     chance
         Of the line's faults.
 
@@ -201,7 +203,8 @@ class Firmware:
             inertia=Inertia(round(angle), round(100 * rate_deg_s)),
             cliff=CliffRaw(*map(_voltage, touch.floor_m)),
             current=MotorCurrent(_current(left_n_m), _current(right_n_m)),
-            # A sensor of 100 Hz on a link of 50: two samples, or three (kobuki.md 1.3, 5.1).
+            # A sensor of 100 Hz on a link of 50: two samples, or three
+            # (docs/reference/kobuki.md#feedback).
             gyro=GyroRaw((5 * number - 4) // 2 % 256, (sample,) * (2 + number % 2)),
             gp=NO_INPUT,
             hardware=HARDWARE if "hardware" in asked else None,

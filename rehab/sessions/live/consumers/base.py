@@ -71,8 +71,8 @@ class Socket(AsyncWebsocketConsumer):
     """A socket of the live path.
 
     It uses no channel layer (the hub is in this process) and, unlike Channels' own dispatch, hops
-    to no database thread for each frame: half of what a step costs (stack.md, T1). Subclasses
-    implement ``opened``, ``heard`` and ``left``.
+    to no database thread for each frame: half of what a step costs
+    (docs/reference/stack.md#one-process). Subclasses implement ``opened``, ``heard`` and ``left``.
     """
 
     live: LiveSession | None = None

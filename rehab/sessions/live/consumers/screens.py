@@ -76,7 +76,7 @@ class ScreenConsumer(Socket):
             theirs = await database_sync_to_async(language_of)(self.actor)
             self.language = theirs or settings.LANGUAGE_CODE
         self.start(self._pump(live, _after(self.scope["query_string"])))
-        self.runtime.notes.add(Act.VIEW, self.actor, session_id, self.scope)
+        self.runtime.notes.add(Act.VIEW, self.actor, session_id, self.scope, timezone.now())
 
     @classmethod
     def is_welcome(cls, actor: Actor) -> bool:
@@ -199,7 +199,7 @@ class ScreenConsumer(Socket):
             self.start(_until_stored([s.arm_robot(by, timezone.now()) for s in sessions]))
         if by is not None or order == "stop":  # beside the socket: no robot waits for the log
             act = Act(f"robot_{order}")
-            self.runtime.notes.add(act, self.actor, live.id, self.scope)
+            self.runtime.notes.add(act, self.actor, live.id, self.scope, timezone.now())
 
     async def _refuse(self, mark: str, code: str, message: str) -> None:
         await self.say({"type": "error", "code": code, "id": mark, "message": message})
