@@ -25,7 +25,9 @@ pytestmark = pytest.mark.django_db
 def world() -> World:
     made = build_world("amber")
     Visit.everywhere.all().delete()
-    TrainingSession.everywhere.filter(pk=made.session.pk).update(created_at=NOW - timedelta(9))
+    then = NOW - timedelta(9)
+    sessions = TrainingSession.everywhere.filter(pk=made.session.pk)
+    sessions.update(created_at=then, started_at=then)
     return made
 
 
@@ -72,6 +74,18 @@ def test_a_day_is_the_clinics_own(world):
     pt_of(world).post(f"/patients/{rosa.pk}/visits/", {"in": "0"})
     (visit,) = Visit.everywhere.all()
     assert visit.day == (timezone.now() + timedelta(hours=9)).date()
+
+
+def test_who_was_set_up_yesterday_and_walked_today_is_on_both_lists_of_today(world):
+    rosa, pt = patient(world, "Rosa"), world.people[Role.PT]
+    session = walk(rosa, "positive", [HIT] * 9)
+    sessions = TrainingSession.everywhere.filter(pk=session.pk)
+    sessions.update(created_at=NOW - timedelta(1))
+    assert [row.progress for row in patients_today(pt, HERE)] == [Progress.DONE]
+    assert [row.session for row in dashboard.sessions_today(pt, world.clinic, HERE)] == [session]
+    sessions.update(started_at=NOW - timedelta(1))
+    assert patients_today(pt, HERE) == []
+    assert dashboard.sessions_today(pt, world.clinic, HERE) == []
 
 
 def test_the_first_of_two_midnights_begins_the_day(world):
