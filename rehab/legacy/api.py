@@ -64,7 +64,7 @@ class PaperFilter(Paging):
 @router.get("/users/{code}", response=answers(PaperUser, 404))
 @for_roles(Role.LEAD, Role.PT)
 def show_user(request: HttpRequest, code: Path[Short]) -> Patient:
-    """Read a user by the ID that a PT would type."""
+    """Return a user by the ID that a PT would type."""
     return get_object_or_404(patients_of(caller(request)), code=code)
 
 
@@ -92,8 +92,8 @@ def list_user_sessions(
 
 
 def to_paper_session(session: Any) -> dict[str, Any]:
-    """Tell a session by the paper's attributes, its date by the clinic's clock."""
-    start = clinic_time(session.started_at or session.created_at, session.clinic)
+    """Return a session with the paper's attributes, in the clinic's time zone."""
+    start = clinic_time(session.began_at, session.clinic)
     return {
         "session_id": session.pk,
         "participant_id": session.patient.code,

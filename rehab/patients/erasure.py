@@ -1,4 +1,4 @@
-"""Erasing all that leads to a person, and what a clinic no longer keeps."""
+"""Erasure of what identifies a person, and retention periods."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from rehab.sessions.models import TrainingSession
 
 
 def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) -> None:
-    """Erase all that leads to a person, for good and once. Raises SessionStillOpen."""
+    """Erase everything that identifies a person, permanently. Raises SessionStillOpen."""
     with transaction.atomic():
         lock_without_open_session(patient)
         if patient.erased_at is not None:
-            return  # somebody was quicker
+            return  # somebody else has erased it meanwhile
         withdraw(patient, Purpose.BOARDS, by, now)
         known_as = patient.pseudonym
         if patient.original_id is not None:
@@ -45,7 +45,7 @@ def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) ->
         sessions = TrainingSession.everywhere.filter(patient=patient)
         # Sources may be files that are named after a person.
         sessions.update(source="", source_args=[], legacy_row=None)
-        # It still says that the session was imported, but no longer from where.
+        # The session is still marked as imported, but its original cannot be found.
         sessions.filter(original_id__isnull=False).update(original_id=-1 * F("pk"))
         SessionEvent.everywhere.filter(
             session__patient=patient, kind__in=[remark.value for remark in Remark]
@@ -63,10 +63,10 @@ def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) ->
 
 
 def patients_past_retention(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
-    """Give the patients whom a clinic has kept for as long as it wants to.
+    """Return the patients whose retention period has passed.
 
-    It counts from the last session, or from the day on which the patient was taken in: sessions
-    that were imported are older than that. Whoever is expected again stays.
+    It begins with the last session, but not before the patient was added, since imported sessions
+    are older. Patients with a planned visit are not among them.
     """
     patients = Patient.everywhere.filter(clinic=clinic, erased_at=None, simulated=False)
     if clinic.keep_months is None:
@@ -80,14 +80,14 @@ def patients_past_retention(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
 
 
 def delete_old_logs(clinic: Clinic, now: datetime) -> int:
-    """Delete what is older than a clinic keeps its logs; give how many entries."""
+    """Delete entries that are older than a clinic keeps its logs; return how many."""
     before = months_before(now, clinic.keep_log_months)
     changes, _each = HistoryEntry.everywhere.filter(clinic=clinic, at__lt=before).delete()
     return changes + audit_log.forget_before(clinic.pk, before)
 
 
 def months_before(moment: datetime, months: int) -> datetime:
-    """Give the same day so many months earlier, or that month's last one where it has no such."""
+    """Return the same day some months earlier, or the last day of a shorter month."""
     year, month = divmod(moment.year * 12 + moment.month - 1 - months, 12)
     year, month = max(year, 1), month + 1
     return moment.replace(year=year, month=month, day=min(moment.day, monthrange(year, month)[1]))

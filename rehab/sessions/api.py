@@ -1,4 +1,4 @@
-"""Calls about sessions: create and steer them as the pages do, read what was walked."""
+"""API calls about sessions: create and control them as the pages do, read steps and figures."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ ORDERS = {
     "oldest": ("created_at", "pk"),
     "best": (F("metric_score").desc(nulls_last=True), "created_at", "pk"),
 }
-# What the set-up form calls otherwise.
+# Fields that have another name in the set-up form.
 FORM_NAMES = {"feedback_type": "valence", "goal": "goal_value"}
 
 
 def visible_sessions(user: User) -> QuerySet[TrainingSession]:
-    """Give the sessions that somebody sees, with all that is told of them."""
+    """Return the sessions that somebody may see, with what `SessionOut` needs."""
     rows = TrainingSession.objects.visible_to(user).defer("plan")
     return with_metrics(user, rows).select_related("patient", "measure", "protocol", "station")
 
 
 def get_session(user: User, session_id: int) -> TrainingSession:
-    """Give a session that somebody sees. Raises Http404 for any other."""
+    """Return a session that somebody may see. Raises Http404 for any other."""
     return get_object_or_404(visible_sessions(user), pk=session_id)
 
 
@@ -107,9 +107,9 @@ def add_session(request: HttpRequest, given: SessionRequestBody) -> Status[Train
     form = SessionForm(data, patient=patient, by=user)
     session = form.create()
     if session is None:
-        ours = {theirs: name for name, theirs in FORM_NAMES.items()}
+        api_names = {field: name for name, field in FORM_NAMES.items()}
         objections = say_errors(form.errors)
-        raise Rejected({ours.get(name, name): words for name, words in objections.items()})
+        raise Rejected({api_names.get(name, name): message for name, message in objections.items()})
     return Status(201, get_session(user, session.pk))
 
 

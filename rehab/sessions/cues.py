@@ -1,4 +1,4 @@
-"""What a PT may choose that the robot does: the usual of a feedback type, nothing, or a gesture."""
+"""The choices of a robot's gestures: the default of a valence, none, or a certain gesture."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DEFAULT_GESTURE, NO_GESTURE = (
 
 
 def robot_gesture_choices(by: User) -> list[tuple[str, Any]]:
-    """Give the choices with their words."""
+    """Return the choices with their labels."""
     return [
         (DEFAULT_GESTURE, _("As usual for the feedback type")),
         (NO_GESTURE, _("Nothing")),
@@ -34,39 +34,39 @@ def robot_gesture_choices(by: User) -> list[tuple[str, Any]]:
 
 
 def known_gesture_choices(by: User) -> set[str]:
-    """Give every choice that can be made, without its words."""
+    """Return all choices without their labels."""
     composed = Gesture.objects.visible_to(by).values_list("name", flat=True)
     return {DEFAULT_GESTURE, NO_GESTURE, *GESTURES, *ORIGINALS, *composed}
 
 
 def cue_from_choices(above: str, below: str, valence: str, patient: Patient) -> Cue:
-    """Give the cue for two choices, by what is usual in the patient's clinic."""
-    usual = valences_of(patient.clinic_id)[valence].cue
-    return Cue(_gesture(above, usual.above), _gesture(below, usual.below))
+    """Return the cue for two choices, with the defaults of the patient's clinic."""
+    default = valences_of(patient.clinic_id)[valence].cue
+    return Cue(_gesture(above, default.above), _gesture(below, default.below))
 
 
-def _gesture(choice: str, usual: str | None) -> str | None:
-    return usual if choice == DEFAULT_GESTURE else None if choice == NO_GESTURE else choice
+def _gesture(choice: str, default: str | None) -> str | None:
+    return default if choice == DEFAULT_GESTURE else None if choice == NO_GESTURE else choice
 
 
 def choices_from_cue(cue: Cue, valence: str, patient: Patient, by: User) -> tuple[str, str]:
-    """Give the choices for a cue; the usual one for a gesture that is not to be had any more."""
-    usual = valences_of(patient.clinic_id)[valence].cue
+    """Return the choices for a cue; the default for a gesture that was deleted."""
+    default = valences_of(patient.clinic_id)[valence].cue
     composed = Gesture.objects.visible_to(by).values_list("name", flat=True)
     known = {None, *GESTURES, *ORIGINALS, *composed}
-    return _choice(cue.above, usual.above, known), _choice(cue.below, usual.below, known)
+    return _choice(cue.above, default.above, known), _choice(cue.below, default.below, known)
 
 
-def _choice(gesture: str | None, usual: str | None, known: set[str | None]) -> str:
-    if gesture == usual or gesture not in known:
+def _choice(gesture: str | None, default: str | None, known: set[str | None]) -> str:
+    if gesture == default or gesture not in known:
         return DEFAULT_GESTURE
     return gesture or NO_GESTURE
 
 
 def composed_gestures(patient: Patient, cue: Cue) -> Iterator[dict[str, Any]]:
-    """Give the gestures of the patient's clinic that a cue names, as they travel to a robot.
+    """Yield the composed gestures of the patient's clinic that a cue names, as sent to a robot.
 
-    Raises InvalidSetting for a gesture that nobody knows, and for one that no robot would play.
+    Raises InvalidSetting for an unknown gesture, and for one that no robot would play.
     """
     named = {name for name in (cue.above, cue.below) if name is not None}
     for name in sorted(named - GESTURES.keys() - ORIGINALS.keys()):
@@ -87,13 +87,13 @@ def composed_gestures(patient: Patient, cue: Cue) -> Iterator[dict[str, Any]]:
         yield data
 
 
-def silence_cue(cue: Cue, usual: Cue, chosen: Cue) -> Cue:
-    """Give the cue of a type that a session may be changed to.
+def silence_cue(cue: Cue, default: Cue, chosen: Cue) -> Cue:
+    """Return the cue of another valence that a session may be changed to.
 
-    What was silenced for the session, where its type would usually have a gesture, stays silent:
-    no change of the feedback makes a robot move that was told to stand still.
+    Where the PT chose no gesture although ``default`` has one, the result has none either: a change
+    of the feedback must not make a robot move that was set to stand still.
     """
     return Cue(
-        None if usual.above and not chosen.above else cue.above,
-        None if usual.below and not chosen.below else cue.below,
+        None if default.above and not chosen.above else cue.above,
+        None if default.below and not chosen.below else cue.below,
     )

@@ -1,4 +1,4 @@
-"""One sitting of one patient."""
+"""Training sessions."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ STATES = {
 
 
 class TrainingSession(ClinicRow):
-    """One sitting of one patient, who is the same from its creation to its end.
+    """One session of one patient.
 
-    ``plan`` is what every step is scored with; the columns beside it are there to be found by.
+    ``plan`` is what every step is scored with; the columns beside it are for queries.
     ``state``, ``goal``, ``started_at``, ``ended_at``, ``changed_to`` and ``active_s`` follow from
     the log and are written together with its changes (``active_s`` of a running session is that of
-    its last one). ``valence`` is the feedback type it began with. Only a correction alters
+    its last one). ``valence`` is the valence that it began with. Only a correction changes
     ``patient`` and ``excluded`` (``corrections.py``).
     """
 
@@ -114,10 +114,10 @@ class TrainingSession(ClinicRow):
         editable=False,
         help_text=_("Corrected: in no figure, board or trend."),
     )
-    # Its row in the original GARRY's database, where it was imported from there: without steps.
+    # Of an imported session, which has no steps: its key and row in the original GARRY's database.
     original_id = models.BigIntegerField(_("imported session"), null=True, editable=False)
     legacy_row = models.JSONField(null=True, editable=False)
-    # Which process writes the log: each taking over raises the epoch and shuts out the one before.
+    # The process that writes the log; each change of owner raises the epoch and locks out the last.
     epoch = models.PositiveIntegerField(default=0, editable=False)
     owner = models.CharField(max_length=200, blank=True, editable=False)
 

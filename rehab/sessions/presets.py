@@ -1,4 +1,4 @@
-"""Presets: what a PT often sets up, kept under a name and put into the set-up with one tap."""
+"""Presets: set-ups stored under a name, to fill in the set-up form with one tap."""
 
 from __future__ import annotations
 
@@ -107,10 +107,10 @@ class Preset(ClinicRow):
         return self.name
 
     def clean(self) -> None:
-        """Refuse what could not be walked, in the rules' own words."""
+        """Refuse what could not be walked, with the rules' own message."""
         protocol = getattr(self, "protocol", None)
         if protocol is None or self.valence not in VALENCES or self.robot not in ROBOT_LEVELS:
-            return  # said at the field itself
+            return  # the field itself has the error
         by_value = self.goal_by == "value"
         try:
             SessionPlan(
@@ -128,27 +128,29 @@ class Preset(ClinicRow):
             raise ValidationError(in_words(problem)) from problem
 
     @property
-    def about(self) -> str:
-        """Say in a few words what it sets."""
-        return " · ".join(filter(None, (self.get_valence_display(), self.goal_label, self.length)))
+    def summary(self) -> str:
+        """Valence, goal and duration in a few words."""
+        return " · ".join(
+            filter(None, (self.get_valence_display(), self.goal_label, self.duration_label))
+        )
 
     @property
     def goal_label(self) -> str:
-        """Say the goal."""
+        """The goal as text."""
         if self.goal_by == "value":
             return format_quantity(self.goal_value, A2.unit)
         share = format_rate(self.goal_percent / 100 if self.goal_percent else None)
         return gettext("%(share)s of baseline") % {"share": share}
 
     @property
-    def length(self) -> str:
-        """Say how long is planned."""
+    def duration_label(self) -> str:
+        """The planned duration as text."""
         return gettext("%(count)s min") % {"count": self.minutes} if self.minutes else ""
 
     def to_initial(self, by: User) -> dict[str, Any]:
-        """Give what it sets of the set-up; a gesture that is gone becomes the usual one."""
+        """Return initial values for the set-up form; a deleted gesture becomes the default one."""
         known = known_gesture_choices(by)
-        chosen: dict[str, Any] = {
+        initial: dict[str, Any] = {
             "valence": self.valence,
             "goal_by": self.goal_by,
             "wanted_hits": self.wanted_hits,
@@ -159,5 +161,5 @@ class Preset(ClinicRow):
             "robot_below": self.robot_below if self.robot_below in known else DEFAULT_GESTURE,
         }
         goal = {"goal_value": self.goal_value, "goal_percent": self.goal_percent}
-        chosen |= {name: value for name, value in goal.items() if value is not None}
-        return chosen | ({"source": self.source} if self.source else {})
+        initial |= {name: value for name, value in goal.items() if value is not None}
+        return initial | ({"source": self.source} if self.source else {})

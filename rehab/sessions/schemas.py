@@ -1,4 +1,4 @@
-"""What goes in and out of the calls about sessions: the one place that says which fields."""
+"""Request and response schemas of the API's session calls."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FeedbackType = Annotated[
 
 
 def parse_change_kind(kind: str) -> ChangeKind:
-    """Give the change of that name. Raises ValueError for one that is not made here."""
+    """Return the change of that name. Raises ValueError for one that a client cannot request."""
     if kind not in ASKED:
         raise ValueError(f"A change is one of: {', '.join(ASKED)}.")
     return ChangeKind(kind)
@@ -73,17 +73,17 @@ class SessionOut(Schema):
 
     @staticmethod
     def resolve_imported(session: TrainingSession) -> bool:
-        """Say whether it has no steps of its own."""
+        """Return whether it was imported from the original GARRY."""
         return session.original_id is not None
 
     @staticmethod
     def resolve_source(session: TrainingSession, context: Any) -> str | None:
-        """Give where its steps come from, to those who know the patient."""
+        """Return where its steps come from, to those who may see the patient's name."""
         return session.source if sees_names(context) else None
 
     @staticmethod
     def resolve_trained_side(session: TrainingSession) -> str | None:
-        """Give the trained leg; null where the original did not keep it."""
+        """Return the trained leg; null where the original did not store it."""
         return session.trained_side or None
 
 
@@ -173,10 +173,10 @@ class MetricOut(Schema):
 
     @staticmethod
     def resolve_label(metric: SessionMetric) -> str:
-        """Give what the figure is."""
+        """Return the figure's name."""
         return METRICS[metric.slug].label
 
     @staticmethod
     def resolve_unit(metric: SessionMetric) -> str:
-        """Give the figure's unit; none for a ratio or a count."""
+        """Return the figure's unit; empty for a ratio or a count."""
         return METRICS[metric.slug].unit

@@ -1,4 +1,4 @@
-"""Where a session's steps can come from, as offered in the set-up."""
+"""The sources of steps that the set-up offers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LIVE = "live"
 
 
 def list_recordings() -> list[Path]:
-    """Give the recordings on this machine. None on a hosted server: they belong to no clinic."""
+    """Return the recordings on this machine; none on a hosted server, where they have no clinic."""
     folder: Path = settings.DATA_DIR / "recordings"
     return [] if settings.HOSTED or not folder.is_dir() else sorted(folder.glob("*.csv"))
 
@@ -31,7 +31,10 @@ def source_choices() -> list[tuple[str, str]]:
 
 
 def build_source_args(kind: str, name: str, patient: Patient) -> list[str]:
-    """Give what the server runs as `python -m rehab.sources` for a choice of ``source_choices``."""
+    """Return the arguments of `python -m rehab.sources` for a choice of `source_choices`.
+
+    ``kind`` and ``name`` are its two words. Returns [] for a source that dials in by itself.
+    """
     match kind:
         case "synthetic":
             return ["synthetic", "--profile", name, "--seed", str(secrets.randbelow(2**31))]

@@ -1,4 +1,4 @@
-"""What templates draw again and again."""
+"""Tags and filters of all templates."""
 
 from django import template
 from django.templatetags.static import static
@@ -14,7 +14,7 @@ register = template.Library()
 
 @register.simple_tag
 def icon(name: str) -> SafeString:
-    """Give an icon of static/img/icons.svg; decoration, so words must stand beside it."""
+    """Return an icon of static/img/icons.svg. It is hidden from readers: put text beside it."""
     return format_html(
         '<svg class="ic" aria-hidden="true"><use href="{}#{}"></use></svg>',
         static("img/icons.svg"),
@@ -24,7 +24,7 @@ def icon(name: str) -> SafeString:
 
 @register.filter
 def leg(side: str) -> str:
-    """Name the leg of a side; "" for none."""
+    """Return the label of a leg; "" for none."""
     return {"left": _("left leg"), "right": _("right leg")}.get(side, "")
 
 
@@ -34,11 +34,11 @@ register.filter("source", format_source)
 
 @register.filter
 def type_name(slug: str) -> str:
-    """Name a feedback type."""
+    """Return the label of a valence."""
     return _(VALENCES[slug].label)
 
 
 @register.filter
 def level(name: str) -> str:
-    """Say how lively a robot is."""
+    """Return the label of a robot level."""
     return str(ROBOT_LEVEL_LABELS[name])

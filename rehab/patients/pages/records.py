@@ -1,4 +1,4 @@
-"""A patient's records: what is kept, how the program ends, and how a person is erased."""
+"""A patient's records: stored data, end of the program, erasure."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from rehab.sessions.models import TrainingSession
 
 
 def get_patient(user: User, patient_id: int) -> Patient:
-    """Give a patient that somebody sees. Raises Http404 for any other."""
+    """Return a patient that somebody may see. Raises Http404 for any other."""
     patients = Patient.objects.visible_to(user).select_related("clinic")
     return get_object_or_404(patients, pk=patient_id)
 
@@ -30,13 +30,13 @@ def get_patient(user: User, patient_id: int) -> Patient:
 @for_roles(Role.LEAD, Role.PT)
 @require_safe
 def show_records(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Show what can be done with all that is kept of a patient."""
+    """Show the page on consent, data and the end of the program."""
     patient = get_patient(person(request), patient_id)
     return render_records(request, patient)
 
 
 def render_records(request: HttpRequest, patient: Patient, **forms: Any) -> HttpResponse:
-    """Give the page, with the forms as they were sent."""
+    """Return the page, with the forms as they were sent."""
     user = person(request)
     sessions = TrainingSession.objects.visible_to(user).filter(patient=patient)
     context = {
@@ -78,10 +78,10 @@ def reopen(request: HttpRequest, patient_id: int) -> HttpResponse:
     return redirect("patient", patient_id=patient.pk)
 
 
-@for_roles(Role.LEAD, patients=False)  # what is noted must not name whom it erases
+@for_roles(Role.LEAD, patients=False)  # the audit entry must not name the erased patient
 @require_POST
 def erase_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Erase all that leads to a person, once the code has been typed."""
+    """Erase everything that identifies a person, after the code was typed as confirmation."""
     user = person(request)
     patient = get_patient(user, patient_id)
     form = ErasingForm(request.POST, patient=patient)

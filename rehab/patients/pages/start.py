@@ -1,4 +1,4 @@
-"""Where a session begins: who walks today, and what is open or past."""
+"""The start list and a patient's own pages."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from rehab.sessions.models import TrainingSession
 from rehab.stations.builtin import first_station
 from rehab.training.changes import OPEN
 
-SHOWN = 60  # patients on one page, those who were here last first
+MAX_PATIENTS = 60  # patients on one page
 DEMO_CODE = "demo"
 
 
 def patients_by_last_visit(user: User) -> QuerySet[Patient]:
-    """Give the patients of somebody's clinic, those who were here last first."""
+    """Return the patients of somebody's clinic, the most recent session first."""
     return (
         Patient.objects.visible_to(user)
         .annotate(last_here=Max("sessions__created_at"), count=Count("sessions"))
@@ -39,7 +39,7 @@ def patients_by_last_visit(user: User) -> QuerySet[Patient]:
 
 
 def open_sessions(user: User) -> QuerySet[TrainingSession]:
-    """Give the sessions that have begun, or could, and have not ended."""
+    """Return the sessions that are ready, running or paused."""
     states = [state.value for state in OPEN]
     return (
         TrainingSession.objects.visible_to(user)
@@ -49,25 +49,25 @@ def open_sessions(user: User) -> QuerySet[TrainingSession]:
 
 
 def start_lists(user: User, words: str = "") -> dict[str, Any]:
-    """Give both lists of the start page: who is expected today, and all patients."""
+    """Return the context of the start page: who is expected today, and all patients."""
     now = clinic_time(timezone.now(), clinic_of(user))
     patients = patients_by_last_visit(user)
     if words:
         patients = patients.filter(Q(nickname__icontains=words) | Q(code__icontains=words))
-    else:  # whose program has ended is found by name or code
+    else:  # patients whose program has ended are found by name or code only
         patients = patients.filter(ended_at=None)
-    shown = list(patients[: SHOWN + 1])
+    shown = list(patients[: MAX_PATIENTS + 1])
     return {
         "now": now,
         "today": patients_today(user, now),
-        "patients": shown[:SHOWN],
-        "more": len(shown) > SHOWN,
+        "patients": shown[:MAX_PATIENTS],
+        "more": len(shown) > MAX_PATIENTS,
         "open": open_sessions(user),
     }
 
 
 @for_roles(Role.LEAD, Role.PT)
-@never_cache  # going back shows what is true now
+@never_cache  # so that going back shows the present state
 @require_safe
 def choose_patient(request: HttpRequest) -> HttpResponse:
     """List who is expected today, then all patients."""
@@ -107,7 +107,7 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
 def add_patient(request: HttpRequest) -> HttpResponse:
-    """Take a new patient in."""
+    """Add a new patient."""
     user = person(request)
     form = PatientForm(request.POST or None, by=user, now=timezone.now())
     if request.method == "POST" and form.keep():
@@ -118,7 +118,7 @@ def add_patient(request: HttpRequest) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
 def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Mend what was written of a patient."""
+    """Edit a patient's details."""
     user = person(request)
     patient = get_object_or_404(patients_by_last_visit(user), pk=patient_id)
     form = PatientForm(request.POST or None, by=user, now=timezone.now(), instance=patient)
@@ -131,7 +131,7 @@ def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
 def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Fit the patient's page to this patient's eyes and ears."""
+    """Set how the patient's page looks and sounds."""
     patient = get_object_or_404(patients_by_last_visit(person(request)), pk=patient_id)
     form = ScreenForm(request.POST or None, instance=patient)
     if request.method == "POST" and form.keep():
@@ -142,7 +142,7 @@ def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_POST
 def add_demo(request: HttpRequest) -> HttpResponse:
-    """Let somebody who only looks around begin with a simulated patient."""
+    """Add a simulated patient, for people who want to try GARRY."""
     user = person(request)
     patient, _made = Patient.objects.visible_to(user).get_or_create(
         clinic=clinic_of(user),

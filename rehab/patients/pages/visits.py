@@ -1,4 +1,4 @@
-"""Planning when a patient comes again."""
+"""Planning and removing visits."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
 
-MAX_DAYS_AHEAD = timedelta(days=366)
+MAX_AHEAD = timedelta(days=366)
 
 
 class InvalidVisitDay(ValueError):
-    """A day on which nobody can be expected; the message says what to do."""
+    """A day or time that is no valid visit; the message says what to do."""
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -45,7 +45,7 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
             day = now.date() + timedelta(days=int(days))
             at = suggested_time(user, patient, now) if int(days) else None
         else:
-            day, at = _read(given.get("day", ""), given.get("at", ""), now.date())
+            day, at = _parse_day(given.get("day", ""), given.get("at", ""), now.date())
     except InvalidVisitDay as problem:
         messages.error(request, str(problem))
     else:
@@ -56,8 +56,8 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
     return redirect("patient", patient_id=patient.pk)
 
 
-def _read(day: str, at: str, today: date) -> tuple[date, time | None]:
-    """Read a day and a time, which may be left out. Raises InvalidVisitDay."""
+def _parse_day(day: str, at: str, today: date) -> tuple[date, time | None]:
+    """Return a day and an optional time. Raises InvalidVisitDay."""
     try:
         chosen, hour = parse_date(day), parse_time(at) if at else None
     except ValueError:
@@ -66,6 +66,6 @@ def _read(day: str, at: str, today: date) -> tuple[date, time | None]:
         raise InvalidVisitDay(
             _("Choose the day of the visit, and a time such as 10:30 if there is one.")
         )
-    if not today <= chosen <= today + MAX_DAYS_AHEAD:
+    if not today <= chosen <= today + MAX_AHEAD:
         raise InvalidVisitDay(_("Choose a day between today and a year from now."))
     return chosen, hour

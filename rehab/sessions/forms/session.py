@@ -1,4 +1,4 @@
-"""What a PT fills in before a session: who walks, and how the session is set up."""
+"""The form that sets a session up."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ class NumberField(forms.FloatField):
     """A number, with a point or a comma."""
 
     def to_python(self, value: Any) -> Any:
-        """Read it."""
+        """Return the number."""
         return super().to_python(value.replace(",", ".") if isinstance(value, str) else value)
 
 
 class SessionForm(forms.Form):
-    """Everything a session of one patient needs. Nothing has to be typed."""
+    """The set-up of one patient's session. With its initial values it can be sent as it is."""
 
     valence = forms.ChoiceField(choices=[(v.slug, _(v.label)) for v in VALENCES.values()])
     goal_by = forms.ChoiceField(choices=[("value", A2.unit), ("percent", _("% of baseline"))])
@@ -95,7 +95,7 @@ class SessionForm(forms.Form):
         fields["robot_above"].choices = fields["robot_below"].choices = robot_gesture_choices(by)
 
     def clean_station(self) -> Station:
-        """Refuse a station where somebody else may be walking right now."""
+        """Return the station. Refuses one with an open session."""
         station: Station = self.cleaned_data["station"]
         try:
             check_station_is_free(station)
@@ -104,7 +104,7 @@ class SessionForm(forms.Form):
         return station
 
     def clean_source(self) -> str:
-        """Refuse a recording that cannot be played, in its reader's own words."""
+        """Return the source. Refuses a recording that cannot be played."""
         source: str = self.cleaned_data["source"]
         kind, _between, name = source.partition(" ")
         if kind == "recording":
@@ -158,25 +158,25 @@ class SessionForm(forms.Form):
         )
 
     def create(self) -> TrainingSession | None:
-        """Create the session, or give None and say in ``errors`` what hinders."""
+        """Create the session; return None, with the reason in ``errors``, where it cannot."""
         if not self.is_valid():
             return None
         try:
             return self.save()
-        except StationTaken as problem:  # just now, by somebody else
+        except StationTaken as problem:  # since the form was checked
             self.add_error("station", in_words(problem))
         except InvalidSetting as problem:
             self.add_error(None, in_words(problem))
         return None
 
 
-# Usual stride time of the recordings (docs/reference/gait.md#phases), to tell how long a phase of
+# Typical stride time of the recordings (docs/reference/gait.md#phases), to tell how long a phase of
 # strides takes.
 STRIDE_S = 1.1
 
 
 def protocol_minutes(protocol: Protocol | None) -> int | None:
-    """Give how long a protocol takes; None where a phase lasts until the PT moves on."""
+    """Return a protocol's duration; None where a phase lasts until the PT moves on."""
     total_s = 0.0
     for phase in () if protocol is None else protocol.to_rules():
         limits = [phase.seconds, phase.strides and phase.strides * STRIDE_S]
@@ -188,13 +188,13 @@ def protocol_minutes(protocol: Protocol | None) -> int | None:
 
 
 def _first_free_station(stations: QuerySet[Station]) -> Station | None:
-    """Give the first station where nobody has an open session, or else the first."""
+    """Return the first station without an open session, or else the first."""
     taken = stations.filter(sessions__state__in=[state.value for state in OPEN])
     return stations.exclude(pk__in=taken.values("pk")).first() or stations.first()
 
 
 def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
-    """Give what the set-up begins with: the patient's last session, or sensible first values."""
+    """Return the set-up's initial values: those of the last session, or defaults."""
     stations = Station.objects.visible_to(by)
     words = dict(source_choices())
     last = (
@@ -226,7 +226,7 @@ def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
     plan = last.to_plan()
     source = next((name for name, label in words.items() if label == last.source), LIVE)
     if last.source_args and not patient.simulated:
-        source = LIVE  # one trial with a simulator makes nobody a simulated patient
+        source = LIVE  # after a trial with a simulator, a person's next session is live again
     hits, seconds = plan.target.hit_rate, plan.target.duration_s
     above, below = choices_from_cue(plan.valence.cue, last.valence, patient, by)
     return {
@@ -248,7 +248,7 @@ def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
 
 
 def _last_intensity(session: TrainingSession, by: User) -> float:
-    """Give how the robot answered at the end of a session."""
+    """Return the robot's intensity at the end of a session."""
     changes = SessionEvent.objects.visible_to(by).filter(
         session=session, kind=ChangeKind.ROBOT_INTENSITY.value
     )

@@ -20,7 +20,7 @@ from rehab.sessions.log import EVENTS, Remark
 from rehab.sessions.models import TrainingSession
 from rehab.training.plans import ROBOT_LEVELS
 
-# What is noted with one tap, with its icon.
+# The icon of each remark, in the order of the buttons.
 ICONS = {
     Remark.REST: "rest",
     Remark.PAIN: "pain",
@@ -34,7 +34,7 @@ ICONS = {
 
 
 def redirect_to_consent(request: HttpRequest, patient: Patient) -> HttpResponse:
-    """Lead whoever would watch from elsewhere to the page where it can be agreed to."""
+    """Redirect somebody outside the clinic to the page where remote view is consented to."""
     said = _(
         "You are not in the clinic, and %(patient)s has not agreed to remote view. Ask first, and "
         "note it here."
@@ -46,7 +46,7 @@ def redirect_to_consent(request: HttpRequest, patient: Patient) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_safe
 def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
-    """Show and steer a session; everything on it comes by its socket."""
+    """Show the page that controls a session; its contents come by the session's socket."""
     sessions = TrainingSession.objects.visible_to(person(request))
     session = get_object_or_404(
         sessions.select_related("patient__clinic", "station", "measure"), pk=session_id
