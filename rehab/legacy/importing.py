@@ -11,7 +11,7 @@ from rehab.people.consent.tombstones import is_kept_away
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Measure
+from rehab.sessions.setup.protocols import Measure
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting

@@ -48,5 +48,5 @@ def lock_without_open_session(patient: Patient) -> None:
         patient=patient, state__in=[state.value for state in OPEN]
     )
     if sessions.exists():
-        said = _("%(patient)s still has an open session. End it first.")
-        raise SessionStillOpen(said % {"patient": patient.nickname})
+        message = _("%(patient)s still has an open session. End it first.")
+        raise SessionStillOpen(message % {"patient": patient.nickname})

@@ -45,8 +45,8 @@ class PatientForm(PatientRowForm):
         code: str = self.cleaned_data["code"]
         others = Patient.objects.visible_to(self._by).filter(code=code).exclude(pk=self.instance.pk)
         if (other := others.first()) is not None:
-            said = _("Code %(code)s already exists: it is %(nickname)s's.")
-            raise ValidationError(said % {"code": code, "nickname": other.nickname})
+            message = _("Code %(code)s already exists: it is %(nickname)s's.")
+            raise ValidationError(message % {"code": code, "nickname": other.nickname})
         return code
 
     def save(self, commit: bool = True) -> Patient:
@@ -101,6 +101,6 @@ class ErasingForm(forms.Form):
         """Return the code. Refuses any other than the patient's."""
         code: str = self.cleaned_data["code"]
         if code != self.patient.code:
-            said = _("That is not %(patient)s's code. Nothing was erased.")
-            raise ValidationError(said % {"patient": self.patient.nickname})
+            message = _("That is not %(patient)s's code. Nothing was erased.")
+            raise ValidationError(message % {"patient": self.patient.nickname})
         return code

@@ -19,7 +19,6 @@ from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import NotStored
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Protocol
 from rehab.sessions.reports.trend import with_metrics
 from rehab.sessions.schemas import (
     ChangeRequestBody,
@@ -32,6 +31,7 @@ from rehab.sessions.schemas import (
     StepPage,
 )
 from rehab.sessions.services import change_session
+from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind, Refused

@@ -78,7 +78,7 @@ def format_source(source: str) -> str:
     return gettext(source) if source else ""
 
 
-# What is said of a session's state beside its result: nothing where it went to its end.
+# Shown beside a session's result; a finished session needs none.
 STATE_LABELS: dict[State, Any] = {
     State.READY: _("not started"),
     State.RUNNING: _("running"),

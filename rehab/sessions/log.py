@@ -116,7 +116,7 @@ class SessionEvent(ScopedModel):
     Rows are only added.
 
     ``data``: what the robot reported; which device stopped it where that was no person; as
-    ``value`` (and ``old``) what a change was to that is no number: a name, or words and their type.
+    ``value`` (and ``old``) of a change that is no number: a name, or texts with their valence.
     """
 
     scope = PatientScope(
@@ -130,7 +130,7 @@ class SessionEvent(ScopedModel):
         _("after number"), help_text=_("The last step before it; 0 for none.")
     )
     kind = models.CharField(
-        _("kind"), max_length=32, choices=[(kind.value, words) for kind, words in EVENTS.items()]
+        _("kind"), max_length=32, choices=[(kind.value, label) for kind, label in EVENTS.items()]
     )
     old = models.FloatField(_("old"), null=True)
     value = models.FloatField(_("value"), null=True)

@@ -13,7 +13,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.consent.models import PatientScope
 from rehab.people.models import SIDES, Clinic, Patient, User
 from rehab.people.scope import ClinicRow
-from rehab.sessions.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import State
 from rehab.training.plans import SessionPlan
@@ -99,7 +99,7 @@ class TrainingSession(ClinicRow):
     state = models.CharField(
         _("state"),
         max_length=16,
-        choices=[(state.value, words) for state, words in STATES.items()],
+        choices=[(state.value, label) for state, label in STATES.items()],
         default=State.READY.value,
     )
     goal = models.FloatField(

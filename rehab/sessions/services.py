@@ -12,10 +12,10 @@ from django.utils.translation import gettext
 from rehab.feedback.valences import valences_of
 from rehab.people.consent.models import may_be_cared_for
 from rehab.people.models import Patient, User
-from rehab.sessions.cues import composed_gestures, silence_cue
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Measure, Protocol
+from rehab.sessions.setup.gestures import composed_gestures, silence_cue
+from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import OPEN, ChangeKind, PauseReason, Value
 from rehab.training.goals import GoalRule, Target

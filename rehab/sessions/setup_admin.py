@@ -18,10 +18,10 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import person
 from rehab.people.web.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
-from rehab.sessions.cues import robot_gesture_choices
 from rehab.sessions.forms.session import STRIDE_S, protocol_minutes
-from rehab.sessions.presets import Preset
-from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase, display_name
+from rehab.sessions.setup.gestures import robot_gesture_choices
+from rehab.sessions.setup.presets import Preset
+from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase, display_name
 
 TEMPORARY_OFFSET = 10_000  # of positions while phases change places; no protocol has as many
 
@@ -158,8 +158,8 @@ class ProtocolAdmin(SharedAdmin):
     ) -> HttpResponseBase | None:
         """Copy protocols into the clinic, which can then change them."""
         made = [self._copy(request, protocol) for protocol in protocols]
-        words = gettext("Copied: %(names)s. The copies are your clinic's to change.")
-        messages.success(request, words % {"names": ", ".join(copy.name for copy in made)})
+        message = gettext("Copied: %(names)s. The copies are your clinic's to change.")
+        messages.success(request, message % {"names": ", ".join(copy.name for copy in made)})
         if len(made) == 1:
             return redirect("admin:rehab_protocol_change", made[0].pk)
         return None

@@ -12,8 +12,8 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Protocol
 from rehab.sessions.services import SessionRequest, create_session
+from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Station
 from rehab.training.goals import GoalRule
 from rehab.training.metrics import METRICS

@@ -26,8 +26,8 @@ from rehab.people.consent.models import (
 from rehab.people.models import Boards, Erasing, Patient
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
-from rehab.sessions.defaults import install_defaults
 from rehab.sessions.services import SessionRequest, create_session
+from rehab.sessions.setup.defaults import install_defaults
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from tests.support.world import NOW, World, build_world, client_of

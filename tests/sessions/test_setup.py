@@ -9,8 +9,8 @@ from rehab.gestures.models import Gesture
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Protocol
 from rehab.sessions.services import SessionRequest, change_session, create_session
+from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule

@@ -27,9 +27,9 @@ from rehab.sessions.live.actor import Row, SessionActor
 from rehab.sessions.live.writer import Job, commit
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.presets import Preset
-from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase
 from rehab.sessions.services import SessionRequest, create_session
+from rehab.sessions.setup.presets import Preset
+from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
 from rehab.stations.models import Device, LeaveTries, Pairing, Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule

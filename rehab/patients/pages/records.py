@@ -64,8 +64,8 @@ def end(request: HttpRequest, patient_id: int) -> HttpResponse:
     except SessionStillOpen as problem:
         form.add_error(None, str(problem))
         return render_records(request, patient, ending=form)
-    said = _("%(patient)s's program has ended. Give the summary along.")
-    messages.success(request, said % {"patient": patient.nickname})
+    message = _("%(patient)s's program has ended. Give the summary along.")
+    messages.success(request, message % {"patient": patient.nickname})
     return redirect("patient", patient_id=patient.pk)
 
 

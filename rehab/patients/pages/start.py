@@ -48,12 +48,12 @@ def open_sessions(user: User) -> QuerySet[TrainingSession]:
     )
 
 
-def start_lists(user: User, words: str = "") -> dict[str, Any]:
+def start_lists(user: User, query: str = "") -> dict[str, Any]:
     """Return the context of the start page: who is expected today, and all patients."""
     now = clinic_time(timezone.now(), clinic_of(user))
     patients = patients_by_last_visit(user)
-    if words:
-        patients = patients.filter(Q(nickname__icontains=words) | Q(code__icontains=words))
+    if query:
+        patients = patients.filter(Q(nickname__icontains=query) | Q(code__icontains=query))
     else:  # patients whose program has ended are found by name or code only
         patients = patients.filter(ended_at=None)
     shown = list(patients[: MAX_PATIENTS + 1])
@@ -71,8 +71,8 @@ def start_lists(user: User, words: str = "") -> dict[str, Any]:
 @require_safe
 def choose_patient(request: HttpRequest) -> HttpResponse:
     """List who is expected today, then all patients."""
-    words = request.GET.get("q", "").strip()
-    context = start_lists(person(request), words) | {"q": words}
+    query = request.GET.get("q", "").strip()
+    context = start_lists(person(request), query) | {"q": query}
     return render(request, "sessions/start.html", context)
 
 
@@ -150,6 +150,6 @@ def add_demo(request: HttpRequest) -> HttpResponse:
         defaults={"nickname": "Demo", "paretic_side": "left", "simulated": True},
     )
     if not patient.simulated:
-        said = _("%(nickname)s has the code %(code)s. Give that patient another code first.")
-        messages.error(request, said % {"nickname": patient.nickname, "code": patient.code})
+        message = _("%(nickname)s has the code %(code)s. Give that patient another code first.")
+        messages.error(request, message % {"nickname": patient.nickname, "code": patient.code})
     return redirect("patient", patient_id=patient.pk)

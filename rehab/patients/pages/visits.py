@@ -50,9 +50,9 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
         messages.error(request, str(problem))
     else:
         visit = plan_visit(patient, day, at)
-        words = format_date(visit.day, "l j F") + (f", {visit.at:%H:%M}" if visit.at else "")
-        said = {"name": patient.nickname, "when": words}
-        messages.success(request, _("%(name)s is expected on %(when)s.") % said)
+        when = format_date(visit.day, "l j F") + (f", {visit.at:%H:%M}" if visit.at else "")
+        names = {"name": patient.nickname, "when": when}
+        messages.success(request, _("%(name)s is expected on %(when)s.") % names)
     return redirect("patient", patient_id=patient.pk)
 
 

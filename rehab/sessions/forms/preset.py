@@ -11,7 +11,7 @@ from django.utils.translation import gettext
 from rehab.people.access import clinic_of
 from rehab.people.models import Patient, User
 from rehab.sessions.forms.session import SessionForm
-from rehab.sessions.presets import NAME_TAKEN, Preset
+from rehab.sessions.setup.presets import NAME_TAKEN, Preset
 
 # Not part of a preset: they depend on the patient and the place.
 EXCLUDED_FIELDS = ("station", "trained_side")
@@ -26,7 +26,7 @@ def save_preset(data: Any, patient: Patient, by: User, name: str) -> Preset:
     for field in EXCLUDED_FIELDS:
         del form.fields[field]
     if not form.is_valid():
-        raise ValidationError([words for errors in form.errors.values() for words in errors])
+        raise ValidationError([message for errors in form.errors.values() for message in errors])
     chosen = form.cleaned_data
     kinds = {slug for slug, _words in Preset._meta.get_field("source").flatchoices}
     preset = Preset(

@@ -14,23 +14,23 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import SIDES, Patient, User
 from rehab.people.web.refusals import in_words
-from rehab.sessions.cues import (
-    DEFAULT_GESTURE,
-    choices_from_cue,
-    cue_from_choices,
-    robot_gesture_choices,
-)
 from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_source
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Protocol
 from rehab.sessions.services import (
     SessionRequest,
     StationTaken,
     check_station_is_free,
     create_session,
 )
-from rehab.sessions.step_sources import LIVE, build_source_args, source_choices
+from rehab.sessions.setup.gestures import (
+    DEFAULT_GESTURE,
+    choices_from_cue,
+    cue_from_choices,
+    robot_gesture_choices,
+)
+from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.sources import LIVE, build_source_args, source_choices
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
 from rehab.stations.models import Station
@@ -90,7 +90,7 @@ class SessionForm(forms.Form):
         fields["protocol"].queryset = Protocol.objects.visible_to(by)
         fields["station"].queryset = Station.objects.visible_to(by)
         fields["source"].choices = [
-            (name, format_source(words)) for name, words in source_choices()
+            (name, format_source(label)) for name, label in source_choices()
         ]
         fields["robot_above"].choices = fields["robot_below"].choices = robot_gesture_choices(by)
 
@@ -196,7 +196,7 @@ def _first_free_station(stations: QuerySet[Station]) -> Station | None:
 def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
     """Return the set-up's initial values: those of the last session, or defaults."""
     stations = Station.objects.visible_to(by)
-    words = dict(source_choices())
+    sources = dict(source_choices())
     last = (
         TrainingSession.objects.visible_to(by)
         .filter(patient=patient, protocol__isnull=False)
@@ -217,14 +217,14 @@ def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
             "protocol": protocol,
             "station": _first_free_station(stations),
             "source": (source := "synthetic good" if patient.simulated else LIVE),
-            "source_words": format_source(words[source]),
+            "source_words": format_source(sources[source]),
             "trained_side": patient.paretic_side or Side.LEFT.value,
             "robot": "normal",
             "robot_above": DEFAULT_GESTURE,
             "robot_below": DEFAULT_GESTURE,
         }
     plan = last.to_plan()
-    source = next((name for name, label in words.items() if label == last.source), LIVE)
+    source = next((name for name, label in sources.items() if label == last.source), LIVE)
     if last.source_args and not patient.simulated:
         source = LIVE  # after a trial with a simulator, a person's next session is live again
     hits, seconds = plan.target.hit_rate, plan.target.duration_s
@@ -239,7 +239,7 @@ def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
         "protocol": last.protocol,
         "station": last.station or _first_free_station(stations),
         "source": source,
-        "source_words": format_source(words[source]),
+        "source_words": format_source(sources[source]),
         "trained_side": last.trained_side,
         "robot": name_robot_level(_last_intensity(last, by)),
         "robot_above": above,

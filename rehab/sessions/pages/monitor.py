@@ -35,11 +35,11 @@ ICONS = {
 
 def redirect_to_consent(request: HttpRequest, patient: Patient) -> HttpResponse:
     """Redirect somebody outside the clinic to the page where remote view is consented to."""
-    said = _(
+    message = _(
         "You are not in the clinic, and %(patient)s has not agreed to remote view. Ask first, and "
         "note it here."
     )
-    messages.error(request, said % {"patient": patient.nickname})
+    messages.error(request, message % {"patient": patient.nickname})
     return redirect("consent", patient_id=patient.pk)
 
 

@@ -16,8 +16,8 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.forms.preset import save_preset
 from rehab.sessions.forms.session import SessionForm, initial_choices, protocol_minutes
-from rehab.sessions.presets import Preset
-from rehab.sessions.protocols import Protocol
+from rehab.sessions.setup.presets import Preset
+from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.builtin import first_station
 
 # Where the person who set the session up may go next.
@@ -47,8 +47,8 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
                 form.errors.clear()
                 form.add_error(None, problem.messages)
             else:
-                words = gettext("Saved as preset “%(name)s”. It is renamed or deleted in Admin.")
-                messages.success(request, words % {"name": preset.name})
+                message = gettext("Saved as preset “%(name)s”. It is renamed or deleted in Admin.")
+                messages.success(request, message % {"name": preset.name})
                 return redirect(f"{reverse('setup', args=[patient.pk])}?preset={preset.pk}")
         elif (session := form.create()) is not None:
             return redirect(

@@ -124,7 +124,7 @@ class SessionSearchFilter(ListFilter):
         self.zone = user.clinic.time_zone if user.clinic else settings.TIME_ZONE
         names = [name for name in SessionSearchForm(by=user).fields if name in params]
         given = {name: params.pop(name)[-1].strip() for name in names}
-        self.used_parameters = {name: words for name, words in given.items() if words}
+        self.used_parameters = {name: value for name, value in given.items() if value}
         self.form = SessionSearchForm(given or None, by=user)
         self.others: list[tuple[str, str]] = []
 

@@ -14,15 +14,15 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.models import Clinic, User
 from rehab.people.scope import ClinicRow, Scope
 from rehab.people.web.refusals import in_words
-from rehab.sessions.cues import DEFAULT_GESTURE, known_gesture_choices
 from rehab.sessions.formatting import (
     ROBOT_LEVEL_LABELS,
     SIMULATED_PREFIX,
     format_quantity,
     format_rate,
 )
-from rehab.sessions.protocols import Protocol
-from rehab.sessions.step_sources import LIVE
+from rehab.sessions.setup.gestures import DEFAULT_GESTURE, known_gesture_choices
+from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.sources import LIVE
 from rehab.sources.synthetic import PROFILES
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting

@@ -64,7 +64,7 @@ PROTOCOLS: dict[str, tuple[str, tuple[Phase, ...]]] = {
 
 def install_defaults(using: str = "default", **_signal: Any) -> None:
     """Add missing shared rows; existing ones are not changed."""
-    from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase
+    from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
 
     with transaction.atomic(using=using):
         Measure.everywhere.using(using).get_or_create(
