@@ -22,7 +22,7 @@ from rehab.people.roles import Role
 from rehab.people.web.language import speak_to
 from rehab.sessions.formatting import NBSP, clinic_time, format_number
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import OPEN, State
+from rehab.training.changes import OPEN_STATES, State
 
 SHOWN_S = 20  # a board on a tablet that waits, before the next one
 TITLES = {
@@ -42,7 +42,7 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
     """
     session = find_session(request, session_id)
     speak_to(session.patient)
-    if State(session.state) in OPEN:
+    if State(session.state) in OPEN_STATES:
         return redirect("walk", session_id=session.pk)
     boards: list[Shown] = []
     if not session.patient.blinded:

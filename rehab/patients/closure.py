@@ -13,7 +13,7 @@ from django.utils.translation import gettext as _
 
 from rehab.people.models import Ending, Patient
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import OPEN
+from rehab.training.changes import OPEN_STATES
 
 
 class SessionStillOpen(ValueError):
@@ -45,7 +45,7 @@ def lock_without_open_session(patient: Patient) -> None:
     """Lock the patient's row. Raises SessionStillOpen where a session could still go on."""
     patient.hold()
     sessions = TrainingSession.everywhere.filter(
-        patient=patient, state__in=[state.value for state in OPEN]
+        patient=patient, state__in=[state.value for state in OPEN_STATES]
     )
     if sessions.exists():
         message = _("%(patient)s still has an open session. End it first.")

@@ -16,7 +16,7 @@ from rehab.people.scope import ClinicRow, Scope
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.today import IS_OPEN, todays_sessions
-from rehab.training.changes import OPEN, State
+from rehab.training.changes import OPEN_STATES, State
 
 SOON_DAYS = (0, 1, 2, 7)  # days from today that one tap plans
 QUARTER_MIN = 15
@@ -133,7 +133,7 @@ def _to_row(
     if at is None and sessions:
         at = sessions[0].created_at.astimezone(now.tzinfo).time().replace(second=0, microsecond=0)
     states = [State(session.state) for session in sessions]
-    progress = [PROGRESS_OF_OPEN[state] for state in states if state in OPEN]
+    progress = [PROGRESS_OF_OPEN[state] for state in states if state in OPEN_STATES]
     ended = Progress.DONE if sessions else Progress.EXPECTED
     return PatientToday(
         patient,

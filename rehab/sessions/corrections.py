@@ -20,7 +20,7 @@ from rehab.people.models import Patient, User
 from rehab.people.scope import ScopedModel
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import OPEN, State
+from rehab.training.changes import OPEN_STATES, State
 
 
 class CorrectedField(models.TextChoices):
@@ -123,7 +123,7 @@ def normalize_newlines(text: str) -> str:
 
 def can_correct(session: TrainingSession) -> bool:
     """Return whether a session can be corrected: one that still runs must be ended first."""
-    return State(session.state) not in OPEN
+    return State(session.state) not in OPEN_STATES
 
 
 @transaction.atomic

@@ -19,7 +19,7 @@ from rehab.sessions.live import runtime
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import NotStored
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import OPEN, ChangeKind
+from rehab.training.changes import OPEN_STATES, ChangeKind
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import Valence, bands_to_json
 
@@ -34,7 +34,7 @@ def update_open_sessions(
 ) -> list[str]:
     """Update the clinic's open sessions; return messages about those that could not be."""
     open_ones = TrainingSession.everywhere.filter(
-        clinic=clinic_id, state__in=[state.value for state in OPEN]
+        clinic=clinic_id, state__in=[state.value for state in OPEN_STATES]
     )
     problems: list[str] = []
     for session in open_ones.select_related("patient").order_by("pk"):
@@ -64,7 +64,7 @@ async def _update_session(session_id: int, valence: Valence, by: User) -> None:
         if known is None or known.bands == valence.bands:
             return
         value = {"valence": valence.slug, "bands": bands_to_json(valence.bands)}
-        await live_runtime.change(session_id, ChangeKind.WORDS, value, by)
+        await live_runtime.change(session_id, ChangeKind.FEEDBACK_TEXT, value, by)
     finally:
         if not in_server:
             await live_runtime.drain()

@@ -17,13 +17,13 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.gestures import composed_gestures, silence_cue
 from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.models import Station
-from rehab.training.changes import OPEN, ChangeKind, PauseReason, Value
+from rehab.training.changes import OPEN_STATES, ChangeKind, ChangeValue, PauseReason
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.plans import DEFAULT_ACTIVATION_THRESHOLD, SessionPlan
 from rehab.training.steps import Side
-from rehab.training.valences import Cue, Valence, find_valence
+from rehab.training.valences import CueGestures, Valence, find_valence
 
 
 class StationTaken(InvalidSetting):
@@ -49,7 +49,7 @@ class SessionRequest:
     trained_side: Side | None = None
     target: Target = field(default_factory=Target)
     activation_threshold: float = DEFAULT_ACTIVATION_THRESHOLD
-    cue: Cue | None = None
+    cue: CueGestures | None = None
     robot_intensity: float = 1.0
     station: Station | None = None
     created_by: User | None = None
@@ -60,7 +60,7 @@ class SessionRequest:
 
 def check_station_is_free(station: Station) -> None:
     """Raise StationTaken where a session is open at a station."""
-    states = [state.value for state in OPEN]
+    states = [state.value for state in OPEN_STATES]
     taken = TrainingSession.everywhere.filter(
         station=station, clinic=station.clinic_id, state__in=states
     )
@@ -135,7 +135,7 @@ def _make_plan(request: SessionRequest, measure: Measure) -> SessionPlan:
         try:
             gestures |= {gesture["name"]: gesture for gesture in composed_gestures(patient, cue)}
         except InvalidSetting:  # a deleted gesture must not hinder a session of another type
-            cue = Cue()
+            cue = CueGestures()
         alternatives.append(replace(other, cue=cue))
     return SessionPlan(
         measure=measure.to_rule(),
@@ -170,7 +170,7 @@ def _check_patient_may_train(patient: Patient) -> None:
 
 
 def change_session(
-    session: TrainingSession, kind: ChangeKind, value: Value = None, by: User | None = None
+    session: TrainingSession, kind: ChangeKind, value: ChangeValue = None, by: User | None = None
 ) -> None:
     """Start, pause, steer or end a session from a page; committed when this returns.
 
@@ -182,7 +182,7 @@ def change_session(
     async_to_sync(_change)(session.pk, kind, value, by)
 
 
-async def _change(session_id: int, kind: ChangeKind, value: Value, by: User | None) -> None:
+async def _change(session_id: int, kind: ChangeKind, value: ChangeValue, by: User | None) -> None:
     in_server = runtime.peek() is not None  # else a command, which must not leave anything running
     live = runtime.current()
     try:

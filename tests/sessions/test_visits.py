@@ -22,13 +22,12 @@ pytestmark = pytest.mark.django_db
 
 
 @pytest.fixture
-def world() -> World:
-    made = build_world("amber")
+def world(world: World) -> World:
     Visit.everywhere.all().delete()
     then = NOW - timedelta(9)
-    sessions = TrainingSession.everywhere.filter(pk=made.session.pk)
+    sessions = TrainingSession.everywhere.filter(pk=world.session.pk)
     sessions.update(created_at=then, started_at=then)
-    return made
+    return world
 
 
 def patient(world: World, name: str) -> Patient:

@@ -16,8 +16,8 @@ from rehab.sessions.formatting import clinic_time, format_day, format_state
 from rehab.sessions.forms.correction import CorrectionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.review import review_session
-from rehab.sessions.reports.summary import format_phases, summarize_session
-from rehab.training.changes import OPEN, State
+from rehab.sessions.reports.summary import format_phases, format_summary
+from rehab.training.changes import OPEN_STATES, State
 
 
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
@@ -30,7 +30,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         pk=session_id,
     )
     review = review_session(user, session)
-    summary = summarize_session(session.to_plan(), review)
+    summary = format_summary(session.to_plan(), review)
     corrections = describe_corrections(session, user)
     notes = (entry.new for entry in corrections if entry.row.field == CorrectedField.NOTE)
     by_name = user.role != Role.RESEARCHER
@@ -43,7 +43,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         "day": format_day(start.date(), now.date()).capitalize(),
         "time": f"{start:%H:%M}",
         "state": format_state(session.state),
-        "open": State(session.state) in OPEN,
+        "open": State(session.state) in OPEN_STATES,
         "can_correct": by_name and can_correct(session),
         "corrections": corrections,
         "note": next(notes, ""),

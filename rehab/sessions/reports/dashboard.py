@@ -21,7 +21,7 @@ from rehab.sessions.reports.trend import with_metrics
 from rehab.sessions.reports.week import week_summary
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import is_overdue
-from rehab.training.changes import OPEN, State
+from rehab.training.changes import OPEN_STATES, State
 
 MAX_ENDED = 40  # ended sessions of today that are listed; open ones are all listed
 OPEN_TOO_LONG = timedelta(hours=3)  # no visit takes as long
@@ -89,7 +89,7 @@ def sessions_today(user: User, clinic: Clinic, now: datetime) -> list[SessionRow
             patient=row.patient.nickname if by_name else row.patient.pseudonym,
             time=_format_time(clinic_time(row.began_at, clinic), midnight_of(local)),
             state=row.get_state_display(),
-            is_open=State(row.state) in OPEN,
+            is_open=State(row.state) in OPEN_STATES,
             duration=format_duration(row.active_s),
             hit_rate=_format_hit_rate(row),
         )
@@ -99,7 +99,7 @@ def sessions_today(user: User, clinic: Clinic, now: datetime) -> list[SessionRow
 
 def _format_hit_rate(row: Any) -> str:
     """Return the hit rate; of an open session the current one, where this process runs it."""
-    if State(row.state) not in OPEN:
+    if State(row.state) not in OPEN_STATES:
         return format_rate(row.metric_hit_rate)
     live = find_live_session(row)
     rate = live.actor.fold.feedback.hit_rate if live else None

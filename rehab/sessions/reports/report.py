@@ -20,7 +20,7 @@ from rehab.sessions.log import Remark, RobotEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.report_chart import draw_chart
 from rehab.sessions.reports.review import SessionReview, review_session
-from rehab.sessions.reports.summary import Figure, format_phases, summarize_session
+from rehab.sessions.reports.summary import Figure, format_phases, format_summary
 from rehab.sessions.reports.trend import TrendPoint, load_trend
 from rehab.training.changes import ChangeKind
 from rehab.training.plans import SessionPlan
@@ -53,7 +53,7 @@ def _list_figures(
     plan: SessionPlan, review: SessionReview, point: TrendPoint | None
 ) -> list[Figure]:
     """Return the main figures in the order of the page, with the mean beside its baseline."""
-    summary = summarize_session(plan, review)
+    summary = format_summary(plan, review)
     with_feedback, baseline = (point.with_feedback, point.baseline) if point else (None, None)
     unit = plan.measure.unit
     note = _("no baseline")

@@ -25,9 +25,9 @@ from rehab.sessions.payloads import MARKED_CHANGES
 from rehab.sessions.replay import fold_log
 from rehab.sessions.reports.trend import metrics_by_session
 from rehab.training.changes import ChangeKind, PauseReason
-from rehab.training.figures import describe_session
 from rehab.training.fold import SessionFold
 from rehab.training.plans import SessionPlan, name_robot_level
+from rehab.training.summary import summarize_session
 from rehab.training.valences import VALENCES
 
 # Counted only: listed, they would hide what people did.
@@ -50,7 +50,7 @@ EVENT_LABELS = {
     ChangeKind.ACTIVATION_THRESHOLD: _("Robot threshold"),
     ChangeKind.ROBOT_INTENSITY: _("Robot"),
     ChangeKind.VALENCE: _("Next feedback type"),
-    ChangeKind.WORDS: _("Words edited"),
+    ChangeKind.FEEDBACK_TEXT: _("Words edited"),
     ChangeKind.WORDS_SHOWN: _("Words"),
     ChangeKind.CHART_STYLE: _("Chart"),
     RobotEntry.STOP: _("Robot stopped"),
@@ -110,7 +110,7 @@ def review_session(user: User, session: TrainingSession) -> SessionReview:
         event.kind == RobotEntry.GESTURE.value and event.data.get("phase") == "started"
         for event in rows
     )
-    figures = describe_session(fold)
+    figures = summarize_session(fold)
     if (
         session.original_id is not None
     ):  # imported without a log: its stored figures are all there is
@@ -141,7 +141,7 @@ def describe_event(event: SessionEvent, plan: SessionPlan) -> str:
             return f"{name}: {gettext(plan.phases[int(event.value or 0)].name)}"
         case ChangeKind.VALENCE:
             return f"{name}: {_valence_label(event.data.get('value'))}"
-        case ChangeKind.WORDS:
+        case ChangeKind.FEEDBACK_TEXT:
             return f"{name}: {_valence_label(event.data.get('value', {}).get('valence'))}"
         case ChangeKind.WORDS_SHOWN:
             return f"{name}: {gettext('on') if event.value else gettext('off')}"

@@ -110,7 +110,7 @@ class SessionSearchFilter(ListFilter):
     """The form as a filter of the admin. An invalid form shows its errors and finds nothing."""
 
     title = _("what was walked")
-    template = "admin/find.html"
+    template = "admin/search_filter.html"
 
     def __init__(
         self,

@@ -35,7 +35,7 @@ class SessionSummary:
     strides: Figure
 
 
-def summarize_session(plan: SessionPlan, review: SessionReview) -> SessionSummary:
+def format_summary(plan: SessionPlan, review: SessionReview) -> SessionSummary:
     """Return the main figures of a session."""
     figures, target = review.figures, plan.target
     has_score = plan.valence.has_points or figures["score"] is not None

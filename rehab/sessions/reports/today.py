@@ -8,9 +8,9 @@ from django.db.models import Q, QuerySet
 
 from rehab.sessions.formatting import midnight_of
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import OPEN
+from rehab.training.changes import OPEN_STATES
 
-IS_OPEN = Q(state__in=[state.value for state in OPEN])
+IS_OPEN = Q(state__in=[state.value for state in OPEN_STATES])
 
 
 def begun_today(now: datetime) -> Q:

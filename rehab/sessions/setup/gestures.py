@@ -14,7 +14,7 @@ from rehab.gestures.models import Gesture
 from rehab.people.models import Patient, User
 from rehab.people.web.refusals import in_words
 from rehab.training.measures import InvalidSetting
-from rehab.training.valences import Cue
+from rehab.training.valences import CueGestures
 from robot.gestures import GESTURES, ORIGINALS, BadGesture
 from robot.trial import admit_gesture
 
@@ -39,17 +39,17 @@ def known_gesture_choices(by: User) -> set[str]:
     return {DEFAULT_GESTURE, NO_GESTURE, *GESTURES, *ORIGINALS, *composed}
 
 
-def cue_from_choices(above: str, below: str, valence: str, patient: Patient) -> Cue:
+def cue_from_choices(above: str, below: str, valence: str, patient: Patient) -> CueGestures:
     """Return the cue for two choices, with the defaults of the patient's clinic."""
     default = valences_of(patient.clinic_id)[valence].cue
-    return Cue(_gesture(above, default.above), _gesture(below, default.below))
+    return CueGestures(_gesture(above, default.above), _gesture(below, default.below))
 
 
 def _gesture(choice: str, default: str | None) -> str | None:
     return default if choice == DEFAULT_GESTURE else None if choice == NO_GESTURE else choice
 
 
-def choices_from_cue(cue: Cue, valence: str, patient: Patient, by: User) -> tuple[str, str]:
+def choices_from_cue(cue: CueGestures, valence: str, patient: Patient, by: User) -> tuple[str, str]:
     """Return the choices for a cue; the default for a gesture that was deleted."""
     default = valences_of(patient.clinic_id)[valence].cue
     composed = Gesture.objects.visible_to(by).values_list("name", flat=True)
@@ -63,7 +63,7 @@ def _choice(gesture: str | None, default: str | None, known: set[str | None]) ->
     return gesture or NO_GESTURE
 
 
-def composed_gestures(patient: Patient, cue: Cue) -> Iterator[dict[str, Any]]:
+def composed_gestures(patient: Patient, cue: CueGestures) -> Iterator[dict[str, Any]]:
     """Yield the composed gestures of the patient's clinic that a cue names, as sent to a robot.
 
     Raises InvalidSetting for an unknown gesture, and for one that no robot would play.
@@ -87,13 +87,13 @@ def composed_gestures(patient: Patient, cue: Cue) -> Iterator[dict[str, Any]]:
         yield data
 
 
-def silence_cue(cue: Cue, default: Cue, chosen: Cue) -> Cue:
+def silence_cue(cue: CueGestures, default: CueGestures, chosen: CueGestures) -> CueGestures:
     """Return the cue of another valence that a session may be changed to.
 
     Where the PT chose no gesture although ``default`` has one, the result has none either: a change
     of the feedback must not make a robot move that was set to stand still.
     """
-    return Cue(
+    return CueGestures(
         None if default.above and not chosen.above else cue.above,
         None if default.below and not chosen.below else cue.below,
     )
