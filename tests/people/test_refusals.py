@@ -17,7 +17,7 @@ from django.utils.translation import override
 from rehab.people.models import Clinic, Patient
 from rehab.people.roles import Role
 from rehab.people.web.refusals import in_words
-from rehab.sessions.protocols import Protocol
+from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind, NotAllowed, State, next_state
 from rehab.training.goals import GoalRule

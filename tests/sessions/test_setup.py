@@ -9,8 +9,8 @@ from rehab.gestures.models import Gesture
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Protocol
-from rehab.sessions.services import change_session, create_session
+from rehab.sessions.services import SessionRequest, change_session, create_session
+from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
@@ -82,7 +82,7 @@ def test_every_choice_reaches_the_plan(pt, patient, station, world):
         CueGestures(None, "droop"),
         (),
     )
-    assert (session.runs, session.simulated) == ([], False)
+    assert (session.source_args, session.simulated) == ([], False)
 
 
 def test_the_therapist_may_go_on_at_the_own_page(pt, patient, station):
@@ -152,7 +152,7 @@ def test_nobody_begins_where_somebody_else_may_be_walking(pt, patient, station, 
 def test_like_last_time_offers_what_the_last_session_was(pt, patient, station):
     pt.post(f"/patients/{patient.pk}/new/", choices(station, source="synthetic poor"))
     session = newest()
-    assert session.runs[:3] == ["synthetic", "--profile", "poor"]
+    assert session.source_args[:3] == ["synthetic", "--profile", "poor"]
     assert session.simulated
     change_session(session, ChangeKind.START)
     change_session(session, ChangeKind.GOAL, 4.2)
@@ -213,11 +213,13 @@ def test_a_gesture_of_another_clinic_cannot_be_chosen(pt, patient, station, worl
     assert "Select a valid choice" in page.content.decode()
     with pytest.raises(InvalidSetting, match="no gesture wave"):
         create_session(
-            patient,
-            valence="positive",
-            goal=GoalRule(value=4.0),
-            protocol=Protocol.everywhere.get(name="Training only"),
-            cue=CueGestures(above="wave"),
+            SessionRequest(
+                patient=patient,
+                valence="positive",
+                goal=GoalRule(value=4.0),
+                protocol=Protocol.everywhere.get(name="Training only"),
+                cue=CueGestures(above="wave"),
+            )
         )
 
 
@@ -234,7 +236,7 @@ def test_recordings_of_this_machine_can_be_chosen_and_are_looked_at(
     assert "layouts" in page.lower()
     (folder / "walk.csv").write_text("time_s,side,value\n1.0,left,4.0\n2.1,left,3.9\n")
     pt.post(url, choices(station, source="recording walk.csv"))
-    assert newest().runs == ["recording", str(folder / "walk.csv")]
+    assert newest().source_args == ["recording", str(folder / "walk.csv")]
     settings.HOSTED = True  # there a folder would belong to no clinic
     assert "walk.csv" not in pt.get(url).content.decode()
 
@@ -254,7 +256,7 @@ def test_recorded_signals_can_be_chosen_once_the_body_mass_is_known(
     answer = pt.post(f"/patients/{patient.pk}/details/", details)
     assert answer.url == f"/patients/{patient.pk}/"
     pt.post(url, signals)
-    assert newest().runs == ["recording", str(file), "--mass", "71.5"]
+    assert newest().source_args == ["recording", str(file), "--mass", "71.5"]
 
 
 def test_a_patients_details_can_be_mended_but_not_into_somebody_elses(pt, patient, world):

@@ -1,4 +1,4 @@
-"""Presets: what a PT often sets up, kept under a name and put into the set-up with one tap."""
+"""Presets: set-ups stored under a name, to fill in the set-up form with one tap."""
 
 from __future__ import annotations
 
@@ -14,10 +14,15 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.models import Clinic, User
 from rehab.people.scope import ClinicRow, Scope
 from rehab.people.web.refusals import in_words
-from rehab.sessions.cues import USUAL, name_gestures
-from rehab.sessions.formatting import LEVELS, SIMULATED, say_quantity, say_rate
-from rehab.sessions.protocols import Protocol
-from rehab.sessions.step_sources import LIVE
+from rehab.sessions.formatting import (
+    ROBOT_LEVEL_LABELS,
+    SIMULATED_PREFIX,
+    format_quantity,
+    format_rate,
+)
+from rehab.sessions.setup.gestures import DEFAULT_GESTURE, known_gesture_choices
+from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.sources import LIVE
 from rehab.sources.synthetic import PROFILES
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting
@@ -66,11 +71,15 @@ class Preset(ClinicRow):
     robot = models.CharField(
         _("robot"),
         max_length=16,
-        choices=[(level, capfirst(LEVELS[level])) for level in ROBOT_LEVELS],
+        choices=[(level, capfirst(ROBOT_LEVEL_LABELS[level])) for level in ROBOT_LEVELS],
         default="normal",
     )
-    robot_above = models.CharField(_("after five strong seconds"), max_length=64, default=USUAL)
-    robot_below = models.CharField(_("after five weak seconds"), max_length=64, default=USUAL)
+    robot_above = models.CharField(
+        _("after five strong seconds"), max_length=64, default=DEFAULT_GESTURE
+    )
+    robot_below = models.CharField(
+        _("after five weak seconds"), max_length=64, default=DEFAULT_GESTURE
+    )
     source = models.CharField(
         _("steps come from"),
         max_length=64,
@@ -78,7 +87,7 @@ class Preset(ClinicRow):
         choices=[
             ("", _("As last time")),
             (LIVE, _("Live sensor")),
-            *((f"synthetic {name}", _(SIMULATED + name)) for name in PROFILES),
+            *((f"synthetic {name}", _(SIMULATED_PREFIX + name)) for name in PROFILES),
         ],
     )
 
@@ -98,10 +107,10 @@ class Preset(ClinicRow):
         return self.name
 
     def clean(self) -> None:
-        """Refuse what could not be walked, in the rules' own words."""
+        """Refuse what could not be walked, with the rules' own message."""
         protocol = getattr(self, "protocol", None)
         if protocol is None or self.valence not in VALENCES or self.robot not in ROBOT_LEVELS:
-            return  # said at the field itself
+            return  # the field itself has the error
         by_value = self.goal_by == "value"
         try:
             SessionPlan(
@@ -119,36 +128,38 @@ class Preset(ClinicRow):
             raise ValidationError(in_words(problem)) from problem
 
     @property
-    def about(self) -> str:
-        """Say in a few words what it sets."""
-        return " · ".join(filter(None, (self.get_valence_display(), self.goal_words, self.length)))
+    def summary(self) -> str:
+        """Valence, goal and duration in a few words."""
+        return " · ".join(
+            filter(None, (self.get_valence_display(), self.goal_label, self.duration_label))
+        )
 
     @property
-    def goal_words(self) -> str:
-        """Say the goal."""
+    def goal_label(self) -> str:
+        """The goal as text."""
         if self.goal_by == "value":
-            return say_quantity(self.goal_value, A2.unit)
-        share = say_rate(self.goal_percent / 100 if self.goal_percent else None)
+            return format_quantity(self.goal_value, A2.unit)
+        share = format_rate(self.goal_percent / 100 if self.goal_percent else None)
         return gettext("%(share)s of baseline") % {"share": share}
 
     @property
-    def length(self) -> str:
-        """Say how long is planned."""
+    def duration_label(self) -> str:
+        """The planned duration as text."""
         return gettext("%(count)s min") % {"count": self.minutes} if self.minutes else ""
 
-    def to_choices(self, by: User) -> dict[str, Any]:
-        """Give what it sets of the set-up; a gesture that is gone becomes the usual one."""
-        known = name_gestures(by)
-        chosen: dict[str, Any] = {
+    def to_initial(self, by: User) -> dict[str, Any]:
+        """Return initial values for the set-up form; a deleted gesture becomes the default one."""
+        known = known_gesture_choices(by)
+        initial: dict[str, Any] = {
             "valence": self.valence,
             "goal_by": self.goal_by,
             "wanted_hits": self.wanted_hits,
             "minutes": self.minutes,
             "protocol": self.protocol,
             "robot": self.robot,
-            "robot_above": self.robot_above if self.robot_above in known else USUAL,
-            "robot_below": self.robot_below if self.robot_below in known else USUAL,
+            "robot_above": self.robot_above if self.robot_above in known else DEFAULT_GESTURE,
+            "robot_below": self.robot_below if self.robot_below in known else DEFAULT_GESTURE,
         }
         goal = {"goal_value": self.goal_value, "goal_percent": self.goal_percent}
-        chosen |= {name: value for name, value in goal.items() if value is not None}
-        return chosen | ({"source": self.source} if self.source else {})
+        initial |= {name: value for name, value in goal.items() if value is not None}
+        return initial | ({"source": self.source} if self.source else {})

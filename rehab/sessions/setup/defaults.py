@@ -1,6 +1,6 @@
-"""Rows that every database begins with: the measure A2 and the protocols that all may use.
+"""Rows of a new database: the measure A2 and the protocols that all clinics share.
 
-They are stored in English, and each page says them in its language.
+They are stored in English and translated by the pages.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ PROTOCOLS: dict[str, tuple[str, tuple[Phase, ...]]] = {
 
 
 def install_defaults(using: str = "default", **_signal: Any) -> None:
-    """Add what is missing of the shared rows; rows that are there stay as they are."""
-    from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase
+    """Add missing shared rows; existing ones are not changed."""
+    from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
 
     with transaction.atomic(using=using):
         Measure.everywhere.using(using).get_or_create(

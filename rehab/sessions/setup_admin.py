@@ -18,25 +18,25 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import person
 from rehab.people.web.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
-from rehab.sessions.cues import list_gestures
-from rehab.sessions.forms import STRIDE_S, minutes_of
-from rehab.sessions.presets import Preset
-from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase, say_shared
+from rehab.sessions.forms.session import STRIDE_S, protocol_minutes
+from rehab.sessions.setup.gestures import robot_gesture_choices
+from rehab.sessions.setup.presets import Preset
+from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase, display_name
 
-PARKED = 10_000  # where phases wait while they change places; no protocol has as many
+TEMPORARY_OFFSET = 10_000  # of positions while phases change places; no protocol has as many
 
 
 class SharedAdmin(ScopedAdmin):
-    """Rows of which some are the clinic's own and some are shared by all."""
+    """Admin of rows that are the clinic's own or shared by all."""
 
     @admin.display(description=_("name"), ordering="name")
     def named(self, row: Measure | Protocol) -> str:
-        """Say its name."""
-        return say_shared(row)
+        """Its name."""
+        return display_name(row)
 
     @admin.display(description=_("belongs to"), ordering="clinic")
     def whose(self, row: Measure | Protocol) -> str:
-        """Say whether all clinics have it."""
+        """Whether all clinics have it."""
         return gettext("all clinics") if row.clinic_id is None else gettext("this clinic")
 
 
@@ -49,7 +49,7 @@ class MeasureAdmin(SharedAdmin):
 
 
 class PhaseForm(forms.ModelForm):
-    """A phase as a row. Its place is where it stands: the page numbers the rows."""
+    """A phase as a row; its position is that of the row, which the page numbers."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -57,7 +57,7 @@ class PhaseForm(forms.ModelForm):
         self.fields["position"].widget.attrs["class"] = "vIntegerField"
 
     def _get_validation_exclusions(self) -> set[str]:
-        # Two rows may swap places; that each place is taken once is the page's business.
+        # Two rows may swap positions; `PhaseFormSet` numbers them without duplicates.
         return super()._get_validation_exclusions() | {"position"}  # type: ignore[misc, no-any-return]
 
 
@@ -92,7 +92,7 @@ class PhaseRows(ScopedOptions, admin.TabularInline):
     fields = ("position", "kind", "name", "feedback", "gain", "strides", "seconds")
 
     def get_extra(self, request: HttpRequest, obj: Any = None, **options: Any) -> int:
-        """Give a new protocol a row to begin with."""
+        """Return one empty row for a new protocol."""
         return 0 if obj else 1
 
 
@@ -107,29 +107,29 @@ class ProtocolAdmin(SharedAdmin):
     actions = row_actions = for_viewers = ("copy_to_clinic",)
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Protocol]:
-        """Give the visible protocols with their phases."""
+        """Return the visible protocols with their phases."""
         return super().get_queryset(request).prefetch_related("phases")
 
     @admin.display(description=_("description"))
     def about(self, protocol: Protocol) -> str:
-        """Say what it is for."""
+        """Its description."""
         return protocol.description if protocol.clinic_id else gettext(protocol.description)
 
     @admin.display(description=_("phases"))
     def phase_count(self, protocol: Protocol) -> int:
-        """Count the phases."""
+        """The number of phases."""
         return len(protocol.phases.all())
 
     @admin.display(description=_("takes"))
     def length(self, protocol: Protocol) -> str:
-        """Say how long it takes, where every phase ends by itself."""
-        minutes = minutes_of(protocol)
+        """Its duration, where every phase ends by itself."""
+        minutes = protocol_minutes(protocol)
         return gettext("open end") if minutes is None else f"{minutes} min"
 
     def render_change_form(
         self, request: HttpRequest, context: dict[str, Any], *args: Any, **kwargs: Any
     ) -> Any:
-        """Show the form; what is drawn of the protocol begins with what is stored."""
+        """Show the form with a drawing of the stored protocol."""
         row: Protocol | None = context.get("original")
         context["stride_s"] = STRIDE_S
         context["phases"] = [asdict(phase) for phase in (row.to_rules() if row else ())]
@@ -137,16 +137,16 @@ class ProtocolAdmin(SharedAdmin):
 
     @transaction.atomic
     def save_formset(self, request: HttpRequest, form: Any, formset: Any, change: bool) -> None:
-        """Save the phases; each stands aside first, so that two can change places."""
+        """Save the phases, all moved aside first, so that two can change places."""
         phases = ProtocolPhase.objects.visible_to(request.user).filter(protocol=form.instance)
-        phases.update(position=F("position") + PARKED)
+        phases.update(position=F("position") + TEMPORARY_OFFSET)
         super().save_formset(request, form, formset, change)
         for row in formset.initial_forms:
             if row not in formset.deleted_forms:
                 phases.filter(pk=row.instance.pk).update(position=row.instance.position)
 
     def get_actions(self, request: HttpRequest) -> Any:
-        """Give what can be done with several; only who has a clinic can copy to it."""
+        """Return the actions; copying needs a clinic to copy to."""
         actions = super().get_actions(request)
         if person(request).clinic_id is None or not self.has_add_permission(request):
             actions.pop("copy_to_clinic", None)
@@ -156,10 +156,10 @@ class ProtocolAdmin(SharedAdmin):
     def copy_to_clinic(
         self, request: HttpRequest, protocols: QuerySet[Protocol]
     ) -> HttpResponseBase | None:
-        """Make copies that the clinic can change."""
+        """Copy protocols into the clinic, which can then change them."""
         made = [self._copy(request, protocol) for protocol in protocols]
-        words = gettext("Copied: %(names)s. The copies are your clinic's to change.")
-        messages.success(request, words % {"names": ", ".join(copy.name for copy in made)})
+        message = gettext("Copied: %(names)s. The copies are your clinic's to change.")
+        messages.success(request, message % {"names": ", ".join(copy.name for copy in made)})
         if len(made) == 1:
             return redirect("admin:rehab_protocol_change", made[0].pk)
         return None
@@ -182,9 +182,9 @@ class ProtocolAdmin(SharedAdmin):
 
 @admin.register(Preset)
 class PresetAdmin(ScopedAdmin):
-    """What the set-up offers as one tap."""
+    """Presets, which the set-up offers as one tap."""
 
-    list_display = ("name", "valence", "goal_words", "wanted_hits", "minutes", "protocol", "robot")
+    list_display = ("name", "valence", "goal_label", "wanted_hits", "minutes", "protocol", "robot")
     list_filter = ("valence", "robot")
     list_select_related = ("protocol",)
     search_fields = ("name", "protocol__name")
@@ -211,11 +211,12 @@ class PresetAdmin(ScopedAdmin):
         """Offer the gestures that this clinic has."""
         if db_field.name in {"robot_above", "robot_below"}:
             return forms.ChoiceField(
-                choices=list_gestures(person(request)), label=capfirst(db_field.verbose_name)
+                choices=robot_gesture_choices(person(request)),
+                label=capfirst(db_field.verbose_name),
             )
         return super().formfield_for_dbfield(db_field, request, **kwargs)
 
     @admin.display(description=_("goal"))
-    def goal_words(self, preset: Preset) -> str:
-        """Say the goal."""
-        return preset.goal_words
+    def goal_label(self, preset: Preset) -> str:
+        """The goal as text."""
+        return preset.goal_label

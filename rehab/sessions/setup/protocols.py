@@ -17,8 +17,8 @@ from rehab.training import measures as rules
 from rehab.training.phases import PHASE_KINDS, Phase
 
 
-def say_shared(row: Measure | Protocol) -> str:
-    """Give the name of a row; one that all clinics share is said in the page's language."""
+def display_name(row: Measure | Protocol) -> str:
+    """Return the name of a row; that of a shared one is translated."""
     return row.name if row.clinic_id else gettext(row.name)
 
 
@@ -65,10 +65,10 @@ class Measure(ClinicRow):
         ]
 
     def __str__(self) -> str:
-        return f"{say_shared(self)} [{self.unit}]"
+        return f"{display_name(self)} [{self.unit}]"
 
     def to_rule(self) -> rules.Measure:
-        """Give the measure as the rules know it."""
+        """Return the measure in the form that the rules use."""
         return rules.Measure(
             slug=self.slug,
             name=self.name,
@@ -111,10 +111,10 @@ class Protocol(ClinicRow):
         ]
 
     def __str__(self) -> str:
-        return say_shared(self)
+        return display_name(self)
 
     def to_rules(self) -> tuple[Phase, ...]:
-        """Give the phases as the rules know them."""
+        """Return the phases in the form that the rules use."""
         phases = sorted(self.phases.all(), key=lambda phase: phase.position)  # also if prefetched
         return tuple(phase.to_rule() for phase in phases)
 
@@ -163,7 +163,7 @@ class ProtocolPhase(ScopedModel):
         return gettext(self.name)
 
     def to_rule(self) -> Phase:
-        """Give the phase as the rules know it. Raises InvalidSetting for what they refuse."""
+        """Return the phase in the form that the rules use. Raises InvalidSetting."""
         return Phase(
             kind=self.kind,
             name=self.name,
@@ -174,7 +174,7 @@ class ProtocolPhase(ScopedModel):
         )
 
     def clean(self) -> None:
-        """Refuse what the rules refuse, in the rules' own words."""
+        """Refuse what the rules refuse, with their message."""
         try:
             self.to_rule()
         except rules.InvalidSetting as problem:

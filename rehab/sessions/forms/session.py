@@ -1,4 +1,4 @@
-"""What a PT fills in before a session: who walks, and how the session is set up."""
+"""The form that sets a session up."""
 
 from __future__ import annotations
 
@@ -14,13 +14,23 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import SIDES, Patient, User
 from rehab.people.web.refusals import in_words
-from rehab.sessions.cues import USUAL, list_gestures, to_choices, to_cue
-from rehab.sessions.formatting import LEVELS, say_source
+from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_source
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Protocol
-from rehab.sessions.services import StationTaken, check_station, create_session
-from rehab.sessions.step_sources import LIVE, list_sources, source_arguments
+from rehab.sessions.services import (
+    SessionRequest,
+    StationTaken,
+    check_station_is_free,
+    create_session,
+)
+from rehab.sessions.setup.gestures import (
+    DEFAULT_GESTURE,
+    choices_from_cue,
+    cue_from_choices,
+    robot_gesture_choices,
+)
+from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.sources import LIVE, build_source_args, source_choices
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
 from rehab.stations.models import Station
@@ -45,12 +55,12 @@ class NumberField(forms.FloatField):
     """A number, with a point or a comma."""
 
     def to_python(self, value: Any) -> Any:
-        """Read it."""
+        """Return the number."""
         return super().to_python(value.replace(",", ".") if isinstance(value, str) else value)
 
 
 class SessionForm(forms.Form):
-    """Everything a session of one patient needs. Nothing has to be typed."""
+    """The set-up of one patient's session. With its initial values it can be sent as it is."""
 
     valence = forms.ChoiceField(choices=[(v.slug, _(v.label)) for v in VALENCES.values()])
     goal_by = forms.ChoiceField(choices=[("value", A2.unit), ("percent", _("% of baseline"))])
@@ -67,7 +77,7 @@ class SessionForm(forms.Form):
     source = forms.ChoiceField(widget=forms.RadioSelect)
     trained_side = forms.ChoiceField(choices=SIDES, widget=forms.RadioSelect)
     robot = forms.ChoiceField(
-        choices=[(level, capfirst(LEVELS[level])) for level in ROBOT_LEVELS],
+        choices=[(level, capfirst(ROBOT_LEVEL_LABELS[level])) for level in ROBOT_LEVELS],
         widget=forms.RadioSelect,
     )
     robot_above = forms.ChoiceField()
@@ -79,20 +89,22 @@ class SessionForm(forms.Form):
         fields: dict[str, Any] = self.fields
         fields["protocol"].queryset = Protocol.objects.visible_to(by)
         fields["station"].queryset = Station.objects.visible_to(by)
-        fields["source"].choices = [(name, say_source(words)) for name, words in list_sources()]
-        fields["robot_above"].choices = fields["robot_below"].choices = list_gestures(by)
+        fields["source"].choices = [
+            (name, format_source(label)) for name, label in source_choices()
+        ]
+        fields["robot_above"].choices = fields["robot_below"].choices = robot_gesture_choices(by)
 
     def clean_station(self) -> Station:
-        """Refuse a station where somebody else may be walking right now."""
+        """Return the station. Refuses one with an open session."""
         station: Station = self.cleaned_data["station"]
         try:
-            check_station(station)
+            check_station_is_free(station)
         except StationTaken as problem:
             raise ValidationError(in_words(problem)) from problem
         return station
 
     def clean_source(self) -> str:
-        """Refuse a recording that cannot be played, in its reader's own words."""
+        """Return the source. Refuses a recording that cannot be played."""
         source: str = self.cleaned_data["source"]
         kind, _between, name = source.partition(" ")
         if kind == "recording":
@@ -120,46 +132,51 @@ class SessionForm(forms.Form):
         hits, minutes = data["wanted_hits"], data["minutes"]
         kind, _between, name = data["source"].partition(" ")
         return create_session(
-            self.patient,
-            valence=data["valence"],
-            goal=GoalRule(
-                value=data["goal_value"] if by_value else None,
-                percent_of_baseline=None if by_value else data["goal_percent"],
-            ),
-            protocol=data["protocol"],
-            trained_side=Side(data["trained_side"]),
-            target=Target(
-                hit_rate=hits / 100 if hits else None, duration_s=minutes * 60 if minutes else None
-            ),
-            cue=to_cue(data["robot_above"], data["robot_below"], data["valence"], self.patient),
-            robot_intensity=ROBOT_LEVELS[data["robot"]],
-            station=data["station"],
-            created_by=self.by,
-            source=dict(list_sources()).get(data["source"], ""),
-            simulated=kind == "synthetic",
-            runs=source_arguments(kind, name, self.patient),
+            SessionRequest(
+                patient=self.patient,
+                valence=data["valence"],
+                goal=GoalRule(
+                    value=data["goal_value"] if by_value else None,
+                    percent_of_baseline=None if by_value else data["goal_percent"],
+                ),
+                protocol=data["protocol"],
+                trained_side=Side(data["trained_side"]),
+                target=Target(
+                    hit_rate=hits / 100 if hits else None,
+                    duration_s=minutes * 60 if minutes else None,
+                ),
+                cue=cue_from_choices(
+                    data["robot_above"], data["robot_below"], data["valence"], self.patient
+                ),
+                robot_intensity=ROBOT_LEVELS[data["robot"]],
+                station=data["station"],
+                created_by=self.by,
+                source=dict(source_choices()).get(data["source"], ""),
+                simulated=kind == "synthetic",
+                source_args=build_source_args(kind, name, self.patient),
+            )
         )
 
     def create(self) -> TrainingSession | None:
-        """Create the session, or give None and say in ``errors`` what hinders."""
+        """Create the session; return None, with the reason in ``errors``, where it cannot."""
         if not self.is_valid():
             return None
         try:
             return self.save()
-        except StationTaken as problem:  # just now, by somebody else
+        except StationTaken as problem:  # since the form was checked
             self.add_error("station", in_words(problem))
         except InvalidSetting as problem:
             self.add_error(None, in_words(problem))
         return None
 
 
-# Usual stride time of the recordings (docs/reference/gait.md#phases), to tell how long a phase of
+# Typical stride time of the recordings (docs/reference/gait.md#phases), to tell how long a phase of
 # strides takes.
 STRIDE_S = 1.1
 
 
-def minutes_of(protocol: Protocol | None) -> int | None:
-    """Give how long a protocol takes; None where a phase lasts until the PT moves on."""
+def protocol_minutes(protocol: Protocol | None) -> int | None:
+    """Return a protocol's duration; None where a phase lasts until the PT moves on."""
     total_s = 0.0
     for phase in () if protocol is None else protocol.to_rules():
         limits = [phase.seconds, phase.strides and phase.strides * STRIDE_S]
@@ -170,16 +187,16 @@ def minutes_of(protocol: Protocol | None) -> int | None:
     return math.ceil(total_s / 60) or None
 
 
-def _free(stations: QuerySet[Station]) -> Station | None:
-    """Give the first station where nobody has an open session, or else the first."""
+def _first_free_station(stations: QuerySet[Station]) -> Station | None:
+    """Return the first station without an open session, or else the first."""
     taken = stations.filter(sessions__state__in=[state.value for state in OPEN_STATES])
     return stations.exclude(pk__in=taken.values("pk")).first() or stations.first()
 
 
-def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
-    """Give what the set-up begins with: the patient's last session, or sensible first values."""
+def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
+    """Return the set-up's initial values: those of the last session, or defaults."""
     stations = Station.objects.visible_to(by)
-    words = dict(list_sources())
+    sources = dict(source_choices())
     last = (
         TrainingSession.objects.visible_to(by)
         .filter(patient=patient, protocol__isnull=False)
@@ -196,22 +213,22 @@ def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
             "goal_value": FIRST_GOAL_W_KG,
             "goal_percent": 100,
             "wanted_hits": WANTED_HITS_PERCENT,
-            "minutes": minutes_of(protocol) or PLANNED_MINUTES,
+            "minutes": protocol_minutes(protocol) or PLANNED_MINUTES,
             "protocol": protocol,
-            "station": _free(stations),
+            "station": _first_free_station(stations),
             "source": (source := "synthetic good" if patient.simulated else LIVE),
-            "source_words": say_source(words[source]),
+            "source_words": format_source(sources[source]),
             "trained_side": patient.paretic_side or Side.LEFT.value,
             "robot": "normal",
-            "robot_above": USUAL,
-            "robot_below": USUAL,
+            "robot_above": DEFAULT_GESTURE,
+            "robot_below": DEFAULT_GESTURE,
         }
     plan = last.to_plan()
-    source = next((name for name, label in words.items() if label == last.source), LIVE)
-    if last.runs and not patient.simulated:
-        source = LIVE  # one trial with a simulator makes nobody a simulated patient
+    source = next((name for name, label in sources.items() if label == last.source), LIVE)
+    if last.source_args and not patient.simulated:
+        source = LIVE  # after a trial with a simulator, a person's next session is live again
     hits, seconds = plan.target.hit_rate, plan.target.duration_s
-    above, below = to_choices(plan.valence.cue, last.valence, patient, by)
+    above, below = choices_from_cue(plan.valence.cue, last.valence, patient, by)
     return {
         "valence": last.valence,
         "goal_by": "percent" if plan.goal.needs_baseline else "value",
@@ -220,9 +237,9 @@ def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
         "wanted_hits": round(100 * hits) if hits else None,
         "minutes": round(seconds / 60) if seconds else None,
         "protocol": last.protocol,
-        "station": last.station or _free(stations),
+        "station": last.station or _first_free_station(stations),
         "source": source,
-        "source_words": say_source(words[source]),
+        "source_words": format_source(sources[source]),
         "trained_side": last.trained_side,
         "robot": name_robot_level(_last_intensity(last, by)),
         "robot_above": above,
@@ -231,7 +248,7 @@ def like_last_time(patient: Patient, by: User) -> dict[str, Any]:
 
 
 def _last_intensity(session: TrainingSession, by: User) -> float:
-    """Give how the robot answered at the end of a session."""
+    """Return the robot's intensity at the end of a session."""
     changes = SessionEvent.objects.visible_to(by).filter(
         session=session, kind=ChangeKind.ROBOT_INTENSITY.value
     )
