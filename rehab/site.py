@@ -100,11 +100,11 @@ class GarrySite(AdminSite):
         from rehab.people.access import user_of
         from rehab.people.roles import Role
         from rehab.people.server_status import server_status
-        from rehab.sessions.reports.dashboard import look
+        from rehab.sessions.reports.dashboard import dashboard_context
 
         user = user_of(request)
         now = timezone.now()
-        context = server_status(user) if user.role == Role.HOST else look(user, now)
+        context = server_status(user) if user.role == Role.HOST else dashboard_context(user, now)
         return super().index(request, {**context, **(extra_context or {})})
 
     def app_index(  # type: ignore[override]

@@ -309,7 +309,7 @@ def test_another_file_with_the_same_ids_is_not_mixed_in(file, clinic):
 def test_several_clinics_have_to_be_told_apart(file, clinic):
     birch = Clinic.everywhere.create(name="Birch")
     _, problem = refused(file)
-    assert "Say --clinic with one of: Birch, Oak" in problem
+    assert "Give --clinic with one of: Birch, Oak" in problem
     assert "no clinic 'Elm'" in refused(file, "--clinic", "Elm")[1]
     run(file, "--clinic", "Birch")
     assert TrainingSession.everywhere.filter(clinic=birch).count() == 67

@@ -13,7 +13,7 @@ from django.urls import reverse
 
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocol_admin import PresetAdmin
+from rehab.sessions.setup_admin import PresetAdmin
 from tests.support.world import client_of, scoped_models
 
 pytestmark = pytest.mark.django_db

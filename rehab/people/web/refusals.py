@@ -10,7 +10,7 @@ from django.utils.translation import gettext
 
 from rehab.training import marking
 from rehab.training.measures import InvalidSetting
-from robot import gestures
+from robot.motion import gesture_errors
 
 
 class _Number(float):
@@ -20,7 +20,7 @@ class _Number(float):
         return number_format(super().__format__(spec))
 
 
-def format_refusal(problem: InvalidSetting | gestures.BadGesture) -> str:
+def format_refusal(problem: InvalidSetting | gesture_errors.BadGesture) -> str:
     """Return an error in the active language; one without values may be translated already."""
     template = gettext(problem.template)
     if not problem.values:
@@ -30,7 +30,7 @@ def format_refusal(problem: InvalidSetting | gestures.BadGesture) -> str:
 
 def _format_value(value: object) -> object:
     match value:
-        case marking.Marked() | gestures.Marked():
+        case marking.Marked() | gesture_errors.Marked():
             return gettext(value)
         case marking.AnyOf():
             return f" {gettext(marking.OR)} ".join(map(gettext, value))
