@@ -2,12 +2,14 @@
 
 from django import template
 from django.templatetags.static import static
-from django.utils.html import format_html
+from django.utils.html import format_html, json_script
 from django.utils.safestring import SafeString
 from django.utils.translation import gettext as _
 
 from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_duration, format_source
 from rehab.training.valences import VALENCES
+from robot.wire.close_codes import FINAL_FOR_PAGES
+from robot.wire.limits import PAGE_HEARTBEAT_S
 
 register = template.Library()
 
@@ -20,6 +22,13 @@ def icon(name: str) -> SafeString:
         static("img/icons.svg"),
         name,
     )
+
+
+@register.simple_tag
+def wire_limits() -> SafeString:
+    """Return what a page's scripts have to know of the wire, as the JSON element ``wire``."""
+    limits = {"final_codes": sorted(FINAL_FOR_PAGES), "heartbeat_ms": 1000 * PAGE_HEARTBEAT_S}
+    return json_script(limits, "wire")
 
 
 @register.filter

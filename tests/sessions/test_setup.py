@@ -16,8 +16,8 @@ from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import CueGestures
-from robot.composed import read_gesture
-from robot.motion import HOME
+from robot.motion.gesture_spec import parse_gesture
+from robot.motion.pose import HOME
 from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
@@ -191,7 +191,7 @@ def test_a_composed_gesture_goes_along_with_the_plan(pt, patient, station, world
     plan = newest().to_plan()
     assert plan.valence.cue == CueGestures("wave", None)
     assert [data["name"] for data in plan.gestures] == ["wave"]
-    assert read_gesture(plan.gestures[0]).goals[-1].pose == HOME
+    assert parse_gesture(plan.gestures[0]).waypoints[-1].pose == HOME
     TrainingSession.everywhere.filter(pk=newest().pk).update(state="finished")
     form = pt.get(url).context["form"]
     assert (form["robot_above"].value(), form["robot_below"].value()) == ("wave", "(nothing)")

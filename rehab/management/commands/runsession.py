@@ -33,7 +33,7 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.phases import Phase, make_phase
 from rehab.training.steps import Measurement, Side
 from rehab.training.valences import VALENCES
-from robot.rehearsal import REHEARSED, Rehearsal
+from robot.simulation import SIMULATED_BASES, Simulation
 
 BASELINE_STRIDES = 54
 MIN_SYNTHETIC_STRIDES = 100
@@ -93,7 +93,7 @@ class Command(BaseCommand):
         )
         parser.add_argument(
             "--base",
-            choices=sorted(REHEARSED),
+            choices=sorted(SIMULATED_BASES),
             default="null",
             help="robot base that answers, on a clock that runs with the strides",
         )
@@ -145,18 +145,18 @@ class Command(BaseCommand):
         fold = asyncio.run(run_session(session.pk, strides, Pace(options["speed"])))
         wall_s = time.perf_counter() - began
         return session_report(
-            session, fold, wall_s, recording, rehearse(session, fold, options["base"])
+            session, fold, wall_s, recording, simulate_robot(session, fold, options["base"])
         )
 
 
-def rehearse(session: TrainingSession, fold: SessionFold, base: str) -> dict[str, Any]:
-    """Return what a simulated robot did in a stored session."""
-    rehearsal = Rehearsal(base, describe_cue(fold))
-    rehearsal.walk(robot_steps(session, fold))
-    windows = len(rehearsal.decisions)
+def simulate_robot(session: TrainingSession, fold: SessionFold, base: str) -> dict[str, Any]:
+    """Let a simulated robot answer a stored session; return what it did."""
+    simulation = Simulation(base, describe_cue(fold))
+    simulation.walk(robot_steps(session, fold))
+    windows = len(simulation.decisions)
     return {
-        "robot": {"base": base, "windows": windows, "activated_share": rehearsal.share},
-        "gestures": rehearsal.gestures,
+        "robot": {"base": base, "windows": windows, "activated_share": simulation.share},
+        "gestures": simulation.gestures,
     }
 
 

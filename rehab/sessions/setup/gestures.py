@@ -15,8 +15,9 @@ from rehab.people.models import Patient, User
 from rehab.people.web.refusals import in_words
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import CueGestures
-from robot.gestures import GESTURES, ORIGINALS, BadGesture
-from robot.trial import admit_gesture
+from robot.motion.dry_run import validate_gesture
+from robot.motion.gesture_errors import BadGesture
+from robot.motion.gestures import GESTURES, ORIGINALS
 
 DEFAULT_GESTURE, NO_GESTURE = (
     "(usual)",
@@ -78,7 +79,7 @@ def composed_gestures(patient: Patient, cue: CueGestures) -> Iterator[dict[str, 
             )
         data = row.to_data()
         try:
-            admit_gesture(data)
+            validate_gesture(data)
         except BadGesture as problem:
             raise InvalidSetting(
                 gettext("Gesture %(name)s: %(problem)s")
