@@ -96,7 +96,7 @@ def run(file: Path, *options: str) -> str:
 
 
 def refused(file: Path, *options: str) -> tuple[str, str]:
-    """Give what was told, and why nothing was changed."""
+    """Return what was told, and why nothing was changed."""
     out = StringIO()
     with pytest.raises(CommandError) as caught:
         call_command("import_garry", str(file), *options, stdout=out)

@@ -210,7 +210,7 @@ def protocol(world) -> Protocol:
 
 
 def rows(protocol: Protocol, *phases: dict[str, object]) -> dict[str, object]:
-    """Give the form of a protocol with these phases."""
+    """Return the form of a protocol with these phases."""
     stored = protocol.phases.count() if protocol.pk else 0
     form: dict[str, object] = {
         "name": protocol.name,

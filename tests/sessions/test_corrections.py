@@ -54,7 +54,7 @@ def opened(world: World, session: TrainingSession, role: Role = Role.PT) -> dict
 
 
 def sent_by(page: str) -> dict[str, str]:
-    """Give what a page with the form sends."""
+    """Return what a page with the form sends."""
     form = re.search(r'<form method="post" class="fields card">.*?</form>', page, re.DOTALL)
     found: dict[str, str] = {}
     for tag in re.findall(r"<input[^>]*>", form[0] if form else ""):
@@ -78,7 +78,7 @@ def correct(world: World, session: TrainingSession, role: Role = Role.PT, **chan
 
 
 def log_of(session: TrainingSession) -> list[object]:
-    """Give everything that was recorded of a session."""
+    """Return everything that was recorded of a session."""
     return [
         list(model.everywhere.filter(session=session).order_by("pk").values())
         for model in (Step, SessionEvent, SessionMetric)

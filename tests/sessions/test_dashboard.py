@@ -56,7 +56,7 @@ def rosa(world: World) -> Patient:
 
 
 def ago(patient: Patient, valence: str, walked, moment: datetime, **how) -> TrainingSession:
-    """Let somebody walk from a moment on."""
+    """Store a walk that began at a moment."""
     return walk(patient, valence, walked, now=moment, **how)
 
 

@@ -107,7 +107,7 @@ def test_the_page_asks_for_a_reason(world):
 
 
 def everything_stored() -> str:
-    """Give every row of every model, and the admin's own notes, as text."""
+    """Return every row of every model, and the admin's own notes, as text."""
     rows: list[Any] = [*scoped_models(), LogEntry]
     return "\n".join(serialize("json", model._base_manager.all()) for model in rows)
 

@@ -61,7 +61,7 @@ def plain(page: str) -> str:
 
 
 def items(page: str) -> list[str]:
-    """Give the words of each session in the list, markup left out."""
+    """Return the words of each session in the list, markup left out."""
     return [words(item) for item in re.findall(r'<a class="item".*?</a>', page, re.DOTALL)]
 
 

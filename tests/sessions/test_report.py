@@ -34,7 +34,7 @@ def patient(world: World) -> Patient:
 
 
 def read(world: World, session: TrainingSession, role: Role = Role.PT) -> str:
-    """Give the page's words."""
+    """Return the page's words."""
     client = client_of(world, role)
     page = client.get(f"/sessions/{session.pk}/report/").content.decode()
     paper = page.split("<article")[1].split("</article>")[0]
