@@ -1,4 +1,4 @@
-"""Admin of gestures: a PT composes steps, sees where they lead, and hears what is wrong."""
+"""Admin of gestures: a PT composes steps, and sees their path or what is wrong with them."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.gestures.models import Gesture, GestureStep
-from rehab.gestures.picture import draw
+from rehab.gestures.path_drawing import draw_path
 from rehab.people.web.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
 from rehab.people.web.refusals import in_words
 from robot.composed import MOVES_MAX, to_data
 from robot.gestures import TETHER_M, BadGesture
 from robot.trial import Trial, admit_gesture, try_gesture
 
-WINDOW_S = 5.0  # what takes longer is still running when the next decision comes
+WINDOW_S = 5.0  # of the robot's decisions; a longer gesture still runs at the next one
 
 
 class StepFormSet(RowFormSet):
-    """The steps of one gesture, which must be one together."""
+    """The steps of one gesture, which must be valid together."""
 
     def clean(self) -> None:
-        """Refuse steps that no robot plays, in the robot's own words."""
+        """Refuse steps that no robot plays."""
         super().clean()
         if any(self.errors):
             return
@@ -46,7 +46,7 @@ class StepFormSet(RowFormSet):
 
 
 class StepForm(forms.ModelForm):
-    """A row of small numbers."""
+    """One step, in narrow fields."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -66,12 +66,12 @@ class StepRows(ScopedOptions, admin.TabularInline):
     ordering = ("position",)
 
     def get_extra(self, request: HttpRequest, obj: Any = None, **options: Any) -> int:
-        """Give a new gesture some rows to begin with."""
+        """Return the number of empty rows: 4 for a new gesture."""
         return 0 if obj else 4
 
 
-def tell(trial: Trial) -> str:
-    """Say how long a gesture takes and how far it goes."""
+def describe_trial(trial: Trial) -> str:
+    """Return how long a gesture takes and how far it goes, in words."""
     words = gettext(
         "Takes %(took).1f s, goes up to %(far).2f m from home (tether %(tether).2f m), "
         "ends at home."
@@ -93,20 +93,20 @@ class GestureAdmin(ScopedAdmin):
 
     @admin.display(description=_("simulated"))
     def simulated(self, gesture: Gesture) -> str:
-        """Say how long it takes and how far it goes, or what is wrong with it."""
+        """Return how long it takes and how far it goes, or what is wrong with it."""
         try:
-            return tell(try_gesture(admit_gesture(gesture.to_data())))
+            return describe_trial(try_gesture(admit_gesture(gesture.to_data())))
         except BadGesture as problem:
             return in_words(problem)
 
     @admin.display(description=_("where it goes"))
     def picture(self, gesture: Gesture) -> str:
-        """Draw the way of what is stored."""
+        """Return the drawing of the stored gesture's path, or why there is none."""
         if not gesture.pk:
             return gettext("Save it to see where it goes. Its last step has to end at home.")
         try:
             trial = try_gesture(admit_gesture(gesture.to_data()))
         except BadGesture as problem:
             return in_words(problem)
-        words = tell(trial)
-        return format_html("{}<p>{}</p>", draw(gesture.to_moves(), trial, words), words)
+        words = describe_trial(trial)
+        return format_html("{}<p>{}</p>", draw_path(gesture.to_moves(), trial, words), words)

@@ -11,8 +11,8 @@ from typing import Any
 from asgiref.sync import async_to_sync
 from django.utils.translation import gettext as _
 
-from rehab.feedback.models import FeedbackType, words_edited
-from rehab.feedback.valences import usual_valence
+from rehab.feedback.clinic_valences import default_valence
+from rehab.feedback.models import FeedbackType, feedback_text_edited
 from rehab.people.models import User
 from rehab.people.web.refusals import in_words
 from rehab.sessions.live import runtime
@@ -26,7 +26,7 @@ from rehab.training.valences import Valence, bands_to_json
 
 def listen() -> None:
     """Listen, from the start of the process on."""
-    words_edited.connect(on_words_edited)
+    feedback_text_edited.connect(on_words_edited)
 
 
 def on_words_edited(
@@ -39,7 +39,7 @@ def on_words_edited(
     problems: list[str] = []
     for session in open_ones.select_related("patient").order_by("pk"):
         language = session.to_plan().language
-        worded = row.to_valence(language) if row is not None else usual_valence(slug, language)
+        worded = row.to_valence(language) if row is not None else default_valence(slug, language)
         try:
             async_to_sync(_reword)(session.pk, worded, by)
         except (InvalidSetting, OwnedElsewhere, NotStored) as problem:
