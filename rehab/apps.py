@@ -14,13 +14,13 @@ class RehabConfig(AppConfig):
     def ready(self) -> None:
         """Register the checks, the shared rows of every database, and who listens to changes."""
         from rehab import checks  # noqa: F401
-        from rehab.boards.watching import watch
+        from rehab.boards.signals import connect_receivers
         from rehab.models import TRACKED
         from rehab.people.audit.history import track
         from rehab.sessions.defaults import install_defaults
         from rehab.sessions.feedback_text_updates import listen
 
         post_migrate.connect(install_defaults, sender=self)
-        watch()
+        connect_receivers()
         track(*TRACKED)
         listen()

@@ -141,7 +141,7 @@ def list_boards(user: User, patient: Patient) -> list[dict[str, Any]]:
             "board": row.board.name,
             "feedback_type": row.valence or None,
             "figure": row.figure,
-            "could_be_kept": row.stake,
+            "could_be_kept": row.points_at_stake,
         }
         for row in rows
     ] + [{"in_the_group_of_the_board": board.name} for board in grouped]

@@ -1,9 +1,9 @@
-"""Builds boards of many patients beside everything else: by a thread that works a little at a time.
+"""Rebuilds boards: of a few patients at once, of many in a thread, a batch of patients at a time.
 
-SQLite lets one writer in at a time, and what patients walk must be stored meanwhile: a step's
-commit waits for one batch at most. How far it has come is stored with each batch (`entries.py`), so
-that a server that was stopped goes on where it was; several may build at once. A board is not shown
-before it is built, nor while many of its rows are those of another day.
+SQLite allows one writer at a time, and steps must be stored meanwhile: a step's commit waits for
+one batch at most. The progress is stored with each batch (`entries.py`), so that a server that was
+stopped goes on where it was; several may build at once. A board is not shown before it is built,
+nor while many of its rows are of an earlier day.
 """
 
 from __future__ import annotations
@@ -19,24 +19,23 @@ from functools import partial
 from django.db import connection, transaction
 from django.utils import timezone
 
-from rehab.boards import entries
+from rehab.boards.building import entries
 from rehab.boards.models import Leaderboard
 
 log = logging.getLogger(__name__)
 
-FEW = 50  # patients whose rows are made while a page waits
-HOLD_S = 0.015  # what a batch should take; its size follows from what the last one took
-# Between two batches [s]. Who waits for SQLite looks every 5 to 25 ms.
+MAX_INLINE = 50  # patients whose rows are computed while a page waits
+BATCH_S = 0.015  # the aim for a batch; its size follows from how long the last one took
+# Between two batches [s]. Writers that wait for SQLite try again every 5 to 25 ms.
 PAUSE_S = 0.025
-FIRST, FEWEST, MOST = 20, 10, 1_000  # patients a batch
+FIRST_SIZE, MIN_SIZE, MAX_SIZE = 20, 10, 1_000  # patients a batch
 
-
-# Works off so many patients at most, as of now; gives whether there are more.
-Step = Callable[[int, datetime], bool]
+# Builds a number of patients at most, as of a moment; returns whether there are more.
+Work = Callable[[int, datetime], bool]
 
 
 class Builder:
-    """One thread at most, while there is something to build."""
+    """Runs one thread at most, while there is something to build."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -45,7 +44,7 @@ class Builder:
         self._is_wanted = False
 
     def wake(self) -> None:
-        """Build what is to be built, soon. Never waits."""
+        """Start the thread if there may be something to build. Never waits."""
         with self._lock:
             self._is_wanted = True
             if self._thread is None and not self._ends.is_set():
@@ -53,7 +52,7 @@ class Builder:
                 self._thread.start()
 
     def stop(self) -> None:
-        """End after the batch at hand; another server, or the next start, goes on."""
+        """Stop after the current batch; another server, or the next start, goes on."""
         self._ends.set()
         with self._lock:
             thread = self._thread
@@ -62,94 +61,98 @@ class Builder:
 
     def _run(self) -> None:
         try:
-            while (step := self._next()) is not None:
-                self._go(step)
-        except Exception:  # a look at the board, or the next start, tries again
+            while (work := self._find_work()) is not None:
+                self._run_batches(work)
+        except Exception:  # the next page with the board, or the next start, tries again
             log.exception("A board could not be built")
             with self._lock:
                 self._thread = None
         finally:
             connection.close()
 
-    def _next(self) -> Step | None:
-        """Give what is to be done. Looks again where somebody asked meanwhile."""
+    def _find_work(self) -> Work | None:
+        """Return what is to be built; None, with no thread any more, where nothing is.
+
+        Looks again if it was woken meanwhile.
+        """
         while True:
             with self._lock:
                 if self._ends.is_set() or not self._is_wanted:
                     self._thread = None
                     return None
                 self._is_wanted = False
-            step = find_step(timezone.now())
-            if step is not None:
+            work = find_work(timezone.now())
+            if work is not None:
                 with self._lock:
                     self._is_wanted = True  # there may be more after it
-                return step
+                return work
 
-    def _go(self, step: Step) -> None:
-        most, more = FIRST, True
+    def _run_batches(self, work: Work) -> None:
+        size, more = FIRST_SIZE, True
         while more and not self._ends.is_set():
             began = time.perf_counter()
-            more = step(most, timezone.now())
+            more = work(size, timezone.now())
             held_s = time.perf_counter() - began
-            most = max(FEWEST, min(MOST, round(most * min(2.0, HOLD_S / held_s))))
+            size = max(MIN_SIZE, min(MAX_SIZE, round(size * min(2.0, BATCH_S / held_s))))
             self._ends.wait(max(held_s, PAUSE_S))
         if not more:
-            entries.tidy()
+            entries.analyze_tables()
 
 
-def find_step(now: datetime) -> Step | None:
-    """Give what works off so many patients of a board that is to be built, or caught up with."""
+def find_work(now: datetime) -> Work | None:
+    """Return what builds a board, or brings its outdated rows up to date; None for nothing."""
     board_id = entries.find_unbuilt()
     if board_id is not None:
-        return partial(entries.advance, board_id)
-    outdated = entries.find_outdated(now, FEW)
+        return partial(entries.build_next, board_id)
+    outdated = entries.find_outdated(now, MAX_INLINE)
     if outdated is not None:
         return partial(entries.refresh_stale, outdated)
     return None
 
 
-builder = Builder()
-atexit.register(builder.stop)
+board_builder = Builder()
+atexit.register(board_builder.stop)
 
 
 def rebuild(board: Leaderboard, now: datetime) -> None:
-    """Have a board's rows made anew: those of a few patients here and now, more beside."""
-    if len(entries.next_patients(board, 0, FEW + 1)) <= FEW:
+    """Rebuild a board's rows: those of a few patients now, more in the thread."""
+    if len(entries.next_patients(board, 0, MAX_INLINE + 1)) <= MAX_INLINE:
         entries.refresh(board, now=now)
     else:
-        _begin(board)
+        _rebuild_in_thread(board)
 
 
-def follow(board: Leaderboard, now: datetime, patients: set[int] | None = None) -> None:
-    """Let a board follow what decides who may stand on it: for some patients, or (None) all."""
-    if patients is not None and len(patients) <= FEW:
+def update_eligibility(board: Leaderboard, now: datetime, patients: set[int] | None = None) -> None:
+    """Update a board after a change of who is eligible: some patients, or (None) any of them."""
+    if patients is not None and len(patients) <= MAX_INLINE:
         entries.refresh(board, patients, now=now)
     elif entries.is_snapshot(board, now):
-        entries.thin_out(board)
+        entries.drop_ineligible(board)
     else:
         rebuild(board, now)
 
 
-def heal(patients: set[int], now: datetime) -> None:
-    """Have the boards built that did not follow what some patients walked."""
+def rebuild_after_failure(patients: set[int], now: datetime) -> None:
+    """Rebuild the boards that could not be updated after sessions of some patients."""
     for board in entries.boards_of(entries.clinics_of(patients)):
         if not entries.is_snapshot(board, now):
-            _begin(board)
+            _rebuild_in_thread(board)
 
 
 def catch_up(board: Leaderboard, now: datetime) -> bool:
-    """Bring the rows up to date that time has altered; False where those are many: they are then
-    made beside, and the board is not shown meanwhile.
+    """Bring the rows of an earlier day up to date; return whether they are.
+
+    Many rows are left to the thread: the board is not shown meanwhile.
     """
-    stale = entries.find_stale(board, now, FEW + 1)
-    if len(stale) > FEW:
-        builder.wake()
+    stale = entries.find_stale(board, now, MAX_INLINE + 1)
+    if len(stale) > MAX_INLINE:
+        board_builder.wake()
         return False
     if stale:
         entries.refresh(board, stale, now=now, corrected=True)
     return True
 
 
-def _begin(board: Leaderboard) -> None:
-    entries.begin(board)
-    transaction.on_commit(lambda: builder.wake())  # noqa: PLW0108 (looked up when it is time)
+def _rebuild_in_thread(board: Leaderboard) -> None:
+    entries.start_rebuild(board)
+    transaction.on_commit(lambda: board_builder.wake())  # noqa: PLW0108 (tests replace `wake`)

@@ -1,4 +1,4 @@
-"""Rows of boards in words: figures, names, days."""
+"""Rows of boards as pages show them: figures, names, days."""
 
 from __future__ import annotations
 
@@ -7,96 +7,103 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, datetime
 
-from rehab.boards.choosing import Chosen
-from rehab.boards.figures import SHARES, standing_on
+from rehab.boards.choices import NameStyle
 from rehab.boards.models import Leaderboard
+from rehab.boards.ranking.eligibility import eligible_patients
+from rehab.boards.ranking.sessions import SHARES
+from rehab.boards.ranking.visibility import VisibleRow
 from rehab.people.aliases import say_alias
 from rehab.sessions.formatting import SPACE, say_day, say_duration, say_number
 from rehab.sessions.models import TrainingSession
 from rehab.training.metrics import METRICS
 
-UNITS = {"%", "min"}  # what is said beside a figure; the board's own name says the others
+UNITS = {"%", "min"}  # those that are written beside a figure; the board's name tells the others
 
 
 @dataclass(frozen=True)
-class Row:
-    """A row on a page. ``bar`` is in percent; ``skips``: rows before it are left out."""
+class PanelRow:
+    """A row on a page.
+
+    ``bar`` is in percent; ``follows_gap`` says whether rows directly before it are not shown.
+    """
 
     value: str
     bar: int
     title: str = ""
     detail: str = ""
     rank: int | None = None
-    stake: str = ""
+    points_at_stake: str = ""
     you: bool = False
-    skips: bool = False
+    follows_gap: bool = False
     session_id: int | None = None
 
 
-def say_figure(slug: str, value: int) -> str:
-    """Write a metric's figure as boards show it."""
+def format_figure(slug: str, value: int) -> str:
+    """Return a metric's figure as boards show it."""
     unit = "%" if slug in SHARES else METRICS[slug].unit
     return say_number(value, 0) + (f"{SPACE}{unit}" if unit in UNITS else "")
 
 
-def write(board: Leaderboard, chosen: Sequence[Chosen]) -> list[Row]:
-    """Give rows with their figures, without saying whose they are."""
-    full = 100 if board.metric in SHARES else max([1, *(each.row.figure for each in chosen)])
+def format_rows(board: Leaderboard, visible: Sequence[VisibleRow]) -> list[PanelRow]:
+    """Return rows with their figures and ranks, without names or days."""
+    full = 100 if board.metric in SHARES else max([1, *(each.row.figure for each in visible)])
     return [
-        Row(
-            value=say_figure(board.metric, each.row.figure),
-            bar=share(each.row.figure, each.row.stake or full),
-            rank=each.row.rank if tells_place(board, each) else None,
-            stake="" if each.row.stake is None else say_number(each.row.stake, 0),
-            skips=each.skips,
+        PanelRow(
+            value=format_figure(board.metric, each.row.figure),
+            bar=to_percent(each.row.figure, each.row.points_at_stake or full),
+            rank=each.row.rank if shows_rank(board, each) else None,
+            points_at_stake=(
+                "" if each.row.points_at_stake is None else say_number(each.row.points_at_stake, 0)
+            ),
+            follows_gap=each.follows_gap,
             session_id=each.row.session_id,
         )
-        for each in chosen
+        for each in visible
     ]
 
 
-def tells_place(board: Leaderboard, chosen: Chosen) -> bool:
-    """Whether a row's place is told. Of points that can only be lost it never is."""
-    return board.show_ranks and chosen.ranked and chosen.row.stake is None
+def shows_rank(board: Leaderboard, visible: VisibleRow) -> bool:
+    """Whether a row's rank is shown. By points that can only be lost it never is."""
+    return board.show_ranks and visible.has_rank and visible.row.points_at_stake is None
 
 
-def share(value: int, full: int) -> int:
-    """Give what part of the whole a figure is, in percent from 0 to 100."""
+def to_percent(value: int, full: int) -> int:
+    """Return a figure's share of the whole, in percent from 0 to 100."""
     return max(0, min(100, round(100 * value / full)))
 
 
-def name_rows(board: Leaderboard, chosen: Sequence[Chosen], me: int | None) -> list[Row]:
-    """Give rows with the names that their patients go by on this board.
+def name_rows(board: Leaderboard, visible: Sequence[VisibleRow], me: int | None) -> list[PanelRow]:
+    """Return rows with the names that their patients have on this board.
 
-    Who no longer agrees stands in no row, however the agreement was taken back.
+    A patient who is no longer eligible has no row, even before the stored ones have followed.
     """
-    standing = standing_on(board).filter(pk__in=[each.row.patient_id for each in chosen])
-    found = {patient.pk: patient for patient in standing}
+    eligible = eligible_patients(board).filter(pk__in=[each.row.patient_id for each in visible])
+    found = {patient.pk: patient for patient in eligible}
     seen: Counter[str] = Counter()
-    named: list[Row] = []
-    for each, row in zip(chosen, write(board, chosen), strict=True):
+    named: list[PanelRow] = []
+    for each, row in zip(visible, format_rows(board, visible), strict=True):
         patient = found.get(each.row.patient_id)
         if patient is None:
             continue
-        if board.names == Leaderboard.Names.CODE:
+        if board.names == NameStyle.CODE:
             name = patient.code
-        elif board.names == Leaderboard.Names.INITIALS:
+        elif board.names == NameStyle.INITIALS:
             name = "".join(f"{word[0].upper()}." for word in patient.nickname.split())
         else:
             name = say_alias(patient.alias) if patient.alias else patient.pseudonym
         seen[name] += 1
-        if seen[name] > 1:  # as initials may: each row has a name of its own
+        if seen[name] > 1:  # initials may repeat: each row has a name of its own
             name = f"{name} {seen[name]}"
         named.append(replace(row, title=name, you=patient.pk == me, session_id=None))
     return named
 
 
 def date_rows(
-    rows: Iterable[Row],
+    rows: Iterable[PanelRow],
     sessions: dict[int, TrainingSession],
     at_hand: TrainingSession | None,
     now: datetime,
-) -> list[Row]:
+) -> list[PanelRow]:
     """Return rows of own sessions with the day of each, and how long was walked.
 
     ``now`` is the clinic's clock.
@@ -107,7 +114,7 @@ def date_rows(
         for pk, session in sessions.items()
     }
     a_day: Counter[date] = Counter(began[row.session_id or 0].date() for row in rows)
-    dated: list[Row] = []
+    dated: list[PanelRow] = []
     for row in rows:
         start = began[row.session_id or 0]
         walked = say_duration(sessions[row.session_id or 0].active_s)
