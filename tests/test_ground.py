@@ -1,5 +1,6 @@
 """The ground that all else stands on: what may be committed, and what pure packages may need."""
 
+import ast
 import json
 import re
 import shutil
@@ -91,6 +92,37 @@ def test_browser_libraries_are_exact_and_without_address() -> None:
     for entry in locked.values():
         assert entry["integrity"].startswith("sha512-")
         assert "resolved" not in entry
+
+
+def imported_by(file: Path) -> set[str]:
+    """Return the modules that a file imports, and what it takes of them."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def test_no_test_imports_a_test() -> None:
+    """What two of them need stands in tests/support, which imports no test either."""
+    found = [
+        f"{file.relative_to(ROOT)}: {name}"
+        for file in sorted((ROOT / "tests").rglob("*.py"))
+        for name in sorted(imported_by(file))
+        if re.search(r"^tests\.(.*\.)?test_\w+(\.|$)", name)
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_test_files_are_short_and_named_without_their_folder() -> None:
+    """A long file has two subjects; its folder has said whose tests these are."""
+    files = sorted((ROOT / "tests").rglob("test_*.py"))
+    lengths = {file: len(file.read_text().splitlines()) for file in files}
+    long = {file.name: lines for file, lines in lengths.items() if lines > 500}
+    assert not long
+    assert not [f for f in files if f.stem.startswith(f"test_{f.parent.name}_")]
 
 
 # Clinic machines may run Windows and have no Django; what third-party libraries import is their

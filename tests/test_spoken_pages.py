@@ -17,7 +17,7 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
-from tests.support.world import World, build_world, fill_board, signed_in
+from tests.support.world import World, fill_board, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -118,8 +118,7 @@ class Page(HTMLParser):
 
 
 @pytest.fixture
-def world() -> World:
-    world = build_world("amber")
+def world(world: World) -> World:
     fill_board(world)
     Clinic.everywhere.update(language="es")
     Patient.everywhere.update(language="es", boards="clinic")

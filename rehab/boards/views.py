@@ -16,7 +16,7 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.web.language import speak_to
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import OPEN, State
+from rehab.training.changes import OPEN_STATES, State
 
 SHOWN_S = 20  # for which a waiting tablet shows a board, before the next one
 
@@ -31,7 +31,7 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
     """
     session = find_session(request, session_id)
     speak_to(session.patient)
-    if State(session.state) in OPEN:
+    if State(session.state) in OPEN_STATES:
         return redirect("walk", session_id=session.pk)
     boards: list[BoardPanel] = []
     if not session.patient.blinded:

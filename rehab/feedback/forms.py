@@ -15,7 +15,7 @@ from rehab.people.models import LANGUAGES
 from rehab.people.web.admin_base import ClinicForm
 from rehab.people.web.refusals import in_words
 from rehab.training.measures import InvalidSetting
-from rehab.training.valences import VALENCES, WORDS_MAX, Band
+from rehab.training.valences import TEXT_MAX, VALENCES, Band
 
 
 def word_fields() -> dict[str, str]:
@@ -91,7 +91,7 @@ class BandForm(forms.ModelForm):
 for _field, _language in word_fields().items():
     BandForm.base_fields[_field] = forms.CharField(
         label=format_lazy(_("words, {language}"), language=dict(LANGUAGES)[_language]),
-        max_length=WORDS_MAX,
+        max_length=TEXT_MAX,
         required=False,
     )
     BandForm.declared_fields[_field] = BandForm.base_fields[_field]

@@ -22,7 +22,7 @@ from rehab.training.valences import (
     VALENCES,
     Band,
     Confetti,
-    Cue,
+    CueGestures,
     Valence,
     edit_valence,
 )
@@ -93,7 +93,7 @@ class FeedbackType(ClinicRow):
             hit_points=self.hit_points,
             miss_points=self.miss_points,
             bands=bands,
-            cue=Cue(self.cue_above or None, self.cue_below or None),
+            cue=CueGestures(self.cue_above or None, self.cue_below or None),
         )
 
 

@@ -1,12 +1,18 @@
-"""From raw signals to strides with A2, while somebody walks. Pure: no Django, no clock."""
+"""Strides with A2 from raw signals, while somebody walks. Pure: no Django, no clock.
 
-from rehab.gait.gyroscope import ContactKind, GyroscopeContact, GyroscopeDetector
-from rehab.gait.kinetics import find_ankle_moment, find_ankle_velocity
-from rehab.gait.legs import LegSamples, TwoLegDetector
+``StrideDetector`` and ``TwoLegDetector`` take samples as they come, ``measure_strides`` and
+``measure_both_legs`` whole recordings with the same code. The comments
+of thresholds name their sources.
+"""
+
+from rehab.gait.contacts.gyroscope import ContactKind, GyroscopeContact, GyroscopeDetector
 from rehab.gait.offline import measure_both_legs, measure_strides
 from rehab.gait.online import StrideDetector
-from rehab.gait.selfcheck import Finding, SignalCheck, check_signals
-from rehab.gait.strides import Flag, GaitInputError, Reason, Stride
+from rehab.gait.selfcheck.checks import Finding, SignalCheck, check_signals
+from rehab.gait.signals.samples import LegSamples
+from rehab.gait.stances.kinetics import compute_ankle_moment, compute_ankle_velocity
+from rehab.gait.strides import Flag, GaitInputError, RejectionReason, Stride
+from rehab.gait.two_legs import TwoLegDetector
 
 __all__ = [
     "ContactKind",
@@ -16,14 +22,14 @@ __all__ = [
     "GyroscopeContact",
     "GyroscopeDetector",
     "LegSamples",
-    "Reason",
+    "RejectionReason",
     "SignalCheck",
     "Stride",
     "StrideDetector",
     "TwoLegDetector",
     "check_signals",
-    "find_ankle_moment",
-    "find_ankle_velocity",
+    "compute_ankle_moment",
+    "compute_ankle_velocity",
     "measure_both_legs",
     "measure_strides",
 ]

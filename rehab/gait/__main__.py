@@ -17,18 +17,28 @@ from pathlib import Path
 
 import numpy as np
 
-from rehab.gait.columns import CHANNELS
-from rehab.gait.files import find_mass, find_rate, read_signals
 from rehab.gait.offline import measure_both_legs, measure_strides
-from rehab.gait.plot import load_pyplot, plot_strides
-from rehab.gait.selfcheck import check_signals
+from rehab.gait.recordings.columns import CHANNELS
+from rehab.gait.recordings.csv_files import estimate_rate, read_mass, read_signals
+from rehab.gait.recordings.plot import load_pyplot, plot_strides
+from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.strides import GaitInputError, Stride
 
 LOOK_AHEAD_S = 0.05
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure each file and print what was found; 2 after an input that cannot be measured."""
+    """Measure each file and print its strides.
+
+    Parameters
+    ----------
+    arguments
+        The command line without the program's name; None for that of the process.
+
+    Returns
+    -------
+    The exit status: 0, or 2 after input that cannot be measured.
+    """
     options = _read_options(arguments)
     try:
         if options.plot:
@@ -65,8 +75,8 @@ def _read_options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 def _measure_file(path: Path, options: argparse.Namespace) -> None:
     time, legs = read_signals(path, options.columns)
-    rate_hz = find_rate(time, path) if options.rate is None else options.rate
-    mass_kg = find_mass(path) if options.mass is None else options.mass
+    rate_hz = estimate_rate(time, path) if options.rate is None else options.rate
+    mass_kg = read_mass(path) if options.mass is None else options.mass
     if len(legs) == 2:
         strides = measure_both_legs(
             time,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from rehab.gait.legs import LegSamples, TwoLegDetector
 from rehab.gait.online import StrideDetector
+from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import Stride
+from rehab.gait.two_legs import TwoLegDetector
 
 
 def measure_strides(
@@ -23,7 +24,24 @@ def measure_strides(
     is_velocity: bool = False,
     side: str | None = None,
 ) -> list[Stride]:
-    """Give the strides of one leg. Channels and settings are those of ``StrideDetector``."""
+    """Return the strides of one leg of a recording.
+
+    Parameters
+    ----------
+    t_s, force_n, moment_nm, angle_rad, forward_n, position_m
+        Channels of shape (n,), as in ``StrideDetector.feed``.
+    rate_hz, mass_kg, look_ahead_s, is_velocity, side
+        As in ``StrideDetector``.
+
+    Returns
+    -------
+    All strides in order of time, the last one invalid where the record cuts it off.
+
+    Raises
+    ------
+    GaitInputError
+        For settings or channels that nothing can be measured from.
+    """
     detector = StrideDetector(
         rate_hz, mass_kg, look_ahead_s=look_ahead_s, is_velocity=is_velocity, side=side
     )
@@ -41,6 +59,23 @@ def measure_both_legs(
     look_ahead_s: float = 0.05,
     is_velocity: bool = False,
 ) -> list[Stride]:
-    """Give the strides of both legs. Channels and settings are those of ``TwoLegDetector``."""
+    """Return the strides of both legs of a recording.
+
+    Parameters
+    ----------
+    t_s, left, right
+        Times [s], shape (n,), and the channels of each leg, as in ``TwoLegDetector.feed``.
+    rate_hz, mass_kg, look_ahead_s, is_velocity
+        As in ``TwoLegDetector``.
+
+    Returns
+    -------
+    The strides of both legs in the order in which they were complete.
+
+    Raises
+    ------
+    GaitInputError
+        For settings or channels that nothing can be measured from.
+    """
     detector = TwoLegDetector(rate_hz, mass_kg, look_ahead_s=look_ahead_s, is_velocity=is_velocity)
     return detector.feed(t_s, left, right) + detector.finish()

@@ -1,4 +1,4 @@
-"""What a detector may be told, and the cure for what it may not."""
+"""Settings of a detector, checked, with the cure for those that cannot be used."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ LOOK_AHEAD_MAX_S = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
-    """How strides are found and measured; parameters are those of ``StrideDetector``.
+class DetectorSettings:
+    """How strides are detected and measured; the fields are those of ``StrideDetector``.
 
-    Raises GaitInputError, with the cure, for settings that nothing can be measured with.
+    Raises
+    ------
+    GaitInputError
+        With the cure, for settings that nothing can be measured with.
     """
 
     rate_hz: float
@@ -47,7 +50,7 @@ class Settings:
 
 
 def check_mass(mass_kg: float | None) -> None:
-    """Raise GaitInputError, with the cure, for a body mass that nobody has, or that is missing."""
+    """Raise GaitInputError, with the cure, for a body mass [kg] that is missing or nobody's."""
     if mass_kg is None or not MASS_MIN_KG <= mass_kg <= MASS_MAX_KG:
         raise GaitInputError(
             f"A body mass of {mass_kg} kg cannot be used. Weigh the patient and give "
@@ -56,7 +59,7 @@ def check_mass(mass_kg: float | None) -> None:
 
 
 def check_rate(rate_hz: float) -> None:
-    """Raise GaitInputError, with the cure, for a rate that nothing can be measured at."""
+    """Raise GaitInputError, with the cure, for a rate [Hz] that nothing can be measured at."""
     if not RATE_MIN_HZ <= rate_hz <= RATE_MAX_HZ:
         raise GaitInputError(
             f"A rate of {rate_hz:g} Hz cannot be used. Give the samples' rate, "

@@ -1,4 +1,4 @@
-"""One stride as it was measured, and why it may not count."""
+"""One stride as it was measured, and why it may be invalid."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ class GaitInputError(ValueError):
     """Input that nothing can be measured from; the message says the cure."""
 
 
-class Reason(StrEnum):
-    """Why a stride does not count. A stride without one is valid."""
+class RejectionReason(StrEnum):
+    """Why a stride is invalid. A stride without a reason is valid."""
 
     TIME_BACKWARDS = "time_backwards"  # the clock stood still or jumped back
     GAP = "gap"  # samples are missing
@@ -40,7 +40,7 @@ class Reason(StrEnum):
 
 
 class Flag(StrEnum):
-    """What the therapist should know of a stride that counts all the same."""
+    """What the therapist should know of a stride that is valid."""
 
     OFFSET = "offset"  # the plate's zero has moved by more than 15 N; taken out of the contacts
     SUPPORTED = "supported"  # a handrail or harness carries more than 5 % of the weight
@@ -93,7 +93,7 @@ class Stride:
     a2_w_kg: float | None
     a2_time_s: float | None
     valid: bool
-    reasons: tuple[Reason, ...]
+    reasons: tuple[RejectionReason, ...]
     flags: tuple[Flag, ...]
     stance_s: float
     stride_s: float | None

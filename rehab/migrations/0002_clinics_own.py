@@ -790,7 +790,7 @@ class Migration(migrations.Migration):
                     ("activation_threshold", "activation threshold"),
                     ("robot_intensity", "robot intensity"),
                     ("valence", "feedback type"),
-                    ("words", "words"),
+                    ("feedback_text", "words"),
                     ("words_shown", "words shown"),
                     ("chart_style", "chart style"),
                     ("robot_stop", "robot stop"),

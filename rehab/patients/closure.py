@@ -13,7 +13,7 @@ from django.utils.translation import gettext as _
 
 from rehab.people.models import Ending, Patient
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import OPEN
+from rehab.training.changes import OPEN_STATES
 
 
 class StillOpen(ValueError):
@@ -45,7 +45,7 @@ def hold_closed(patient: Patient) -> None:
     """Hold the patient's row. Raises StillOpen where a session could still go on."""
     patient.hold()
     sessions = TrainingSession.everywhere.filter(
-        patient=patient, state__in=[state.value for state in OPEN]
+        patient=patient, state__in=[state.value for state in OPEN_STATES]
     )
     if sessions.exists():
         said = _("%(patient)s still has an open session. End it first.")

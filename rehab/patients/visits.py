@@ -16,7 +16,7 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.scope import ClinicRow, Scope
 from rehab.sessions.formatting import at_clinic, midnight_of
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import OPEN, State
+from rehab.training.changes import OPEN_STATES, State
 
 SOON_DAYS = (0, 1, 2, 7)  # from today on: what one tap plans
 QUARTER_MIN = 15
@@ -125,7 +125,7 @@ def read_today(user: User, now: datetime) -> list[Today]:
 
 def _of_today(sessions: QuerySet[TrainingSession], midnight: datetime) -> Iterable[TrainingSession]:
     """Give what is open, and what people have walked since midnight (and a day, at most)."""
-    open_now = models.Q(state__in=[state.value for state in OPEN])
+    open_now = models.Q(state__in=[state.value for state in OPEN_STATES])
     begun = models.Q(created_at__gte=midnight, created_at__lt=midnight + timedelta(days=1))
     walked = begun & models.Q(active_s__gt=0, simulated=False)
     return sessions.filter(open_now | walked).order_by("created_at")
@@ -138,6 +138,6 @@ def _tell(
     sessions = list(sessions)
     if at is None and sessions:
         at = sessions[0].created_at.astimezone(now.tzinfo).time().replace(second=0, microsecond=0)
-    found = [OPEN_NOW[State(row.state)] for row in sessions if State(row.state) in OPEN]
+    found = [OPEN_NOW[State(row.state)] for row in sessions if State(row.state) in OPEN_STATES]
     done = Progress.DONE if sessions else Progress.EXPECTED
     return Today(patient, at, found[-1] if found else done, sum(row.active_s for row in sessions))

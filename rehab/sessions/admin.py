@@ -21,7 +21,7 @@ from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.search import Finder
 from rehab.sessions.reports.trend import with_figures
-from rehab.training.changes import OPEN, State
+from rehab.training.changes import OPEN_STATES, State
 
 
 @admin.register(TrainingSession)
@@ -101,7 +101,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         links = [(reverse("session", args=[row.pk]), _("Every stride"))]
         if person(request).role == Role.RESEARCHER:
             return links
-        if State(row.state) in OPEN:
+        if State(row.state) in OPEN_STATES:
             links.append((reverse("monitor", args=[row.pk]), _("Monitor")))
         if may_correct(row):
             links.append((reverse("correct", args=[row.pk]), _("Correct")))

@@ -20,7 +20,7 @@ from rehab.people.consent.models import PatientScope
 from rehab.people.models import Patient, User
 from rehab.people.scope import ScopedModel
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import OPEN, State
+from rehab.training.changes import OPEN_STATES, State
 
 
 class Part(models.TextChoices):
@@ -237,7 +237,7 @@ def read_parts(session: TrainingSession, reader: Any) -> dict[Part, str]:
 
 def may_correct(session: TrainingSession) -> bool:
     """Whether a session can be corrected: what still runs is ended first."""
-    return State(session.state) not in OPEN
+    return State(session.state) not in OPEN_STATES
 
 
 @transaction.atomic

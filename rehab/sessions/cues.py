@@ -14,7 +14,7 @@ from rehab.gestures.models import Gesture
 from rehab.people.models import Patient, User
 from rehab.people.web.refusals import in_words
 from rehab.training.measures import InvalidSetting
-from rehab.training.valences import Cue
+from rehab.training.valences import CueGestures
 from robot.gestures import GESTURES, ORIGINALS, BadGesture
 from robot.trial import admit_gesture
 
@@ -36,17 +36,17 @@ def name_gestures(by: User) -> set[str]:
     return {USUAL, NOTHING, *GESTURES, *ORIGINALS, *composed}
 
 
-def to_cue(above: str, below: str, valence: str, patient: Patient) -> Cue:
+def to_cue(above: str, below: str, valence: str, patient: Patient) -> CueGestures:
     """Give the cue for two choices, by what is usual in the patient's clinic."""
     usual = valences_of(patient.clinic_id)[valence].cue
-    return Cue(_gesture(above, usual.above), _gesture(below, usual.below))
+    return CueGestures(_gesture(above, usual.above), _gesture(below, usual.below))
 
 
 def _gesture(choice: str, usual: str | None) -> str | None:
     return usual if choice == USUAL else None if choice == NOTHING else choice
 
 
-def to_choices(cue: Cue, valence: str, patient: Patient, by: User) -> tuple[str, str]:
+def to_choices(cue: CueGestures, valence: str, patient: Patient, by: User) -> tuple[str, str]:
     """Give the choices for a cue; the usual one for a gesture that is not to be had any more."""
     usual = valences_of(patient.clinic_id)[valence].cue
     composed = Gesture.objects.visible_to(by).values_list("name", flat=True)
@@ -60,7 +60,7 @@ def _choice(gesture: str | None, usual: str | None, known: set[str | None]) -> s
     return gesture or NOTHING
 
 
-def find_composed(patient: Patient, cue: Cue) -> Iterator[dict[str, Any]]:
+def find_composed(patient: Patient, cue: CueGestures) -> Iterator[dict[str, Any]]:
     """Give the gestures of the patient's clinic that a cue names, as they travel to a robot.
 
     Raises InvalidSetting for a gesture that nobody knows, and for one that no robot would play.
@@ -84,13 +84,13 @@ def find_composed(patient: Patient, cue: Cue) -> Iterator[dict[str, Any]]:
         yield data
 
 
-def quiet_cue(cue: Cue, usual: Cue, chosen: Cue) -> Cue:
+def quiet_cue(cue: CueGestures, usual: CueGestures, chosen: CueGestures) -> CueGestures:
     """Give the cue of a type that a session may be changed to.
 
     What was silenced for the session, where its type would usually have a gesture, stays silent:
     no change of the feedback makes a robot move that was told to stand still.
     """
-    return Cue(
+    return CueGestures(
         None if usual.above and not chosen.above else cue.above,
         None if usual.below and not chosen.below else cue.below,
     )

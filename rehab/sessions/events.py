@@ -19,11 +19,11 @@ from rehab.sessions.payloads import (
     describe_walked,
     type_mark,
 )
-from rehab.training.changes import ChangeKind, Value
+from rehab.training.changes import ChangeKind, ChangeValue
 from rehab.training.fold import SessionFold
 from rehab.training.phases import Phase
 from rehab.training.plans import SessionPlan
-from rehab.training.steps import Reason, ScoredStep
+from rehab.training.steps import InvalidReason, ScoredStep
 from rehab.training.valences import Valence
 
 
@@ -214,7 +214,7 @@ def phase_event(fold: SessionFold, *, switched: bool = False) -> LiveEvent:
     return _to_each(fold, patient=phase | streak, monitor=monitor, robot=_cue(fold))
 
 
-def change_event(fold: SessionFold, kind: ChangeKind, value: Value = None) -> LiveEvent:
+def change_event(fold: SessionFold, kind: ChangeKind, value: ChangeValue = None) -> LiveEvent:
     """Give the event of any change that a person made."""
     told: Message
     match kind:
@@ -228,7 +228,7 @@ def change_event(fold: SessionFold, kind: ChangeKind, value: Value = None) -> Li
             value, told = fold.robot_intensity, {"value": fold.robot_intensity}
         case ChangeKind.VALENCE:
             told = describe_types(fold)
-        case ChangeKind.WORDS:
+        case ChangeKind.FEEDBACK_TEXT:
             told = {}
         case ChangeKind.WORDS_SHOWN:
             value, told = float(fold.words_shown), {"value": fold.words_shown}
@@ -368,7 +368,7 @@ def _last_step(fold: SessionFold, recent: Sequence[StoredStep]) -> Message | Non
     for step in reversed(recent):
         if step.number <= switched_after:
             return None  # it meant something else
-        if step.side == plan.trained_side and Reason.PAUSED not in step.reasons:
+        if step.side == plan.trained_side and InvalidReason.PAUSED not in step.reasons:
             score, streak = fold.score, fold.feedback.streak
             told = replace(told, phase=plan.phases[step.phase])
             return _patient_step(plan, told, step, score, streak, live=False)

@@ -19,7 +19,7 @@ from rehab.sessions.live import runtime
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import NotStored
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import OPEN, ChangeKind
+from rehab.training.changes import OPEN_STATES, ChangeKind
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import Valence, bands_to_json
 
@@ -34,7 +34,7 @@ def on_words_edited(
 ) -> list[str]:
     """Reword the clinic's open sessions; give what could not be reached, in words."""
     open_ones = TrainingSession.everywhere.filter(
-        clinic=clinic_id, state__in=[state.value for state in OPEN]
+        clinic=clinic_id, state__in=[state.value for state in OPEN_STATES]
     )
     problems: list[str] = []
     for session in open_ones.select_related("patient").order_by("pk"):
@@ -64,7 +64,7 @@ async def _reword(session_id: int, worded: Valence, by: User) -> None:
         if known is None or known.bands == worded.bands:
             return
         value = {"valence": worded.slug, "bands": bands_to_json(worded.bands)}
-        await here.change(session_id, ChangeKind.WORDS, value, by)
+        await here.change(session_id, ChangeKind.FEEDBACK_TEXT, value, by)
     finally:
         if not serves:
             await here.drain()

@@ -24,7 +24,7 @@ from rehab.sessions.step_sources import LIVE, list_sources, source_arguments
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
 from rehab.stations.models import Station
-from rehab.training.changes import OPEN, ChangeKind
+from rehab.training.changes import OPEN_STATES, ChangeKind
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.plans import ROBOT_LEVELS, name_robot_level
@@ -172,7 +172,7 @@ def minutes_of(protocol: Protocol | None) -> int | None:
 
 def _free(stations: QuerySet[Station]) -> Station | None:
     """Give the first station where nobody has an open session, or else the first."""
-    taken = stations.filter(sessions__state__in=[state.value for state in OPEN])
+    taken = stations.filter(sessions__state__in=[state.value for state in OPEN_STATES])
     return stations.exclude(pk__in=taken.values("pk")).first() or stations.first()
 
 

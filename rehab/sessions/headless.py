@@ -18,11 +18,11 @@ from rehab.sessions.models import TrainingSession
 from rehab.sources.recording import Recording
 from rehab.sources.synthetic import SyntheticWalker
 from rehab.training.changes import ChangeKind
-from rehab.training.figures import describe_session
 from rehab.training.fold import SessionFold
 from rehab.training.measures import A2
 from rehab.training.scoring import judge
 from rehab.training.steps import Measurement
+from rehab.training.summary import summarize_session
 
 # Steps on their way to the disk at full speed: commits cost little, memory stays flat.
 BATCH = 500
@@ -118,7 +118,7 @@ def report(
     robot: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Give the JSON that `runsession` prints; ``robot`` is what a robot did, if one answered."""
-    figures = describe_session(fold)
+    figures = summarize_session(fold)
     if recording is not None:
         counts = compare_with_flags(session, recording)
         figures["recorded_success"] = _sum_counts(list(counts.values()))

@@ -93,7 +93,7 @@ EVENTS = {
     ChangeKind.ACTIVATION_THRESHOLD: _("activation threshold"),
     ChangeKind.ROBOT_INTENSITY: _("robot intensity"),
     ChangeKind.VALENCE: _("feedback type"),
-    ChangeKind.WORDS: _("words"),
+    ChangeKind.FEEDBACK_TEXT: _("words"),
     ChangeKind.WORDS_SHOWN: _("words shown"),
     ChangeKind.CHART_STYLE: _("chart style"),
     RobotEntry.STOP: _("robot stop"),

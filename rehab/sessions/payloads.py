@@ -7,7 +7,7 @@ from typing import Any
 
 from django.utils.translation import gettext, override
 
-from rehab.training.changes import ChangeKind, State, Value
+from rehab.training.changes import ChangeKind, ChangeValue, State
 from rehab.training.fold import SessionFold
 from rehab.training.phases import find_phase_kind
 from rehab.training.plans import SessionPlan
@@ -98,7 +98,7 @@ def describe_state(fold: SessionFold) -> Message:
     }
 
 
-def change_mark(after: int, kind: ChangeKind, value: Value) -> Message:
+def change_mark(after: int, kind: ChangeKind, value: ChangeValue) -> Message:
     """Give a change as a PT's chart points it out; of edited words only whose they are."""
     return {
         "after": after,

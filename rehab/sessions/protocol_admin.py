@@ -100,7 +100,7 @@ class PhaseRows(ScopedOptions, admin.TabularInline):
 class ProtocolAdmin(SharedAdmin):
     """Protocols: the shared ones, and the clinic's own."""
 
-    change_form_template = "sessions/admin_protocol.html"
+    change_form_template = "sessions/protocol_form.html"
     list_display = ("named", "whose", "phase_count", "length", "about")
     search_fields = ("name", "description", "phases__name")
     inlines = (PhaseRows,)

@@ -12,7 +12,7 @@ from rehab.people.api import PatientName, Short
 from rehab.people.web.api_base import Given, Key, Moment, Paging, Whole, Words, left_out, sees_names
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import ASKED, ChangeKind, State
+from rehab.training.changes import REQUESTABLE, ChangeKind, State
 from rehab.training.metrics import METRICS
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES, find_valence
@@ -27,13 +27,13 @@ FeedbackType = Annotated[
 
 def read_kind(kind: str) -> ChangeKind:
     """Give the change of that name. Raises ValueError for one that is not made here."""
-    if kind not in ASKED:
-        raise ValueError(f"A change is one of: {', '.join(ASKED)}.")
+    if kind not in REQUESTABLE:
+        raise ValueError(f"A change is one of: {', '.join(REQUESTABLE)}.")
     return ChangeKind(kind)
 
 
 AskedKind = Annotated[
-    str, AfterValidator(read_kind), Field(json_schema_extra={"enum": list(ASKED)})
+    str, AfterValidator(read_kind), Field(json_schema_extra={"enum": list(REQUESTABLE)})
 ]
 
 

@@ -17,13 +17,13 @@ from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocols import Measure, Protocol
 from rehab.stations.models import Station
-from rehab.training.changes import OPEN, ChangeKind, PauseReason, Value
+from rehab.training.changes import OPEN_STATES, ChangeKind, ChangeValue, PauseReason
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.plans import DEFAULT_ACTIVATION_THRESHOLD, SessionPlan
 from rehab.training.steps import Side
-from rehab.training.valences import Cue, Valence, find_valence
+from rehab.training.valences import CueGestures, Valence, find_valence
 
 
 class StationTaken(InvalidSetting):
@@ -32,7 +32,7 @@ class StationTaken(InvalidSetting):
 
 def check_station(station: Station) -> None:
     """Raise StationTaken where a session is open at a station."""
-    states = [state.value for state in OPEN]
+    states = [state.value for state in OPEN_STATES]
     taken = TrainingSession.everywhere.filter(
         station=station, clinic=station.clinic_id, state__in=states
     )
@@ -55,7 +55,7 @@ def create_session(
     trained_side: Side | None = None,
     target: Target | None = None,
     activation_threshold: float = DEFAULT_ACTIVATION_THRESHOLD,
-    cue: Cue | None = None,
+    cue: CueGestures | None = None,
     robot_intensity: float = 1.0,
     station: Station | None = None,
     created_by: User | None = None,
@@ -93,7 +93,7 @@ def create_session(
         try:
             composed |= {one["name"]: one for one in find_composed(patient, their_cue)}
         except InvalidSetting:  # a gesture that is gone: it hinders no session of another type
-            their_cue = Cue()
+            their_cue = CueGestures()
         alternatives.append(replace(other, cue=their_cue))
     plan = SessionPlan(
         measure=measure.to_rule(),
@@ -158,7 +158,7 @@ def _check_may_walk(patient: Patient) -> None:
 
 
 def change_session(
-    session: TrainingSession, kind: ChangeKind, value: Value = None, by: User | None = None
+    session: TrainingSession, kind: ChangeKind, value: ChangeValue = None, by: User | None = None
 ) -> None:
     """Start, pause, steer or end a session from a page; committed when this returns.
 
@@ -170,7 +170,7 @@ def change_session(
     async_to_sync(_change)(session.pk, kind, value, by)
 
 
-async def _change(session_id: int, kind: ChangeKind, value: Value, by: User | None) -> None:
+async def _change(session_id: int, kind: ChangeKind, value: ChangeValue, by: User | None) -> None:
     serves = runtime.peek() is not None  # else a command: what it starts must not outlive it
     here = runtime.current()
     try:

@@ -1,7 +1,7 @@
 """Where steps come from: one module each, without Django, so that a clinic machine can run them.
 
-A source gives measurements in the order walked. It scores nothing. ``client`` brings them to the
-server, ``intake`` makes strides of what labs send, ``source`` says what a source is.
+A source supplies measurements in the order walked. It scores nothing. ``client`` sends them to the
+server, ``intake`` makes strides of what labs send, ``source`` defines what a source is.
 """
 
 from __future__ import annotations
@@ -25,6 +25,6 @@ SOURCES: dict[str, tuple[str, str]] = {
 
 
 def load_source(name: str) -> type[PlayedSource | LiveSource]:
-    """Give a registered source."""
+    """Return the registered source of that name."""
     source: type[PlayedSource | LiveSource] = import_module(SOURCES[name][0]).SOURCE
     return source

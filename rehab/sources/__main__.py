@@ -23,12 +23,13 @@ from typing import TYPE_CHECKING, TextIO
 from rehab.sources import SOURCES, load_source
 from rehab.sources.client import (
     LiveFeed,
-    OutOfStep,
-    Player,
     SourceClient,
+    StepsLost,
+    StridePlayback,
     UnsendableStride,
 )
-from rehab.sources.source import LiveSource, PlayedSource, Source, Unusable
+from rehab.sources.reporting import SourceError
+from rehab.sources.source import LiveSource, PlayedSource, Source
 from rehab.training.steps import Side
 from robot.dialing import CannotDial, add_dialing_arguments, find_token, websocket_url
 from robot.link import Link, LinkRefused
@@ -39,11 +40,11 @@ if TYPE_CHECKING:
 SOURCE_PATH = "/ws/source/"
 STATUS_EVERY_S = 5.0
 
-DONE, UNUSABLE, REFUSED, INTERRUPTED = 0, 2, 3, 130
+EXIT_DONE, EXIT_UNUSABLE, EXIT_REFUSED, EXIT_INTERRUPTED = 0, 2, 3, 130
 
 
 def parse_speed(text: str) -> float | None:
-    """Read `max` as None and a finite number above 0 as itself."""
+    """Return None for `max` and the speed for a finite number above 0."""
     if text == "max":
         return None
     try:
@@ -56,14 +57,14 @@ def parse_speed(text: str) -> float | None:
 
 
 def parse_count(text: str) -> int:
-    """Read a whole number above 0."""
+    """Return a whole number above 0."""
     if not (text.isascii() and text.isdecimal() and int(text) > 0):
         raise ArgumentTypeError("give a whole number above 0")
     return int(text)
 
 
 def make_parser(name: str, source: type[Source]) -> ArgumentParser:
-    """Give the command line of a source."""
+    """Return the command-line parser of a source."""
     parser = ArgumentParser(
         prog=f"python -m rehab.sources {name}",
         description=sys.modules[source.__module__].__doc__,
@@ -102,8 +103,8 @@ def make_parser(name: str, source: type[Source]) -> ArgumentParser:
     return parser
 
 
-def make_menu() -> ArgumentParser:
-    """Give what answers to anything but the name of a source."""
+def make_top_parser() -> ArgumentParser:
+    """Return the parser that answers to anything but the name of a source."""
     names = "\n".join(f"  {name:14}{summary}" for name, (_, summary) in SOURCES.items())
     parser = ArgumentParser(
         prog="python -m rehab.sources",
@@ -115,54 +116,54 @@ def make_menu() -> ArgumentParser:
 
 
 def open_log(path: Path) -> TextIO:
-    """Open a file to append to. Raises Unusable."""
+    """Open a file to append to. Raises SourceError where that is not possible."""
     try:
         return path.open("a", encoding="utf-8")
     except OSError as problem:
-        raise Unusable(f"The log {path} cannot be written: {problem.strerror}.") from None
+        raise SourceError(f"The log {path} cannot be written: {problem.strerror}.") from None
 
 
-def end_with_parent() -> None:
-    """Wait until standard input closes, as it does when the server dies, and end with it."""
+def exit_with_parent() -> None:
+    """Wait until standard input closes, as it does when the server dies, and exit."""
     while os.read(0, 4096):  # not sys.stdin: Python aborts where a thread holds its lock at the end
         pass
-    os._exit(INTERRUPTED)
+    os._exit(EXIT_INTERRUPTED)
 
 
-def say(text: str) -> None:
-    """Print a line for whoever looks on."""
+def print_status(text: str) -> None:
+    """Print a line for the person who runs the source."""
     print(text, file=sys.stderr, flush=True)
 
 
-async def walk(
+async def run_client(
     client: SourceClient, describe: Callable[[], str], *others: Coroutine[None, None, None]
 ) -> None:
-    """Walk until that is over, with others beside, and say every few seconds how it goes.
+    """Run a client and other work until the client is done, and print its status now and then.
 
-    An other that ends by itself changes nothing; one that fails ends the walk.
+    Other work that ends changes nothing; other work that fails ends the client.
     """
 
-    async def tell() -> None:
+    async def report_status() -> None:
         while True:
             await asyncio.sleep(STATUS_EVERY_S)
-            say(describe())
+            print_status(describe())
 
     walking = asyncio.create_task(client.run())
-    beside = [asyncio.create_task(work) for work in (tell(), *others)]
-    waiting = {walking, *beside}
+    others_running = [asyncio.create_task(work) for work in (report_status(), *others)]
+    waiting = {walking, *others_running}
     try:
         while walking in waiting:
             done, waiting = await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
                 task.result()
     finally:
-        for task in (walking, *beside):
+        for task in (walking, *others_running):
             task.cancel()
-        await asyncio.gather(walking, *beside, return_exceptions=True)
+        await asyncio.gather(walking, *others_running, return_exceptions=True)
 
 
-async def measure(source: LiveSource, intake: Intake, client: SourceClient) -> None:
-    """Walk by what a live source hands in."""
+async def run_live_source(source: LiveSource, intake: Intake, client: SourceClient) -> None:
+    """Run a client with the strides of a live source."""
 
     async def read() -> None:
         await source.read(intake)
@@ -171,19 +172,19 @@ async def measure(source: LiveSource, intake: Intake, client: SourceClient) -> N
     def describe() -> str:
         return f"{client.describe()}; {intake.describe()}"
 
-    await walk(client, describe, read(), intake.watch())
+    await run_client(client, describe, read(), intake.watch())
 
 
 def run(name: str, options: Namespace, stack: ExitStack) -> int:
-    """Run a source to its end and give the exit status. Raises what cannot be used."""
+    """Run a source until it is done and return the exit status. Raises what makes it unusable."""
     if options.stay and options.session is not None:
-        raise Unusable("--stay goes on with later sessions, --session names one: give only one.")
+        raise SourceError("--stay goes on with later sessions, --session names one: give only one.")
     url = websocket_url(options.server, SOURCE_PATH)
     token = find_token(options, "GARRY_TOKEN", "a source")
     try:
-        source = load_source(name)(options, say)
+        source = load_source(name)(options, print_status)
     except ValueError as problem:  # RecordingError, GaitInputError, UnsendableStride
-        raise Unusable(str(problem)) from None
+        raise SourceError(str(problem)) from None
     log = stack.enter_context(open_log(options.log)) if options.log else None
 
     def on_ack(session: int, number: int) -> None:
@@ -192,14 +193,14 @@ def run(name: str, options: Namespace, stack: ExitStack) -> int:
             log.write(json.dumps(line) + "\n")
             log.flush()
 
-    def make_client(player: Player | LiveFeed) -> SourceClient:
+    def make_client(feed: StridePlayback | LiveFeed) -> SourceClient:
         return SourceClient(
             partial(Link, url, token),
-            player,
+            feed,
             session=options.session,
             stay=options.stay,
             on_ack=on_ack,
-            notice=say,
+            notify=print_status,
         )
 
     if isinstance(source, LiveSource):
@@ -208,45 +209,49 @@ def run(name: str, options: Namespace, stack: ExitStack) -> int:
 
         feed = LiveFeed()
         client = make_client(feed)
-        intake = Intake(feed, source.settings, say)
+        intake = Intake(feed, source.settings, print_status)
         stack.callback(intake.close)
 
-        doing = measure(source, intake, client)
+        doing = run_live_source(source, intake, client)
     else:
         client = make_client(
-            Player(source.open_walk, options.speed, source.ahead, resumes=options.resume)
+            StridePlayback(
+                source.open_walk, options.speed, source.max_unacknowledged, resumes=options.resume
+            )
         )
-        doing = walk(client, client.describe)
+        doing = run_client(client, client.describe)
     try:
         asyncio.run(doing)
     except KeyboardInterrupt:
-        say(f"Stopped. {client.describe()}")
-        return INTERRUPTED
-    except (LinkRefused, OutOfStep) as refusal:
-        say(f"{refusal}")
-        say(client.describe())
-        return REFUSED
-    say(f"Done: {client.acknowledged} strides acknowledged, {client.lost} not taken any more.")
-    return DONE
+        print_status(f"Stopped. {client.describe()}")
+        return EXIT_INTERRUPTED
+    except (LinkRefused, StepsLost) as refusal:
+        print_status(f"{refusal}")
+        print_status(client.describe())
+        return EXIT_REFUSED
+    print_status(
+        f"Done: {client.acknowledged} strides acknowledged, {client.lost} not taken any more."
+    )
+    return EXIT_DONE
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the source that the command line names and give the exit status."""
+    """Run the source that the command line names and return the exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     if not words or words[0] not in SOURCES:
-        make_menu().parse_args(words[:1])
+        make_top_parser().parse_args(words[:1])
     name = words[0]
     options = make_parser(name, load_source(name)).parse_args(words[1:])
     if options.child:
-        threading.Thread(target=end_with_parent, daemon=True).start()
+        threading.Thread(target=exit_with_parent, daemon=True).start()
     try:
         with ExitStack() as stack:
             return run(name, options, stack)
-    except (CannotDial, UnsendableStride, Unusable) as problem:
-        say(f"{problem}")
-        return UNUSABLE
+    except (CannotDial, UnsendableStride, SourceError) as problem:
+        print_status(f"{problem}")
+        return EXIT_UNUSABLE
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return EXIT_INTERRUPTED
 
 
 if __name__ == "__main__":

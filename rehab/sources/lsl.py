@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rehab.sources.intake import Intake, IntakeSettings, add_signal_arguments
-from rehab.sources.source import LiveSource, Say, Unusable
+from rehab.sources.reporting import Notify, SourceError
+from rehab.sources.source import LiveSource
 
 # For streams; one on the same network answers within 0.7 s (docs/reference/gait.md#streaming).
-LOOK_S = 1.0
+RESOLVE_S = 1.0
 PULL_S = 0.2
 SILENT_S = 1.0
 CORRECT_EVERY_S = 5.0
@@ -32,10 +33,10 @@ CHUNK = 1024
 
 
 class ClockCorrection:
-    """Brings a sender's time stamps to this machine's clock, without steps in between.
+    """Converts a sender's time stamps to this machine's clock, without steps in between.
 
-    What is measured wanders by fractions of a millisecond. It is followed by at most ``slew`` of
-    the time that passes; a change of more than ``jump_s`` is another clock, and taken at once.
+    The measured difference varies by fractions of a millisecond. It is followed by at most ``slew``
+    of the time that passes; a change of more than ``jump_s`` is another clock, and taken at once.
     """
 
     def __init__(self, measured_s: float, slew: float = 0.001, jump_s: float = 0.1) -> None:
@@ -43,14 +44,14 @@ class ClockCorrection:
         self._slew, self._jump_s = slew, jump_s
         self._last_s: float | None = None
 
-    def measure(self, measured_s: float) -> None:
-        """Take a newly measured difference [s], ours less the sender's."""
+    def update(self, measured_s: float) -> None:
+        """Set the newly measured difference [s], our clock less the sender's."""
         self._target_s = measured_s
         if abs(measured_s - self.offset_s) > self._jump_s:
             self.offset_s = measured_s
 
     def correct(self, stamps_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Give the times of stamps on this machine's clock."""
+        """Return the times of stamps on this machine's clock."""
         passed_s = 0.0 if self._last_s is None else max(0.0, float(stamps_s[-1]) - self._last_s)
         self._last_s = float(stamps_s[-1])
         most_s = self._slew * passed_s
@@ -62,7 +63,7 @@ class ClockCorrection:
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """A stream that is open: its inlet and the names of its channels."""
+    """An open stream: its inlet and the names of its channels."""
 
     name: str
     labels: tuple[str, ...]
@@ -70,12 +71,12 @@ class Stream:
     inlet: Any
 
 
-class Lsl(LiveSource):
-    """Pulls each stream in a thread of its own; all go into one intake."""
+class LslSource(LiveSource):
+    """Reads each stream in a thread of its own; all feed one intake."""
 
     @classmethod
     def add_arguments(cls, parser: ArgumentParser) -> None:
-        """Say what its command line can hold."""
+        """Add the options of this source to a command line."""
         parser.add_argument(
             "--stream",
             nargs="+",
@@ -90,31 +91,34 @@ class Lsl(LiveSource):
         )
         add_signal_arguments(parser)
 
-    def __init__(self, options: Namespace, say: Say, pylsl: Any = None) -> None:
-        """Look at the command line."""
+    def __init__(self, options: Namespace, notify: Notify, pylsl: Any = None) -> None:
+        """Read the command line. Raises SourceError where LSL or the options cannot be used."""
         self.settings = IntakeSettings.read(options)
         self._wanted: list[str] = options.stream
         self._dejitter: bool = options.dejitter
-        self._say = say
+        self._notify = notify
         self._pylsl = pylsl or load_pylsl()
 
     async def read(self, intake: Intake) -> None:
-        """Take samples for as long as this runs."""
+        """Read samples for as long as this runs."""
         streams = await self._find(intake)
         loop = asyncio.get_running_loop()
         stopped = threading.Event()
         for stream in streams:
-            self._say(f"Reading LSL stream {stream.name}: {', '.join(stream.labels)}.")
+            self._notify(f"Reading LSL stream {stream.name}: {', '.join(stream.labels)}.")
             if stream.rate_hz > 0 and any(label in intake.forces for label in stream.labels):
                 intake.expect_rate(stream.rate_hz)
 
-        def tell(function: Callable[..., object], *arguments: object) -> None:
+        def call_in_loop(function: Callable[..., object], *arguments: object) -> None:
             if not stopped.is_set():
                 loop.call_soon_threadsafe(function, *arguments)
 
         threads = [
             threading.Thread(
-                target=self._pull, args=(stream, tell, intake, stopped), name="lsl", daemon=True
+                target=self._pull,
+                args=(stream, call_in_loop, intake, stopped),
+                name="lsl",
+                daemon=True,
             )
             for stream in streams
         ]
@@ -131,7 +135,7 @@ class Lsl(LiveSource):
         """Find and open the streams, however long it takes until they are there."""
         said = ""
         while True:
-            found = await asyncio.to_thread(self._pylsl.resolve_streams, LOOK_S)
+            found = await asyncio.to_thread(self._pylsl.resolve_streams, RESOLVE_S)
             chosen, missing = choose_streams(found, self._wanted)
             if not missing:
                 try:
@@ -143,7 +147,7 @@ class Lsl(LiveSource):
                         check_labels(stream, intake)
                     return opened
             if missing != said:
-                self._say(missing)
+                self._notify(missing)
             said = missing
 
     def _open(self, info: Any) -> Stream:
@@ -159,7 +163,7 @@ class Lsl(LiveSource):
     def _pull(
         self,
         stream: Stream,
-        tell: Callable[..., None],
+        call_in_loop: Callable[..., None],
         intake: Intake,
         stopped: threading.Event,
     ) -> None:
@@ -176,10 +180,10 @@ class Lsl(LiveSource):
                     text = (
                         f"LSL stream {stream.name} is silent. Start its sender; it is heard anew."
                     )
-                    tell(self._say, text)
+                    call_in_loop(self._notify, text)
                 continue
             if is_silent:
-                tell(self._say, f"LSL stream {stream.name} is heard again.")
+                call_in_loop(self._notify, f"LSL stream {stream.name} is heard again.")
             silent_s, is_silent = now_s, False
             samples, stamps = inlet.pull_chunk(timeout=0.0, max_samples=CHUNK)
             if now_s >= next_s:
@@ -187,7 +191,7 @@ class Lsl(LiveSource):
                 correction = self._correct(inlet, correction)
             stamped = np.array([stamp, *stamps])
             t_s = stamped if correction is None else correction.correct(stamped)
-            tell(take_samples, intake, stream, [sample, *samples], t_s)
+            call_in_loop(add_samples, intake, stream, [sample, *samples], t_s)
         inlet.close_stream()
 
     def _correct(self, inlet: Any, correction: ClockCorrection | None) -> ClockCorrection | None:
@@ -198,52 +202,52 @@ class Lsl(LiveSource):
             return correction
         if correction is None:
             return ClockCorrection(measured_s)
-        correction.measure(measured_s)
+        correction.update(measured_s)
         return correction
 
 
 def check_labels(stream: Stream, intake: Intake) -> None:
-    """Raise Unusable for a stream whose channels mean nothing here."""
-    if not intake.knows(stream.labels):
-        raise Unusable(
+    """Raise SourceError for a stream whose channels are neither mapped nor a stride's."""
+    if not intake.accepts(stream.labels):
+        raise SourceError(
             f"LSL stream {stream.name} has other channels: {', '.join(stream.labels)}. Say which "
             "is which: --columns time=stamp left.force=… left.moment=… left.angle=…"
         )
 
 
-def take_samples(
+def add_samples(
     intake: Intake, stream: Stream, samples: Sequence[Sequence[Any]], t_s: NDArray[np.float64]
 ) -> None:
-    """Hand in samples: rows where they are strides, a table where they are signals."""
+    """Hand samples to the intake: strides as rows, signals as a table."""
     if "value" in stream.labels:
         times = [{"time_s": float(t)} for t in t_s]
         cells = (dict(zip(stream.labels, sample, strict=True)) for sample in samples)
-        intake.take([row | time for row, time in zip(cells, times, strict=True)])
+        intake.add_rows([row | time for row, time in zip(cells, times, strict=True)])
     else:
         try:
             table = np.array(samples, dtype=np.float64)
         except ValueError:
-            intake.complain(f"LSL stream {stream.name} sends text. Let it send numbers.")
+            intake.reject_row(f"LSL stream {stream.name} sends text. Let it send numbers.")
             return
-        intake.take_table(stream.name, stream.labels, t_s, table)
+        intake.add_table(stream.name, stream.labels, t_s, table)
 
 
 def choose_streams(found: Sequence[Any], wanted: Sequence[str]) -> tuple[list[Any], str]:
-    """Give the streams that are wanted, and what is missing. Raises Unusable for doubts."""
+    """Return the streams that are wanted, and what is missing. Raises SourceError if ambiguous."""
     there = ", ".join(
         f"{s.name()} ({s.channel_count()} channels, {s.nominal_srate():g} Hz, {s.hostname()})"
         for s in found
     )
     if not wanted:
         if len(found) > 1:
-            raise Unusable(f"Several LSL streams are here: {there}. Choose with --stream NAME.")
+            raise SourceError(f"Several LSL streams are here: {there}. Choose with --stream NAME.")
         missing = "" if found else "No LSL stream is here yet. Start its sender in this network."
         return list(found), missing
     chosen = []
     for name in wanted:
         fitting = [s for s in found if name in (s.name(), s.type(), s.source_id())]
         if len(fitting) > 1:
-            raise Unusable(
+            raise SourceError(
                 f"Several LSL streams are called {name}: {there}. Stop one, or choose by source id."
             )
         if not fitting:
@@ -253,16 +257,16 @@ def choose_streams(found: Sequence[Any], wanted: Sequence[str]) -> tuple[list[An
 
 
 def load_pylsl() -> Any:
-    """Give pylsl. Raises Unusable where it is not there."""
+    """Return the module pylsl. Raises SourceError where it is not installed."""
     try:
         pylsl = importlib.import_module("pylsl")
         pylsl.StreamInlet  # noqa: B018 (a folder of that name has none)
     except (AttributeError, ImportError, OSError, RuntimeError) as problem:
-        raise Unusable(
+        raise SourceError(
             f"LSL cannot be used here ({str(problem).splitlines()[0][:120]}). Install it beside "
             "GARRY: pip install pylsl (on Linux without its own wheel, also the package liblsl)."
         ) from None
     return pylsl
 
 
-SOURCE = Lsl
+SOURCE = LslSource

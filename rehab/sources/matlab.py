@@ -14,23 +14,24 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from rehab.sources.intake import Intake, IntakeSettings, parse_address
 from rehab.sources.intake.rows import Cell
-from rehab.sources.source import LiveSource, Say
+from rehab.sources.reporting import Notify
+from rehab.sources.source import LiveSource
 from rehab.training.steps import Side
 
-AGAIN_S = 1.0
+RETRY_S = 1.0
 KEYWORDS = ("start", "one", "two", "three", "four", "five")
 
 
-class Matlab(LiveSource):
+class MatlabSource(LiveSource):
     """Sends the keyword when the session starts, as the original's tablet did, and reads strides.
 
-    MATLAB sends no times: a stride's time is when it comes. Its goal travels as ``matlab_goal``;
-    what counts is the one that the therapist set.
+    MATLAB sends no times: a stride's time is when it comes. Its goal is sent on as ``matlab_goal``;
+    the goal that counts is the therapist's.
     """
 
     @classmethod
     def add_arguments(cls, parser: ArgumentParser) -> None:
-        """Say what its command line can hold."""
+        """Add the options of this source to a command line."""
         parser.add_argument(
             "--connect", default="ws://127.0.0.1:4000", metavar="URL", help="default: %(default)s"
         )
@@ -40,54 +41,56 @@ class Matlab(LiveSource):
             help=f"which data to ask for; the original knows {', '.join(KEYWORDS)} (default one)",
         )
 
-    def __init__(self, options: Namespace, say: Say) -> None:
-        """Look at the command line."""
+    def __init__(self, options: Namespace, notify: Notify) -> None:
+        """Read the command line. Raises SourceError for an address of no use."""
         self.settings = IntakeSettings(side=Side(options.side) if options.side else None)
         self.address = parse_address(options.connect, ("ws",))
         self._keyword: str = options.keyword
-        self._say = say
+        self._notify = notify
         self._goal: float | None = None
 
     async def read(self, intake: Intake) -> None:
-        """Take strides until MATLAB says ``end``; begin anew where the connection breaks."""
+        """Read strides until MATLAB sends ``end``; start anew where the connection breaks."""
         said = ""
         while True:
             await intake.wait_for_start()
             try:
                 async with connect(str(self.address), proxy=None, compression=None) as socket:
                     said = ""
-                    if await self._take_all(socket, intake):
-                        self._say("MATLAB has sent all.")
+                    if await self._receive_all(socket, intake):
+                        self._notify("MATLAB has sent all.")
                         return
             except (OSError, WebSocketException) as problem:
                 text = f"No MATLAB server at {self.address} ({problem})"
                 if text != said:
-                    self._say(f"{text}. Start GarryMatlabServer there; trying every {AGAIN_S:g} s.")
+                    self._notify(
+                        f"{text}. Start GarryMatlabServer there; trying every {RETRY_S:g} s."
+                    )
                 said = text
-            await asyncio.sleep(AGAIN_S)
+            await asyncio.sleep(RETRY_S)
 
-    async def _take_all(self, socket: ClientConnection, intake: Intake) -> bool:
-        """Take what comes; give whether that was all."""
+    async def _receive_all(self, socket: ClientConnection, intake: Intake) -> bool:
+        """Read what comes; return whether that was all."""
         await socket.send(self._keyword)
-        self._say(f"Asked MATLAB for {self._keyword!r}.")
+        self._notify(f"Asked MATLAB for {self._keyword!r}.")
         try:
             async for message in socket:
                 if message == "end":
                     return True
                 row = self._read(message)
                 if row is None:
-                    intake.complain(
+                    intake.reject_row(
                         f"MATLAB sent {message[:40]!r}. Let it send sprintf('%f, %f', a2, goal)."
                     )
                 else:
-                    intake.take([row])
+                    intake.add_rows([row])
         except ConnectionClosed:
             pass
-        self._say(f"MATLAB hung up before the end. Asking for {self._keyword!r} anew.")
+        self._notify(f"MATLAB hung up before the end. Asking for {self._keyword!r} anew.")
         return False
 
     def _read(self, message: str | bytes) -> dict[str, Cell] | None:
-        """Give the stride that a message tells, None for what tells none."""
+        """Return the stride in a message, None where there is none."""
         words = message.split(",") if isinstance(message, str) else []
         try:
             a2, goal = (float(word) for word in words)
@@ -97,9 +100,9 @@ class Matlab(LiveSource):
         if math.isfinite(goal):
             row["matlab_goal"] = goal
             if goal != self._goal:
-                self._say(f"MATLAB's goal is {goal:g}; the session's own is what counts.")
+                self._notify(f"MATLAB's goal is {goal:g}; the session's own is what counts.")
             self._goal = goal
         return row
 
 
-SOURCE = Matlab
+SOURCE = MatlabSource

@@ -17,20 +17,21 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from rehab.sources.intake import Address, Intake, LineReader, parse_address
 from rehab.sources.intake.settings import IntakeSettings, add_signal_arguments
-from rehab.sources.source import LiveSource, Say, Unusable
+from rehab.sources.reporting import Notify, SourceError
+from rehab.sources.source import LiveSource
 
-AGAIN_S = 1.0  # between attempts to reach a lab that is not there
+RETRY_S = 1.0  # between attempts to reach a lab that is not there
 SILENT_S = 5.0  # after which another sender of datagrams may take over
 READ_BYTES = 64 * 1024
 TAKEN = "Another program already sends here. Stop it first."
 
 
-class Rows(LiveSource):
+class RowsSource(LiveSource):
     """Listens for one sender of rows, or connects to one."""
 
     @classmethod
     def add_arguments(cls, parser: ArgumentParser) -> None:
-        """Say what its command line can hold."""
+        """Add the options of this source to a command line."""
         where = parser.add_mutually_exclusive_group(required=True)
         where.add_argument(
             "--listen", metavar="URL", help="tcp://, udp:// or ws://127.0.0.1:9101 (0.0.0.0: all)"
@@ -41,8 +42,8 @@ class Rows(LiveSource):
         )
         add_signal_arguments(parser)
 
-    def __init__(self, options: Namespace, say: Say) -> None:
-        """Look at the command line."""
+    def __init__(self, options: Namespace, notify: Notify) -> None:
+        """Read the command line. Raises SourceError for an address of no use."""
         self.settings = IntakeSettings.read(options)
         self.address = (
             parse_address(options.listen)
@@ -53,46 +54,46 @@ class Rows(LiveSource):
         self._header = (
             [name.strip() for name in options.header.split(",")] if options.header else []
         )
-        self._say = say
+        self._notify = notify
         self._sender = ""
 
     async def read(self, intake: Intake) -> None:
-        """Take rows from one sender at a time, for as long as this runs."""
+        """Read rows from one sender at a time, for as long as this runs."""
         if not self._listens:
-            await self._dial(intake)
+            await self._keep_connecting(intake)
         async with AsyncExitStack() as stack:
             try:
                 self.address = await self._open(intake, stack)
             except OSError as problem:
-                raise Unusable(
+                raise SourceError(
                     f"Nothing can listen at {self.address}: {problem.strerror or problem}. Stop "
                     "what does already, or take another port."
                 ) from None
-            self._say(f"Listening for rows at {self.address}.")
+            self._notify(f"Listening for rows at {self.address}.")
             await asyncio.Event().wait()
 
     async def _open(self, intake: Intake, stack: AsyncExitStack) -> Address:
-        """Begin to listen; give where, with a port that was 0 filled in."""
+        """Start listening; return where, with a port that was 0 filled in."""
         kind, host, port = self.address
         if kind == "udp":
             loop = asyncio.get_running_loop()
             transport, _ = await loop.create_datagram_endpoint(
-                lambda: _Datagrams(self._make_reader(), intake, self._say), (host, port)
+                lambda: _Datagrams(self._make_reader(), intake, self._notify), (host, port)
             )
             stack.callback(transport.close)
             return Address(kind, *transport.get_extra_info("sockname")[:2])
         if kind == "tcp":
             senders: set[asyncio.StreamWriter] = set()
 
-            async def take_tcp(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            async def serve_tcp(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
                 senders.add(writer)
                 try:
                     peer = _name(writer.get_extra_info("peername"))
-                    if not self._take_place(peer):
+                    if not self._claim_sender(peer):
                         writer.write(f"{TAKEN}\n".encode())
                         await writer.drain()
                         return
-                    await self._take_all(_read_tcp(reader), intake, peer)
+                    await self._receive_all(_read_tcp(reader), intake, peer)
                 except OSError:
                     pass
                 finally:
@@ -104,22 +105,22 @@ class Rows(LiveSource):
                 for sender in senders:
                     sender.close()
 
-            server = await asyncio.start_server(take_tcp, host, port)
+            server = await asyncio.start_server(serve_tcp, host, port)
             stack.callback(hang_up)
             return Address(kind, *server.sockets[0].getsockname()[:2])
 
-        async def take_ws(socket: ServerConnection) -> None:
+        async def serve_ws(socket: ServerConnection) -> None:
             peer = _name(socket.remote_address)
-            if self._take_place(peer):
-                await self._take_all(_read_ws(socket), intake, peer)
+            if self._claim_sender(peer):
+                await self._receive_all(_read_ws(socket), intake, peer)
             else:
                 await socket.send(TAKEN)
                 await socket.close(1013, TAKEN)
 
-        listening = await stack.enter_async_context(serve(take_ws, host, port))
+        listening = await stack.enter_async_context(serve(serve_ws, host, port))
         return Address(kind, *next(iter(listening.sockets)).getsockname()[:2])
 
-    async def _dial(self, intake: Intake) -> None:
+    async def _keep_connecting(self, intake: Intake) -> None:
         """Connect to a lab that serves, again and again."""
         said = ""
         while True:
@@ -128,27 +129,27 @@ class Rows(LiveSource):
                     reader, writer = await asyncio.open_connection(*self.address[1:])
                     stream, close = _read_tcp(reader), writer.close
                     try:
-                        await self._take_all(stream, intake, str(self.address))
+                        await self._receive_all(stream, intake, str(self.address))
                     finally:
                         close()
                 else:
                     async with connect(str(self.address), proxy=None) as socket:
-                        await self._take_all(_read_ws(socket), intake, str(self.address))
+                        await self._receive_all(_read_ws(socket), intake, str(self.address))
                 said = ""
             except (OSError, WebSocketException) as problem:
                 text = f"No lab answers at {self.address} ({getattr(problem, 'strerror', problem)})"
                 if text != said:
-                    self._say(f"{text}. Start its script; trying again every {AGAIN_S:g} s.")
+                    self._notify(f"{text}. Start its script; trying again every {RETRY_S:g} s.")
                 said = text
-            await asyncio.sleep(AGAIN_S)
+            await asyncio.sleep(RETRY_S)
 
     def _make_reader(self) -> LineReader:
         return LineReader(self._header)
 
-    def _take_place(self, peer: str) -> bool:
-        """Give whether this sender is the only one."""
+    def _claim_sender(self, peer: str) -> bool:
+        """Return whether this sender is the only one, and remember it."""
         if self._sender:
-            self._say(
+            self._notify(
                 f"{peer} wants to send as well and was turned away: {self._sender} already does. "
                 "Stop one of the two."
             )
@@ -156,10 +157,10 @@ class Rows(LiveSource):
         self._sender = peer
         return True
 
-    async def _take_all(self, stream: AsyncIterator[bytes], intake: Intake, peer: str) -> None:
-        """Take all that one sender sends."""
+    async def _receive_all(self, stream: AsyncIterator[bytes], intake: Intake, peer: str) -> None:
+        """Read everything that one sender sends."""
         self._sender = peer
-        self._say(f"{peer} sends.")
+        self._notify(f"{peer} sends.")
         lines = self._make_reader()
         try:
             async for data in stream:
@@ -167,14 +168,14 @@ class Rows(LiveSource):
             _take(lines, b"\n", intake)
         finally:
             self._sender = ""
-            self._say(f"{peer} sends no more.")
+            self._notify(f"{peer} sends no more.")
 
 
 class _Datagrams(asyncio.DatagramProtocol):
-    """Takes datagrams of whole lines from one sender, until it has been silent for a while."""
+    """Reads datagrams of whole lines from one sender, until it has been silent for a while."""
 
-    def __init__(self, lines: LineReader, intake: Intake, say: Say) -> None:
-        self._lines, self._intake, self._say = lines, intake, say
+    def __init__(self, lines: LineReader, intake: Intake, notify: Notify) -> None:
+        self._lines, self._intake, self._notify = lines, intake, notify
         self._peer: object = None
         self._heard_s = 0.0
 
@@ -182,13 +183,13 @@ class _Datagrams(asyncio.DatagramProtocol):
         now_s = asyncio.get_running_loop().time()
         if addr != self._peer:
             if self._peer is not None and now_s - self._heard_s < SILENT_S:
-                self._intake.complain(
+                self._intake.reject_row(
                     f"{_name(addr)} sends datagrams as well as {_name(self._peer)}, and is not "
                     "heard. Stop one of the two."
                 )
                 return
             self._peer = addr
-            self._say(f"{_name(addr)} sends.")
+            self._notify(f"{_name(addr)} sends.")
         self._heard_s = now_s
         _take(self._lines, data if data.endswith(b"\n") else data + b"\n", self._intake)
 
@@ -196,8 +197,8 @@ class _Datagrams(asyncio.DatagramProtocol):
 def _take(lines: LineReader, data: bytes, intake: Intake) -> None:
     rows, wrong = lines.read_bytes(data)
     for text in wrong:
-        intake.complain(text)
-    intake.take(rows)
+        intake.reject_row(text)
+    intake.add_rows(rows)
 
 
 async def _read_tcp(reader: asyncio.StreamReader) -> AsyncIterator[bytes]:
@@ -207,7 +208,7 @@ async def _read_tcp(reader: asyncio.StreamReader) -> AsyncIterator[bytes]:
 
 
 async def _read_ws(socket: object) -> AsyncIterator[bytes]:
-    """Give messages as whole lines."""
+    """Yield messages as whole lines."""
     with suppress(ConnectionClosed):
         async for message in socket:  # type: ignore[attr-defined]
             yield (message.encode() if isinstance(message, str) else message) + b"\n"
@@ -217,4 +218,4 @@ def _name(peer: object) -> str:
     return f"{peer[0]}:{peer[1]}" if isinstance(peer, tuple) else str(peer)
 
 
-SOURCE = Rows
+SOURCE = RowsSource

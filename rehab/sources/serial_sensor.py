@@ -20,10 +20,11 @@ from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from rehab.sources.intake import BadRow, Cell, Intake, IntakeSettings, add_signal_arguments
-from rehab.sources.source import LiveSource, Say, Unusable
+from rehab.sources.reporting import Notify, SourceError
+from rehab.sources.source import LiveSource
 
 BAUD = 921_600
-AGAIN_S = 1.0
+RETRY_S = 1.0
 READ_S = 0.05
 WRAP_US = 2**32
 MAX_FRAME = 1024  # bytes
@@ -31,7 +32,7 @@ _FRAME = re.compile(rb"\$([HD]),([^*$]*)\*([0-9A-Fa-f]{2})\s*")
 
 
 class Port(Protocol):
-    """What is used of a pyserial port."""
+    """The part of a pyserial port that is used here."""
 
     @property
     def in_waiting(self) -> int: ...
@@ -46,20 +47,20 @@ class FrameReader:
 
     def __init__(self) -> None:
         self.damaged = 0
-        self._cut = b""
+        self._partial = b""
         self._names: list[str] = []
         self._last_us: int | None = None
         self._turns = 0
 
     def read(self, data: bytes) -> list[Mapping[str, Cell]]:
-        """Give the rows of all frames that these bytes complete.
+        """Return the rows of all frames that these bytes complete.
 
-        Damaged frames are counted and left out: their samples are missing, and strides that need
-        them say so. Frames before the first names are left out silently.
+        Damaged frames are counted and skipped: their samples are missing, and strides that need
+        them have a reason. Frames before the first names are skipped silently.
         """
-        *lines, self._cut = (self._cut + data).split(b"\n")
-        if len(self._cut) > MAX_FRAME:
-            self._cut = b""
+        *lines, self._partial = (self._partial + data).split(b"\n")
+        if len(self._partial) > MAX_FRAME:
+            self._partial = b""
             self.damaged += 1
         rows = []
         for line in lines:
@@ -74,7 +75,7 @@ class FrameReader:
 
     def _read_frame(self, line: bytes) -> Mapping[str, Cell] | None:
         frame = _FRAME.fullmatch(line)
-        if frame is None or find_checksum(line[1 : frame.start(3) - 1]) != int(frame[3], 16):
+        if frame is None or compute_checksum(line[1 : frame.start(3) - 1]) != int(frame[3], 16):
             raise BadRow("damaged")
         cells = frame[2].decode("ascii", "replace").split(",")
         if frame[1] == b"H":
@@ -92,60 +93,63 @@ class FrameReader:
         return {"time_s": time_s} | dict(zip(self._names, numbers, strict=True))
 
     def _unwrap(self, now_us: int) -> int:
-        """Give microseconds that go on where the device's count begins again."""
+        """Return microseconds that go on where the device's counter wraps around."""
         if self._last_us is not None and self._last_us - now_us > WRAP_US // 2:
             self._turns += 1
         self._last_us = now_us
         return self._turns * WRAP_US + now_us
 
 
-def find_checksum(data: bytes) -> int:
-    """Give the exclusive or of all bytes."""
+def compute_checksum(data: bytes) -> int:
+    """Return the exclusive or of all bytes."""
     result = 0
     for byte in data:
         result ^= byte
     return result
 
 
-class SerialSensor(LiveSource):
-    """Reads a serial port in a thread of its own, and opens it anew where it was pulled out."""
+class SerialSensorSource(LiveSource):
+    """Reads a serial port in a thread of its own, and reopens it after it was unplugged."""
 
     @classmethod
     def add_arguments(cls, parser: ArgumentParser) -> None:
-        """Say what its command line can hold."""
+        """Add the options of this source to a command line."""
         parser.add_argument("--port", help="such as COM3 or /dev/ttyACM0 (default: the only one)")
         parser.add_argument("--baud", type=int, default=BAUD, help="default: %(default)s")
         add_signal_arguments(parser)
 
     def __init__(
-        self, options: Namespace, say: Say, open_port: Callable[[str, int], Port] | None = None
+        self,
+        options: Namespace,
+        notify: Notify,
+        open_port: Callable[[str, int], Port] | None = None,
     ) -> None:
-        """Look at the command line."""
+        """Read the command line. Raises SourceError where no port can be chosen."""
         self.settings = IntakeSettings.read(options)
         self.port: str = options.port or find_port()
         self._baud: int = options.baud
-        self._say = say
+        self._notify = notify
         self._open_port = open_port or open_serial
 
     async def read(self, intake: Intake) -> None:
-        """Take frames for as long as this runs."""
+        """Read frames for as long as this runs."""
         loop = asyncio.get_running_loop()
         stopped = threading.Event()
 
         def take(rows: list[Mapping[str, Cell]], damaged: int) -> None:
             for _ in range(damaged):
-                intake.complain(
+                intake.reject_row(
                     f"A frame of {self.port} was damaged. Use a shorter cable, another USB port or "
                     "the sketch's baud rate (--baud)."
                 )
-            intake.take(rows)
+            intake.add_rows(rows)
 
-        def tell(function: Callable[..., object], *arguments: object) -> None:
+        def call_in_loop(function: Callable[..., object], *arguments: object) -> None:
             if not stopped.is_set():
                 loop.call_soon_threadsafe(function, *arguments)
 
         reading = threading.Thread(
-            target=self._read_port, args=(tell, take, stopped), name="serial", daemon=True
+            target=self._read_port, args=(call_in_loop, take, stopped), name="serial", daemon=True
         )
         reading.start()
         try:
@@ -156,7 +160,7 @@ class SerialSensor(LiveSource):
 
     def _read_port(
         self,
-        tell: Callable[..., None],
+        call_in_loop: Callable[..., None],
         take: Callable[[list[Mapping[str, Cell]], int], None],
         stopped: threading.Event,
     ) -> None:
@@ -167,12 +171,14 @@ class SerialSensor(LiveSource):
             except (OSError, ValueError) as problem:  # SerialException is an OSError
                 text = f"{self.port} cannot be opened ({problem})"
                 if text != said:
-                    tell(self._say, f"{text}. Plug the sensor in, or close what uses it.")
+                    call_in_loop(
+                        self._notify, f"{text}. Plug the sensor in, or close what uses it."
+                    )
                 said = text
-                stopped.wait(AGAIN_S)
+                stopped.wait(RETRY_S)
                 continue
             said = ""
-            tell(self._say, f"Reading {self.port}.")
+            call_in_loop(self._notify, f"Reading {self.port}.")
             frames = FrameReader()
             try:
                 while not stopped.is_set():
@@ -180,10 +186,13 @@ class SerialSensor(LiveSource):
                     before = frames.damaged
                     rows = frames.read(data) if data else []
                     if rows or frames.damaged > before:
-                        tell(take, rows, frames.damaged - before)
+                        call_in_loop(take, rows, frames.damaged - before)
             except OSError as problem:
-                tell(self._say, f"The sensor at {self.port} is gone ({problem}). Plug it in again.")
-                stopped.wait(AGAIN_S)
+                call_in_loop(
+                    self._notify,
+                    f"The sensor at {self.port} is gone ({problem}). Plug it in again.",
+                )
+                stopped.wait(RETRY_S)
             finally:
                 port.close()
 
@@ -197,18 +206,18 @@ def open_serial(port: str, baud: int) -> Port:
 
 
 def find_port() -> str:
-    """Give the only serial port there is. Raises Unusable."""
+    """Return the only serial port there is. Raises SourceError."""
     from serial.tools.list_ports import comports
 
     ports = [found for found in comports() if found.vid is not None]
     if len(ports) == 1:
         return str(ports[0].device)
     there = "; ".join(f"{found.device} ({found.description})" for found in ports)
-    raise Unusable(
+    raise SourceError(
         f"Several serial ports are here: {there}. Choose one with --port."
         if ports
         else "No sensor is plugged in by USB. Plug it in, or name its port with --port."
     )
 
 
-SOURCE = SerialSensor
+SOURCE = SerialSensorSource

@@ -22,7 +22,7 @@ class State(StrEnum):
 
 
 class ChangeKind(StrEnum):
-    """What can change the way that later steps are scored."""
+    """What can change the way that later steps are scored or shown."""
 
     START = "start"
     PAUSE = "pause"
@@ -35,13 +35,13 @@ class ChangeKind(StrEnum):
     ACTIVATION_THRESHOLD = "activation_threshold"
     ROBOT_INTENSITY = "robot_intensity"
     VALENCE = "valence"  # of the next phase with feedback
-    WORDS = "words"  # the bands of a valence, as the clinic edited them
+    FEEDBACK_TEXT = "feedback_text"  # the bands of a valence, as the clinic edited them
     WORDS_SHOWN = "words_shown"
     CHART_STYLE = "chart_style"
 
 
 # What pages and programs ask for. Words are edited with their feedback type, for all open sessions.
-ASKED = tuple(kind for kind in ChangeKind if kind is not ChangeKind.WORDS)
+REQUESTABLE = tuple(kind for kind in ChangeKind if kind is not ChangeKind.FEEDBACK_TEXT)
 
 
 class PauseReason(StrEnum):
@@ -52,28 +52,51 @@ class PauseReason(StrEnum):
     RESTART = "restart"  # of the server
 
 
-Value = float | str | Mapping[str, Any] | None
+ChangeValue = float | str | Mapping[str, Any] | None
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One change.
+    """One change of a session.
 
-    ``value``: the new goal, gain, threshold, intensity, phase index, 1 or 0 for words shown or not;
-    a valence's slug, a chart style or a reason to pause by name; the valence and bands of words.
-    None for the others.
+    Attributes
+    ----------
+    kind
+        What changes.
+    value
+        The new goal, gain, threshold, intensity or phase index; 1 or 0 for words shown or not; the
+        slug of a valence, a chart style or the reason of a pause; for feedback text, the valence
+        and its bands. None for the others.
     """
 
     kind: ChangeKind
-    value: Value = None
+    value: ChangeValue = None
+
+    @property
+    def number(self) -> float:
+        """The value as a number. Raises InvalidSetting where it is none."""
+        value: object = self.value  # JSON knows true and false beside numbers
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InvalidSetting(
+                "The change '{kind}' needs a value, and that is a number.",
+                kind=Marked(CHANGE_LABELS[self.kind]),
+            )
+        return value
+
+    @property
+    def switch(self) -> bool:
+        """The value as on (1) or off (0). Raises InvalidSetting where it is neither."""
+        if self.number not in (0, 1):
+            raise InvalidSetting("Words are shown (1) or not (0).")
+        return self.number == 1
 
 
-class Refused(InvalidSetting):
-    """A change that the session's state does not allow; the message says what would be needed."""
+class NotAllowed(InvalidSetting):
+    """A change or step that the session's state does not allow; the message says what would be."""
 
 
-OPEN = frozenset({State.READY, State.RUNNING, State.PAUSED})
-ENDED = frozenset({State.FINISHED, State.ABORTED})
+OPEN_STATES = frozenset({State.READY, State.RUNNING, State.PAUSED})
+ENDED_STATES = frozenset({State.FINISHED, State.ABORTED})
 
 # kind: (states it may come in, state it leads to; None where the state stays)
 TRANSITIONS: dict[ChangeKind, tuple[frozenset[State], State | None]] = {
@@ -81,28 +104,28 @@ TRANSITIONS: dict[ChangeKind, tuple[frozenset[State], State | None]] = {
     ChangeKind.PAUSE: (frozenset({State.RUNNING}), State.PAUSED),
     ChangeKind.RESUME: (frozenset({State.PAUSED}), State.RUNNING),
     ChangeKind.FINISH: (frozenset({State.RUNNING, State.PAUSED}), State.FINISHED),
-    ChangeKind.ABORT: (OPEN, State.ABORTED),
-    ChangeKind.GOAL: (OPEN, None),
-    ChangeKind.GAIN: (OPEN, None),
-    ChangeKind.PHASE: (OPEN, None),
-    ChangeKind.ACTIVATION_THRESHOLD: (OPEN, None),
-    ChangeKind.ROBOT_INTENSITY: (OPEN, None),
-    ChangeKind.VALENCE: (OPEN, None),
-    ChangeKind.WORDS: (OPEN, None),
-    ChangeKind.WORDS_SHOWN: (OPEN, None),
-    ChangeKind.CHART_STYLE: (OPEN, None),
+    ChangeKind.ABORT: (OPEN_STATES, State.ABORTED),
+    ChangeKind.GOAL: (OPEN_STATES, None),
+    ChangeKind.GAIN: (OPEN_STATES, None),
+    ChangeKind.PHASE: (OPEN_STATES, None),
+    ChangeKind.ACTIVATION_THRESHOLD: (OPEN_STATES, None),
+    ChangeKind.ROBOT_INTENSITY: (OPEN_STATES, None),
+    ChangeKind.VALENCE: (OPEN_STATES, None),
+    ChangeKind.FEEDBACK_TEXT: (OPEN_STATES, None),
+    ChangeKind.WORDS_SHOWN: (OPEN_STATES, None),
+    ChangeKind.CHART_STYLE: (OPEN_STATES, None),
 }
 
 
 # How refusals name them: programs know these words, and pages have them translated.
-STATE_WORDS = {
+STATE_LABELS = {
     State.READY: gettext_noop("ready"),
     State.RUNNING: gettext_noop("running"),
     State.PAUSED: gettext_noop("paused"),
     State.FINISHED: gettext_noop("finished"),
     State.ABORTED: gettext_noop("aborted"),
 }
-KIND_WORDS = {
+CHANGE_LABELS = {
     ChangeKind.START: gettext_noop("start"),
     ChangeKind.PAUSE: gettext_noop("pause"),
     ChangeKind.RESUME: gettext_noop("resume"),
@@ -114,20 +137,26 @@ KIND_WORDS = {
     ChangeKind.ACTIVATION_THRESHOLD: gettext_noop("activation_threshold"),
     ChangeKind.ROBOT_INTENSITY: gettext_noop("robot_intensity"),
     ChangeKind.VALENCE: gettext_noop("valence"),
-    ChangeKind.WORDS: gettext_noop("words"),
+    ChangeKind.FEEDBACK_TEXT: gettext_noop("feedback_text"),
     ChangeKind.WORDS_SHOWN: gettext_noop("words_shown"),
     ChangeKind.CHART_STYLE: gettext_noop("chart_style"),
 }
 
 
 def next_state(state: State, kind: ChangeKind) -> State:
-    """Give the state after a change. Raises Refused, saying when it would be allowed."""
+    """Return the state after a change.
+
+    Raises
+    ------
+    NotAllowed
+        Naming the states in which the change would be allowed.
+    """
     allowed, leads_to = TRANSITIONS[kind]
     if state not in allowed:
-        raise Refused(
+        raise NotAllowed(
             "A session that is {state} cannot take the change '{kind}'; it must be {allowed}.",
-            state=Marked(STATE_WORDS[state]),
-            kind=Marked(KIND_WORDS[kind]),
-            allowed=AnyOf(sorted(STATE_WORDS[each] for each in allowed)),
+            state=Marked(STATE_LABELS[state]),
+            kind=Marked(CHANGE_LABELS[kind]),
+            allowed=AnyOf(sorted(STATE_LABELS[each] for each in allowed)),
         )
     return leads_to or state

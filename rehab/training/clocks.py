@@ -1,7 +1,6 @@
-"""What another clock shows, told by nothing but the times of what happened there.
+"""Another machine's clock, estimated from nothing but the times that arrive from it.
 
-One that is heard over a network: each time arrives some delay after it was true, and the shortest
-delay tells most.
+Each time arrives some delay after it was true, and the shortest delay says most.
 """
 
 from __future__ import annotations
@@ -13,23 +12,23 @@ LATE_S = 5.0
 # off by ±0.5 % when it is made and ±0.2 % by temperature (Murata, CERALOCK catalog P16E), a quartz
 # by less than ±0.01 %; ours is a quartz. So no drift alone makes anything late, and what a fresh
 # time may be behind grows by at most 0.6 s for each minute in which none was.
-LEAK = 0.01
+DRIFT_MAX = 0.01
 
 
-class HeardClock:
-    """Tells what came just now from what was held up on its way, by the time that it has there.
+class RemoteClock:
+    """Estimates a remote clock from the times that arrive, and tells fresh times from late ones.
 
-    The quickest time so far stands for a fresh one. What it tells leaks away by ``LEAK``, so that a
-    clock that runs slow is followed; a delay that grows no faster cannot be told from that. A time
-    that lies more than ``LATE_S`` before the last one was read from a clock that was set back, by a
-    device that began anew or by its network time: what was known of it says nothing any more.
+    The time that arrived with the shortest delay so far stands for a fresh one. The estimate decays
+    by ``DRIFT_MAX``, so that a clock that runs slow is followed; a delay that grows no faster
+    cannot be told from that. A time more than ``LATE_S`` before the last one was read from a clock
+    that was set back, by a device that restarted or by its network time: the estimate begins anew.
 
     Parameters
     ----------
     speed
         Seconds of that clock in one of ours.
     time_s, now_s
-        What it shows while ours shows ``now_s``, where it was told [s].
+        What it shows while ours shows ``now_s`` [s], where the device said so; else None.
     """
 
     def __init__(self, speed: float = 1.0, time_s: float | None = None, now_s: float = 0.0) -> None:
@@ -41,19 +40,27 @@ class HeardClock:
 
     @property
     def is_known(self) -> bool:
-        """Whether anything is known of it."""
+        """Whether there is an estimate."""
         return self._offset is not None
 
     def read_s(self, now_s: float) -> float | None:
-        """Give what it shows now [s], if anything is known of it."""
-        leaked = self._leaked(now_s)
-        return None if leaked is None else leaked + now_s * self._speed
+        """Return what it shows now [s], None without an estimate."""
+        decayed = self._decayed_offset(now_s)
+        return None if decayed is None else decayed + now_s * self._speed
 
-    def is_late(self, time_s: float, now_s: float) -> bool:
-        """Hear a time that arrives now; say whether it was held up."""
+    def observe(self, time_s: float, now_s: float) -> bool:
+        """Update the estimate with a time that arrives now, and return whether that time is late.
+
+        Parameters
+        ----------
+        time_s
+            The time on the remote clock [s].
+        now_s
+            Ours [s].
+        """
         slack_s = LATE_S * max(1.0, self._speed)
         offset = time_s - now_s * self._speed
-        known, last_s, self._last_s = self._leaked(now_s), self._last_s, time_s
+        known, last_s, self._last_s = self._decayed_offset(now_s), self._last_s, time_s
         if known is None or (last_s is not None and time_s < last_s - slack_s):
             known = offset
         if known - offset > slack_s:
@@ -61,13 +68,13 @@ class HeardClock:
         self._offset, self._seen_s = max(known, offset), now_s
         return False
 
-    def slacken(self, now_s: float) -> None:
-        """Allow that it stood still while nothing fresh was heard. What comes next tells."""
+    def allow_standstill(self, now_s: float) -> None:
+        """Lower the estimate as if the clock had stood still since its last fresh time."""
         if self._offset is not None:
             self._offset -= (now_s - self._seen_s) * self._speed
             self._seen_s = now_s
 
-    def _leaked(self, now_s: float) -> float | None:
+    def _decayed_offset(self, now_s: float) -> float | None:
         if self._offset is None:
             return None
-        return self._offset - LEAK * self._speed * (now_s - self._seen_s)
+        return self._offset - DRIFT_MAX * self._speed * (now_s - self._seen_s)

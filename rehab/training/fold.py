@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
 from rehab.training.changes import (
-    KIND_WORDS,
-    STATE_WORDS,
+    STATE_LABELS,
     Change,
     ChangeKind,
+    NotAllowed,
     PauseReason,
-    Refused,
     State,
     next_state,
 )
@@ -24,18 +21,19 @@ from rehab.training.plans import (
     ChartStyle,
     SessionPlan,
     check_activation_threshold,
+    check_chart_style,
     check_robot_intensity,
 )
-from rehab.training.scoring import RULES_VERSION, judge
+from rehab.training.scoring import score_measurement
 from rehab.training.steps import (
     InvalidMeasurement,
+    InvalidReason,
     Measurement,
-    Reason,
     ScoredStep,
     add_reason,
-    find_reasons,
+    find_invalid_reasons,
 )
-from rehab.training.tallies import Tally
+from rehab.training.tallies import Block, Tally
 from rehab.training.valences import Valence, bands_from_json
 
 # Strides further apart than this were not walked without a break, or a clock jumped: no more than
@@ -44,19 +42,16 @@ from rehab.training.valences import Valence, bands_from_json
 MAX_GAP_S = 10.0
 
 
-class Block(NamedTuple):
-    """What was alike while some strides of a phase were walked; no valence without feedback."""
-
-    phase: int
-    gain: float
-    valence: str
-
-
 class SessionFold:
-    """Where a session stands after the steps and changes it was given, in constant memory.
+    """State of a session after the steps and changes of its log so far, in constant memory.
 
-    ``step`` scores a measurement and moves on through the phases; ``change`` applies what a person
-    decided, effective from the next step. Neither looks at a clock.
+    ``step`` scores a measurement and advances through the phases; ``change`` applies what a person
+    decided, effective from the next step. Neither reads a clock.
+
+    Parameters
+    ----------
+    plan
+        What the session is scored with.
     """
 
     def __init__(self, plan: SessionPlan) -> None:
@@ -81,12 +76,18 @@ class SessionFold:
         self.words_shown = True
         self.chart_style = ChartStyle.POINTS
         self.pause_reason: PauseReason | None = None
-        self._joined = False  # whether the time since the last step was walked
-        self._begin(0)
+        self._was_walking = False  # whether the time since the last step was walked
+        self._begin_phase(0)
 
     @classmethod
     def replay(cls, plan: SessionPlan, log: Iterable[Measurement | Change]) -> SessionFold:
-        """Give the fold of a whole log."""
+        """Return the fold of a whole log.
+
+        Raises
+        ------
+        NotAllowed, InvalidMeasurement, InvalidSetting
+            For a log that no session can have written.
+        """
         fold = cls(plan)
         for entry in log:
             if isinstance(entry, Change):
@@ -104,13 +105,13 @@ class SessionFold:
 
     @property
     def changed_to(self) -> tuple[str, ...]:
-        """The valences that it was changed to on its way, in their order, each once."""
+        """The valences that the session was changed to, in that order, each once."""
         others = dict.fromkeys(slug for _, slug in self.switches)
         others.pop(self.plan.valence.slug, None)
         return tuple(others)
 
     def tally_of(self, kind: str) -> Tally:
-        """Give the sums over all phases of one kind."""
+        """Return the sums over all phases of one kind."""
         total = Tally()
         for phase, tally in zip(self.plan.phases, self.phases, strict=True):
             if phase.kind == kind:
@@ -124,15 +125,20 @@ class SessionFold:
         return baseline.mean_value if baseline.valid >= MIN_BASELINE_STRIDES else None
 
     def step(self, measurement: Measurement) -> ScoredStep:
-        """Score one stride. Raises Refused where the session has not begun or is over.
+        """Score one stride and count it.
 
-        Raises InvalidMeasurement for a number that is not the next one.
+        Raises
+        ------
+        NotAllowed
+            Where the session has not begun or is over.
+        InvalidMeasurement
+            For a number that does not follow the last one.
         """
         running = self.state is State.RUNNING
         if not running and self.state is not State.PAUSED:
-            raise Refused(
+            raise NotAllowed(
                 "A session that is {state} takes no steps; it must be running.",
-                state=Marked(STATE_WORDS[self.state]),
+                state=Marked(STATE_LABELS[self.state]),
             )
         if measurement.number != self.last_number + 1:
             raise InvalidMeasurement(
@@ -142,53 +148,34 @@ class SessionFold:
         time_s = measurement.time_s
         elapsed_s = 0.0 if self.last_time_s is None else time_s - self.last_time_s
         backwards = elapsed_s < 0
-        reasons = find_reasons(measurement, self.plan.measure)
+        reasons = find_invalid_reasons(measurement, self.plan.measure)
         if backwards:
-            reasons = add_reason(reasons, Reason.TIME_BACKWARDS)
+            reasons = add_reason(reasons, InvalidReason.TIME_BACKWARDS)
         if not running:
-            reasons = add_reason(reasons, Reason.PAUSED)
-        scored = self._score(measurement, reasons)
+            reasons = add_reason(reasons, InvalidReason.PAUSED)
+        scored = score_measurement(
+            measurement,
+            reasons,
+            measure=self.plan.measure,
+            trained_side=self.plan.trained_side,
+            phase=self.phase_index,
+            gain=self.gain,
+            goal=self.goal,
+            valence=self.valence if self.phase.feedback else None,
+        )
         self.last_number = scored.number
         if scored.side == self.plan.trained_side:
             self._count(scored, running)
-        if self._joined and not backwards:
+        if self._was_walking and not backwards:
             walked_s = min(elapsed_s, MAX_GAP_S)
             self.active_s += walked_s
             self.phase_s += walked_s
         # Later steps follow a clock that was set back (a source that began anew): one step is lost.
         self.last_time_s = time_s
-        self._joined = running and not backwards
+        self._was_walking = running and not backwards
         if running and self.phase.is_over(self.phase_strides, self.phase_s):
-            self._move_on()
+            self._advance_phase()
         return scored
-
-    def _score(self, measurement: Measurement, reasons: tuple[str, ...]) -> ScoredStep:
-        plan, goal, value = self.plan, self.goal, measurement.value
-        shown = performance = hit = points = None
-        if reasons:
-            if value is not None and not math.isfinite(value):
-                value = None
-        elif value is not None and goal is not None and measurement.side == plan.trained_side:
-            shown, performance, hit = judge(plan.measure, value, self.gain, goal)
-            if self.phase.feedback:
-                points = self.valence.points(hit)
-        return ScoredStep(
-            number=measurement.number,
-            time_s=measurement.time_s,
-            side=measurement.side,
-            value=value,
-            gain=self.gain,
-            shown=shown,
-            goal=goal,
-            performance=performance,
-            hit=hit,
-            points=points,
-            valid=not reasons,
-            reasons=reasons,
-            phase=self.phase_index,
-            extra=measurement.extra,
-            rules_version=RULES_VERSION,
-        )
 
     def _count(self, step: ScoredStep, running: bool) -> None:
         self.trained.add(step)
@@ -201,24 +188,24 @@ class SessionFold:
                 self.feedback.add(step)
             self.phase_strides += 1
 
-    def _move_on(self) -> None:
-        """Go to the next phase, or note why that cannot be."""
+    def _advance_phase(self) -> None:
+        """Begin the next phase, or note why that cannot be."""
         if self.phase_index + 1 == len(self.plan.phases):
             self.completed = True
             return
         try:
-            self._enter(self.phase_index + 1)
+            self._enter_phase(self.phase_index + 1)
         except InvalidSetting as problem:
             self.obstacle = str(problem)
 
-    def _enter(self, index: int) -> None:
+    def _enter_phase(self, index: int) -> None:
         """Begin a phase. Raises InvalidSetting where its goal should be known and cannot be."""
         kinds = [phase.kind for phase in self.plan.phases]
         if self.goal is None and kinds[index] != "baseline" and "baseline" in kinds[:index]:
             self.goal = self._goal_from_baseline()
-        self._begin(index)
+        self._begin_phase(index)
 
-    def _begin(self, index: int) -> None:
+    def _begin_phase(self, index: int) -> None:
         self.phase_index = index
         self.phase = self.plan.phases[index]  # the one that the next step falls in
         self.phase_strides = 0
@@ -233,7 +220,7 @@ class SessionFold:
 
     def _goal_from_baseline(self) -> float | None:
         if self.baseline_mean is None:
-            raise Refused(
+            raise NotAllowed(
                 "The goal needs {needed} valid baseline strides and has {had}. Walk on, or set the "
                 "goal as a value.",
                 needed=MIN_BASELINE_STRIDES,
@@ -244,40 +231,44 @@ class SessionFold:
     def change(self, change: Change) -> None:
         """Apply a change from the next step on.
 
-        Raises Refused where the state does not allow it and InvalidSetting for a value out of
-        bounds; the session is then as it was.
+        Raises
+        ------
+        NotAllowed
+            Where the state does not allow it; the session is then as it was.
+        InvalidSetting
+            For a value out of bounds; likewise.
         """
         state = next_state(self.state, change.kind)
         match change.kind:
             case ChangeKind.GOAL:
-                self.goal = self.plan.measure.check_goal(_needed(change))
+                self.goal = self.plan.measure.check_goal(change.number)
                 self.obstacle = ""
             case ChangeKind.GAIN:
-                self.gain = check_gain(_needed(change))
+                self.gain = check_gain(change.number)
             case ChangeKind.ACTIVATION_THRESHOLD:
-                self.activation_threshold = check_activation_threshold(_needed(change))
+                self.activation_threshold = check_activation_threshold(change.number)
             case ChangeKind.ROBOT_INTENSITY:
-                self.robot_intensity = check_robot_intensity(_needed(change))
+                self.robot_intensity = check_robot_intensity(change.number)
             case ChangeKind.PHASE:
-                self._enter(self._phase_index(_needed(change)))
+                self._enter_phase(self.plan.check_phase(change.number))
             case ChangeKind.PAUSE:
-                self._joined = False
+                self._was_walking = False
                 known = [reason for reason in PauseReason if reason == change.value]
                 self.pause_reason = known[0] if known else None
             case ChangeKind.RESUME:
                 self.pause_reason = None
             case ChangeKind.VALENCE:
-                self._plan_valence(change.value)
-            case ChangeKind.WORDS:
-                self._reword(change.value)
+                self._schedule_valence(change.value)
+            case ChangeKind.FEEDBACK_TEXT:
+                self._edit_feedback_text(change.value)
             case ChangeKind.WORDS_SHOWN:
-                self.words_shown = _switch(_needed(change))
+                self.words_shown = change.switch
             case ChangeKind.CHART_STYLE:
-                self.chart_style = _style(change.value)
+                self.chart_style = check_chart_style(change.value)
         self.state = state
 
-    def _plan_valence(self, slug: object) -> None:
-        """Note the valence of the next phase with feedback; the one in force undoes that."""
+    def _schedule_valence(self, slug: object) -> None:
+        """Schedule the valence of the next phase with feedback; the current one cancels that."""
         if not isinstance(slug, str) or slug not in self.valences:
             known = ", ".join(self.valences)
             raise InvalidSetting(
@@ -289,13 +280,13 @@ class SessionFold:
         elif any(phase.feedback for phase in self.plan.phases[self.phase_index + 1 :]):
             self.next_valence = slug
         else:
-            raise Refused(
+            raise NotAllowed(
                 "The feedback type changes with a phase, and no phase with feedback follows. "
                 "End this session and set up another one."
             )
 
-    def _reword(self, value: object) -> None:
-        """Take other bands for a valence. What a step earns stays as it was planned."""
+    def _edit_feedback_text(self, value: object) -> None:
+        """Replace the bands of a valence. What a step earns stays as it was planned."""
         given = value if isinstance(value, Mapping) else {}
         slug = given.get("valence")
         if not isinstance(slug, str) or slug not in self.valences:
@@ -304,37 +295,3 @@ class SessionFold:
         self.valences[slug] = worded
         if self.valence.slug == slug:
             self.valence = worded
-
-    def _phase_index(self, value: float) -> int:
-        if not 0 <= value < len(self.plan.phases) or value != int(value):
-            raise InvalidSetting(
-                "This session has no phase {value:g}; its phases are numbered 0 to {last}.",
-                value=value,
-                last=len(self.plan.phases) - 1,
-            )
-        return int(value)
-
-
-def _needed(change: Change) -> float:
-    value: object = change.value  # JSON knows true and false beside numbers
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InvalidSetting(
-            "The change '{kind}' needs a value, and that is a number.",
-            kind=Marked(KIND_WORDS[change.kind]),
-        )
-    return value
-
-
-def _switch(value: float) -> bool:
-    if value not in (0, 1):
-        raise InvalidSetting("Words are shown (1) or not (0).")
-    return value == 1
-
-
-def _style(value: object) -> ChartStyle:
-    try:
-        return ChartStyle(value)  # type: ignore[arg-type]  # whatever it is, it is looked up
-    except ValueError:
-        raise InvalidSetting(
-            "A chart's style is one of: {known}.", known=", ".join(ChartStyle)
-        ) from None

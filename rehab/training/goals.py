@@ -14,9 +14,19 @@ MIN_BASELINE_STRIDES = 50
 
 @dataclass(frozen=True, slots=True)
 class GoalRule:
-    """Where a session's goal comes from: a value in the measure's unit, or percent of baseline.
+    """Where a session's goal comes from: exactly one of a value and a percentage of the baseline.
 
-    Exactly one of the two is given. Raises InvalidSetting otherwise.
+    Attributes
+    ----------
+    value
+        The goal, in the measure's unit.
+    percent_of_baseline
+        50 to 200 % of the mean baseline value.
+
+    Raises
+    ------
+    InvalidSetting
+        Where both or none are given, or the percentage is out of bounds.
     """
 
     value: float | None = None
@@ -38,7 +48,20 @@ class GoalRule:
         return self.value is None
 
     def resolve(self, measure: Measure, baseline_mean: float | None) -> float | None:
-        """Give the goal in the measure's unit, or None while the baseline is unknown."""
+        """Return the goal in the measure's unit, None while the baseline is unknown.
+
+        Parameters
+        ----------
+        measure
+            What is trained.
+        baseline_mean
+            Mean of the valid baseline values, in its unit; None while unknown.
+
+        Raises
+        ------
+        InvalidSetting
+            For a goal outside the measure's bounds.
+        """
         if self.percent_of_baseline is None:
             return None if self.value is None else measure.check_goal(self.value)
         if baseline_mean is None:
@@ -48,7 +71,20 @@ class GoalRule:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What the PT wants of the whole session: "60 % of the steps, over ten minutes"."""
+    """What the PT wants of the whole session: "60 % of the steps, over ten minutes".
+
+    Attributes
+    ----------
+    hit_rate
+        Share of hits wanted, above 0 and up to 1; None for any.
+    duration_s
+        Active walking time wanted [s]; None for any.
+
+    Raises
+    ------
+    InvalidSetting
+        For values out of bounds.
+    """
 
     hit_rate: float | None = None
     duration_s: float | None = None
@@ -62,7 +98,7 @@ class Target:
             raise InvalidSetting("The planned duration must be more than 0 seconds.")
 
     def is_met(self, hit_rate: float | None, active_s: float) -> bool | None:
-        """Say whether both wishes are fulfilled; None where nothing was wished for."""
+        """Return whether both wishes are fulfilled; None where there are none."""
         if self.hit_rate is None and self.duration_s is None:
             return None
         rate_met = self.hit_rate is None or (hit_rate is not None and hit_rate >= self.hit_rate)

@@ -1,15 +1,15 @@
-"""Marks words for translation. Rules know no languages; whoever shows the words translates them."""
+"""Marks text for translation. Rules know no languages: the pages that show it translate it."""
 
 from __future__ import annotations
 
 
 def gettext_noop(text: str) -> str:
-    """Give the words back as they are: the name alone tells the translator's tools to take them."""
+    """Return the text as it is: only the name matters, by which gettext's tools collect it."""
     return text
 
 
 class Marked(str):
-    """A word that has a translation, as it stands in a sentence."""
+    """A word with a translation, as part of a sentence."""
 
     __slots__ = ()
 
@@ -18,7 +18,7 @@ OR = gettext_noop("or")
 
 
 class AnyOf(tuple[str, ...]):
-    """Words with translations of which each would do, as they stand in a sentence."""
+    """Words with translations, any of which would do, as part of a sentence."""
 
     __slots__ = ()
 

@@ -15,7 +15,12 @@ BOUND_MAX = 1e9
 class InvalidSetting(ValueError):
     """A setting that cannot be used; the message says what would be accepted.
 
-    It is ``template`` with ``values`` in its places: whoever shows it says it in another language.
+    Parameters
+    ----------
+    template
+        An English sentence with places for values; pages translate it.
+    values
+        What stands in its places.
     """
 
     def __init__(self, template: str, /, **values: object) -> None:
@@ -27,9 +32,21 @@ class InvalidSetting(ValueError):
 class Measure:
     """A quantity of a stride that can be trained.
 
-    Values lie in [value_min, value_max], goals in (goal_min, goal_max], both in ``unit``; goals lie
-    above 0, since a performance is a share of them. ``higher_is_better`` is False for quantities
-    that training should lower. Raises InvalidSetting for bounds that leave no room.
+    Attributes
+    ----------
+    slug, name, unit
+        For programs, for people (translated by pages), and of its values.
+    value_min, value_max
+        Values lie in [value_min, value_max]; others are invalid.
+    goal_min, goal_max
+        Goals lie in (goal_min, goal_max], above 0, since a performance is a share of them.
+    higher_is_better
+        False for quantities that training should lower.
+
+    Raises
+    ------
+    InvalidSetting
+        For bounds that leave no room.
     """
 
     slug: str
@@ -50,7 +67,7 @@ class Measure:
             raise InvalidSetting("{name}: goals need a range above 0.", name=Marked(self.name))
 
     def check_goal(self, goal: float) -> float:
-        """Give the goal back as a number. Raises InvalidSetting outside (goal_min, goal_max]."""
+        """Return the goal as a float. Raises InvalidSetting outside (goal_min, goal_max]."""
         if not self.goal_min < goal <= self.goal_max:
             raise InvalidSetting(
                 "A goal of {goal:g} {unit} cannot be used for {name}. "
@@ -81,7 +98,7 @@ MEASURES: dict[str, Measure] = {A2.slug: A2}
 
 
 def check_gain(gain: float) -> float:
-    """Give the gain back as a number. Raises InvalidSetting outside [GAIN_MIN, GAIN_MAX]."""
+    """Return the gain as a float. Raises InvalidSetting outside [GAIN_MIN, GAIN_MAX]."""
     if not GAIN_MIN <= gain <= GAIN_MAX:
         raise InvalidSetting(
             "A gain of {gain:g} cannot be used. Give one from {least:g} to {most:g}.",

@@ -1,4 +1,4 @@
-"""What a session adds up to: the figures that reports and leaderboards are made of."""
+"""Metrics of a session: the figures that reports and leaderboards are made of."""
 
 from __future__ import annotations
 
@@ -18,7 +18,17 @@ MIN_BASELINE_SHARE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """A figure of a session. ``compute`` gives None where the session has no such figure."""
+    """A figure of a session.
+
+    Attributes
+    ----------
+    slug, label, unit
+        For programs, for people (translated by pages), and of the figure; "" for ratios.
+    compute
+        Returns the figure of a session, None where it has none.
+    higher_is_better
+        Whether leaderboards rank larger figures first.
+    """
 
     slug: str
     label: str
@@ -51,7 +61,7 @@ def _points_per_100_steps(fold: SessionFold) -> float | None:
 
 
 def _relative_change(fold: SessionFold, mean: float | None) -> float | None:
-    """Give (mean − baseline) / baseline, positive for the better direction."""
+    """Return (mean − baseline) / baseline, positive for the better direction."""
     measure = fold.plan.measure
     baseline = fold.baseline_mean
     if mean is None or baseline is None or baseline <= MIN_BASELINE_SHARE * measure.value_max:
@@ -129,7 +139,7 @@ METRICS: dict[str, Metric] = {
 }
 
 
-def measure_session(fold: SessionFold) -> dict[str, float]:
-    """Give every metric that the session has."""
+def compute_metrics(fold: SessionFold) -> dict[str, float]:
+    """Return every metric that the session has, by slug."""
     figures = {slug: metric.compute(fold) for slug, metric in METRICS.items()}
     return {slug: figure for slug, figure in figures.items() if figure is not None}

@@ -1,4 +1,4 @@
-"""The parts of a session: what each is for, how long it lasts, whether it gives feedback."""
+"""The phases of a session: what each is for, how long it lasts, whether it gives feedback."""
 
 from __future__ import annotations
 
@@ -11,9 +11,16 @@ from rehab.training.measures import InvalidSetting, check_gain
 
 @dataclass(frozen=True, slots=True)
 class PhaseKind:
-    """What a phase is for. ``feedback`` is its default; a phase may say otherwise.
+    """What a phase is for.
 
-    ``calm_words`` stand on the patient's screen in a phase without feedback.
+    Attributes
+    ----------
+    slug, label
+        For programs, and for people (translated by pages).
+    feedback
+        Whether its phases give feedback, unless they say otherwise.
+    calm_words
+        What the patient's screen says in a phase without feedback.
     """
 
     slug: str
@@ -45,7 +52,7 @@ PHASE_KINDS: dict[str, PhaseKind] = {
 
 
 def find_phase_kind(slug: str) -> PhaseKind:
-    """Give the phase kind of that name. Raises InvalidSetting, naming the known ones."""
+    """Return the phase kind of that slug. Raises InvalidSetting, naming the known ones."""
     try:
         return PHASE_KINDS[slug]
     except KeyError:
@@ -58,11 +65,27 @@ def find_phase_kind(slug: str) -> PhaseKind:
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """One part of a session.
+    """One phase of a session.
 
     It ends after ``strides`` strides of the trained leg or ``seconds`` of source time, whichever
-    comes first; with neither, when the PT moves on. Raises InvalidSetting for what cannot be
-    walked.
+    comes first; with neither, when the PT moves on.
+
+    Attributes
+    ----------
+    kind, name
+        Slug of its kind, and what it is called.
+    feedback
+        Whether steps are rewarded, and shown.
+    gain
+        What the value is multiplied with before it is shown (ratio): the hidden decrement of the
+        recorded protocols is a gain of 0.85 (docs/reference/gait.md#protocol).
+    strides, seconds
+        Its limits; None without.
+
+    Raises
+    ------
+    InvalidSetting
+        For a phase that cannot be walked.
     """
 
     kind: str
@@ -85,7 +108,7 @@ class Phase:
             )
 
     def is_over(self, strides: int, seconds: float) -> bool:
-        """Say whether a phase that has lasted so long has reached one of its limits."""
+        """Return whether a phase of so many strides and seconds has reached a limit."""
         return (self.strides is not None and strides >= self.strides) or (
             self.seconds is not None and seconds >= self.seconds
         )
@@ -100,7 +123,7 @@ def make_phase(
     strides: int | None = None,
     seconds: float | None = None,
 ) -> Phase:
-    """Make a phase; name and feedback are its kind's unless given."""
+    """Return a phase; name and feedback are its kind's unless given. Raises InvalidSetting."""
     known = find_phase_kind(kind)
     return Phase(
         kind=kind,

@@ -1,4 +1,4 @@
-"""Everything a session is scored with, fixed when it is created and kept beside its log."""
+"""Plans: everything a session is scored with, fixed at its creation and stored beside its log."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import InvalidSetting, Measure
 from rehab.training.phases import Phase
 from rehab.training.steps import Side
-from rehab.training.valences import Cue, Valence, bands_from_json
+from rehab.training.valences import CueGestures, Valence, bands_from_json
 
 # The paper's default (P 3.4.1): the robot answers windows of at least 90 % of the goal.
 DEFAULT_ACTIVATION_THRESHOLD = 0.90
@@ -21,14 +21,14 @@ ROBOT_LEVELS = {"normal": 1.0, "gentle": 0.5, "off": 0.0}
 
 
 def check_activation_threshold(threshold: float) -> float:
-    """Give the threshold back as a number. Raises InvalidSetting outside (0, 2]."""
+    """Return the threshold as a float. Raises InvalidSetting outside (0, 2]."""
     if not 0 < threshold <= 2:
         raise InvalidSetting("The activation threshold lies above 0 and up to 2 (0.9 for 90 %).")
     return float(threshold)
 
 
 def check_robot_intensity(intensity: float) -> float:
-    """Give the intensity back as a number. Raises InvalidSetting for one that is no level."""
+    """Return the intensity as a float. Raises InvalidSetting for one that is no level."""
     if intensity not in ROBOT_LEVELS.values():
         levels = ", ".join(f"{level} ({value:g})" for level, value in ROBOT_LEVELS.items())
         raise InvalidSetting("A robot's intensity is one of: {levels}.", levels=levels)
@@ -42,20 +42,47 @@ class ChartStyle(StrEnum):
     LINE = "line"
 
 
+def check_chart_style(style: object) -> ChartStyle:
+    """Return the chart style of that name. Raises InvalidSetting, naming the known ones."""
+    try:
+        return ChartStyle(style)  # type: ignore[arg-type]  # whatever it is, it is looked up
+    except ValueError:
+        raise InvalidSetting(
+            "A chart's style is one of: {known}.", known=", ".join(ChartStyle)
+        ) from None
+
+
 def name_robot_level(intensity: float | None) -> str:
-    """Give the level's name; empty for none."""
+    """Return the name of an intensity's level, "" for None."""
     return next((name for name, value in ROBOT_LEVELS.items() if value == intensity), "")
 
 
 @dataclass(frozen=True, slots=True)
 class SessionPlan:
-    """What is measured, how it is paid, in which phases, towards which goal, how a robot answers.
+    """What is measured and rewarded, in which phases, towards which goal, and how a robot answers.
 
-    ``alternatives`` are the valences that it may be changed to on its way, as they are then.
-    ``gestures`` are those that somebody composed and a cue names, as they travel to the robot.
-    ``language`` is the one that its words are in.
-    Raises InvalidSetting for a plan that could not be walked: no phase, a goal outside the
-    measure's bounds, a goal from a baseline that does not come before the first feedback.
+    Attributes
+    ----------
+    measure, valence, phases
+        What is trained, the rule set of feedback, and the session's parts.
+    trained_side
+        The leg whose steps are scored.
+    goal, target
+        What a step should reach, and what is wanted of the whole session.
+    activation_threshold, robot_intensity
+        Mean performance at which the robot celebrates, and the share of its gestures' size.
+    gestures
+        Composed gestures that a cue names, as they are sent to the robot.
+    alternatives
+        Valences that the session may be changed to, as they are then.
+    language
+        Of the plan's texts.
+
+    Raises
+    ------
+    InvalidSetting
+        For a plan that cannot be walked: no phase, a goal outside the measure's bounds, a goal from
+        a baseline that does not come before the first feedback.
     """
 
     measure: Measure
@@ -85,13 +112,23 @@ class SessionPlan:
                     "feedback. Put one first, or give the goal as a value."
                 )
 
+    def check_phase(self, index: float) -> int:
+        """Return the index of a phase as an int. Raises InvalidSetting where there is none."""
+        if not 0 <= index < len(self.phases) or index != int(index):
+            raise InvalidSetting(
+                "This session has no phase {value:g}; its phases are numbered 0 to {last}.",
+                value=index,
+                last=len(self.phases) - 1,
+            )
+        return int(index)
+
     def to_json(self) -> dict[str, Any]:
-        """Give the plan as plain JSON data."""
+        """Return the plan as plain JSON data."""
         return asdict(self)
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> SessionPlan:
-        """Rebuild a plan from ``to_json``'s data, also of a plan that knew less than today's."""
+        """Return the plan of ``to_json``'s data, which may lack what later versions added."""
         return cls(
             measure=Measure(**data["measure"]),
             valence=_read_valence(data["valence"]),
@@ -108,5 +145,5 @@ class SessionPlan:
 
 
 def _read_valence(data: dict[str, Any]) -> Valence:
-    parts = {"bands": bands_from_json(data["bands"]), "cue": Cue(**data["cue"])}
+    parts = {"bands": bands_from_json(data["bands"]), "cue": CueGestures(**data["cue"])}
     return Valence(**data | parts)

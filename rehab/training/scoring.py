@@ -1,4 +1,4 @@
-"""What a step earns: one rule, used for every step from every source."""
+"""Scoring: how a value compares with its goal. One rule, for every step from every source."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 from typing import NamedTuple
 
 from rehab.training.measures import Measure
+from rehab.training.steps import Measurement, ScoredStep, Side
+from rehab.training.valences import Valence
 
 # Rises with every change that could alter a stored verdict; every step keeps the one it had.
 RULES_VERSION = 1
@@ -15,7 +17,17 @@ PERFORMANCE_MAX = 1000.0
 
 
 class Verdict(NamedTuple):
-    """What the patient is shown and how it compares with the goal."""
+    """What the patient is shown and how it compares with the goal.
+
+    Attributes
+    ----------
+    shown
+        The value after the gain, in its unit.
+    performance
+        Its share of the goal (ratio).
+    hit
+        Whether the goal was reached: performance ≥ 1.
+    """
 
     shown: float
     performance: float
@@ -23,13 +35,22 @@ class Verdict(NamedTuple):
 
 
 def judge(measure: Measure, value: float, gain: float, goal: float) -> Verdict:
-    """Compare a valid value with the goal, which lies above 0.
+    """Return how a valid value compares with the goal.
 
     ``shown = gain × value``; ``performance = shown / goal``, within ±PERFORMANCE_MAX; a hit is
     performance ≥ 1, which is shown ≥ goal exactly, since IEEE division rounds to nearest. Where
     lower is better, ``performance = goal / shown`` and a hit is shown ≤ goal.
     Source: docs/reference/scoring.md#words; agrees with the recorded flags of all 4,576 strides at
     hand.
+
+    Parameters
+    ----------
+    measure
+        What is trained.
+    value, goal
+        In its unit, the goal above 0.
+    gain
+        Of the phase (ratio).
     """
     shown = gain * value
     if measure.higher_is_better:
@@ -39,3 +60,59 @@ def judge(measure: Measure, value: float, gain: float, goal: float) -> Verdict:
     if not -PERFORMANCE_MAX <= performance <= PERFORMANCE_MAX:
         performance = math.copysign(PERFORMANCE_MAX, performance)
     return Verdict(shown, performance, performance >= 1)
+
+
+def score_measurement(
+    measurement: Measurement,
+    reasons: tuple[str, ...],
+    *,
+    measure: Measure,
+    trained_side: Side,
+    phase: int,
+    gain: float,
+    goal: float | None,
+    valence: Valence | None,
+) -> ScoredStep:
+    """Return a measurement with its verdict and points.
+
+    Parameters
+    ----------
+    measurement
+        As the source sent it.
+    reasons
+        Why it is invalid; then it is neither judged nor rewarded.
+    measure, trained_side
+        What is trained, and the leg whose steps are judged.
+    phase, gain
+        Index and gain (ratio) of the phase that it belongs to.
+    goal
+        In the measure's unit; None while it is unknown.
+    valence
+        What rewards it; None in a phase without feedback.
+    """
+    value = measurement.value
+    shown = performance = hit = points = None
+    if reasons:
+        if value is not None and not math.isfinite(value):
+            value = None
+    elif value is not None and goal is not None and measurement.side == trained_side:
+        shown, performance, hit = judge(measure, value, gain, goal)
+        if valence is not None:
+            points = valence.points(hit)
+    return ScoredStep(
+        number=measurement.number,
+        time_s=measurement.time_s,
+        side=measurement.side,
+        value=value,
+        gain=gain,
+        shown=shown,
+        goal=goal,
+        performance=performance,
+        hit=hit,
+        points=points,
+        valid=not reasons,
+        reasons=reasons,
+        phase=phase,
+        extra=measurement.extra,
+        rules_version=RULES_VERSION,
+    )

@@ -11,14 +11,14 @@ from rehab.training.measures import Measure
 
 
 class Side(StrEnum):
-    """A leg as hardware names it."""
+    """A leg, named as hardware names it."""
 
     LEFT = "left"
     RIGHT = "right"
 
 
-class Reason(StrEnum):
-    """Why a step does not count. Sources may add codes of their own."""
+class InvalidReason(StrEnum):
+    """Why a step is invalid. Sources may add codes of their own."""
 
     MISSING = "missing"
     NOT_FINITE = "not_finite"
@@ -39,13 +39,28 @@ class InvalidMeasurement(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """What a source says of one stride.
+    """What a source reports of one stride.
 
-    ``number`` counts a session's strides from 1 without gaps; ``time_s`` is the source's own clock;
-    ``value`` is in the unit of the session's measure, None where none could be had; ``reasons`` are
-    the source's own doubts and make the step invalid; ``extra`` holds further named values.
-    Raises InvalidMeasurement for a number below 1, a time that cannot be in seconds and an extra
-    value that is not finite.
+    Attributes
+    ----------
+    number
+        Counts a session's strides from 1 without gaps.
+    time_s
+        When the stride ended, by the source's own clock [s].
+    side
+        Its leg.
+    value
+        In the unit of the session's measure; None where there is none.
+    reasons
+        Why the source doubts it; they make the step invalid.
+    extra
+        Further named values.
+
+    Raises
+    ------
+    InvalidMeasurement
+        For a number below 1, a time that cannot be in seconds and an extra value that is not
+        finite.
     """
 
     number: int
@@ -71,11 +86,23 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class ScoredStep:
-    """A stride with its verdict: everything that the log keeps of it but the moment it arrived.
+    """A stride with its verdict: everything that the log keeps of it but when it arrived.
 
-    ``shown``, ``performance`` and ``hit`` are None where there is nothing to judge (invalid step,
-    other leg, goal not known yet). ``points`` is None where points do not exist (those cases, a
-    phase without feedback, a valence without points) and 0 where they exist but none was earned.
+    Attributes
+    ----------
+    number, time_s, side, value, extra
+        As measured.
+    gain, goal, phase
+        In force when it was scored: ratio, in the value's unit, and the phase's index.
+    shown, performance, hit
+        None where nothing can be judged (invalid step, other leg, goal not known yet).
+    points
+        None where points do not exist (those cases, a phase without feedback, a valence without
+        points); 0 where they exist but none was earned.
+    valid, reasons
+        Whether it counts, and why not.
+    rules_version
+        Of the rules that scored it.
     """
 
     number: int
@@ -95,21 +122,27 @@ class ScoredStep:
     rules_version: int
 
 
-def find_reasons(measurement: Measurement, measure: Measure) -> tuple[str, ...]:
-    """Give the reasons why this measurement cannot count; none for a good one.
+def find_invalid_reasons(measurement: Measurement, measure: Measure) -> tuple[str, ...]:
+    """Return why a measurement is invalid; nothing for a valid one.
 
-    The source's own reasons come first; then at most one of ours, about the value. A stored step
+    The source's own reasons come first, then at most one of ours, about the value. A stored step
     that is measured again gets the reasons it has.
     """
     value, reasons = measurement.value, measurement.reasons
     if value is None:
         # A value that is not finite is stored as None; it was not missing.
-        return reasons if Reason.NOT_FINITE in reasons else add_reason(reasons, Reason.MISSING)
+        return (
+            reasons
+            if InvalidReason.NOT_FINITE in reasons
+            else add_reason(reasons, InvalidReason.MISSING)
+        )
     if measure.value_min <= value <= measure.value_max:
         return reasons
-    return add_reason(reasons, Reason.OUT_OF_BOUNDS if math.isfinite(value) else Reason.NOT_FINITE)
+    return add_reason(
+        reasons, InvalidReason.OUT_OF_BOUNDS if math.isfinite(value) else InvalidReason.NOT_FINITE
+    )
 
 
 def add_reason(reasons: tuple[str, ...], reason: str) -> tuple[str, ...]:
-    """Give the reasons with one more, each only once."""
+    """Return the reasons with one more, each only once."""
     return reasons if reason in reasons else (*reasons, reason)

@@ -1,20 +1,30 @@
-"""Running sums over scored steps: all that figures and metrics are made from."""
+"""Tallies: running sums over scored steps, from which figures and metrics are computed."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from rehab.training.steps import Reason, ScoredStep
+from rehab.training.steps import InvalidReason, ScoredStep
 
 
 @dataclass(slots=True)
 class Tally:
     """Counts and sums over steps of the trained leg.
 
-    A streak is a run of hits among judged steps: an invalid stride neither breaks nor feeds it.
+    ``strides = valid + invalid + missing``. A streak is a run of hits among judged steps: an
+    invalid stride neither breaks nor extends it.
 
-    ``strides = valid + invalid + missing``; a missing stride had no value and no other fault.
-    ``judged`` counts valid steps that a goal was known for.
+    Attributes
+    ----------
+    strides, valid, invalid, missing
+        A missing stride had no value and no other fault.
+    judged, hits, points
+        ``judged`` counts valid steps for which a goal was known.
+    value_sum, performance_sum
+        Of the valid and of the judged steps.
+    streak, best_streak
+        The run of hits that is under way, and the longest one.
     """
 
     strides: int = 0
@@ -30,10 +40,10 @@ class Tally:
     best_streak: int = 0
 
     def add(self, step: ScoredStep) -> None:
-        """Take one more step into account. An invalid one only adds to the counts of strides."""
+        """Count one more step. An invalid one only adds to the counts of strides."""
         self.strides += 1
         if not step.valid:
-            if step.reasons == (Reason.MISSING,):
+            if step.reasons == (InvalidReason.MISSING,):
                 self.missing += 1
             else:
                 self.invalid += 1
@@ -76,3 +86,21 @@ class Tally:
     def hit_rate(self) -> float | None:
         """Hits among the judged steps (ratio)."""
         return self.hits / self.judged if self.judged else None
+
+
+class Block(NamedTuple):
+    """What was constant while some strides of a phase were walked.
+
+    Attributes
+    ----------
+    phase
+        Index of the phase.
+    gain
+        Display gain (ratio).
+    valence
+        Slug of the valence; empty without feedback.
+    """
+
+    phase: int
+    gain: float
+    valence: str

@@ -1,6 +1,6 @@
-"""Feedback valences: what a hit or a miss earns, and what is said and shown about it.
+"""Valences (for people: feedback types): what a hit or a miss earns, and what is said about it.
 
-All of it is data. Pages and robots know no valence: they draw and do what these rows say.
+All of it is data. Pages and robots know no valence: they show and do what these rows say.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from rehab.training.measures import InvalidSetting
 # More would say no more, and overflow where points are stored.
 POINTS_MAX = 1000
 BANDS_MAX = 12
-WORDS_MAX = 60  # characters; longer ones fit no tablet in a size that is read from a treadmill
+TEXT_MAX = 60  # characters; longer ones fit no tablet in a size that is read from a treadmill
 
 
 class Emblem(StrEnum):
-    """The drawing that says what a step meant, told apart by shape alone."""
+    """The drawing that says what a step meant, recognizable by shape alone."""
 
     GAIN = "gain"
     LOSS = "loss"
@@ -30,7 +30,7 @@ class Emblem(StrEnum):
 
 
 class Confetti(StrEnum):
-    """How much confetti a band sets free."""
+    """How much confetti a band releases."""
 
     NONE = "none"
     LITTLE = "little"
@@ -40,7 +40,17 @@ class Confetti(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """What is said from this performance upwards, until the next band."""
+    """What is said from this performance upwards, until the next band.
+
+    Attributes
+    ----------
+    from_performance
+        Where it begins (ratio to the goal).
+    words
+        For the patient, at most TEXT_MAX characters.
+    confetti
+        How much of it is released.
+    """
 
     from_performance: float
     words: str
@@ -48,7 +58,7 @@ class Band:
 
 
 @dataclass(frozen=True, slots=True)
-class Cue:
+class CueGestures:
     """Which gesture a robot performs after a window above or below its threshold; None for none."""
 
     above: str | None = None
@@ -59,9 +69,21 @@ class Cue:
 class Valence:
     """A rule set of feedback.
 
-    ``hit_points`` and ``miss_points`` are added to the score; None for both means that points do
-    not exist. ``bands`` rise from 0; where points exist one begins at 1, so that no words straddle
-    the goal. Raises InvalidSetting for data that breaks these rules.
+    Attributes
+    ----------
+    slug, label, hue
+        For programs, for people (translated by pages), and the color of its pages.
+    hit_points, miss_points
+        Added to the score; None for both means that points do not exist.
+    bands
+        They rise from 0; where points exist one begins at 1, so that no text straddles the goal.
+    cue
+        The robot's gestures.
+
+    Raises
+    ------
+    InvalidSetting
+        For data that breaks these rules.
     """
 
     slug: str
@@ -70,7 +92,7 @@ class Valence:
     hit_points: int | None
     miss_points: int | None
     bands: tuple[Band, ...]
-    cue: Cue
+    cue: CueGestures
 
     def __post_init__(self) -> None:
         label = Marked(self.label)
@@ -96,9 +118,9 @@ class Valence:
             raise InvalidSetting("{type}: one band must begin at 1, the goal.", type=label)
         if len(self.bands) > BANDS_MAX:
             raise InvalidSetting("{type}: at most {most} bands.", type=label, most=BANDS_MAX)
-        if any(len(band.words) > WORDS_MAX for band in self.bands):
+        if any(len(band.words) > TEXT_MAX for band in self.bands):
             raise InvalidSetting(
-                "{type}: words have at most {most} characters.", type=label, most=WORDS_MAX
+                "{type}: words have at most {most} characters.", type=label, most=TEXT_MAX
             )
 
     @property
@@ -112,11 +134,11 @@ class Valence:
         return (self.hit_points or 0) > 0
 
     def points(self, hit: bool) -> int | None:
-        """Give what a hit or a miss adds to the score."""
+        """Return what a hit or a miss adds to the score."""
         return self.hit_points if hit else self.miss_points
 
     def band(self, performance: float) -> Band:
-        """Give the band that a performance falls in."""
+        """Return the band that a performance falls in."""
         found = self.bands[0]
         for band in self.bands:
             if performance >= band.from_performance:
@@ -124,14 +146,14 @@ class Valence:
         return found
 
     def emblem(self, hit: bool) -> Emblem:
-        """Give the drawing for a hit or a miss: it follows the points, not the performance."""
+        """Return the drawing for a hit or a miss: it follows the points, not the performance."""
         points = self.points(hit) or 0
         return Emblem.GAIN if points > 0 else Emblem.LOSS if points < 0 else Emblem.NEUTRAL
 
-    def keeps_character(self, hit_points: int | None, miss_points: int | None) -> bool:
-        """Say whether these points would leave it the rule set that it is.
+    def keeps_rule_set(self, hit_points: int | None, miss_points: int | None) -> bool:
+        """Return whether these points would leave it the rule set that it is.
 
-        Who names a type in a study must be able to trust it: what rewards hits goes on to do so,
+        A study that names a type must be able to rely on it: what rewards hits goes on to do so,
         what takes nothing never does, and what has no points gets none.
         """
         if not self.has_points or hit_points is None or miss_points is None:
@@ -156,7 +178,7 @@ POSITIVE = Valence(
         Band(1.1, gettext_noop("Strong push!"), Confetti.MUCH),
         Band(1.25, gettext_noop("What a push!"), Confetti.MOST),
     ),
-    cue=Cue(above="celebrate"),
+    cue=CueGestures(above="celebrate"),
 )
 NEGATIVE = Valence(
     slug="negative",
@@ -169,7 +191,7 @@ NEGATIVE = Valence(
         Band(0.75, gettext_noop("Below the goal.")),
         Band(1, gettext_noop("No points lost.")),
     ),
-    cue=Cue(below="droop"),
+    cue=CueGestures(below="droop"),
 )
 BINARY = Valence(
     slug="binary",
@@ -184,7 +206,7 @@ BINARY = Valence(
         Band(1.1, gettext_noop("Strong push!"), Confetti.MUCH),
         Band(1.25, gettext_noop("What a push!"), Confetti.MOST),
     ),
-    cue=Cue(above="celebrate", below="droop"),
+    cue=CueGestures(above="celebrate", below="droop"),
 )
 EXPLICIT = Valence(
     slug="explicit",
@@ -193,7 +215,7 @@ EXPLICIT = Valence(
     hit_points=None,
     miss_points=None,
     bands=(Band(0, gettext_noop("Your push, this step.")),),
-    cue=Cue(),
+    cue=CueGestures(),
 )
 
 VALENCES: dict[str, Valence] = {
@@ -202,7 +224,7 @@ VALENCES: dict[str, Valence] = {
 
 
 def find_valence(slug: str) -> Valence:
-    """Give the valence of that name. Raises InvalidSetting, naming the known ones."""
+    """Return the valence of that slug. Raises InvalidSetting, naming the known ones."""
     try:
         return VALENCES[slug]
     except KeyError:
@@ -219,12 +241,18 @@ def edit_valence(
     hit_points: int | None,
     miss_points: int | None,
     bands: Sequence[Band],
-    cue: Cue,
+    cue: CueGestures,
 ) -> Valence:
-    """Give a valence as somebody made it anew. Raises InvalidSetting where it would be no such."""
+    """Return a valence with points, bands and gestures that a clinic chose.
+
+    Raises
+    ------
+    InvalidSetting
+        Where it would be another rule set, or break the rules of ``Valence``.
+    """
     usual = find_valence(slug)
     label = Marked(usual.label)
-    if not usual.keeps_character(hit_points, miss_points):
+    if not usual.keeps_rule_set(hit_points, miss_points):
         if not usual.has_points:
             raise InvalidSetting(
                 "{type} feedback has no points. Choose another type for other rules.", type=label
@@ -239,7 +267,7 @@ def edit_valence(
             hit=hit,
             miss=miss,
         )
-    if not usual.has_points and cue != Cue():
+    if not usual.has_points and cue != CueGestures():
         raise InvalidSetting("{type} feedback only informs: its robot stands still.", type=label)
     return replace(
         usual, hit_points=hit_points, miss_points=miss_points, bands=tuple(bands), cue=cue
@@ -247,7 +275,7 @@ def edit_valence(
 
 
 def bands_to_json(bands: Sequence[Band]) -> list[dict[str, Any]]:
-    """Give bands as plain JSON data."""
+    """Return bands as plain JSON data."""
     return [
         {"from_performance": b.from_performance, "words": b.words, "confetti": b.confetti.value}
         for b in bands
@@ -255,7 +283,7 @@ def bands_to_json(bands: Sequence[Band]) -> list[dict[str, Any]]:
 
 
 def bands_from_json(data: Any) -> tuple[Band, ...]:
-    """Rebuild bands from ``bands_to_json``'s data. Raises InvalidSetting for anything else."""
+    """Return the bands of ``bands_to_json``'s data. Raises InvalidSetting for anything else."""
     try:
         return tuple(_band_from_json(entry) for entry in data)
     except (KeyError, TypeError, ValueError):

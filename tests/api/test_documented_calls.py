@@ -14,6 +14,8 @@ import pytest
 
 from tests.support.servers import ROOT, clean_environment, serve
 
+pytestmark = pytest.mark.server
+
 
 def blocks(language: str) -> str:
     text = (ROOT / "docs" / "api.md").read_text()

@@ -7,14 +7,9 @@ import pytest
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from tests.support.programs import Program, program_of
-from tests.support.world import World, build_world
+from tests.support.world import World
 
-pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
+pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 
 @pytest.fixture

@@ -26,11 +26,6 @@ pytestmark = pytest.mark.django_db
 
 
 @pytest.fixture
-def world() -> World:
-    return build_world("amber")
-
-
-@pytest.fixture
 def pt(world: World) -> Program:
     return program_of(world, Role.PT)
 
@@ -271,7 +266,7 @@ def test_a_session_is_started_steered_paused_and_finished(world, pt, rosa):
     assert (status, "no phase with feedback follows" in problem["message"]) == (409, True)
     status, problem = pt.post(path, kind="valence", value=2)
     assert (status, "can be changed to one of" in problem["fields"]["value"]) == (409, True)
-    status, problem = pt.post(path, kind="words", value="Go!")
+    status, problem = pt.post(path, kind="feedback_text", value="Go!")
     assert (status, "start, pause" in problem["fields"]["kind"]) == (422, True)
     status, ended = pt.post(path, kind="finish")
     assert (status, ended["state"]) == (200, "finished")

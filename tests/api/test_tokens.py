@@ -12,14 +12,9 @@ from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.people.web import api_base
 from tests.support.programs import ROOT, Program, program_of, token_of
-from tests.support.world import World, build_world, client_of
+from tests.support.world import build_world, client_of
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 def test_a_lead_makes_a_token_that_is_shown_once_and_works_until_it_is_revoked(world):

@@ -14,11 +14,11 @@ import pytest
 
 from rehab.gait import LegSamples, TwoLegDetector
 from rehab.sources.lsl import load_pylsl
-from rehab.sources.source import Unusable
+from rehab.sources.reporting import SourceError
 from rehab.sources.synthetic.signals import Sensors, make_signals
 from rehab.sources.synthetic.walker import walk
-from tests.sources_live import NAMES, run_source, send_in_time
-from tests.sources_restarts import walk_with_restarts
+from tests.support.running_source import NAMES, run_source, send_in_time
+from tests.support.server_restarts import walk_with_restarts
 from tests.support.torture import Torture
 
 LOOK_AHEAD_S = 0.05
@@ -31,7 +31,7 @@ def test_step_is_acknowledged_soon_after_terminal_contact(tmp_path, way):
     if way == "lsl":
         try:
             load_pylsl()
-        except Unusable as problem:
+        except SourceError as problem:
             pytest.skip(str(problem))
     late_ms = asyncio.run(measure(tmp_path, way))
     p50, p99 = np.percentile(late_ms, (50, 99))

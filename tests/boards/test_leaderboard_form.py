@@ -15,7 +15,7 @@ from rehab.boards.validation import FIRST_DAY, LAST_DAY
 from rehab.people.aliases import MANNERS, draw_alias, words
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
-from tests.support.world import World, build_world, client_of, fill_board, signed_in
+from tests.support.world import build_world, client_of, fill_board, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -111,11 +111,6 @@ def test_points_of_one_type_may_be_ranked():
 
 
 # --- in the admin ---------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 def filled(**fields) -> dict[str, Any]:

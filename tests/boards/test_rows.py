@@ -24,7 +24,7 @@ from tests.support.boards import COMMON, board_of, everything, patient_of, peopl
 from tests.support.walks import strides, walk
 from tests.support.world import NOW
 
-pytestmark = pytest.mark.django_db
+pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 
 def test_rows_that_were_kept_up_are_those_that_are_made_anew(clinic):

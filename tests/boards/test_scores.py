@@ -31,7 +31,7 @@ from rehab.training.valences import VALENCES
 from tests.support.walks import HIT, MISS, strides, walk
 from tests.support.world import NOW, World, build_world, client_of, signed_in
 
-pytestmark = pytest.mark.django_db
+pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,7 @@ class Seen:
 
 
 @pytest.fixture
-def world() -> World:
-    world = build_world("amber")
+def world(world: World) -> World:
     Leaderboard.everywhere.all().delete()  # test_who_is_shown.py has those
     return world
 
@@ -71,9 +70,7 @@ def read(page: str, board: str) -> list[Seen]:
     """Read a board's rows from the page as a patient would."""
     part = page.split(f'id="board-{board}"')[1].split("</section>", maxsplit=1)[0]
     rows = []
-    for item in re.findall(
-        r"<li(?: class=\"you\").*?</li>|<li data-session.*?</li>", part, re.DOTALL
-    ):
+    for item in re.findall(r"<li\s+(?:class=\"you\"|data-session).*?</li>", part, re.DOTALL):
         rank = re.search(r'class="rank">(\d+)\.<', item)
         value = re.search(r'class="value">(.*?)</span>', item, re.DOTALL)[1]
         words = re.sub(r"<[^>]+>", "", value).replace("\N{NO-BREAK SPACE}", " ")

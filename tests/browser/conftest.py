@@ -1,13 +1,11 @@
-"""What all tests in a browser share: one server and one browser for the tests of a file."""
+"""What tests in a browser share: one server for the tests of a file."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser
 
-from tests.support.browsers import chromium
 from tests.support.servers import Server, serve
 
 
@@ -15,11 +13,4 @@ from tests.support.servers import Server, serve
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """Run a server on a folder of its own."""
     with serve(tmp_path_factory.mktemp("data")) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """Run Chromium."""
-    with chromium() as running:
         yield running

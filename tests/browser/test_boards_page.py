@@ -8,9 +8,9 @@ import subprocess
 import sys
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 
-from tests.support.browsers import SIZES, can_be_read, chromium
+from tests.support.browsers import SIZES, can_be_read
 from tests.support.servers import ROOT, clean_environment, serve
 
 pytestmark = pytest.mark.browser
@@ -41,8 +41,8 @@ def choose(page: Page, words: str) -> None:
     page.click(f".radiolist label:has-text('{words}')")
 
 
-def test_a_board_is_built_with_its_preview_and_seen_on_a_tablet(tmp_path):
-    with serve(tmp_path) as server, chromium() as browser:
+def test_a_board_is_built_with_its_preview_and_seen_on_a_tablet(tmp_path, browser: Browser):
+    with serve(tmp_path) as server:
         seeded = subprocess.run(
             [sys.executable, "manage.py", "shell", "-v0", "-c", SEED],
             cwd=ROOT,

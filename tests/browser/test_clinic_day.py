@@ -154,7 +154,7 @@ LOOKS = ["ready", "begin", "calm", "waiting", "lost", "still", "paused", "ask", 
 # Draws every look with every phrase in every size, and tells what runs out or into another.
 FIND_CLASHES = """async ([phrases, long, looks]) => {
   const { createFeedback } = await import("garry/walk/feedback");
-  const { createFitting } = await import("garry/walk/fitting");
+  const { createFitting } = await import("garry/walk/fit_text");
   const { body } = document;
   const [draw, fit] = [createFeedback(body), createFitting(body)];
   const step = { kind: "step", number: 214, hit: true, points: 2, emblem: "gain", shown: 4.38 };

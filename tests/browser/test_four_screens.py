@@ -7,8 +7,8 @@ from contextlib import ExitStack
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.test_patient_page import DIGEST, open_page, signed_in, stored, until_step
 from tests.support.browsers import SIZES
+from tests.support.patient_page import DIGEST, open_page, signed_in, stored, until_step
 from tests.support.servers import Server
 from tests.support.walk_seed import Feet, Walk, feet_of, make_walks
 

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import json
-import sqlite3
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, expect
-from playwright.sync_api import TimeoutError as PlaywrightTimeout
+from playwright.sync_api import Page, expect
 from websockets.sync.client import connect
 
-from tests.support.browsers import SIZES
+from tests.support.patient_page import DIGEST, PATIENCE_MS, open_page, signed_in, stored, until_step
 from tests.support.servers import ROOT, Server
 from tests.support.walk_seed import Walk, feet_of, make_walks
 from tests.support.wire import Wire
@@ -25,21 +22,9 @@ pytestmark = pytest.mark.browser
 VALENCES = ("positive", "negative", "binary", "explicit")
 TABLETS = ("tablet-portrait", "tablet-landscape")
 STRIDES = 30
-PATIENCE_MS = 40_000  # a loaded machine draws eight pages slowly
-# What is on the page, in one word: the same after a reload, and on a second tablet.
-DIGEST = """() => ({
-  look: document.body.dataset.look, theme: document.body.dataset.theme,
-  words: document.querySelector(".words").textContent,
-  emblem: document.querySelector(".emblem svg").dataset.emblem,
-  key: document.querySelector(".key").textContent,
-  run: document.querySelector(".run span").textContent,
-  time: document.querySelector(".time").textContent,
-  dots: [...document.querySelectorAll(".dots circle")].map((dot) =>
-    dot.matches(".gap") ? "gap" : [dot.matches(".hit"), dot.getAttribute("cy")]),
-})"""
 # Records what a page is given of steps, through the same module that the page itself uses.
 RECORD = """async (path) => {
-  const { connect } = await import("garry/live");
+  const { connect } = await import("garry/shared/session_socket");
   window.given = []; window.links = []; window.snapshots = [];
   window.live = connect(path, {
     onSnapshot: (snapshot) => snapshots.push(snapshot.number),
@@ -50,50 +35,10 @@ RECORD = """async (path) => {
 }"""
 
 
-@contextmanager
-def signed_in(
-    browser: Browser, server: Server, walk: Walk, port: int = 0, **options: Any
-) -> Iterator[BrowserContext]:
-    url = f"http://127.0.0.1:{port or server.port}"
-    context = browser.new_context(base_url=url, **options)
-    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": url}])
-    context.set_default_timeout(PATIENCE_MS)
-    yield context
-    context.close()
-
-
-def open_page(context: BrowserContext, walk: Walk, size: str = "tablet-portrait") -> Page:
-    """Open a page whose complaints fail the test."""
-    width, height = SIZES[size]
-    page = context.new_page()
-    page.set_viewport_size({"width": width, "height": height})
-    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
-    page.goto(walk.path)
-    return page
-
-
 def looks(page: Page, look: str, words: str = "") -> None:
     page.wait_for_selector(f"body[data-look={look}]")
     if words:
         expect(page.locator(".words")).to_have_text(words)
-
-
-def until_step(page: Page, number: int) -> None:
-    try:
-        page.wait_for_function("n => document.body.dataset.step == n", arg=number)
-    except PlaywrightTimeout as problem:
-        state = page.evaluate("JSON.stringify(document.body.dataset)")
-        raise AssertionError(f"step {number} was not drawn; the page is at {state}") from problem
-
-
-def stored(server: Server, walk: Walk) -> list[dict[str, Any]]:
-    database = sqlite3.connect(server.folder / "garry.sqlite3")
-    database.row_factory = sqlite3.Row
-    rows = database.execute(
-        "SELECT * FROM rehab_step WHERE session_id = ? ORDER BY number", (walk.session,)
-    ).fetchall()
-    database.close()
-    return [dict(row) for row in rows]
 
 
 def expected_key(valence: str, steps: list[dict[str, Any]]) -> str:
@@ -380,7 +325,7 @@ def test_confetti_rests_three_seconds_and_heeds_who_wants_no_motion(server, brow
         looks(page, "feedback")
         fired = page.evaluate(
             """async () => {
-              const { createCelebration } = await import("garry/celebration");
+              const { createCelebration } = await import("garry/walk/confetti");
               const { celebrate } = createCelebration(document.querySelector(".confetti"));
               return ["none", "much", "most"].map(celebrate);
             }"""

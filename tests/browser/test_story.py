@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sqlite3
 import subprocess
 import sys
@@ -14,15 +13,16 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.support.browsers import SIZES
+from tests.support.extent import EVERYTHING
 from tests.support.servers import ROOT, Server, clean_environment, serve
 
 pytestmark = pytest.mark.browser
 
-# CI walks every type on both sides of a tablet, at the same time; elsewhere one has to do.
+# `make test-all` walks every type on both sides of a tablet, at the same time.
 EVERYWHERE = list(
     product(("positive", "negative", "binary", "explicit"), ("tablet-portrait", "tablet-landscape"))
 )
-STORIES = EVERYWHERE if "CI" in os.environ else EVERYWHERE[:1]
+STORIES = EVERYWHERE if EVERYTHING else EVERYWHERE[:1]
 STRIDES = 10
 PATIENCE_MS = 40_000
 

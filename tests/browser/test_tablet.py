@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 
-from tests.support.browsers import SIZES, chromium
+from tests.support.browsers import SIZES
 from tests.support.servers import serve
 
 pytestmark = pytest.mark.browser
@@ -13,8 +13,8 @@ pytestmark = pytest.mark.browser
 PATIENCE_MS = 40_000
 
 
-def test_a_paired_tablet_follows_its_station(tmp_path):
-    with serve(tmp_path) as server, chromium() as browser:
+def test_a_paired_tablet_follows_its_station(tmp_path, browser: Browser):
+    with serve(tmp_path) as server:
 
         def open_page(size: str) -> Page:
             width, height = SIZES[size]

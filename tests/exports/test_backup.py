@@ -32,7 +32,7 @@ from tests.support.servers import ROOT, clean_environment
 from tests.support.walks import HIT, MISS, walk
 from tests.support.world import NOW, build_world
 
-pytestmark = pytest.mark.django_db
+pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 SECRET, PUBLIC = generate_key()
 IDENTITIES, RECIPIENTS = read_identities(SECRET), read_recipients([PUBLIC])
@@ -273,6 +273,7 @@ def test_nobody_else_on_the_machine_may_read_it(file, key):
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
 
 
+@pytest.mark.server
 def test_from_one_machine_to_another(file, key, tmp_path):
     """The two commands as an administrator runs them, on SQLite, each in a process of its own."""
 

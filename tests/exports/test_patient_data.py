@@ -41,11 +41,6 @@ from tests.support.world import NOW, World, build_world, client_of, mark
 NAMED = {Patient, User, Station}
 
 
-@pytest.fixture
-def world(db) -> World:
-    return build_world("amber")
-
-
 def fetch(world: World, role: Role = Role.LEAD) -> dict[str, str]:
     url = reverse("patient-data", kwargs={"patient_id": world.patient.pk})
     return open_archive(body_of(client_of(world, role).get(url)))

@@ -5,40 +5,20 @@ from __future__ import annotations
 import pytest
 from django.urls import reverse
 
-from rehab.feedback.admin import initial_bands
 from rehab.feedback.clinic_valences import valences_of
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.feedback.preview import preview_bands
 from rehab.feedback.translation import pick_words
 from rehab.people.roles import Role
-from rehab.training.valences import VALENCES, Cue
-from tests.support.world import build_world, client_of, mark
+from rehab.training.valences import VALENCES, CueGestures
+from tests.support.forms import feedback_form
+from tests.support.world import client_of, mark
 
 pytestmark = pytest.mark.django_db
 
 ADD = reverse("admin:rehab_feedbacktype_add")
 LIST = reverse("admin:rehab_feedbacktype_changelist")
 PREVIEW = reverse("admin:rehab_feedbacktype_preview")
-
-
-@pytest.fixture
-def world():
-    return build_world("amber")
-
-
-def form(slug, **changes):
-    """Give the form of a type as it is when it is taken over."""
-    usual = VALENCES[slug]
-    rows = initial_bands(slug)
-    fields = {"slug": slug, "bands-TOTAL_FORMS": len(rows), "bands-INITIAL_FORMS": 0}
-    for index, row in enumerate(rows):
-        fields |= {f"bands-{index}-{name}": value for name, value in row.items()}
-    if usual.hit_points:
-        fields["hit_points"] = usual.hit_points
-    if usual.miss_points:
-        fields["miss_points"] = usual.miss_points
-    fields |= {"cue_above": usual.cue.above or "", "cue_below": usual.cue.below or ""}
-    return fields | changes
 
 
 def test_without_a_row_the_rules_defaults_hold(world):
@@ -51,7 +31,7 @@ def test_a_type_taken_over_as_it_is_says_what_it_said(world, slug):
     page = client_of(world).get(f"{ADD}?slug={slug}")
     assert page.status_code == 200
     assert VALENCES[slug].bands[-1].words in page.content.decode()
-    answer = client_of(world).post(f"{ADD}?slug={slug}", form(slug))
+    answer = client_of(world).post(f"{ADD}?slug={slug}", feedback_form(slug))
     assert answer.status_code == 302, answer.context["errors"]
     assert valences_of(world.clinic.pk)[slug] == VALENCES[slug]
 
@@ -69,8 +49,8 @@ def test_a_researcher_looks_and_edits_nothing(world):
     assert "?slug=" not in client.get(LIST).content.decode()
     url = reverse("admin:rehab_feedbacktype_change", args=[row.pk])
     assert client.get(url).status_code == 200
-    assert client.post(url, form("negative")).status_code == 403
-    assert client.get(PREVIEW, form("positive")).status_code == 403
+    assert client.post(url, feedback_form("negative")).status_code == 403
+    assert client.get(PREVIEW, feedback_form("positive")).status_code == 403
 
 
 def test_a_type_that_is_edited_already_is_not_added_again(world):
@@ -95,7 +75,7 @@ def test_a_type_that_is_edited_already_is_not_added_again(world):
 )
 def test_what_the_rules_refuse_the_form_refuses_and_the_preview_says(world, slug, changes, why):
     client = client_of(world, Role.LEAD)
-    given = form(slug, **changes)
+    given = feedback_form(slug, **changes)
     assert why.lower() in client.post(f"{ADD}?slug={slug}", given).content.decode().lower()
     assert not FeedbackType.everywhere.filter(slug=slug).exists()
     assert client.get(PREVIEW, given).context["faults"]
@@ -106,13 +86,15 @@ def test_explicit_has_neither_points_nor_gestures_to_edit(world):
     page = client.get(f"{ADD}?slug=explicit").content.decode()
     assert 'name="hit_points"' not in page
     assert 'name="cue_above"' not in page
-    client.post(f"{ADD}?slug=explicit", form("explicit", hit_points="5", cue_above="celebrate"))
+    client.post(
+        f"{ADD}?slug=explicit", feedback_form("explicit", hit_points="5", cue_above="celebrate")
+    )
     mine = valences_of(world.clinic.pk)["explicit"]
-    assert (mine.has_points, mine.cue) == (False, Cue())
+    assert (mine.has_points, mine.cue) == (False, CueGestures())
 
 
 def test_the_preview_shows_each_band_and_stores_nothing(world):
-    given = form("positive", **{"bands-4-words_en": "Like a spring!", "hit_points": "7"})
+    given = feedback_form("positive", **{"bands-4-words_en": "Like a spring!", "hit_points": "7"})
     page = client_of(world).get(PREVIEW, given)
     assert page.headers["X-Frame-Options"] == "SAMEORIGIN"
     seen = page.context["seen"]

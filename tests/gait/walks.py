@@ -41,7 +41,7 @@ class Walk:
         )
 
     def change(self, row, change, *, both=False):
-        """Give the walk with one channel changed, on the left or on both legs."""
+        """Return the walk with one channel changed, on the left or on both legs."""
         legs = [self.left.copy(), self.right.copy()]
         for leg in legs[: 2 if both else 1]:
             leg[row] = change(leg[row])
@@ -49,7 +49,7 @@ class Walk:
 
 
 def read_moore() -> tuple[Walk, dict[str, list[dict[str, float]]]]:
-    """Give the recorded walk and its reference strides by side."""
+    """Return the recorded walk and its reference strides by side."""
     folder = signals("moore2013_s15_pre")
     with (folder / "UnpertPre_data.csv").open() as file:
         names = next(csv.reader(file))
@@ -73,7 +73,7 @@ def read_moore() -> tuple[Walk, dict[str, list[dict[str, float]]]]:
 def make_walk(
     *, stride_s=1.1, a2_w_kg=2.5, mass_kg=75.0, strides=30, seed=0, other_a2_w_kg=None, **sensors
 ):
-    """Give a synthetic walk and its true strides of the left leg."""
+    """Return a synthetic walk and its true strides of the left leg."""
     rng = np.random.default_rng(seed)
     times = np.cumsum(stride_s * (1 + 0.02 * rng.normal(size=strides)))
     values = a2_w_kg * (1 + 0.1 * rng.normal(size=strides))
@@ -106,7 +106,7 @@ CLEAN = {
 
 
 def filter_offline(walk: Walk, truth) -> list[float]:
-    """Give A2 by the method of the references: all signals filtered at 6 Hz, forward-backward.
+    """Return A2 by the method of the references: all signals filtered at 6 Hz, forward-backward.
 
     Written with scipy's own filter and numpy's own gradient, and no code of ``rehab.gait``.
     """
@@ -123,7 +123,7 @@ def filter_offline(walk: Walk, truth) -> list[float]:
 
 
 def pair_up(found, times):
-    """Give for each true initial contact the stride found within 150 ms, or None."""
+    """Return for each true initial contact the stride found within 150 ms, or None."""
     contacts = np.array([stride.initial_contact_s for stride in found])
     pairs = []
     for time in times:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +11,9 @@ import pytest
 from django.contrib.auth.hashers import make_password
 from django.core.checks import CheckMessage, run_checks
 
-ROOT = Path(__file__).parents[2]
+from garry_site import settings as own_settings
+from tests.support.servers import ROOT, clean_environment
+
 HOSTED = {
     "GARRY_HOSTED": "1",
     "GARRY_SECRET_KEY": "k" * 25 + "0123456789" * 5,
@@ -23,11 +25,12 @@ HOSTED = {
 
 def check(tmp_path: Path, *arguments: str, **variables: str) -> tuple[int, str]:
     """Run `manage.py check` as an operator would, with nothing but these variables."""
-    clean = {name: value for name, value in os.environ.items() if not name.startswith("GARRY_")}
+    clean = clean_environment(tmp_path, 8000)
+    del clean["GARRY_PORT"]
     result = subprocess.run(
         [sys.executable, "manage.py", "check", *arguments],
         cwd=ROOT,
-        env=clean | {"GARRY_DATA_DIR": str(tmp_path)} | variables,
+        env=clean | variables,
         capture_output=True,
         text=True,
         timeout=60,
@@ -35,17 +38,20 @@ def check(tmp_path: Path, *arguments: str, **variables: str) -> tuple[int, str]:
     return result.returncode, result.stdout + result.stderr
 
 
+@pytest.mark.server
 def test_one_machine_needs_no_setting(tmp_path):
     code, said = check(tmp_path, "--fail-level", "ERROR")
     assert code == 0, said
     assert (tmp_path / "secret_key").stat().st_mode & 0o777 == 0o600
 
 
+@pytest.mark.server
 def test_the_hosted_settings_pass_the_deployment_checks(tmp_path):
     code, said = check(tmp_path, "--deploy", "--fail-level", "WARNING", **HOSTED)
     assert code == 0, said
 
 
+@pytest.mark.server
 @pytest.mark.parametrize(
     ("variables", "said"),
     [
@@ -102,19 +108,30 @@ def test_an_order_of_applications_that_hides_our_commands_is_named(settings):
     assert "garry.E010" in ids(run_checks())
 
 
-def test_passwords_are_kept_by_argon2():
+def test_passwords_are_kept_by_argon2(settings):
+    settings.PASSWORD_HASHERS = own_settings.PASSWORD_HASHERS  # not the quick ones of tests
     assert make_password("walk well 2026").startswith("argon2$argon2id$")
 
 
-@pytest.mark.django_db
-def test_sqlite_writes_each_commit_through_to_the_disk():
-    from django.db import connection
+LOOK_AT_SQLITE = """
+import django, json
+django.setup()
+from django.db import connection
+with connection.cursor() as cursor:
+    names = ("journal_mode", "synchronous", "foreign_keys")
+    print(json.dumps({name: cursor.execute(f"PRAGMA {name}").fetchone()[0] for name in names}))
+"""
 
-    if connection.vendor != "sqlite":
-        pytest.skip("SQLite's own setting")
-    with connection.cursor() as cursor:
-        found = {}
-        for pragma in ("journal_mode", "synchronous", "foreign_keys"):
-            cursor.execute(f"PRAGMA {pragma}")
-            found[pragma] = cursor.fetchone()[0]
-    assert found == {"journal_mode": "wal", "synchronous": 2, "foreign_keys": 1}
+
+@pytest.mark.server
+def test_sqlite_writes_each_commit_through_to_the_disk(tmp_path):
+    environment = clean_environment(tmp_path, 8000)
+    done = subprocess.run(
+        [sys.executable, "-c", LOOK_AT_SQLITE],
+        cwd=ROOT,
+        env=environment | {"DJANGO_SETTINGS_MODULE": "garry_site.settings"},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == {"journal_mode": "wal", "synchronous": 2, "foreign_keys": 1}

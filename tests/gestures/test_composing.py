@@ -10,6 +10,7 @@ from django.test import Client
 
 from rehab.gestures.models import Gesture
 from robot.trial import admit_gesture
+from tests.support.forms import gesture_form
 from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
@@ -19,27 +20,8 @@ ADD = "/admin/rehab/gesture/add/"
 
 
 @pytest.fixture
-def world() -> World:
-    return build_world("amber")
-
-
-@pytest.fixture
 def pt(world: World) -> Client:
     return client_of(world)
-
-
-def filled(name: str, steps: list[dict[str, Any]], stored: int = 0) -> dict[str, Any]:
-    """Fill the form as a browser does; what is not said is as the page suggests it."""
-    form: dict[str, Any] = {
-        "name": name,
-        "steps-TOTAL_FORMS": len(steps),
-        "steps-INITIAL_FORMS": stored,
-    }
-    suggested = {"position": "", "turn_deg": 0, "forward_m": 0, "hold_s": 0, "pace": 1}
-    for index, step in enumerate(steps):
-        for part, value in (suggested | {"within_s": ""} | step).items():
-            form[f"steps-{index}-{part}"] = value
-    return form
 
 
 def complaints(page: Any) -> list[str]:
@@ -49,7 +31,7 @@ def complaints(page: Any) -> list[str]:
 
 
 def test_a_pt_composes_a_gesture_for_the_clinic(pt, world):
-    answer = pt.post(ADD, filled("wave", [*WAVE, {}, {}]))  # rows left as they came are none
+    answer = pt.post(ADD, gesture_form("wave", [*WAVE, {}, {}]))  # rows left as they came are none
     assert answer.status_code == 302
     wave = Gesture.everywhere.get(name="wave")
     assert wave.clinic == world.clinic
@@ -60,7 +42,7 @@ def test_a_pt_composes_a_gesture_for_the_clinic(pt, world):
 
 def test_numbers_say_the_order(pt):
     steps = [WAVE[1] | {"position": 20}, WAVE[0] | {"position": 10}, WAVE[2]]
-    pt.post(ADD, filled("wave", steps))
+    pt.post(ADD, gesture_form("wave", steps))
     wave = Gesture.everywhere.get(name="wave")
     assert [move.hold_s for move in wave.to_moves()] == [0, 0.5, 0]
     assert list(wave.steps.values_list("position", flat=True)) == [10, 20, 21]
@@ -92,7 +74,7 @@ def test_numbers_say_the_order(pt):
     ],
 )
 def test_what_no_robot_plays_is_refused_with_the_cure(pt, world, steps, cure):
-    page = pt.post(ADD, filled("wave", steps))
+    page = pt.post(ADD, gesture_form("wave", steps))
     assert page.status_code == 200
     (complaint,) = complaints(page)
     assert complaint.startswith(cure)
@@ -109,20 +91,20 @@ def test_what_no_robot_plays_is_refused_with_the_cure(pt, world, steps, cure):
     ],
 )
 def test_names_are_short_and_the_clinic_s_own(pt, name, words):
-    page = pt.post(ADD, filled(name, WAVE))
+    page = pt.post(ADD, gesture_form(name, WAVE))
     assert [text for text in complaints(page) if words in text]
 
 
 def test_two_clinics_may_use_a_name_but_none_twice(pt):
     Gesture.everywhere.create(clinic=build_world("birch").clinic, name="wave")
-    assert pt.post(ADD, filled("wave", WAVE)).status_code == 302
-    page = pt.post(ADD, filled("wave", WAVE))
+    assert pt.post(ADD, gesture_form("wave", WAVE)).status_code == 302
+    page = pt.post(ADD, gesture_form("wave", WAVE))
     assert page.status_code == 200
     assert Gesture.everywhere.filter(name="wave").count() == 2
 
 
 def test_a_stored_gesture_is_drawn_without_styles_or_scripts(pt):
-    pt.post(ADD, filled("wave", [{"forward_m": 0.12}, *WAVE, {"forward_m": -0.12}]))
+    pt.post(ADD, gesture_form("wave", [{"forward_m": 0.12}, *WAVE, {"forward_m": -0.12}]))
     wave = Gesture.everywhere.get(name="wave")
     page = pt.get(f"/admin/rehab/gesture/{wave.pk}/change/").content.decode()
     drawing = re.search(r"<svg xmlns.*?</svg>", page, re.DOTALL)[0]
@@ -135,7 +117,7 @@ def test_a_stored_gesture_is_drawn_without_styles_or_scripts(pt):
 
 
 def test_a_change_is_simulated_as_a_whole(pt):
-    pt.post(ADD, filled("wave", WAVE))
+    pt.post(ADD, gesture_form("wave", WAVE))
     wave = Gesture.everywhere.get(name="wave")
     stored = [
         step | {"id": row.pk, "gesture": wave.pk, "position": row.position}
@@ -143,9 +125,9 @@ def test_a_change_is_simulated_as_a_whole(pt):
     ]
     stored[2] |= {"DELETE": "on"}
     url = f"/admin/rehab/gesture/{wave.pk}/change/"
-    page = pt.post(url, filled("wave", stored, stored=3))
+    page = pt.post(url, gesture_form("wave", stored, stored=3))
     assert "It ends turned by 30° to the right" in complaints(page)[0]
-    page = pt.post(url, filled("wave", [*stored, {"turn_deg": 30}], stored=3))
+    page = pt.post(url, gesture_form("wave", [*stored, {"turn_deg": 30}], stored=3))
     assert page.status_code == 302
     assert list(wave.steps.values_list("position", flat=True)) == [1, 2, 3]
 

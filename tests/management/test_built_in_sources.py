@@ -9,7 +9,11 @@ import time
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from tests.support.servers import ROOT, Server, clean_environment, serve
+
+pytestmark = pytest.mark.server
 
 STRIDES = 24
 

@@ -14,10 +14,12 @@ import pytest
 
 from tests.support.servers import ROOT, clean_environment, serve
 
+pytestmark = pytest.mark.server
+
 
 @pytest.fixture
 def server(tmp_path):
-    with serve(tmp_path) as running:
+    with serve(tmp_path, new_machine=True) as running:
         yield running
 
 
@@ -32,7 +34,7 @@ def test_a_new_machine_serves_tells_its_password_and_ends_clean(server):
     assert re.search(r"as 'pt' with the password (\w{4}-){3}\w{4}", said)
     status, page = get(port, "/")
     assert (status, "GARRY" in page) == (200, True)
-    assert get(port, "/static/css/tokens.css")[0] == 200
+    assert get(port, "/static/css/shared/tokens.css")[0] == 200
     assert "Sign in" in get(port, "/admin/")[1]
     with pytest.raises(urllib.error.HTTPError, match="404"):
         get(port, "/nowhere")

@@ -18,8 +18,6 @@ from websockets.asyncio.client import connect
 
 from tests.support.servers import ROOT, clean_environment, serve
 
-pytestmark = pytest.mark.realtime
-
 PREPARE = """
 import django; django.setup()
 from rehab.people.sign_in.first_start import first_clinic, first_password, prepare_database
@@ -125,6 +123,7 @@ async def perform(url: str, cookie: str, token: str) -> list[dict[str, Any]]:
     return reports
 
 
+@pytest.mark.realtime
 def test_the_robot_answers_stops_and_leaves_with_the_server(tmp_path):
     cookie, source = python(tmp_path, 'KINDS = ["source"]\n' + PREPARE).split()
     with serve(tmp_path, "--robot", "twin") as server:
@@ -149,6 +148,7 @@ def test_the_robot_answers_stops_and_leaves_with_the_server(tmp_path):
     assert kinds == {"robot_decision", "robot_gesture", "robot_stop"}
 
 
+@pytest.mark.server
 def test_a_killed_server_leaves_no_robot(tmp_path):
     with serve(tmp_path, "--robot", "twin") as server:
         robot = wait_for_child(tmp_path)
@@ -157,6 +157,7 @@ def test_a_killed_server_leaves_no_robot(tmp_path):
         assert psutil.wait_procs(started, 5)[1] == []
 
 
+@pytest.mark.server
 def test_a_station_with_a_robot_of_its_own_gets_no_other(tmp_path):
     python(tmp_path, 'KINDS = ["robot"]\n' + PREPARE)
     with serve(tmp_path, "--robot", "kinematic"):

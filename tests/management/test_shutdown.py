@@ -16,8 +16,6 @@ from websockets.asyncio.client import connect
 
 from tests.support.servers import ROOT, clean_environment, serve
 
-pytestmark = pytest.mark.realtime
-
 
 def python(server, *arguments: str) -> str:
     environment = clean_environment(server.folder, server.port)
@@ -82,6 +80,7 @@ async def walk_until_closed(
     return codes, acknowledged
 
 
+@pytest.mark.realtime
 def test_sigterm_with_fifty_viewers(tmp_path):
     with serve(tmp_path) as server:
         rows = json.loads(python(server, "-m", "tests.support.live_seed", "10"))
@@ -104,6 +103,7 @@ def test_sigterm_with_fifty_viewers(tmp_path):
         assert held["refolds"]
 
 
+@pytest.mark.server
 def test_children_end_with_the_server(tmp_path):
     child = f"{sys.executable} -c 'import time; time.sleep(600)'"
     report = tmp_path / "children.json"

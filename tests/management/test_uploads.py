@@ -10,6 +10,8 @@ from django.test import Client
 
 from tests.support.servers import Server, serve
 
+pytestmark = pytest.mark.server
+
 HEAD = b"POST /sign-in/ HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
 TOO_MUCH = 3 * 1024 * 1024
 

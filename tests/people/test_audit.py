@@ -23,7 +23,7 @@ from rehab.sessions.protocols import Measure, Protocol
 from rehab.stations.models import Device
 from tests.support.archives import body_of
 from tests.support.tenancy import all_routes, walk_patterns
-from tests.support.world import NOW, World, build_world, client_of, mark
+from tests.support.world import NOW, client_of, mark
 
 pytestmark = pytest.mark.django_db
 
@@ -31,11 +31,6 @@ pytestmark = pytest.mark.django_db
 @pytest.fixture(autouse=True)
 def nothing_noted_yet(monkeypatch):
     monkeypatch.setattr(audit_log, "recent", Recent())
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 def entries():

@@ -30,15 +30,10 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import create_session
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
-from tests.support.world import NOW, World, build_world, client_of
+from tests.support.world import NOW, World, client_of
 
 pytestmark = pytest.mark.django_db
 LOG = (TrainingSession, Step, SessionEvent, SessionMetric)
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 @pytest.fixture

@@ -16,14 +16,9 @@ from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.stations.models import Device
 from rehab.stations.pins import set_pin
-from tests.support.world import World, build_world, client_of, mark
+from tests.support.world import build_world, client_of, mark
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 def last_of(row) -> HistoryEntry:

@@ -14,14 +14,9 @@ from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.stations import tablets
 from rehab.stations.models import Device
-from tests.support.world import World, build_world, client_of
+from tests.support.world import World, client_of
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 @pytest.fixture

@@ -14,18 +14,13 @@ from django.urls import reverse
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.protocol_admin import PresetAdmin
-from tests.support.world import World, build_world, client_of, scoped_models
+from tests.support.world import client_of, scoped_models
 
 pytestmark = pytest.mark.django_db
 
 LOOKUPS = ("icontains", "isnull")
 REGISTERED = [model for model in scoped_models() if admin.site.is_registered(model)]
 SESSIONS = "admin:rehab_trainingsession_changelist"
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 def list_of(model: type) -> str:

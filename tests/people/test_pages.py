@@ -10,14 +10,9 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.stations.models import Device, Station, find_device
 from tests.support.clock import HERE
-from tests.support.world import NOW, World, build_world, client_of, signed_in
+from tests.support.world import NOW, build_world, client_of, signed_in
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 def test_the_front_page_says_what_can_be_done(client):

@@ -32,14 +32,9 @@ from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from tests.support.world import NOW, World, build_world, client_of
 
-pytestmark = pytest.mark.django_db
+pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 SCREEN = {"screen_side": "left", "screen_text": "large"}
 DETAILS = {"nickname": "Rosa", "code": "R-1", "paretic_side": "left", "body_mass_kg": 70}
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 def save_screen(world: World) -> Any:

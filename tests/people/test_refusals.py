@@ -19,18 +19,16 @@ from rehab.people.roles import Role
 from rehab.people.web.refusals import in_words
 from rehab.sessions.protocols import Protocol
 from rehab.stations.models import Station
-from rehab.training.changes import ChangeKind, Refused, State, next_state
+from rehab.training.changes import ChangeKind, NotAllowed, State, next_state
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
-from rehab.training.valences import VALENCES, Cue, edit_valence
+from rehab.training.valences import VALENCES, CueGestures, edit_valence
 from robot.composed import Move, compose
 from robot.gestures import BadGesture
-from tests.feedback.test_types import form as feedback_form
-from tests.gestures.test_composing import filled as gesture_form
-from tests.sessions.test_two_at_once import choices
+from tests.support.forms import feedback_form, gesture_form, session_form
 from tests.support.programs import program_of
-from tests.support.world import World, build_world, client_of
+from tests.support.world import World, client_of
 
 CATALOG = Path(__file__).parents[2] / "locale/es/LC_MESSAGES/django.po"
 ENGLISH = re.compile(
@@ -62,7 +60,11 @@ def said(act: Callable[[], object], language: str = "es") -> str:
         ),
         (
             lambda: edit_valence(
-                "negative", hit_points=1, miss_points=0, bands=VALENCES["negative"].bands, cue=Cue()
+                "negative",
+                hit_points=1,
+                miss_points=0,
+                bands=VALENCES["negative"].bands,
+                cue=CueGestures(),
             ),
             "Negativa: esta retroalimentación no da nada por un acierto y quita puntos",
         ),
@@ -79,7 +81,7 @@ def test_a_refusal_is_said_in_spanish_with_its_values(act, words):
 
 
 def test_the_message_itself_stays_english():
-    with override("es"), pytest.raises(Refused) as refused:
+    with override("es"), pytest.raises(NotAllowed) as refused:
         next_state(State.READY, ChangeKind.FINISH)
     assert str(refused.value) == (
         "A session that is ready cannot take the change 'finish'; it must be paused or running."
@@ -104,8 +106,7 @@ def test_every_translated_refusal_takes_the_values_of_its_source():
 
 
 @pytest.fixture
-def world(db: None) -> World:
-    world = build_world("amber")
+def world(world: World) -> World:
     Clinic.everywhere.filter(pk=world.clinic.pk).update(language="es")
     return world
 
@@ -171,7 +172,7 @@ def test_a_set_up_is_refused_in_spanish_and_to_a_program_in_english(world):
         clinic=world.clinic, code="K-1", nickname="Rosa", paretic_side="left"
     )
     station = Station.everywhere.create(clinic=world.clinic, name="Ventana")
-    percent = choices(station) | {"goal_by": "percent", "goal_percent": "100"}
+    percent = session_form(station) | {"goal_by": "percent", "goal_percent": "100"}
     page = client_of(world).post(f"/patients/{rosa.pk}/new/", percent)
     told = str(page.context["form"].errors)
     assert "necesita una fase de línea base antes de la primera retroalimentación" in told

@@ -19,6 +19,8 @@ from rehab.people.sign_in import factors, recovery_codes, totp
 from rehab.people.sign_in.factors import Authenticator, RecoveryCode
 from rehab.people.sign_in.totp import STEP_S, code_of, new_secret, step_of
 
+pytestmark = pytest.mark.postgres
+
 PASSWORD = "walk well 2026"
 RFC_SECRET = "GEZDGNBVGY3TQOJQGEZDGNBVGY3TQOJQ"  # "12345678901234567890"
 
@@ -71,11 +73,6 @@ def test_an_app_reads_who_and_where_from_the_square():
 
 
 # --- accounts -------------------------------------------------------------------------------------
-
-
-@pytest.fixture(autouse=True)
-def _quick_hashes(settings):
-    settings.PASSWORD_HASHERS = ["django.contrib.auth.hashers.MD5PasswordHasher"]
 
 
 @pytest.fixture

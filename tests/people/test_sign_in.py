@@ -19,11 +19,6 @@ pytestmark = pytest.mark.django_db
 PASSWORD = "walk well 2026"
 
 
-@pytest.fixture(autouse=True)
-def _quick_hashes(settings):
-    settings.PASSWORD_HASHERS = ["django.contrib.auth.hashers.MD5PasswordHasher"]
-
-
 @pytest.fixture
 def pt() -> User:
     clinic = Clinic.everywhere.create(name="Elm")

@@ -31,11 +31,6 @@ pytestmark = pytest.mark.django_db
 SESSIONS = "/admin/rehab/trainingsession/"
 
 
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
-
-
 def patient_of(world: World, name: str) -> Patient:
     return Patient.everywhere.create(
         clinic=world.clinic, code=f"K-{name}", nickname=name, paretic_side="left"

@@ -34,9 +34,8 @@ NOW = datetime(2026, 9, 16, 10, 0, tzinfo=HERE)
 
 
 @pytest.fixture
-def world() -> World:
+def world(world: World) -> World:
     """A clinic in Madrid whose own session lies long ago."""
-    world = build_world("amber")
     Clinic.everywhere.filter(pk=world.clinic.pk).update(time_zone="Europe/Madrid")
     TrainingSession.everywhere.all().update(
         created_at=NOW - timedelta(days=90), started_at=NOW - timedelta(days=90)

@@ -7,7 +7,11 @@ import re
 import subprocess
 import sys
 
+import pytest
+
 from tests.support.servers import ROOT, clean_environment, serve
+
+pytestmark = pytest.mark.server
 
 
 def test_the_documented_python_client_sends_steps(tmp_path):

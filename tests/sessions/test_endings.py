@@ -33,11 +33,6 @@ from tests.support.world import NOW, World, build_world, client_of, mark, scoped
 pytestmark = pytest.mark.django_db
 
 
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
-
-
 def page_of(world: World, client: Client) -> str:
     url = reverse("patient", kwargs={"patient_id": world.patient.pk})
     return client.get(url).content.decode()

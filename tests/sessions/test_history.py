@@ -23,14 +23,9 @@ from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.clock import HERE
 from tests.support.walks import GOAL, HIT, MISS, RIGHT, Walked, strides, walk
-from tests.support.world import NOW, World, build_world, client_of
+from tests.support.world import NOW, build_world, client_of
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 @pytest.fixture
@@ -277,7 +272,9 @@ def test_phases_and_events_are_told(client, patient):
     assert "Baseline none 1.00 3 2 1 50 % 2.00 100 %" in rows
     of_goal = (2.5 / 2.0 + 2.5 / 2.4 + 1.5 / 2.4 + 1.5 / 2.4) / 4
     assert f"Training Positive 1.00 4 4 2 50 % 2.00 {100 * of_goal:.0f} %" in rows
-    told = [words(item) for item in re.findall(r"<li class=\"\w+\"><time.*?</li>", page, re.DOTALL)]
+    told = [
+        words(item) for item in re.findall(r"<li class=\"\w+\">\s*<time.*?</li>", page, re.DOTALL)
+    ]
     assert [line.split(" ", 1)[1] for line in told] == [
         "Started",
         "Goal 2.00 → 2.40 W/kg after stride 3",

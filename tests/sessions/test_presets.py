@@ -17,12 +17,7 @@ from rehab.sessions.protocols import Protocol
 from rehab.stations.models import Station
 from tests.support.world import World, build_world, client_of, mark
 
-pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
+pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 
 @pytest.fixture
@@ -66,8 +61,8 @@ def preset_of(world: World, **fields: object) -> Preset:
 def filled(page: str) -> dict[str, str]:
     """Give what a set-up would send: checked choices, numbers, selected options."""
     page = page[page.index('class="set-up"') :]
-    found = dict(re.findall(r'<input class="num" name="(\w+)"[^>]* value="([^"]*)"', page))
-    for tag in re.findall(r"<input [^>]*type=\"radio\"[^>]*>", page):
+    found = dict(re.findall(r'<input\s+class="num"\s+name="(\w+)"[^>]*\svalue="([^"]*)"', page))
+    for tag in re.findall(r"<input\s[^>]*type=\"radio\"[^>]*>", page):
         if "checked" in tag:
             name = re.search(r'name="(\w+)"', tag)[1]
             found[name] = re.search(r'value="([^"]*)"', tag)[1]
@@ -127,7 +122,7 @@ def test_another_clinics_preset_is_not_offered(pt, patient):
     foreign = birch.rows[Preset]
     page = pt.get(f"/patients/{patient.pk}/new/?preset={foreign.pk}").content.decode()
     assert mark("birch", Preset) not in page
-    assert 'preset" href="/patients' in page
+    assert re.search(r'class="preset"\s+href="/patients', page)
     assert filled(page)["valence"] == "positive"  # like last time
 
 

@@ -19,14 +19,9 @@ from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.clock import HERE
 from tests.support.walks import HIT, MISS, RIGHT, Walked, walk
-from tests.support.world import NOW, World, build_world, client_of
+from tests.support.world import NOW, World, client_of
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 @pytest.fixture

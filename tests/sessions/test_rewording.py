@@ -22,11 +22,6 @@ pytestmark = pytest.mark.django_db(transaction=True)
 
 
 @pytest.fixture
-def world():
-    return build_world("amber")
-
-
-@pytest.fixture
 def pt(world):
     return client_of(world)
 
@@ -79,7 +74,7 @@ def test_edited_words_reach_open_sessions_and_points_do_not(world, pt):
     assert (fold.valence.hit_points, fold.valence.cue.above) == (1, "celebrate")
     other = SessionActor.load(spanish).fold
     assert other.valences["positive"].band(0.5).words == "Siga."  # should it be changed to that
-    event = SessionEvent.everywhere.get(session=session, kind="words")
+    event = SessionEvent.everywhere.get(session=session, kind="feedback_text")
     assert event.by == world.people[Role.PT]
     assert event.data["value"]["bands"][1]["words"] == "There!"
     assert SessionEvent.everywhere.filter(session=ended).count() == before
@@ -97,7 +92,7 @@ def test_the_same_words_again_are_no_news(world, pt):
     pt.post(reverse("admin:rehab_feedbacktype_change", args=[row.pk]), changed)
     row.refresh_from_db()
     assert row.hit_points == 4
-    assert SessionEvent.everywhere.filter(session=session, kind="words").count() == 1
+    assert SessionEvent.everywhere.filter(session=session, kind="feedback_text").count() == 1
 
 
 def test_back_to_the_defaults_brings_the_usual_words_back(world, pt):

@@ -15,17 +15,12 @@ from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
-from rehab.training.valences import Cue
+from rehab.training.valences import CueGestures
 from robot.composed import read_gesture
 from robot.motion import HOME
 from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 @pytest.fixture
@@ -82,7 +77,11 @@ def test_every_choice_reaches_the_plan(pt, patient, station, world):
     assert (plan.valence.slug, plan.goal.value, plan.trained_side) == ("negative", 4.05, "right")
     assert (plan.target.hit_rate, plan.target.duration_s) == (0.65, 720)
     assert [phase.kind for phase in plan.phases] == ["training"]
-    assert (plan.robot_intensity, plan.valence.cue, plan.gestures) == (0.5, Cue(None, "droop"), ())
+    assert (plan.robot_intensity, plan.valence.cue, plan.gestures) == (
+        0.5,
+        CueGestures(None, "droop"),
+        (),
+    )
     assert (session.runs, session.simulated) == ([], False)
 
 
@@ -190,7 +189,7 @@ def test_a_composed_gesture_goes_along_with_the_plan(pt, patient, station, world
     assert "wave" in pt.get(url).content.decode()
     pt.post(url, choices(station, robot_above="wave", robot_below="(nothing)"))
     plan = newest().to_plan()
-    assert plan.valence.cue == Cue("wave", None)
+    assert plan.valence.cue == CueGestures("wave", None)
     assert [data["name"] for data in plan.gestures] == ["wave"]
     assert read_gesture(plan.gestures[0]).goals[-1].pose == HOME
     TrainingSession.everywhere.filter(pk=newest().pk).update(state="finished")
@@ -218,7 +217,7 @@ def test_a_gesture_of_another_clinic_cannot_be_chosen(pt, patient, station, worl
             valence="positive",
             goal=GoalRule(value=4.0),
             protocol=Protocol.everywhere.get(name="Training only"),
-            cue=Cue(above="wave"),
+            cue=CueGestures(above="wave"),
         )
 
 

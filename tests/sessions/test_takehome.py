@@ -12,14 +12,9 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.training.phases import make_phase
 from tests.support.walks import HIT, MISS, RIGHT, walk
-from tests.support.world import World, build_world, client_of
+from tests.support.world import World, client_of
 
 pytestmark = pytest.mark.django_db
-
-
-@pytest.fixture
-def world() -> World:
-    return build_world("amber")
 
 
 @pytest.fixture

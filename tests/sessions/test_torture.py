@@ -4,7 +4,11 @@ import asyncio
 import os
 import time
 
+import pytest
+
 from tests.support.torture import Torture
+
+pytestmark = pytest.mark.server
 
 
 def test_three_kills_lose_nothing(tmp_path, capsys):

@@ -17,11 +17,13 @@ from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.defaults import install_defaults
 from rehab.sessions.forms import SessionForm
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Protocol
 from rehab.sessions.services import StationTaken
 from rehab.stations.models import Station
+from tests.support.forms import session_form
 from tests.support.programs import program_of
 from tests.support.world import World, build_world, client_of
+
+pytestmark = pytest.mark.postgres
 
 
 @pytest.fixture
@@ -43,21 +45,6 @@ def people(world: World) -> list[Patient]:
         )
         for name in ("Rosa", "Omar")
     ]
-
-
-def choices(station: Station) -> dict[str, Any]:
-    return {
-        "valence": "binary",
-        "goal_by": "value",
-        "goal_value": "3",
-        "source": "live",
-        "trained_side": "left",
-        "robot": "off",
-        "robot_above": "(usual)",
-        "robot_below": "(usual)",
-        "protocol": Protocol.everywhere.get(name="Training only", clinic=None).pk,
-        "station": station.pk,
-    }
 
 
 def at_once(*acts: Callable[[], Any]) -> list[Any]:
@@ -82,7 +69,7 @@ def open_at(station: Station) -> int:
 def test_of_two_forms_that_were_both_free_to_go_one_creates(world, station, people):
     for _ in range(5):
         forms = [
-            SessionForm(choices(station), patient=patient, by=world.people[Role.PT])
+            SessionForm(session_form(station), patient=patient, by=world.people[Role.PT])
             for patient in people
         ]
         assert all(form.is_valid() for form in forms)
@@ -99,7 +86,9 @@ def test_pages_and_programs_obey(world, station, people):
 
     def by_page(patient: Patient) -> Callable[[], int]:
         browser = client_of(world)
-        return lambda: browser.post(f"/patients/{patient.pk}/new/", choices(station)).status_code
+        return lambda: (
+            browser.post(f"/patients/{patient.pk}/new/", session_form(station)).status_code
+        )
 
     def by_program(patient: Patient) -> Callable[[], int]:
         asked = {"patient": patient.pk, "station": station.pk, "feedback_type": "binary"}
@@ -119,8 +108,8 @@ def test_pages_and_programs_obey(world, station, people):
 def test_a_station_that_is_taken_is_refused_whoever_asks(world, station, people):
     rosa, omar = people
     by = world.people[Role.PT]
-    first = SessionForm(choices(station), patient=rosa, by=by)
-    second = SessionForm(choices(station), patient=omar, by=by)
+    first = SessionForm(session_form(station), patient=rosa, by=by)
+    second = SessionForm(session_form(station), patient=omar, by=by)
     assert first.is_valid()
     assert second.is_valid()
     first.save()

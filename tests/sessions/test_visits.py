@@ -22,11 +22,10 @@ pytestmark = pytest.mark.django_db
 
 
 @pytest.fixture
-def world() -> World:
-    made = build_world("amber")
+def world(world: World) -> World:
     Visit.everywhere.all().delete()
-    TrainingSession.everywhere.filter(pk=made.session.pk).update(created_at=NOW - timedelta(9))
-    return made
+    TrainingSession.everywhere.filter(pk=world.session.pk).update(created_at=NOW - timedelta(9))
+    return world
 
 
 def patient(world: World, name: str) -> Patient:

@@ -61,7 +61,7 @@ class FakeGarry:
         await self.tell(type="ack", number=self._acknowledged)
 
     async def refuse(self, socket: ServerConnection, close: int, code: str, message: str) -> None:
-        """Say what is wrong and hang up."""
+        """Send what is wrong and close."""
         await socket.send(json.dumps({"type": "error", "code": code, "message": message}))
         await socket.close(close)
 

@@ -11,7 +11,8 @@ from websockets.asyncio.server import serve
 
 from rehab.sources import load_source
 from rehab.sources.__main__ import make_parser
-from rehab.sources.serial_sensor import find_checksum
+from rehab.sources.serial_sensor import compute_checksum
+from rehab.training.steps import Measurement
 from tests.sources.fake_lsl import FakeLsl
 
 SETTINGS = ["--token", "t"]
@@ -201,7 +202,7 @@ class FakePort:
 def frame(kind: str, *cells: object) -> bytes:
     """Write a frame as the sketch does."""
     body = ",".join([kind, *map(str, cells)]).encode()
-    return b"$%s*%02X\n" % (body, find_checksum(body))
+    return b"$%s*%02X\n" % (body, compute_checksum(body))
 
 
 class SerialLab(Lab):
@@ -265,3 +266,13 @@ LABS = (
 def json_line(**cells: object) -> str:
     """Write a row as JSON."""
     return json.dumps(cells) + "\n"
+
+
+async def until_strides(harness, count):
+    """Return the strides that an intake puts out, as soon as there are so many."""
+    found: list[Measurement] = []
+    async with asyncio.timeout(5):
+        while len(found) < count:
+            found += harness.strides()
+            await asyncio.sleep(0.005)
+    return found

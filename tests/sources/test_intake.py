@@ -7,48 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rehab.gait import LegSamples, measure_both_legs
-from rehab.gait.columns import LAYOUTS, read_column_map
-from rehab.gait.files import read_signals
-from rehab.sources.client import LiveFeed
-from rehab.sources.intake import Intake, IntakeSettings
+from rehab.gait import measure_both_legs
+from rehab.gait.recordings.columns import read_column_map
+from rehab.gait.recordings.csv_files import read_signals
 from rehab.sources.synthetic.signals import Sensors, make_signals
 from rehab.sources.synthetic.walker import walk
 from rehab.training.steps import Side
-
-MASS = 75.0
-NAMES = [column.name for leg in LAYOUTS["garry"].legs.values() for column in leg.values()][:3]
-NAMES += [name.replace("left", "right") for name in NAMES]
-
-
-class Time:
-    now_s = 1000.0
-
-    def __call__(self):
-        return self.now_s
-
-
-class Desk:
-    """An intake with all that went in and came out."""
-
-    def __init__(self, **settings) -> None:
-        self.time = Time()
-        self.said: list[str] = []
-        self.feed = LiveFeed(self.time)
-        self.feed.begin(Side.LEFT)
-        self.feed.walk()
-        how = IntakeSettings(**{"mass_kg": MASS} | settings)
-        self.intake = Intake(self.feed, how, self.said.append, self.time)
-
-    def send(self, rows, chunk=20):
-        for start in range(0, len(rows), chunk):
-            self.intake.take(rows[start : start + chunk])
-
-    def strides(self):
-        found = []
-        while not isinstance(stride := self.feed.poll(0), float):
-            found.append(stride)
-        return found
+from tests.sources.intake_harness import MASS, NAMES, IntakeHarness, measure
 
 
 @pytest.fixture(scope="module")
@@ -67,23 +32,16 @@ def rows_of(table, names=NAMES):
     return [dict(zip(["time_s", *names], row, strict=True)) for row in table.tolist()]
 
 
-def measure(made, rate_hz=200.0):
-    left, right = (
-        LegSamples(leg.force_n, leg.moment_nm, leg.angle_rad) for leg in (made.left, made.right)
-    )
-    return measure_both_legs(made.t_s, left, right, rate_hz=rate_hz, mass_kg=MASS)
-
-
 def same(stride, other):
     return stride.value == pytest.approx(other.a2_w_kg, rel=0.02)
 
 
 @pytest.mark.parametrize("chunk", [1, 20, 1000])
 def test_strides_are_those_of_the_recording(made, table, chunk):
-    desk = Desk()
-    desk.send(rows_of(table), chunk)
-    desk.intake.finish()
-    found = desk.strides()
+    harness = IntakeHarness()
+    harness.send(rows_of(table), chunk)
+    harness.intake.finish()
+    found = harness.strides()
 
     expected = measure(made)
     assert [(m.side, m.time_s) for m in found] == [(s.side, s.terminal_contact_s) for s in expected]
@@ -94,16 +52,16 @@ def test_strides_are_those_of_the_recording(made, table, chunk):
 
 def test_channels_of_different_rates_meet(made, table):
     """Force at 200 Hz, moment and angle at 100 Hz in rows of their own, which come later."""
-    desk = Desk()
+    harness = IntakeHarness()
     forces, others = [0, 1, 4], [0, 2, 3, 5, 6]
     rows = []
     for start in range(0, len(table), 20):
         part = table[start : start + 20]
         rows += rows_of(part[:, forces], [NAMES[0], NAMES[3]])
         rows += rows_of(part[::2, others], [NAMES[1], NAMES[2], NAMES[4], NAMES[5]])
-    desk.send(rows)
-    desk.intake.finish()
-    found = [m for m in desk.strides() if not m.reasons]
+    harness.send(rows)
+    harness.intake.finish()
+    found = [m for m in harness.strides() if not m.reasons]
 
     expected = {s.terminal_contact_s: s for s in measure(made) if s.valid}
     paired = [(m, expected[m.time_s]) for m in found if m.time_s in expected]
@@ -112,17 +70,17 @@ def test_channels_of_different_rates_meet(made, table):
 
 
 def test_a_channel_that_falls_silent_is_waited_for_and_then_missing(made, table):
-    desk = Desk()
+    harness = IntakeHarness()
     for start in range(0, len(table), 20):
         part = table[start : start + 20]
-        desk.time.now_s += 0.1
-        desk.intake.take(rows_of(part[:, [0, 1, 4]], [NAMES[0], NAMES[3]]))
+        harness.time.now_s += 0.1
+        harness.intake.add_rows(rows_of(part[:, [0, 1, 4]], [NAMES[0], NAMES[3]]))
         names = NAMES[1:3] + NAMES[4:]
         kept = [0, 2, 3, 5, 6]
         if not 10 < start / 200 < 15:
-            desk.intake.take(rows_of(part[:, kept], names))
-    desk.intake.finish()
-    found = desk.strides()
+            harness.intake.add_rows(rows_of(part[:, kept], names))
+    harness.intake.finish()
+    found = harness.strides()
 
     silent = [m for m in found if 11 < m.time_s < 14.8]
     assert len(silent) >= 6
@@ -135,11 +93,11 @@ def test_blank_cells_are_no_samples(made, table):
     for number, row in enumerate(rows):
         if number % 2:
             row |= {name: None for name in NAMES if "force" not in name}
-    desk = Desk()
-    desk.send(rows)
-    desk.intake.finish()
+    harness = IntakeHarness()
+    harness.send(rows)
+    harness.intake.finish()
 
-    valid = [m for m in desk.strides() if not m.reasons]
+    valid = [m for m in harness.strides() if not m.reasons]
     assert len(valid) >= sum(s.valid for s in measure(made)) - 3
 
 
@@ -147,25 +105,25 @@ def test_a_garbled_cell_costs_its_row_and_no_more(made, table):
     rows = rows_of(table)
     for number in range(5, len(rows), 50):
         rows[number] |= {NAMES[number % 3]: "ERR"}
-    desk = Desk()
-    desk.send(rows)
-    desk.intake.finish()
+    harness = IntakeHarness()
+    harness.send(rows)
+    harness.intake.finish()
 
-    assert any("is 'ERR', which is no number." in text for text in desk.said)
-    valid = [m for m in desk.strides() if not m.reasons]
+    assert any("is 'ERR', which is no number." in text for text in harness.said)
+    valid = [m for m in harness.strides() if not m.reasons]
     assert len(valid) >= sum(s.valid for s in measure(made)) - 3
 
 
 def test_times_that_tell_no_rate_are_told_with_the_cure(made, table):
-    desk = Desk()
+    harness = IntakeHarness()
     uneven_s = np.cumsum([0, *[0.01, 0.03] * 49, 0])  # as many steps of one length as of another
     some = table[:100].copy()
     some[:, 0] = uneven_s - 50
-    desk.send(rows_of(some), chunk=100)
-    assert desk.said[0].startswith("The times of the samples tell no rate. Give it with --rate.")
-    desk.send(rows_of(table))  # and goes on
-    desk.intake.finish()
-    assert [m for m in desk.strides() if not m.reasons]
+    harness.send(rows_of(some), chunk=100)
+    assert harness.said[0].startswith("The times of the samples tell no rate. Give it with --rate.")
+    harness.send(rows_of(table))  # and goes on
+    harness.intake.finish()
+    assert [m for m in harness.strides() if not m.reasons]
 
 
 def one_of(*cells):
@@ -187,13 +145,13 @@ odd_rows = st.lists(
 
 @given(st.lists(odd_rows, max_size=5), st.sampled_from([None, 100.0]))
 def test_nothing_that_comes_stops_it(batches, rate_hz):
-    desk = Desk(rate_hz=rate_hz)
+    harness = IntakeHarness(rate_hz=rate_hz)
     for number in range(20):  # of samples, so that the rate and the legs are known
         times = [0.01 * (10 * number + k) for k in range(10)]
-        desk.intake.take([{"time_s": t, **dict.fromkeys(NAMES, 500.0)} for t in times])
+        harness.intake.add_rows([{"time_s": t, **dict.fromkeys(NAMES, 500.0)} for t in times])
     for batch in batches:
-        desk.intake.take(batch)
-    desk.intake.finish()
+        harness.intake.add_rows(batch)
+    harness.intake.finish()
 
 
 def spoil(table, rows, columns, change):
@@ -224,10 +182,10 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_no_fault_shows_a_wrong_a2(made, table, fault):
-    desk = Desk()
-    desk.send(rows_of(FAULTS[fault](table)))
-    desk.intake.finish()
-    found = desk.strides()
+    harness = IntakeHarness()
+    harness.send(rows_of(FAULTS[fault](table)))
+    harness.intake.finish()
+    found = harness.strides()
 
     expected = [s for s in measure(made) if s.valid]
     truth = np.array([s.terminal_contact_s for s in expected])
@@ -263,21 +221,21 @@ def test_no_fault_shows_a_wrong_a2(made, table, fault):
     ],
 )
 def test_rows_of_no_use_are_told_with_the_cure(rows, cure):
-    desk = Desk()
-    desk.send(rows * 50)
+    harness = IntakeHarness()
+    harness.send(rows * 50)
 
-    assert desk.strides() == []
-    assert len(desk.said) == 1  # not fifty times
-    assert cure in desk.said[0]
-    assert "50 rows not understood" in desk.intake.describe()
+    assert harness.strides() == []
+    assert len(harness.said) == 1  # not fifty times
+    assert cure in harness.said[0]
+    assert "50 rows not understood" in harness.intake.describe()
 
 
 def test_milliseconds_are_noticed(table):
-    desk = Desk()
-    desk.send(rows_of(table * [1000, *[1] * 6]))
+    harness = IntakeHarness()
+    harness.send(rows_of(table * [1000, *[1] * 6]))
 
-    assert desk.strides() == []
-    assert any("milliseconds" in text and "t*0.001" in text for text in desk.said)
+    assert harness.strides() == []
+    assert any("milliseconds" in text and "t*0.001" in text for text in harness.said)
 
 
 def test_units_and_signs_can_be_mapped(made, table):
@@ -287,79 +245,79 @@ def test_units_and_signs_can_be_mapped(made, table):
         words += [f"{side}.angle={side}_deg*0.017453292519943295"]
     names = [f"{side}_{name}" for side in ("left", "right") for name in ("Fz", "M", "deg")]
     sent = table * [1000, *[0.001, -1, 180 / np.pi] * 2]
-    desk = Desk(columns=read_column_map(words))
-    desk.send([dict(zip(["ms", *names], row, strict=True)) for row in sent.tolist()])
-    desk.intake.finish()
+    harness = IntakeHarness(columns=read_column_map(words))
+    harness.send([dict(zip(["ms", *names], row, strict=True)) for row in sent.tolist()])
+    harness.intake.finish()
 
-    valid = [m.value for m in desk.strides() if not m.reasons]
+    valid = [m.value for m in harness.strides() if not m.reasons]
     assert valid == pytest.approx([s.a2_w_kg for s in measure(made) if s.valid], rel=1e-6)
 
 
 async def test_no_body_mass_is_refused_with_the_cure(table):
-    desk = Desk(mass_kg=None)
-    desk.send(rows_of(table[:300]))
+    harness = IntakeHarness(mass_kg=None)
+    harness.send(rows_of(table[:300]))
 
     with pytest.raises(ValueError, match="--mass 75"):
-        await desk.intake.watch()
-    assert desk.strides() == []
+        await harness.intake.watch()
+    assert harness.strides() == []
 
 
 def test_what_is_kept_is_measured_alike(made, table, tmp_path):
     path = tmp_path / "kept.csv"
-    desk = Desk(keep=path)
-    desk.send(rows_of(table))
-    desk.intake.finish()
-    desk.intake.close()
+    harness = IntakeHarness(keep=path)
+    harness.send(rows_of(table))
+    harness.intake.finish()
+    harness.intake.close()
 
     t_s, legs = read_signals(path)
     again = measure_both_legs(t_s, legs["left"], legs["right"], rate_hz=200, mass_kg=MASS)
-    live = [m.value for m in desk.strides() if not m.reasons]
+    live = [m.value for m in harness.strides() if not m.reasons]
     assert [s.a2_w_kg for s in again if s.valid] == pytest.approx(live, rel=1e-4)
 
 
 def test_the_quality_line(table):
-    desk = Desk()
-    desk.intake.describe()
+    harness = IntakeHarness()
+    harness.intake.describe()
     rows = rows_of(np.delete(table, slice(1000, 1060), axis=0))
-    desk.send(rows[:2000])
-    desk.time.now_s += 10
-    line = desk.intake.describe()
+    harness.send(rows[:2000])
+    harness.time.now_s += 10
+    line = harness.intake.describe()
 
     assert "200 samples/s, 1 gaps, lag" in line
     assert "last stride" in line
     assert "10.0 s ago" in line
-    desk.time.now_s += 5
-    assert "no samples now" in desk.intake.describe()
+    harness.time.now_s += 5
+    assert "no samples now" in harness.intake.describe()
 
 
 def test_the_check_of_the_first_half_minute_is_told(made, table):
-    desk = Desk(mass_kg=60.0)
-    desk.send(rows_of(table))
+    harness = IntakeHarness(mass_kg=60.0)
+    harness.send(rows_of(table))
 
-    assert any("Check the body mass" in text for text in desk.said)
+    assert any("Check the body mass" in text for text in harness.said)
 
 
 def test_extra_values_travel_as_far_as_they_can():
-    desk = Desk()
+    harness = IntakeHarness()
     row = {"time_s": 5.0, "value": 3.5, "side": "R", "symmetry": 0.03, "belt speed": 1.0}
-    desk.send([row | {"note": "tired", "nothing": None, "endless": float("inf")}])
-    (stride,) = desk.strides()
+    harness.send([row | {"note": "tired", "nothing": None, "endless": float("inf")}])
+    (stride,) = harness.strides()
 
     assert stride.extra == {"symmetry": 0.03}
     assert (stride.side, stride.value, stride.time_s) == (Side.RIGHT, 3.5, 5.0)
-    assert "belt speed, note" in desk.said[0]
+    assert "belt speed, note" in harness.said[0]
 
 
 @pytest.mark.parametrize("begins_anew", [True, False])
 def test_the_clock_that_is_told_follows_a_slow_sensor_and_one_that_begins_anew(begins_anew):
-    desk = Desk()
+    harness = IntakeHarness()
     device_s = 0.0
     for _ in range(2000):  # an hour, by a clock that is 0.5 % slow
-        desk.time.now_s += 1.8
+        harness.time.now_s += 1.8
         device_s += 1.8 * 0.995
-        desk.intake.take([{"time_s": device_s, "value": 4.0}])
+        harness.intake.add_rows([{"time_s": device_s, "value": 4.0}])
     if begins_anew:
-        desk.time.now_s += 20.0
+        harness.time.now_s += 20.0
         device_s = 1.0
-        desk.intake.take([{"time_s": device_s, "value": 4.0}])
-    assert desk.feed.clock_s == pytest.approx(device_s, abs=0.1)
+        harness.intake.add_rows([{"time_s": device_s, "value": 4.0}])
+    assert harness.feed.clock_s == pytest.approx(device_s, abs=0.1)

@@ -10,13 +10,12 @@ import pytest
 
 from rehab.sources.intake import Intake
 from rehab.sources.lsl import ClockCorrection, choose_streams, load_pylsl
-from rehab.sources.source import Unusable
+from rehab.sources.reporting import SourceError
 from rehab.sources.synthetic import walk
 from rehab.sources.synthetic.signals import make_signals
 from tests.sources.fake_lsl import FakeLsl
-from tests.sources.labs import LslLab
-from tests.sources.test_intake import MASS, NAMES, Desk, measure
-from tests.sources.test_rows import until_strides
+from tests.sources.intake_harness import MASS, NAMES, IntakeHarness, measure
+from tests.sources.labs import LslLab, until_strides
 
 
 def test_a_correction_that_wanders_never_turns_the_stamps_around():
@@ -25,7 +24,7 @@ def test_a_correction_that_wanders_never_turns_the_stamps_around():
     stamps = np.arange(100_000) / 1000
     times = []
     for start in range(0, len(stamps), 50):
-        correction.measure(5.0 + rng.normal(0, 0.002))
+        correction.update(5.0 + rng.normal(0, 0.002))
         times.append(correction.correct(stamps[start : start + 50]))
     found = np.concatenate(times)
 
@@ -35,7 +34,7 @@ def test_a_correction_that_wanders_never_turns_the_stamps_around():
 
 def test_another_clock_is_taken_at_once():
     correction = ClockCorrection(5.0)
-    correction.measure(900.0)
+    correction.update(900.0)
     assert correction.correct(np.array([1.0])) == pytest.approx([901.0])
 
 
@@ -45,24 +44,24 @@ def test_streams_are_chosen_or_listed():
     one = lsl.add("Treadmill", NAMES, 1000)
     assert choose_streams(lsl.outlets, []) == ([one], "")
     other = lsl.add("Mocap", NAMES, 100)
-    with pytest.raises(Unusable, match="Treadmill .6 channels, 1000 Hz, lab., Mocap"):
+    with pytest.raises(SourceError, match="Treadmill .6 channels, 1000 Hz, lab., Mocap"):
         choose_streams(lsl.outlets, [])
     assert choose_streams(lsl.outlets, ["Mocap", "Treadmill-1"]) == ([other, one], "")
     assert "No LSL stream EMG is here yet" in choose_streams(lsl.outlets, ["EMG"])[1]
     lsl.add("Mocap", NAMES, 100)
-    with pytest.raises(Unusable, match="Several LSL streams are called Mocap"):
+    with pytest.raises(SourceError, match="Several LSL streams are called Mocap"):
         choose_streams(lsl.outlets, ["Mocap"])
 
 
 def test_without_pylsl_the_cure_is_said(monkeypatch):
     monkeypatch.setitem(sys.modules, "pylsl", None)
-    with pytest.raises(Unusable, match="pip install pylsl"):
+    with pytest.raises(SourceError, match="pip install pylsl"):
         load_pylsl()
 
 
 def test_a_folder_of_that_name_is_no_pylsl(monkeypatch):
     monkeypatch.setitem(sys.modules, "pylsl", ModuleType("pylsl"))
-    with pytest.raises(Unusable, match="pip install pylsl"):
+    with pytest.raises(SourceError, match="pip install pylsl"):
         load_pylsl()
 
 
@@ -70,7 +69,7 @@ async def test_a_stream_that_goes_away_while_it_is_opened_is_tried_again(tmp_pat
     lab = LslLab(tmp_path)
     lab.outlet.vanishes = True
     lab.outlet.push([3.0, 0.7], step_s=1.0)
-    found = await read_streams(lab, Desk(), 1)
+    found = await read_streams(lab, IntakeHarness(), 1)
 
     assert found[0].value == 3.0
     assert any("went away" in text for text in lab.said)
@@ -86,16 +85,16 @@ def test_without_liblsl_the_cure_is_said(monkeypatch):
 
     monkeypatch.delitem(sys.modules, "pylsl", raising=False)
     monkeypatch.setattr("importlib.import_module", fail)
-    with pytest.raises(Unusable, match="library file was not found.*liblsl"):
+    with pytest.raises(SourceError, match="library file was not found.*liblsl"):
         load_pylsl()
 
 
-async def read_streams(lab, desk, count):
+async def read_streams(lab, harness, count):
     source = lab.make("--mass", str(MASS))
-    intake = Intake(desk.feed, source.settings, lab.said.append, desk.time)
+    intake = Intake(harness.feed, source.settings, lab.said.append, harness.time)
     task = asyncio.create_task(source.read(intake))
     try:
-        return await until_strides(desk, count)
+        return await until_strides(harness, count)
     finally:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
@@ -115,7 +114,7 @@ async def test_two_streams_of_two_clocks_and_rates_become_one_walk(tmp_path):
         if number % 2 == 0:
             mocap.samples.put((list(row), time_s + 3.0))
     expected = measure(made, 100.0)
-    found = await read_streams(lab, Desk(), len(expected) - 2)
+    found = await read_streams(lab, IntakeHarness(), len(expected) - 2)
 
     assert sum(not m.reasons for m in found) >= 0.7 * len(found)
     by_time = {s.terminal_contact_s: s for s in expected}
@@ -131,14 +130,16 @@ async def test_channels_without_a_meaning_are_refused_with_the_cure(tmp_path):
     lab = LslLab(tmp_path)
     lab.lsl.add("EEG", ("Fz", "Cz"), 250)
     lab.typed = ["--stream", "EEG"]
-    with pytest.raises(Unusable, match=r"Fz, Cz.*--columns"):
-        await asyncio.wait_for(lab.make().read(Intake(Desk().feed, lab.make().settings, print)), 5)
+    with pytest.raises(SourceError, match=r"Fz, Cz.*--columns"):
+        await asyncio.wait_for(
+            lab.make().read(Intake(IntakeHarness().feed, lab.make().settings, print)), 5
+        )
 
 
 async def test_real_streams_are_heard(tmp_path):
     try:
         pylsl = load_pylsl()
-    except Unusable as problem:
+    except SourceError as problem:
         pytest.skip(str(problem))
     name = f"GARRY test {tmp_path.name}"
     info = pylsl.StreamInfo(name, "Gait", 2, 0, "double64", tmp_path.name)
@@ -156,7 +157,7 @@ async def test_real_streams_are_heard(tmp_path):
             outlet.push_sample([3.0 + number, 0.7])
 
     pushing = asyncio.create_task(push())
-    found = await read_streams(lab, Desk(), 5)
+    found = await read_streams(lab, IntakeHarness(), 5)
     await pushing
 
     assert [m.value for m in found] == [3.0, 4.0, 5.0, 6.0, 7.0]

@@ -8,7 +8,7 @@ import pytest
 from rehab.sources.recording import LAYOUTS, RecordingError, read_recording
 from rehab.training.measures import A2
 from rehab.training.phases import PHASE_KINDS, Phase
-from rehab.training.steps import Measurement, Side, find_reasons
+from rehab.training.steps import Measurement, Side, find_invalid_reasons
 
 HEBB91 = "Step Count,iA2,A2_Success,iVGRF_max,iSL\n"
 
@@ -88,7 +88,7 @@ def test_odd_values_are_passed_on_for_scoring_to_judge(parse, hebb03, cell, valu
     (stride,) = parse(hebb03({"iA2_Actual": cell})).strides
 
     assert stride.measurement.value == value
-    assert find_reasons(stride.measurement, A2) == reasons
+    assert find_invalid_reasons(stride.measurement, A2) == reasons
 
 
 def test_flagged_stride_keeps_its_value(parse, hebb03):
@@ -180,7 +180,7 @@ def test_plain_knows_every_phase_kind(parse, kind):
 def test_plain_reasons(parse, valid, reason, value, reasons):
     (stride,) = parse(f"time_s,value,valid,reason\n0,{value},{valid},{reason}\n").strides
 
-    assert find_reasons(stride.measurement, A2) == reasons
+    assert find_invalid_reasons(stride.measurement, A2) == reasons
 
 
 def test_further_columns_of_plain_are_extra_values(parse):

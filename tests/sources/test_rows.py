@@ -10,10 +10,9 @@ from websockets.asyncio.server import serve
 
 from rehab.sources.intake import Intake, LineReader, parse_address
 from rehab.sources.intake.lines import MAX_LINE
-from rehab.sources.source import Unusable
-from rehab.training.steps import Measurement
-from tests.sources.labs import RowsLab, json_line
-from tests.sources.test_intake import Desk
+from rehab.sources.reporting import SourceError
+from tests.sources.intake_harness import IntakeHarness
+from tests.sources.labs import RowsLab, json_line, until_strides
 
 
 class UdpLab(RowsLab):
@@ -27,26 +26,17 @@ class WsLab(RowsLab):
 @asynccontextmanager
 async def reading(lab, *more):
     """Read what a lab sends, without a server behind."""
-    desk, source = Desk(mass_kg=None), lab.make(*more)
-    intake = Intake(desk.feed, source.settings, lab.said.append, desk.time)
+    harness, source = IntakeHarness(mass_kg=None), lab.make(*more)
+    intake = Intake(harness.feed, source.settings, lab.said.append, harness.time)
     task = asyncio.create_task(source.read(intake))
     try:
         async with asyncio.timeout(5):
             while not task.done() and not source.address.port:  # noqa: ASYNC110
                 await asyncio.sleep(0.002)
-        yield desk, source.address.port, task
+        yield harness, source.address.port, task
     finally:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
-
-
-async def until_strides(desk, count):
-    found: list[Measurement] = []
-    async with asyncio.timeout(5):
-        while len(found) < count:
-            found += desk.strides()
-            await asyncio.sleep(0.005)
-    return found
 
 
 STRIDES = [json_line(time_s=n * 1.1, value=3.0 + n, symmetry=0.1) for n in range(1, 5)]
@@ -54,16 +44,16 @@ STRIDES = [json_line(time_s=n * 1.1, value=3.0 + n, symmetry=0.1) for n in range
 
 async def test_udp_hears_one_sender_and_tells_of_the_other(tmp_path):
     lab = UdpLab(tmp_path)
-    async with reading(lab) as (desk, port, _):
+    async with reading(lab) as (harness, port, _):
         with (
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one,
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as two,
         ):
             one.sendto("".join(STRIDES[:2]).encode(), ("127.0.0.1", port))
-            first = await until_strides(desk, 2)
+            first = await until_strides(harness, 2)
             two.sendto(STRIDES[3].encode(), ("127.0.0.1", port))
             one.sendto(STRIDES[2].rstrip().encode(), ("127.0.0.1", port))
-            rest = await until_strides(desk, 1)
+            rest = await until_strides(harness, 1)
 
     assert [m.value for m in first + rest] == [4.0, 5.0, 6.0]
     assert first[0].extra == {"symmetry": 0.1}
@@ -73,12 +63,12 @@ async def test_udp_hears_one_sender_and_tells_of_the_other(tmp_path):
 async def test_websocket_turns_a_second_sender_away(tmp_path):
     lab = WsLab(tmp_path)
     async with (
-        reading(lab) as (desk, port, _),
+        reading(lab) as (harness, port, _),
         connect(f"ws://127.0.0.1:{port}", proxy=None) as one,
         connect(f"ws://127.0.0.1:{port}", proxy=None) as two,
     ):
         await one.send("\n".join(STRIDES[:3]))
-        found = await until_strides(desk, 3)
+        found = await until_strides(harness, 3)
         assert "Stop it first" in await two.recv()
 
     assert [m.value for m in found] == [4.0, 5.0, 6.0]
@@ -86,10 +76,10 @@ async def test_websocket_turns_a_second_sender_away(tmp_path):
 
 async def test_tcp_turns_a_second_sender_away_and_hears_it_later(tmp_path):
     lab = RowsLab(tmp_path)
-    async with reading(lab) as (desk, port, _):
+    async with reading(lab) as (harness, port, _):
         _, one = await asyncio.open_connection("127.0.0.1", port)
         one.write(STRIDES[0].encode())
-        found = await until_strides(desk, 1)
+        found = await until_strides(harness, 1)
         reader, turned_away = await asyncio.open_connection("127.0.0.1", port)
         assert b"Stop it first" in await reader.read()
         turned_away.close()
@@ -97,7 +87,7 @@ async def test_tcp_turns_a_second_sender_away_and_hears_it_later(tmp_path):
         await asyncio.sleep(0.05)
         _, two = await asyncio.open_connection("127.0.0.1", port)
         two.write(STRIDES[1].encode())
-        found += await until_strides(desk, 1)
+        found += await until_strides(harness, 1)
         two.close()
 
     assert [m.value for m in found] == [4.0, 5.0]
@@ -132,8 +122,8 @@ async def test_a_lab_that_serves_is_dialed_again(tmp_path):
     async with serve(tell, "127.0.0.1", 0) as server:
         port = server.sockets[0].getsockname()[1]
         lab.typed = ["--connect", f"ws://127.0.0.1:{port}"]
-        async with reading(lab) as (desk, _, _):
-            found = await until_strides(desk, 2)
+        async with reading(lab) as (harness, _, _):
+            found = await until_strides(harness, 2)
 
     assert [m.value for m in found] == [4.0, 5.0]
 
@@ -143,13 +133,13 @@ async def test_a_port_that_is_taken_is_said_with_the_cure(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as other:
         lab.typed = ["--listen", f"tcp://127.0.0.1:{other.getsockname()[1]}"]
         async with reading(lab) as (_, _, task):
-            with pytest.raises(Unusable, match="take another port"):
+            with pytest.raises(SourceError, match="take another port"):
                 await task
 
 
 @pytest.mark.parametrize("text", ["9101", "http://x:1", "tcp://x", "udp://:9", "tcp://x:99999"])
 def test_what_is_no_address_is_said_with_the_cure(text):
-    with pytest.raises(Unusable, match=r"Write one like tcp://127\.0\.0\.1:9101"):
+    with pytest.raises(SourceError, match=r"Write one like tcp://127\.0\.0\.1:9101"):
         parse_address(text)
 
 
@@ -168,7 +158,7 @@ def test_a_line_without_end_is_told_once_and_takes_no_memory():
     for _ in range(50):
         wrong += reader.read_bytes(b"x" * 20_000)[1]
     assert len(wrong) == 1
-    assert len(reader._cut) <= MAX_LINE + 20_000
+    assert len(reader._partial) <= MAX_LINE + 20_000
     assert reader.read_bytes(b'\n{"value": 1}\n')[0] == [{"value": 1.0}]
 
 

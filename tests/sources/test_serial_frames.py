@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rehab.sources.serial_sensor import FrameReader, find_checksum
+from rehab.sources.serial_sensor import FrameReader, compute_checksum
 from tests.sources.labs import frame
 
 NAMES = b"$H,left_force_n,left_angle_rad*4D\n"
@@ -58,7 +58,7 @@ def test_endless_noise_takes_no_memory():
     reader = FrameReader()
     for _ in range(1000):
         assert reader.read(b"\xff" * 1000) == []
-    assert len(reader._cut) <= 1024
+    assert len(reader._partial) <= 1024
     assert reader.read(b"\n" + NAMES + frame("D", 0, 1, 1))[0]["left_force_n"] == 1
 
 
@@ -67,4 +67,4 @@ def test_the_sketch_sends_what_is_documented():
     assert "921600" in text
     for word in ("$", "*%02X", "micros()", "left_force_n"):
         assert word in text
-    assert find_checksum(b"H,left_force_n,left_angle_rad") == 0x4D
+    assert compute_checksum(b"H,left_force_n,left_angle_rad") == 0x4D

@@ -13,7 +13,7 @@ from rehab.sources.recording import read_recording
 from rehab.sources.synthetic import GOOD, walk
 from rehab.training.phases import make_phase
 from rehab.training.steps import Measurement
-from tests.sources.test_synthetic_walker import SESSION_1, usable
+from tests.sources.protocols import SESSION_1, usable
 from tests.support.data import recording
 
 SEEDS = range(20)
@@ -85,7 +85,7 @@ RETURNED_PHASES = {
 
 @pytest.fixture(scope="module")
 def walks() -> dict[str, list[list[Measurement]]]:
-    """Walk; give the strides of each phase, a list for each time that it was walked."""
+    """Walk; return the strides of each phase, a list for each time that it was walked."""
     found = defaultdict(list)
     for seed in SEEDS:
         strides = walk(GOOD, seed, SESSION_1)
@@ -104,7 +104,7 @@ def find_lag_1(strides: list[Measurement]) -> float:
 
 
 def standardize(values: list[float]) -> np.ndarray:
-    """Give what is left without the mean of 15 strides around each, by its own sd."""
+    """Return what is left without the mean of 15 strides around each, by its own sd."""
     whole = np.array(values)
     slow = np.convolve(whole, np.ones(15) / 15, "valid")
     rest = whole[7 : 7 + len(slow)] - slow
@@ -125,7 +125,7 @@ def test_mean_sd_and_success_of_each_phase(walks, name):
 
 @pytest.fixture(scope="module")
 def returned() -> dict[tuple[int, str], list[tuple[float, list[Measurement]]]]:
-    """Walk sessions 2 and 3; give each phase's strides with the goal: the walk's own baseline."""
+    """Walk sessions 2 and 3; return each phase's strides with the goal: the walk's own baseline."""
     found = defaultdict(list)
     for session, profile in RETURNED.items():
         for seed in SEEDS:

@@ -23,34 +23,18 @@ from rehab.training.phases import make_phase
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES
+from tests.sources.protocols import SESSION_1, usable
 
 BASELINE = make_phase("baseline")
 TRAINING = make_phase("training")
 WASHOUT = make_phase("washout")
 
-# The protocol of HEBB_03, session 1 (docs/reference/gait.md#protocol): kind, percent shown,
-# strides.
-SESSION_1 = [
-    make_phase(kind, f"{kind} {percent}", gain=percent / 100, strides=strides)
-    for kind, percent, strides in (
-        *(("baseline", 100, 54), ("catch", 100, 34), ("familiarization", 100, 30)),
-        *(("catch", 100, 7), ("training", 100, 51), ("catch", 100, 12), ("training", 95, 48)),
-        *(("catch", 100, 12), ("training", 90, 101), ("catch", 100, 12), ("training", 85, 107)),
-        *(("catch", 100, 12), ("training", 85, 168), ("catch", 100, 13), ("training", 85, 230)),
-        *(("catch", 100, 13), ("training", 85, 174), ("washout", 100, 552)),
-    )
-]
-
 
 def steady(profile=GOOD, **changes):
-    """Give a profile that learns nothing, tires of nothing and stays at its first level."""
+    """Return a profile that learns nothing, tires of nothing and stays at its first level."""
     return replace(
         profile, trained_level=1.5, exploration_level=1.5, fatigue_per_100_strides=0, **changes
     )
-
-
-def usable(strides):
-    return [m.value for m in strides if m.value is not None and not m.reasons]
 
 
 # --- The same seed, the same walk ----------------------------------------------------------------
@@ -162,7 +146,7 @@ def test_walker_and_session_agree_on_the_phase_of_every_stride(phases, seed):
 
 @pytest.fixture(scope="module")
 def walks():
-    """Walk session 1 with twenty seeds; give usable values per phase as ratios to the baseline."""
+    """Return usable values per phase of session 1 with twenty seeds, as ratios to the baseline."""
     values: dict[str, list[float]] = {}
     for seed in range(20):
         strides = walk(GOOD, seed, SESSION_1)

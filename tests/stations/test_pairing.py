@@ -23,11 +23,6 @@ def fresh_cache():
 
 
 @pytest.fixture
-def world() -> World:
-    return build_world("amber")
-
-
-@pytest.fixture
 def pt(world: World) -> Client:
     return client_of(world)
 

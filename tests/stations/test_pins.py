@@ -19,11 +19,6 @@ SCREEN = "tablet 1"
 
 
 @pytest.fixture
-def world() -> World:
-    return build_world("amber")
-
-
-@pytest.fixture
 def station(world: World) -> Station:
     made = Station(clinic=world.clinic, name="Bay 4")
     set_pin(made, "4711")

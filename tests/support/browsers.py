@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
@@ -26,6 +26,28 @@ def chromium() -> Iterator[Browser]:
         )
         yield browser
         browser.close()
+
+
+class SharedChromium:
+    """Chromium that stays until it is closed, and is started again when asked for."""
+
+    def __init__(self) -> None:
+        self._running: AbstractContextManager[Browser] | None = None
+        self._browser: Browser | None = None
+
+    def browser(self) -> Browser:
+        """Return the running browser, started where need be."""
+        if self._running is None:
+            self._running = chromium()
+            self._browser = self._running.__enter__()
+        assert self._browser is not None
+        return self._browser
+
+    def close(self) -> None:
+        """Close the browser, if it runs."""
+        if self._running is not None:
+            running, self._running = self._running, None
+            running.__exit__(None, None, None)
 
 
 # Every visible text of the page: its words, size, and contrast with what is painted behind it.

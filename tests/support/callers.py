@@ -12,6 +12,7 @@ from channels.testing import WebsocketCommunicator
 
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
+from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import create_session
@@ -19,7 +20,7 @@ from rehab.stations.models import Device, Station
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.phases import Phase, make_phase
-from rehab.training.valences import Cue
+from rehab.training.valences import CueGestures
 from tests.support.world import signed_in
 
 PATIENCE_S = 10.0  # only a failing test waits so long
@@ -320,7 +321,7 @@ def open_session(
     goal: GoalRule | None = None,
     at_station: bool = True,
     beside: bool = False,
-    cue: Cue | None = None,
+    cue: CueGestures | None = None,
 ) -> TrainingSession:
     """Make a session that is ready at the place's station.
 
@@ -352,3 +353,10 @@ async def numbers(session: TrainingSession) -> list[int]:
     """Give the numbers of a session's stored steps."""
     steps = Step.everywhere.filter(session=session).order_by("number")
     return [number async for number in steps.values_list("number", flat=True)]
+
+
+async def restart() -> None:
+    """Let this server go and another one come."""
+    runtime = runtimes.current()
+    await runtime.drain()
+    runtimes._current = None

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import datetime
+from datetime import datetime, timedelta
 from zoneinfo import ZoneInfo
 
 import pytest
@@ -28,6 +28,15 @@ def has_real_clock(item: pytest.Item) -> bool:
     return item.get_closest_marker("database") is None or any(
         item.get_closest_marker(name) for name in REAL
     )
+
+
+@contextmanager
+def just_before() -> Iterator[None]:
+    """Let it be two seconds before ``START``: what is made is older than any test."""
+    import time_machine
+
+    with time_machine.travel(START - timedelta(seconds=2), tick=True):
+        yield
 
 
 @contextmanager

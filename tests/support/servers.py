@@ -6,9 +6,11 @@ import os
 import socket
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -47,9 +49,31 @@ def clean_environment(folder: Path, port: int) -> dict[str, str]:
     return clean | {"GARRY_DATA_DIR": str(folder), "GARRY_PORT": str(port)}
 
 
+@cache
+def _tables() -> bytes:
+    """Return a database with the tables and no row of ours, as a server makes one at first."""
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run(
+            [sys.executable, "manage.py", "migrate", "--verbosity", "0"],
+            cwd=ROOT,
+            env=clean_environment(Path(folder), 8000),
+            check=True,
+        )
+        database = Path(folder, "garry.sqlite3")
+        assert not database.with_name("garry.sqlite3-wal").exists()  # all is in the file
+        return database.read_bytes()
+
+
 @contextmanager
-def serve(folder: Path, *arguments: str) -> Iterator[Server]:
-    """Run `manage.py serve` on a folder of its own until the block ends."""
+def serve(folder: Path, *arguments: str, new_machine: bool = False) -> Iterator[Server]:
+    """Run `manage.py serve` on a folder of its own until the block ends.
+
+    Unless it is a new machine, its tables are there: a server makes them in seconds.
+    """
+    database = folder / "garry.sqlite3"
+    if not new_machine and not database.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        database.write_bytes(_tables())
     port = free_port()
     process = subprocess.Popen(
         [sys.executable, "manage.py", "serve", *arguments],

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import ENDED, State
+from rehab.training.changes import ENDED_STATES, State
 from tests.support.api_noise import JUNK, JUNK_TEXTS
 from tests.support.callers import (
     Caller,
@@ -204,7 +204,7 @@ class Ward:
 
     async def _live(self) -> Any:
         live = await runtimes.current().session(self.session.pk)
-        if live.actor.fold.state in ENDED:  # some noise is a valid change
+        if live.actor.fold.state in ENDED_STATES:  # some noise is a valid change
             self.session = await begin(self.noisy)
             live = await runtimes.current().session(self.session.pk)
         elif live.actor.fold.state is State.PAUSED:

@@ -126,7 +126,7 @@ async def ping_layer() -> None:
 
 def look_at_files() -> Iterator[Finding]:
     """Give whether pages find their files."""
-    missing = [name for name in ("css/tokens.css", "img/mark.svg") if not finders.find(name)]
+    missing = [name for name in ("css/shared/tokens.css", "img/mark.svg") if not finders.find(name)]
     missing += [name for name, folder in settings.BROWSER_LIBRARIES.items() if not folder.is_dir()]
     if missing:
         yield Finding("files", f"missing: {', '.join(missing)}", "Run make setup.")

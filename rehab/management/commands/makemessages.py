@@ -1,4 +1,4 @@
-"""Django's `makemessages`, which also knows the words of our scripts (static/js/language.js)."""
+"""Django's `makemessages`, which also finds the texts of our scripts (shared/language.js)."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ REFUSALS = [
     f'--keyword={name}:{place},"refusal"'
     for name, place in (
         ("InvalidSetting", 1),
-        ("Refused", 1),
+        ("NotAllowed", 1),
         ("BadGesture", 1),
         ("BadGoal", 2),
         ("Marked", 1),

@@ -48,7 +48,7 @@ def render_records(request: HttpRequest, patient: Patient, **forms: Any) -> Http
         "erasing": ErasingForm(patient=patient),
         **forms,
     }
-    return render(request, "exports/records.html", context)
+    return render(request, "patients/records.html", context)
 
 
 @for_roles(Role.LEAD, Role.PT)

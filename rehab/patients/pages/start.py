@@ -23,7 +23,7 @@ from rehab.sessions.formatting import at_clinic
 from rehab.sessions.forms import SessionForm, like_last_time
 from rehab.sessions.models import TrainingSession
 from rehab.stations.builtin import first_station
-from rehab.training.changes import OPEN
+from rehab.training.changes import OPEN_STATES
 
 SHOWN = 60  # patients on one page, those who were here last first
 DEMO_CODE = "demo"
@@ -40,7 +40,7 @@ def patients_of(user: User) -> QuerySet[Patient]:
 
 def open_sessions(user: User) -> QuerySet[TrainingSession]:
     """Give the sessions that have begun, or could, and have not ended."""
-    states = [state.value for state in OPEN]
+    states = [state.value for state in OPEN_STATES]
     return (
         TrainingSession.objects.visible_to(user)
         .filter(state__in=states)
@@ -73,7 +73,7 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
     """List who is expected today, then all patients."""
     words = request.GET.get("q", "").strip()
     context = list_everybody(person(request), words) | {"q": words}
-    return render(request, "sessions/start.html", context)
+    return render(request, "patients/start.html", context)
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -101,7 +101,7 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
         ],
         "at": usual_time(user, patient, lists["now"]),
     }
-    return render(request, "sessions/start.html", context)
+    return render(request, "patients/start.html", context)
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -112,7 +112,7 @@ def add_patient(request: HttpRequest) -> HttpResponse:
     form = PatientForm(request.POST or None, by=user, now=timezone.now())
     if request.method == "POST" and form.keep():
         return redirect("setup", patient_id=form.instance.pk)
-    return render(request, "sessions/patient_form.html", {"form": form})
+    return render(request, "patients/form.html", {"form": form})
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -125,7 +125,7 @@ def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     if request.method == "POST" and form.keep():
         return redirect("patient", patient_id=patient.pk)
     context = {"form": form, "patient": Patient.objects.visible_to(user).get(pk=patient_id)}
-    return render(request, "sessions/patient_form.html", context)
+    return render(request, "patients/form.html", context)
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -136,7 +136,7 @@ def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
     form = ScreenForm(request.POST or None, instance=patient)
     if request.method == "POST" and form.keep():
         return redirect("patient", patient_id=patient.pk)
-    return render(request, "sessions/screen_form.html", {"form": form, "patient": patient})
+    return render(request, "patients/screen_form.html", {"form": form, "patient": patient})
 
 
 @for_roles(Role.LEAD, Role.PT)

@@ -48,4 +48,4 @@ def change_password(request: HttpRequest) -> HttpResponse:
         update_session_auth_hash(request, user)
         messages.success(request, _("Your password is changed."))
         return redirect("account")
-    return render(request, "people/new_password.html", {"form": form})
+    return render(request, "people/sign_in/new_password.html", {"form": form})

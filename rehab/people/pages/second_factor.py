@@ -44,7 +44,7 @@ def choose(request: HttpRequest) -> HttpResponse:
         "is_required": factors.is_required(user),
         "passkeys": passkeys.are_possible(request),
     }
-    return render(request, "people/set_up.html", context)
+    return render(request, "people/sign_in/choose_factor.html", context)
 
 
 @for_roles(*Role, setting_up=True, patients=False)
@@ -65,7 +65,7 @@ def add_app(request: HttpRequest) -> HttpResponse:
     drawing = segno.make(totp.address(secret, user.username), micro=False)
     spaced = " ".join(secret[start : start + 4] for start in range(0, len(secret), 4))
     context = {"form": form, "qr": drawing.svg_inline(omitsize=True, border=2), "secret": spaced}
-    return render(request, "people/add_app.html", context)
+    return render(request, "people/sign_in/add_app.html", context)
 
 
 @for_roles(*Role, setting_up=True, patients=False)
@@ -86,7 +86,7 @@ def add_passkey(request: HttpRequest) -> HttpResponse:
         except (KeyError, passkeys.NotProven):
             problem = _("This passkey was not accepted. Try again.")
     context = {"problem": problem, "passkey": passkeys.ask_to_make(request, user)}
-    return render(request, "people/add_passkey.html", context)
+    return render(request, "people/sign_in/add_passkey.html", context)
 
 
 def _added(request: HttpRequest, user: User, new: list[str]) -> HttpResponse:
@@ -120,11 +120,11 @@ def renew_codes(request: HttpRequest) -> HttpResponse:
         "words": _("They replace the old ones, which then open nothing."),
         "act": _("Make new codes"),
     }
-    return render(request, "people/ask_password.html", context)
+    return render(request, "people/sign_in/confirm_password.html", context)
 
 
 def _show(request: HttpRequest, new: list[str], then: str) -> HttpResponse:
-    return render(request, "people/recovery_codes.html", {"codes": new, "then": then})
+    return render(request, "people/sign_in/recovery_codes.html", {"codes": new, "then": then})
 
 
 @for_roles(*Role, patients=False)
@@ -153,4 +153,4 @@ def remove(request: HttpRequest) -> HttpResponse:
         "words": _("It then no longer signs you in."),
         "act": _("Remove"),
     }
-    return render(request, "people/ask_password.html", context)
+    return render(request, "people/sign_in/confirm_password.html", context)

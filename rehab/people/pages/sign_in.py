@@ -31,7 +31,7 @@ def first_page(user: User) -> str:
 class SignIn(LoginView):
     """Name and password."""
 
-    template_name = "people/sign_in.html"
+    template_name = "people/sign_in/sign_in.html"
     authentication_form = SignInForm
 
     def form_valid(self, form: Any) -> HttpResponse:
@@ -76,7 +76,7 @@ def prove(request: HttpRequest) -> HttpResponse:
         "has_app": own.filter(kind=factors.Authenticator.Kind.APP).exists(),
         "passkey": passkeys.ask_to_sign(request, user),
     }
-    return render(request, "people/second_factor.html", context)
+    return render(request, "people/sign_in/second_factor.html", context)
 
 
 @public

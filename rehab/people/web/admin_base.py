@@ -161,7 +161,7 @@ class RowAdmin(admin.ModelAdmin):
             "module_name": capfirst(self.opts.verbose_name_plural),
             "changes": changes_of(request.user, row, parts),
         }
-        return TemplateResponse(request, "people/changes.html", context)
+        return TemplateResponse(request, "admin/changes.html", context)
 
 
 class ScopedAdmin(ScopedOptions, RowAdmin):

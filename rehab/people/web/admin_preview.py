@@ -18,7 +18,7 @@ from rehab.people.web.admin_base import ScopedAdmin
 
 
 class PreviewAdmin(ScopedAdmin):
-    """Rows whose form draws, into a frame and at every key, what it would make (js/preview.js)."""
+    """Rows whose form draws what it would make into a frame, at every key (form_preview.js)."""
 
     def get_urls(self) -> list[URLPattern]:
         """Give the addresses, the preview's among them."""

@@ -12,9 +12,9 @@ from rehab.sessions.log import Remark, RobotEntry, SessionEvent, SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.payloads import MARKED_CHANGES, change_mark
 from rehab.sessions.replay import fold_log
-from rehab.training.changes import ENDED, Change, ChangeKind, State, Value
+from rehab.training.changes import ENDED_STATES, Change, ChangeKind, ChangeValue, State
 from rehab.training.fold import SessionFold
-from rehab.training.metrics import measure_session
+from rehab.training.metrics import compute_metrics
 from rehab.training.steps import Measurement, ScoredStep
 
 log = logging.getLogger(__name__)
@@ -90,12 +90,12 @@ class SessionActor:
         rows: list[Row] = [event]
         if change.kind is ChangeKind.START:
             self.session.started_at = at
-        if self.fold.state in ENDED:
+        if self.fold.state in ENDED_STATES:
             self.session.ended_at = at
         if self.fold.state is State.FINISHED:
             rows += [
                 SessionMetric(session=self.session, slug=slug, value=value)
-                for slug, value in measure_session(self.fold).items()
+                for slug, value in compute_metrics(self.fold).items()
             ]
         return rows
 
@@ -153,7 +153,7 @@ class SessionActor:
         return None
 
 
-def _to_columns(old: Value, value: Value) -> dict[str, Any]:
+def _to_columns(old: ChangeValue, value: ChangeValue) -> dict[str, Any]:
     """Give a change's values as the log keeps them: numbers in columns, all else in ``data``."""
     if value is None or isinstance(value, int | float):
         return {"old": old, "value": value}

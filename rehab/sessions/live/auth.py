@@ -25,7 +25,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.stations import tablets
 from rehab.stations.models import Device, find_device
 from rehab.stations.tablets import find_tablet
-from rehab.training.changes import OPEN
+from rehab.training.changes import OPEN_STATES
 
 Actor = User | Device | None
 
@@ -148,7 +148,7 @@ def may_watch(actor: Actor, session_id: int, scope: Mapping[str, Any]) -> bool:
 def open_session_of(device: Device, session_id: int | None) -> int | None:
     """Give the station's open session (the newest one, or the one that is named)."""
     sessions = TrainingSession.objects.visible_to(device).filter(
-        state__in=[state.value for state in OPEN]
+        state__in=[state.value for state in OPEN_STATES]
     )
     if session_id is not None:
         sessions = sessions.filter(pk=session_id)

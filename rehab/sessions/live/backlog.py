@@ -7,7 +7,7 @@ from channels.db import database_sync_to_async
 from rehab.sessions.log import SessionEvent, Step
 from rehab.training.changes import ChangeKind
 from rehab.training.measures import Measure
-from rehab.training.steps import Measurement, Reason, add_reason, find_reasons
+from rehab.training.steps import InvalidReason, Measurement, add_reason, find_invalid_reasons
 
 PAGE = 256  # past steps at a time
 MOVES = (ChangeKind.START, ChangeKind.PAUSE, ChangeKind.RESUME)
@@ -37,13 +37,13 @@ def is_stored(session_id: int, measurement: Measurement, measure: Measure) -> bo
 
 def _find_reasons(session_id: int, measurement: Measurement, measure: Measure) -> tuple[str, ...]:
     """Give the reasons that a measurement was stored with: the source's, then the fold's."""
-    reasons, number = find_reasons(measurement, measure), measurement.number
+    reasons, number = find_invalid_reasons(measurement, measure), measurement.number
     before = Step.everywhere.filter(session_id=session_id, number=number - 1).first()
     if before is not None and measurement.time_s < before.time_s:
-        reasons = add_reason(reasons, Reason.TIME_BACKWARDS)
+        reasons = add_reason(reasons, InvalidReason.TIME_BACKWARDS)
     moves = SessionEvent.everywhere.filter(
         session_id=session_id, after_number__lt=number, kind__in=MOVES
     )
     if moves.order_by("-pk").values_list("kind", flat=True).first() == ChangeKind.PAUSE:
-        reasons = add_reason(reasons, Reason.PAUSED)
+        reasons = add_reason(reasons, InvalidReason.PAUSED)
     return reasons

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rehab.training.clocks import HeardClock
+from rehab.training.clocks import RemoteClock
 
 
 class Lateness:
@@ -15,7 +15,7 @@ class Lateness:
 
     def __init__(self, run: str, now_s: float, clock_s: float | None, speed: float | None) -> None:
         self.run = run
-        self._clock = None if speed is None else HeardClock(speed, clock_s, now_s)
+        self._clock = None if speed is None else RemoteClock(speed, clock_s, now_s)
 
     @property
     def is_known(self) -> bool:
@@ -27,8 +27,8 @@ class Lateness:
         as nothing of it was heard. The next steps tell.
         """
         if self._clock is not None:
-            self._clock.slacken(now_s)
+            self._clock.allow_standstill(now_s)
 
     def is_late(self, time_s: float, now_s: float) -> bool:
         """Say whether a step of this source time, arriving now, is too late to be shown."""
-        return self._clock is not None and self._clock.is_late(time_s, now_s)
+        return self._clock is not None and self._clock.observe(time_s, now_s)

@@ -9,7 +9,7 @@ from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.live.session import RECENT
 from rehab.sessions.log import RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import OPEN, State
+from rehab.training.changes import OPEN_STATES, State
 
 
 class Loaded(NamedTuple):
@@ -29,7 +29,7 @@ def load(session_id: int) -> Loaded:
     session = TrainingSession.everywhere.select_related("patient", "measure", "station").get(
         pk=session_id
     )
-    before = owners.claim(session) if State(session.state) in OPEN else ""
+    before = owners.claim(session) if State(session.state) in OPEN_STATES else ""
     latest = Step.everywhere.filter(session=session).order_by("-number")[:RECENT]
     return Loaded(
         actor=SessionActor.load(session),
@@ -51,5 +51,5 @@ def _is_robot_stopped(session: TrainingSession) -> bool:
 
 def find_newest_open(station_id: int) -> int | None:
     """Give the newest open session of a station."""
-    there = TrainingSession.everywhere.filter(station=station_id, state__in=[*OPEN])
+    there = TrainingSession.everywhere.filter(station=station_id, state__in=[*OPEN_STATES])
     return there.order_by("-created_at", "-pk").values_list("pk", flat=True).first()

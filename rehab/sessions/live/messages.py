@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from rehab.sessions.log import Remark
-from rehab.training.changes import ASKED, ChangeKind
+from rehab.training.changes import REQUESTABLE, ChangeKind
 from rehab.training.steps import InvalidMeasurement, Measurement, Side
 
 MAX_FRAME = 64 * 1024
@@ -130,8 +130,8 @@ NAMED = frozenset({ChangeKind.VALENCE, ChangeKind.CHART_STYLE})  # changed to a 
 def read_change(message: dict[str, Any]) -> tuple[ChangeKind, float | str | None]:
     """Read what a person wants changed. Raises BadFrame."""
     kind = message.get("kind")
-    if kind not in ASKED:
-        raise BadFrame(f'"kind" is one of: {", ".join(ASKED)}.')
+    if kind not in REQUESTABLE:
+        raise BadFrame(f'"kind" is one of: {", ".join(REQUESTABLE)}.')
     if kind in NAMED:
         return ChangeKind(kind), read_name(message, "value")
     return ChangeKind(kind), _optional_number(message, "value")

@@ -29,14 +29,14 @@ from rehab.sessions.live.supervisor import Children
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Remark
 from rehab.training.changes import (
-    ENDED,
-    OPEN,
+    ENDED_STATES,
+    OPEN_STATES,
     Change,
     ChangeKind,
+    ChangeValue,
+    NotAllowed,
     PauseReason,
-    Refused,
     State,
-    Value,
 )
 
 log = logging.getLogger(__name__)
@@ -127,7 +127,7 @@ class Runtime:
         await self._pause_left(live)
         self._take_over_stops(live)
         self.sessions[session_id] = live
-        if live.actor.fold.state in OPEN and not self.draining:
+        if live.actor.fold.state in OPEN_STATES and not self.draining:
             await sources.run_source(self.children, actor.session, self.address)
 
     async def _pause_left(self, live: LiveSession) -> None:
@@ -177,7 +177,7 @@ class Runtime:
                 socket.close_soon(4012)
 
     async def change(
-        self, session_id: int, kind: ChangeKind, value: Value, by: User | None
+        self, session_id: int, kind: ChangeKind, value: ChangeValue, by: User | None
     ) -> None:
         """Start, pause, steer or end a session; committed when this returns.
 
@@ -187,7 +187,7 @@ class Runtime:
         if live.source_clock is not None and kind in (ChangeKind.START, ChangeKind.RESUME):
             live.source_clock.slacken(time.monotonic())
         await live.change(Change(kind, value), by, timezone.now())
-        if live.actor.fold.state not in ENDED:
+        if live.actor.fold.state not in ENDED_STATES:
             return
         await self.children.stop(sources.child_name(live.id))
         if live.station_id is not None:
@@ -198,8 +198,8 @@ class Runtime:
     async def remark(self, session_id: int, what: Remark, value: float | None, by: User) -> None:
         """Note something of a session; committed when this returns. Raises what ``change`` does."""
         live = await self.admitted(session_id)
-        if live.actor.fold.state in ENDED:
-            raise Refused("The session has ended.")
+        if live.actor.fold.state in ENDED_STATES:
+            raise NotAllowed("The session has ended.")
         await live.remark(what, value, by, timezone.now())
 
     def at_station_of(self, live: LiveSession) -> list[LiveSession]:

@@ -39,7 +39,7 @@ UNTOLD = {
     ChangeKind.ACTIVATION_THRESHOLD,
     ChangeKind.ROBOT_INTENSITY,
     ChangeKind.VALENCE,
-    ChangeKind.WORDS,
+    ChangeKind.FEEDBACK_TEXT,
     ChangeKind.WORDS_SHOWN,
     ChangeKind.CHART_STYLE,
 }

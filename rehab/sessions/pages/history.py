@@ -24,7 +24,7 @@ from rehab.sessions.formatting import at_clinic, say_day, say_duration, say_numb
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.review import review_session, sum_up
 from rehab.sessions.reports.trend import draw_trend, figures_of, read_trend, sum_up_all
-from rehab.training.changes import OPEN, State
+from rehab.training.changes import OPEN_STATES, State
 from rehab.training.valences import VALENCES
 
 A_PAGE = 20
@@ -151,7 +151,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         "day": say_day(start.date(), now.date()).capitalize(),
         "time": f"{start:%H:%M}",
         "state": STATES[State(session.state)],
-        "open": State(session.state) in OPEN,
+        "open": State(session.state) in OPEN_STATES,
         "may_correct": by_name and may_correct(session),
         "corrections": [
             told | {"at": at_clinic(told["row"].at, session.clinic)} for told in corrections

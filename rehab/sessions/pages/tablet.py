@@ -17,7 +17,7 @@ from rehab.people.networks import client_address
 from rehab.sessions.models import TrainingSession
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device
-from rehab.training.changes import OPEN
+from rehab.training.changes import OPEN_STATES
 
 SECRET = "garry_pairing"  # noqa: S105 (the cookie's name)
 
@@ -25,7 +25,7 @@ SECRET = "garry_pairing"  # noqa: S105 (the cookie's name)
 def open_session(tablet: Device) -> TrainingSession | None:
     """Give the newest open session at the tablet's station."""
     sessions = TrainingSession.objects.visible_to(tablet)
-    return sessions.filter(state__in=[state.value for state in OPEN]).first()
+    return sessions.filter(state__in=[state.value for state in OPEN_STATES]).first()
 
 
 @public

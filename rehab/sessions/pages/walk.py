@@ -16,7 +16,7 @@ from rehab.people.roles import Role
 from rehab.people.web.language import speak_to
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.monitor import ask_for_consent
-from rehab.training.changes import ENDED, State
+from rehab.training.changes import ENDED_STATES, State
 
 
 @for_roles(Role.LEAD, Role.PT, tablets=True)
@@ -33,7 +33,7 @@ def show_walk(request: HttpRequest, session_id: int) -> HttpResponse:
         return ask_for_consent(request, session.patient)
     mirror = "mirror" in request.GET
     speak_to(session.patient)
-    if State(session.state) in ENDED and not mirror:
+    if State(session.state) in ENDED_STATES and not mirror:
         return redirect("scores", session_id=session.pk)
     context = {
         "session": session,

@@ -23,7 +23,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.trend import with_figures
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import is_overdue, say_state
-from rehab.training.changes import OPEN, State
+from rehab.training.changes import OPEN_STATES, State
 from rehab.training.valences import VALENCES
 
 SHOWN = 40  # sessions of today that are over; open ones are shown all
@@ -143,7 +143,7 @@ def _sees(user: User, model: type) -> bool:
 def read_today(user: User, clinic: Clinic, now: datetime) -> list[Today]:
     """Give today's sessions by the clinic's clock, and every open one, those that run on top."""
     midnight = midnight_of(at_clinic(now, clinic))
-    is_open = Q(state__in=[state.value for state in OPEN])
+    is_open = Q(state__in=[state.value for state in OPEN_STATES])
     begun = Q(created_at__gte=midnight) | Q(started_at__gte=midnight)
     sessions = TrainingSession.objects.visible_to(user).filter(is_open | begun).defer("plan")
     lines = (
@@ -160,7 +160,7 @@ def read_today(user: User, clinic: Clinic, now: datetime) -> list[Today]:
             who=row.patient.nickname if by_name else row.patient.pseudonym,
             time=_say_time(at_clinic(row.started_at or row.created_at, clinic), midnight),
             state=row.get_state_display(),
-            open=State(row.state) in OPEN,
+            open=State(row.state) in OPEN_STATES,
             walked=say_duration(row.active_s),
             hit_rate=_say_hits(row),
         )
@@ -170,7 +170,7 @@ def read_today(user: User, clinic: Clinic, now: datetime) -> list[Today]:
 
 def _say_hits(row: Any) -> str:
     """Give the hit rate; of an open session as it stands by now, where this process runs it."""
-    if State(row.state) not in OPEN:
+    if State(row.state) not in OPEN_STATES:
         return say_rate(row.metric_hit_rate)
     running = _find_running(row)
     rate = running.actor.fold.feedback.hit_rate if running else None

@@ -18,9 +18,9 @@ from rehab.sessions.payloads import MARKED_CHANGES
 from rehab.sessions.replay import fold_log
 from rehab.sessions.reports.trend import figures_of
 from rehab.training.changes import ChangeKind, PauseReason
-from rehab.training.figures import describe_session
 from rehab.training.fold import SessionFold
 from rehab.training.plans import SessionPlan, name_robot_level
+from rehab.training.summary import summarize_session
 from rehab.training.valences import VALENCES
 
 # What a robot did is counted; in the list it would hide what people did.
@@ -43,7 +43,7 @@ NAMES = {
     ChangeKind.ACTIVATION_THRESHOLD: _("Robot threshold"),
     ChangeKind.ROBOT_INTENSITY: _("Robot"),
     ChangeKind.VALENCE: _("Next feedback type"),
-    ChangeKind.WORDS: _("Words edited"),
+    ChangeKind.FEEDBACK_TEXT: _("Words edited"),
     ChangeKind.WORDS_SHOWN: _("Words"),
     ChangeKind.CHART_STYLE: _("Chart"),
     RobotEntry.STOP: _("Robot stopped"),
@@ -87,7 +87,7 @@ def review_session(user: User, session: TrainingSession) -> Review:
         event.kind == RobotEntry.GESTURE.value and event.data.get("phase") == "started"
         for event in events
     )
-    figures = describe_session(fold)
+    figures = summarize_session(fold)
     if session.original_id is not None:  # no log: what the original added up is all there is
         stored = figures_of(user, [session]).get(session.pk, {})
         figures |= {"score": stored.get("score"), "active_s": session.active_s}
@@ -114,7 +114,7 @@ def say_event(event: SessionEvent, plan: SessionPlan) -> str:
             return f"{name}: {gettext(plan.phases[int(event.value or 0)].name)}"
         case ChangeKind.VALENCE:
             return f"{name}: {_name_type(event.data.get('value'))}"
-        case ChangeKind.WORDS:
+        case ChangeKind.FEEDBACK_TEXT:
             return f"{name}: {_name_type(event.data.get('value', {}).get('valence'))}"
         case ChangeKind.WORDS_SHOWN:
             return f"{name}: {gettext('on') if event.value else gettext('off')}"

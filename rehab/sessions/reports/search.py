@@ -110,7 +110,7 @@ class Finder(ListFilter):
     """The form as the admin's filter. What it cannot read it says, and then gives nothing."""
 
     title = _("what was walked")
-    template = "admin/find.html"
+    template = "admin/search_filter.html"
 
     def __init__(
         self,

@@ -1,31 +1,31 @@
-"""How a source brings its strides to the server: everything but the strides.
+"""How a source sends its strides to the server: everything but the strides.
 
-``outbox`` keeps what is not acknowledged, ``player`` walks by a ``clock`` that can stand still,
-``live`` is given strides as they are measured; they know no sockets. ``client`` connects them with
-the server. docs/protocol.md is the contract.
+``step_queue`` keeps what is not acknowledged, ``playback`` plays strides by a ``clock`` that can be
+paused, ``live`` takes strides as they are measured, ``follower`` follows the session; they know no
+sockets. ``client`` connects them with the server. docs/protocol.md is the contract.
 """
 
 from rehab.sources.client.client import SourceClient
-from rehab.sources.client.clock import SourceClock
+from rehab.sources.client.clock import PlaybackClock
 from rehab.sources.client.live import LiveFeed
-from rehab.sources.client.outbox import (
+from rehab.sources.client.playback import NextStride, StridePlayback
+from rehab.sources.client.step_queue import (
     WINDOW,
-    Outbox,
-    OutOfStep,
+    StepQueue,
+    StepsLost,
     UnsendableStride,
     write_step,
 )
-from rehab.sources.client.player import Player, Walk
 
 __all__ = [
     "WINDOW",
     "LiveFeed",
-    "OutOfStep",
-    "Outbox",
-    "Player",
+    "NextStride",
+    "PlaybackClock",
     "SourceClient",
-    "SourceClock",
+    "StepQueue",
+    "StepsLost",
+    "StridePlayback",
     "UnsendableStride",
-    "Walk",
     "write_step",
 ]

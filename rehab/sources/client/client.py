@@ -1,4 +1,4 @@
-"""A source that dials in: walks while the session runs, sends strides until they are stored."""
+"""A source's client: plays while the session runs, sends strides until they are stored."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import secrets
 from collections.abc import Awaitable, Callable
 from typing import Any
 
+from rehab.sources.client.follower import SessionFollower
 from rehab.sources.client.live import LiveFeed
-from rehab.sources.client.outbox import Outbox
-from rehab.sources.client.player import Player
-from rehab.sources.client.visit import Visit
+from rehab.sources.client.playback import StridePlayback
+from rehab.sources.client.step_queue import StepQueue
 from rehab.training.steps import Measurement
 from robot.link import ENDED, Link, LinkRefused, Message
 
@@ -26,18 +26,19 @@ class SourceClient:
     ----------
     dial
         Makes the link, given ``greet`` and ``on_lost`` by name.
-    player
-        Gives the strides: a ``Player`` walks them, a ``LiveFeed`` has them as they are measured.
+    feed
+        Where the strides come from: a ``StridePlayback`` plays them, a ``LiveFeed`` has them as
+        they are measured.
     run
-        Names this run of the source; otherwise chance does.
+        Name of this run of the source; random by default.
     session
-        Which session to join; otherwise the station's open one.
+        Which session to join; the station's open one by default.
     stay
         Whether to go on with the station's later sessions.
     on_ack
-        Called with session and number of each ack.
-    notice
-        Called with what somebody who looks on should know.
+        Called with session and number of each acknowledgment.
+    notify
+        Called with lines for the person who runs the source.
     sleep
         How to wait [s].
     """
@@ -45,55 +46,55 @@ class SourceClient:
     def __init__(
         self,
         dial: Callable[..., Link],
-        player: Player | LiveFeed,
+        feed: StridePlayback | LiveFeed,
         *,
         run: str = "",
         session: int | None = None,
         stay: bool = False,
         on_ack: Callable[[int, int], None] = lambda _session, _number: None,
-        notice: Callable[[str], None] = lambda _text: None,
+        notify: Callable[[str], None] = lambda _text: None,
         sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
     ) -> None:
         self.run_id = run or secrets.token_hex(8)
-        self._link = dial(greet=self._greet, on_lost=self._lose)
+        self._link = dial(greet=self._greet, on_lost=self._note_lost_link)
         self._wanted_session = session
         self._stay = stay
-        self._notice = notice
+        self._notify = notify
         self._sleep = sleep
-        self._player = player
-        self._outbox = Outbox()
-        self._visit = Visit(player, self._outbox, stay=stay, on_ack=on_ack, notice=notice)
+        self._feed = feed
+        self._queue = StepQueue()
+        self._follower = SessionFollower(feed, self._queue, stay=stay, on_ack=on_ack, notify=notify)
         self._changed = asyncio.Event()
-        if isinstance(player, LiveFeed):
-            player.on_change = self._tell
+        if isinstance(feed, LiveFeed):
+            feed.on_change = self._wake_waiters
         self._strides = self._unusable = 0
 
     @property
     def unacknowledged(self) -> int:
-        """How many strides the server may not have."""
-        return self._outbox.unacknowledged
+        """How many strides the server may not have stored."""
+        return self._queue.unacknowledged
 
     @property
     def acknowledged(self) -> int:
         """How many strides the server has stored."""
-        return self._visit.acknowledged
+        return self._follower.acknowledged
 
     @property
     def lost(self) -> int:
-        """How many strides their session ended without."""
-        return self._visit.lost
+        """How many strides were not stored when their session ended."""
+        return self._follower.lost
 
     async def run(self) -> None:
-        """Walk until the strides are over and acknowledged, or the session is.
+        """Run until the strides are over and acknowledged, or the session is.
 
-        Raises LinkRefused where the server will not have this source, OutOfStep where it has lost
-        steps and UnsendableStride for a stride that the protocol has no room for.
+        Raises LinkRefused where the server refuses this source, StepsLost where it has lost steps
+        and UnsendableStride for a stride that does not fit the protocol.
         """
         doing = [
-            self._listen(),
+            self._receive(),
             self._walk(),
             self._send(),
-            self._until(lambda: self._visit.is_done),
+            self._until(lambda: self._follower.is_done),
         ]
         tasks = [asyncio.create_task(work) for work in doing]
         try:
@@ -107,8 +108,8 @@ class SourceClient:
             await self._link.close()
 
     def describe(self) -> str:
-        """Say in one line how it goes."""
-        session, visit = self._outbox.session, self._visit
+        """Return the state of the client in one line."""
+        session, visit = self._queue.session, self._follower
         if session is None:
             return "Waiting for a session." if visit.is_welcome else "Waiting for the server."
         share = self._unusable / self._strides if self._strides else 0.0
@@ -126,34 +127,34 @@ class SourceClient:
             "type": "hello",
             "version": 1,
             "run": self.run_id,
-            "last": self._outbox.last,
-            "speed": self._player.speed,
+            "last": self._queue.last,
+            "speed": self._feed.speed,
         }
-        if self._player.clock_s is not None:
+        if self._feed.clock_s is not None:
             # A clock that stands would make all that comes after it look late.
-            hello["clock_s"] = self._player.clock_s
+            hello["clock_s"] = self._feed.clock_s
         if self._wanted_session is not None:
             hello["session"] = self._wanted_session
         return hello
 
-    def _lose(self, reason: str, pause_s: float) -> None:
-        self._visit.is_welcome = False
-        self._notice(f"{reason}; dialing in again in {pause_s:.1f} s.")
+    def _note_lost_link(self, reason: str, pause_s: float) -> None:
+        self._follower.is_welcome = False
+        self._notify(f"{reason}; dialing in again in {pause_s:.1f} s.")
 
     # --- What the server says ---
 
-    async def _listen(self) -> None:
+    async def _receive(self) -> None:
         while True:
             try:
                 async for message in self._link:
-                    self._visit.take(message)
-                    self._tell()
+                    self._follower.handle(message)
+                    self._wake_waiters()
             except LinkRefused as refusal:
-                if refusal.code != ENDED or self._outbox.session is None:
+                if refusal.code != ENDED or self._queue.session is None:
                     raise
                 # Somebody finished the session while steps were on their way.
-                self._visit.is_welcome = False
-                self._visit.leave()
+                self._follower.is_welcome = False
+                self._follower.leave()
                 if not self._stay:
                     return
                 await self._sleep(RETURN_S)
@@ -164,28 +165,28 @@ class SourceClient:
 
     async def _walk(self) -> None:
         while True:
-            due = self._player.poll(self._outbox.unacknowledged)
+            due = self._feed.poll(self._queue.unacknowledged)
             if isinstance(due, Measurement):
-                self._outbox.give(due)
+                self._queue.add(due)
                 self._strides += 1
                 self._unusable += due.value is None or bool(due.reasons)
-                self._tell()
+                self._wake_waiters()
             else:
-                if self._player.is_over:
-                    self._tell()
+                if self._feed.is_over:
+                    self._wake_waiters()
                 await self._wait(due)
 
     async def _send(self) -> None:
         while True:
-            await self._until(lambda: self._visit.may_send)
-            frame = self._outbox.take()
+            await self._until(lambda: self._follower.may_send)
+            frame = self._queue.next_frame()
             if frame is not None:
                 await self._link.send(frame)
 
     # --- Waiting ---
 
-    def _tell(self) -> None:
-        """Let everyone who waits look again."""
+    def _wake_waiters(self) -> None:
+        """Wake everything that waits for a change."""
         # One event for each change: what was set stays set for those who have waited for it.
         self._changed.set()
         self._changed = asyncio.Event()

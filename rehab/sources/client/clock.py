@@ -1,12 +1,12 @@
-"""The clock that a played source walks by."""
+"""The clock that a played source runs by."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 
-class SourceClock:
-    """Source time [s] that runs ``speed`` times as fast as ours and stands still when told to.
+class PlaybackClock:
+    """Source time [s] that runs ``speed`` times as fast as ours and can be paused.
 
     With ``speed`` None strides come as fast as they are taken: nothing is waited for, and the clock
     shows what it was last set to.
@@ -31,20 +31,20 @@ class SourceClock:
         return self._time_s + (self._monotonic() - self._since_s) * self.speed
 
     def set(self, time_s: float) -> None:
-        """Let it show another time and run on, or stand, as before."""
+        """Set the time it shows, whether it runs or not."""
         self._time_s = time_s
         if self._since_s is not None:
             self._since_s = self._monotonic()
 
-    def run(self) -> None:
-        """Let it run on from what it shows."""
+    def start(self) -> None:
+        """Start it, or let it run on."""
         if self._since_s is None:
             self._since_s = self._monotonic()
 
-    def stand(self) -> None:
-        """Let it stand still at what it shows."""
+    def pause(self) -> None:
+        """Pause it at what it shows."""
         self._time_s, self._since_s = self.now_s, None
 
     def wait_s(self, time_s: float) -> float:
-        """Give how long it takes a running clock to show that time, in our seconds."""
+        """Return how long a running clock takes to show that time, in our seconds."""
         return 0.0 if self.speed is None else max(0.0, (time_s - self.now_s) / self.speed)

@@ -1,18 +1,19 @@
 """From what a lab sends to strides: rows with named cells in, measurements out.
 
 A row is a stride (it has a value) or a sample of raw signals. ``rows`` reads the cells;
-``alignment`` brings channels of different rates to one; ``signals`` makes strides of them with
-``rehab.gait``; ``quality`` says how it goes and ``keeping`` writes the raw signals down. ``intake``
-is the door to all of it. ``lines`` and ``addresses`` are for those who get their rows as text.
+``alignment`` brings channels of different rates to one; ``pipeline`` makes strides of them with
+``rehab.gait``; ``quality`` summarizes how well the source is heard and ``recorder`` writes the raw
+signals to a file. ``intake`` is the entry to all of it. ``lines`` and ``addresses`` are for rows
+that come as text.
 """
 
 from rehab.sources.intake.addresses import Address, parse_address
 from rehab.sources.intake.intake import Intake
 from rehab.sources.intake.lines import LineReader
+from rehab.sources.intake.measurements import to_measurement
+from rehab.sources.intake.pipeline import SignalPipeline
 from rehab.sources.intake.rows import BadRow, Cell
 from rehab.sources.intake.settings import IntakeSettings, add_signal_arguments
-from rehab.sources.intake.signals import SignalPath
-from rehab.sources.intake.strides import name_stride
 
 __all__ = [
     "Address",
@@ -21,8 +22,8 @@ __all__ = [
     "Intake",
     "IntakeSettings",
     "LineReader",
-    "SignalPath",
+    "SignalPipeline",
     "add_signal_arguments",
-    "name_stride",
     "parse_address",
+    "to_measurement",
 ]

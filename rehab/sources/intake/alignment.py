@@ -1,4 +1,4 @@
-"""Channels that come at different rates, brought to the times of the force."""
+"""Channels that come at different rates, resampled at the times of the force."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from rehab.gait.columns import REQUIRED
+from rehab.gait.recordings.columns import REQUIRED
 
 Floats = NDArray[np.float64]
-Channel = tuple[str, str]  # side, and one of rehab.gait.columns.CHANNELS
+Channel = tuple[str, str]  # side, and one of rehab.gait.recordings.columns.CHANNELS
 Samples = tuple[Floats, dict[Channel, Floats]]  # times, and as many values of each channel
 
 HOLD_S = 0.05  # between two samples nothing is known over more (docs/reference/gait.md#time-base)
@@ -19,24 +19,24 @@ KEEP_S = 60.0  # of samples that wait for others
 
 
 class Alignment:
-    """Gives samples in which every channel has a value at every time.
+    """Aligns channels, so that every one has a value at every time.
 
-    Rows that hold whole legs pass as they are. As soon as some do not, channels are interpolated
-    linearly at the times of the first force: a time is given once all channels have come past it,
-    or with NaN for those from which nothing was heard for ``WAIT_S``. Where a channel has no
-    samples within ``HOLD_S`` of each other, it is NaN. A clock that goes back begins anew.
+    Rows that hold whole legs pass unchanged. As soon as some do not, channels are interpolated
+    linearly at the times of the first force: a time is complete once all channels have come past
+    it, or with NaN for those that have been silent for ``WAIT_S``. Where a channel has no samples
+    within ``HOLD_S`` of each other, it is NaN. A clock that is set back starts anew.
     """
 
     def __init__(self) -> None:
         self._tracks: dict[Channel, tuple[Floats, Floats]] = {}
         self._heard_s: dict[Channel, float] = {}
         self._grid: Channel | None = None
-        self._given_s = -np.inf
+        self._collected_s = -np.inf
 
-    def take(
+    def add(
         self, t_s: Floats, values: Mapping[Channel, Floats], there: Floats, now_s: float
     ) -> list[Samples]:
-        """Take rows; give what can be known by now.
+        """Add rows and return the samples that are complete by now.
 
         Parameters
         ----------
@@ -60,7 +60,7 @@ class Alignment:
             for name in REQUIRED:
                 self._tracks.setdefault((side, name), (np.empty(0), np.empty(0)))
                 self._heard_s.setdefault((side, name), now_s)
-        return self._give(now_s)
+        return self._collect(now_s)
 
     def _append(self, channel: Channel, t_s: Floats, column: Floats) -> None:
         times, known = self._tracks.get(channel, (np.empty(0), np.empty(0)))
@@ -75,12 +75,12 @@ class Alignment:
             t_s, column = t_s[begin:], column[begin:]
             self._tracks = {one: (np.empty(0), np.empty(0)) for one in self._tracks}
             times, known = np.empty(0), np.empty(0)
-            self._given_s = -np.inf
+            self._collected_s = -np.inf
         self._tracks[channel] = np.concatenate((times, t_s)), np.concatenate((known, column))
         if channel[1] == "force" and self._grid is None:
             self._grid = channel
 
-    def _give(self, now_s: float) -> list[Samples]:
+    def _collect(self, now_s: float) -> list[Samples]:
         if self._grid is None:
             self._forget_before(-np.inf)
             return []
@@ -93,7 +93,7 @@ class Alignment:
         }
         awaited = [end for one, end in ends.items() if now_s - self._heard_s[one] <= WAIT_S]
         ready_s = min(awaited, default=ends[self._grid])
-        due = (grid > self._given_s) & (grid <= ready_s)
+        due = (grid > self._collected_s) & (grid <= ready_s)
         if not due.any():
             return []
         at_s = grid[due]
@@ -101,12 +101,12 @@ class Alignment:
             channel: force[due] if channel == self._grid else _interpolate(at_s, *track)
             for channel, track in self._tracks.items()
         }
-        self._given_s = float(at_s[-1])
-        self._forget_before(self._given_s)
+        self._collected_s = float(at_s[-1])
+        self._forget_before(self._collected_s)
         return [(at_s, values)]
 
     def _forget_before(self, time_s: float) -> None:
-        """Keep what later samples need: from the last one at or before that time on."""
+        """Drop the samples before the last one at or before that time."""
         for channel, (times, known) in self._tracks.items():
             begin = max(0, int(np.searchsorted(times, time_s, "right")) - 1)
             if len(times):
@@ -115,7 +115,7 @@ class Alignment:
 
 
 def _interpolate(at_s: Floats, times: Floats, known: Floats) -> Floats:
-    """Give a channel's values at these times, NaN where there is nothing near on both sides."""
+    """Return a channel's values at these times, NaN where there is nothing near on both sides."""
     if not len(times):
         return np.full(len(at_s), np.nan)
     after = np.searchsorted(times, at_s)

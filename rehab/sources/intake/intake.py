@@ -1,4 +1,4 @@
-"""The door through which rows of a lab become strides of a session."""
+"""The entry through which rows of a lab become strides of a session."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from rehab.gait import Stride
-from rehab.gait.selfcheck import CURES
+from rehab.gait.selfcheck.cures import CURES
 from rehab.sources.client import LiveFeed
 from rehab.sources.intake.alignment import Alignment, Channel, Floats
-from rehab.sources.intake.keeping import Keeper
-from rehab.sources.intake.quality import Quality
+from rehab.sources.intake.measurements import to_measurement
+from rehab.sources.intake.pipeline import SignalPipeline
+from rehab.sources.intake.quality import SignalQuality
+from rehab.sources.intake.recorder import SignalRecorder
 from rehab.sources.intake.rows import (
     TIMES,
     VALUE,
@@ -24,9 +26,7 @@ from rehab.sources.intake.rows import (
     read_time,
 )
 from rehab.sources.intake.settings import IntakeSettings
-from rehab.sources.intake.signals import SignalPath
-from rehab.sources.intake.strides import name_stride
-from rehab.sources.source import Say, Unusable
+from rehab.sources.reporting import Notify, SourceError
 from rehab.training.steps import Measurement, Side
 
 REPEAT_S = 10.0  # before the same complaint is said again
@@ -34,10 +34,10 @@ CURE_OF = {str(reason): text for reason, text in CURES.items()}
 
 
 class Intake:
-    """Takes rows, and puts the strides that they are or complete into a ``LiveFeed``.
+    """Turns rows into strides, and puts these into a ``LiveFeed``.
 
-    Nothing that comes can stop it but raw signals of a walker whose mass is not known. What cannot
-    be read is told with its cure, at most every ten seconds, and counted.
+    Nothing that comes can stop it but raw signals of a walker whose mass is not known. Rows that
+    cannot be read are counted, and reported with the cure, each kind at most every ten seconds.
 
     Parameters
     ----------
@@ -45,8 +45,8 @@ class Intake:
         Where strides go.
     settings
         How to read what comes.
-    say
-        Called with what somebody who looks on should know.
+    notify
+        Called with lines for the person who runs the source.
     monotonic
         Our clock [s].
     """
@@ -55,28 +55,28 @@ class Intake:
         self,
         feed: LiveFeed,
         settings: IntakeSettings,
-        say: Say,
+        notify: Notify,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.quality = Quality(monotonic)
+        self.quality = SignalQuality(monotonic)
         self._feed = feed
         self._settings = settings
-        self._say = say
+        self._notify = notify
         self._monotonic = monotonic
         self._alignment = Alignment()
-        self._signals: SignalPath | None = None
-        self._keeper = Keeper(settings.keep, say) if settings.keep else None
+        self._pipeline: SignalPipeline | None = None
+        self._recorder = SignalRecorder(settings.keep, notify) if settings.keep else None
         self._columns = {
             column.name: ((side, channel), column.factor)
             for side, leg in settings.columns.legs.items()
             for channel, column in leg.items()
         }
         self._rate_hz = settings.rate_hz
-        self._problem: Unusable | None = None
-        self._troubled = asyncio.Event()
+        self._problem: SourceError | None = None
+        self._failed = asyncio.Event()
         self._number = 0
         self._said: dict[str, float] = {}
-        self._doubts: set[str] = set()
+        self._reported_reasons: set[str] = set()
 
     @property
     def side(self) -> Side:
@@ -89,92 +89,92 @@ class Intake:
             await asyncio.sleep(0.05)
 
     async def watch(self) -> None:
-        """Raise Unusable once something came that only somebody at the machine can put right."""
-        await self._troubled.wait()
+        """Raise SourceError once something came that only a person at the machine can put right."""
+        await self._failed.wait()
         if self._problem is not None:
             raise self._problem
 
     def expect_rate(self, rate_hz: float) -> None:
-        """Say how fast samples come, where their sender tells and the command line does not."""
+        """Set the rate of the samples [Hz], as their sender says it; the command line's wins."""
         self._rate_hz = self._rate_hz or rate_hz
 
-    def take(self, rows: Iterable[Mapping[str, Cell]]) -> None:
-        """Take rows in the order in which they came."""
+    def add_rows(self, rows: Iterable[Mapping[str, Cell]]) -> None:
+        """Add rows in the order in which they came."""
         samples: list[Mapping[str, Cell]] = []
         for row in rows:
             if VALUE in row:
-                self._take_stride(row)
+                self._add_stride(row)
             elif self._columns.keys() & row.keys():
                 if samples and row.keys() != samples[0].keys():
-                    self._take_samples(samples)
+                    self._add_samples(samples)
                     samples = []
                 samples.append(row)
             else:
                 names = ", ".join(list(row)[:4])
                 known = ", ".join(list(self._columns)[:3])
-                self.complain(
+                self.reject_row(
                     f"A row with {names} is neither a stride nor a sample: a stride has a value, a "
                     f"sample {known} or more. Rename them, or map them with --columns."
                 )
         if samples:
-            self._take_samples(samples)
+            self._add_samples(samples)
 
-    def complain(self, text: str) -> None:
-        """Count a row that could not be used, and say why, but not again and again."""
+    def reject_row(self, text: str) -> None:
+        """Count a row that could not be used, and report why, but not again and again."""
         self.quality.bad_rows += 1
         self._warn(text[-40:], text)  # the cure
 
     def describe(self) -> str:
-        """Say in one line how it is heard, and count anew."""
+        """Return in one line how well the source is heard, and start counting anew."""
         return self.quality.describe()
 
     def finish(self) -> None:
-        """Say that nothing more comes."""
-        if self._signals is not None:
-            self._put_strides(self._signals.finish())
+        """End the feed: nothing more will come."""
+        if self._pipeline is not None:
+            self._put_strides(self._pipeline.finish())
         self._feed.finish()
 
     def close(self) -> None:
-        """End what is kept."""
-        if self._keeper is not None:
-            self._keeper.close()
+        """Close the file of recorded signals, if there is one."""
+        if self._recorder is not None:
+            self._recorder.close()
 
     # --- Strides ---
 
-    def _take_stride(self, row: Mapping[str, Cell]) -> None:
+    def _add_stride(self, row: Mapping[str, Cell]) -> None:
         try:
-            stride, left_out = read_stride(row, self._number + 1, self.side, self._monotonic())
+            stride, excluded = read_stride(row, self._number + 1, self.side, self._monotonic())
         except BadRow as problem:
-            self.complain(str(problem))
+            self.reject_row(str(problem))
             return
-        if left_out:
+        if excluded:
             self._warn(
-                f"left out {left_out}",
-                f"Left out of the strides: {', '.join(left_out)[:120]}. Up to 32 further values "
+                f"left out {excluded}",
+                f"Left out of the strides: {', '.join(excluded)[:120]}. Up to 32 further values "
                 "can travel, numbers named with letters, digits or _ . : -",
             )
         self._put(stride, is_timed=any(name in row for name in TIMES))
 
     def _put(self, stride: Measurement, *, is_timed: bool) -> None:
         self._number += 1
-        self.quality.see_stride(stride, is_timed=is_timed)
+        self.quality.record_stride(stride, is_timed=is_timed)
         for reason in stride.reasons:
-            if reason not in self._doubts:
-                self._doubts.add(reason)
+            if reason not in self._reported_reasons:
+                self._reported_reasons.add(reason)
                 cure = CURE_OF.get(reason, "")
-                self._say(f"A stride ({stride.side}) does not count: {reason}. {cure}".rstrip())
+                self._notify(f"A stride ({stride.side}) does not count: {reason}. {cure}".rstrip())
         self._feed.put(stride)
 
     def _put_strides(self, strides: Iterable[Stride]) -> None:
         for stride in strides:
-            named = name_stride(stride, self._number + 1, self.side)
+            named = to_measurement(stride, self._number + 1, self.side)
             if named is not None:
                 self._put(named, is_timed=False)
 
     # --- Samples ---
 
-    def _take_samples(self, rows: list[Mapping[str, Cell]]) -> None:
-        """Take rows that have the same cells."""
+    def _add_samples(self, rows: list[Mapping[str, Cell]]) -> None:
+        """Add rows that have the same cells."""
         names = [name for name in rows[0] if name in self._columns]
         time = self._settings.columns.time
         times, cells = [], []
@@ -188,16 +188,16 @@ class Intake:
                 time_s = read_time(row, time.name) * time.factor
                 numbers = [read_number(row, name) for name in names]
             except BadRow as problem:
-                self.complain(str(problem))
+                self.reject_row(str(problem))
                 continue
             times.append(time_s)
             cells.append(numbers)
         if cells:
             there = np.array([[cell is not None for cell in row] for row in cells])
             table = np.array(cells, dtype=np.float64)
-            self.take_table(",".join(names), names, np.array(times), table, there)
+            self.add_table(",".join(names), names, np.array(times), table, there)
 
-    def take_table(
+    def add_table(
         self,
         stream: str,
         names: Sequence[str],
@@ -205,14 +205,14 @@ class Intake:
         table: Floats,
         there: Floats | None = None,
     ) -> None:
-        """Take samples of a stream as a table.
+        """Add samples of a stream as a table.
 
         Parameters
         ----------
         stream
-            Any name that tells it from others.
+            Any name that distinguishes it from others.
         names
-            Of the columns; those that are mapped to no channel are left out.
+            Of the columns; those that are mapped to no channel are excluded.
         t_s, table
             Times [s], shape (n,), and cells, shape (n, columns).
         there
@@ -220,14 +220,14 @@ class Intake:
         """
         if not len(t_s):
             return
-        self.quality.see_samples(stream, t_s)
+        self.quality.count_samples(stream, t_s)
         known = [place for place, name in enumerate(names) if name in self._columns]
         values: dict[Channel, Floats] = {}
         for place in known:
             channel, factor = self._columns[names[place]]
             values[channel] = table[:, place] * factor
         sent = np.ones((len(t_s), len(known))) if there is None else there[:, known]
-        for samples in self._alignment.take(t_s, values, sent, self._monotonic()):
+        for samples in self._alignment.add(t_s, values, sent, self._monotonic()):
             self._measure(*samples)
 
     @property
@@ -235,29 +235,29 @@ class Intake:
         """Names of the columns that hold vertical forces."""
         return {name for name, ((_, channel), _) in self._columns.items() if channel == "force"}
 
-    def knows(self, names: Iterable[str]) -> bool:
-        """Say whether rows with these cells are strides or samples."""
+    def accepts(self, names: Iterable[str]) -> bool:
+        """Return whether rows with these cells are strides or samples."""
         there = set(names)
         return VALUE in there or bool(self._columns.keys() & there)
 
     def _measure(self, t_s: Floats, values: dict[Channel, Floats]) -> None:
-        if self._keeper is not None:
-            self._keeper.write(t_s, values)
-        if self._signals is None:
+        if self._recorder is not None:
+            self._recorder.write(t_s, values)
+        if self._pipeline is None:
             mass_kg = self._settings.mass_kg
             if mass_kg is None:
-                self._problem = Unusable(
+                self._problem = SourceError(
                     "Raw signals come, and the walker's body mass is not known. Give it in kg: "
                     "--mass 75. A2 is power by mass."
                 )
-                self._troubled.set()
+                self._failed.set()
                 return
             look_ahead_s = self._settings.look_ahead_s
-            self._signals = SignalPath(mass_kg, self._rate_hz, look_ahead_s, self._say)
-        self._put_strides(self._signals.take(t_s, values))
-        for finding in self._signals.check():
+            self._pipeline = SignalPipeline(mass_kg, self._rate_hz, look_ahead_s, self._notify)
+        self._put_strides(self._pipeline.add(t_s, values))
+        for finding in self._pipeline.check():
             where = f" ({finding.side} leg)" if finding.side else ""
-            self._say(f"Check of the first half minute{where}: {finding.message}")
+            self._notify(f"Check of the first half minute{where}: {finding.message}")
 
     def _warn(self, kind: str, text: str) -> None:
         now_s = self._monotonic()
@@ -265,4 +265,4 @@ class Intake:
             if len(self._said) > 100:
                 self._said.clear()
             self._said[kind] = now_s
-            self._say(text)
+            self._notify(text)

@@ -26,14 +26,14 @@ class LineReader:
 
     def __init__(self, header: Sequence[str] = ()) -> None:
         self._names = tuple(header)
-        self._cut = b""
+        self._partial = b""
         self._skips = False  # the rest of a line that was too long
 
     def read_bytes(self, data: bytes) -> tuple[list[Mapping[str, Cell]], list[str]]:
-        """Give the rows of all lines that these bytes complete, and what was wrong with others."""
+        """Return the rows of the lines that these bytes complete, and the problems of others."""
         rows: list[Mapping[str, Cell]] = []
         wrong: list[str] = []
-        *lines, self._cut = (self._cut + data).split(b"\n")
+        *lines, self._partial = (self._partial + data).split(b"\n")
         for line in lines:
             if self._skips:
                 self._skips = False
@@ -47,14 +47,14 @@ class LineReader:
             else:
                 if row is not None:
                     rows.append(row)
-        if len(self._cut) > MAX_LINE:
+        if len(self._partial) > MAX_LINE:
             if not self._skips:
                 wrong.append(f"A line has more than {MAX_LINE} bytes. End each row with a newline.")
-            self._cut, self._skips = b"", True
+            self._partial, self._skips = b"", True
         return rows, wrong
 
     def read_line(self, line: str) -> Mapping[str, Cell] | None:
-        """Give a line's row, None for a blank line or a header. Raises BadRow, with the cure."""
+        """Return a line's row, None for a blank line or a header. Raises BadRow, with the cure."""
         line = line.strip().removeprefix("\ufeff")
         if not line:
             return None

@@ -14,8 +14,8 @@ from rehab.training.steps import Measurement
 GAP_S = 0.05  # a longer one makes its stride invalid (docs/reference/gait.md#time-base)
 
 
-class Quality:
-    """Counts what comes. Lag is how much later a row came than the quickest, by its own time."""
+class SignalQuality:
+    """Counts what comes. Lag is a row's delay beyond that of the quickest one, by its own time."""
 
     def __init__(self, monotonic: Callable[[], float] = time.monotonic) -> None:
         self.gaps = 0
@@ -30,7 +30,7 @@ class Quality:
         self._stride: Measurement | None = None
         self._stride_at_s = 0.0
 
-    def see_samples(self, stream: str, t_s: Floats) -> None:
+    def count_samples(self, stream: str, t_s: Floats) -> None:
         """Count samples of a stream."""
         self._samples += len(t_s)
         last_s = self._last_s.get(stream)
@@ -39,20 +39,20 @@ class Quality:
         went_back = bool((steps < 0).any())
         self.clock_jumps += went_back
         self._last_s[stream] = float(t_s[-1])
-        self._see_time(float(t_s[-1]), went_back)
+        self._update_lag(float(t_s[-1]), went_back)
 
-    def see_stride(self, stride: Measurement, *, is_timed: bool) -> None:
-        """Remember a stride; one that came as such, with its device's time, also tells the lag."""
+    def record_stride(self, stride: Measurement, *, is_timed: bool) -> None:
+        """Remember a stride; one that came with its device's time also updates the lag."""
         self._stride, self._stride_at_s = stride, self._monotonic()
         if is_timed:
             last_s = self._last_s.get("strides")
             went_back = last_s is not None and stride.time_s < last_s
             self.clock_jumps += went_back
             self._last_s["strides"] = stride.time_s
-            self._see_time(stride.time_s, went_back)
+            self._update_lag(stride.time_s, went_back)
 
     def describe(self) -> str:
-        """Give the line, and begin to count anew."""
+        """Return the line, and start counting anew."""
         now_s = self._monotonic()
         rate_hz = self._samples / max(now_s - self._since_s, 1e-9)
         rate = f"{rate_hz:.0f} samples/s, {self.gaps} gaps, " if self._last_s and rate_hz else ""
@@ -73,7 +73,7 @@ class Quality:
         ago_s = now_s - self._stride_at_s
         return f"last stride {stride.side} {value}{doubts}, {ago_s:.1f} s ago"
 
-    def _see_time(self, time_s: float, went_back: bool) -> None:
+    def _update_lag(self, time_s: float, went_back: bool) -> None:
         ahead_s = time_s - self._monotonic()
         self._ahead_s = ahead_s if went_back else max(self._ahead_s, ahead_s)
         self._lag_s = max(self._lag_s, self._ahead_s - ahead_s)

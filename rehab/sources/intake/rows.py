@@ -6,8 +6,8 @@ import math
 import re
 from collections.abc import Mapping
 
-from rehab.sources.client.outbox import MAX_EXTRA, MAX_REASONS
-from rehab.training.steps import TIME_MAX_S, Measurement, Reason, Side
+from rehab.sources.client.step_queue import MAX_EXTRA, MAX_REASONS
+from rehab.training.steps import TIME_MAX_S, InvalidReason, Measurement, Side
 
 Cell = float | str | None
 
@@ -25,7 +25,7 @@ class BadRow(ValueError):
 
 
 def read_number(cells: Mapping[str, Cell], name: str) -> float | None:
-    """Give a cell's number, None where it is blank. Raises BadRow for text."""
+    """Return a cell's number, None where it is blank. Raises BadRow for text."""
     cell = cells.get(name)
     if isinstance(cell, str):
         raise BadRow(f"{name} is {cell[:40]!r}, which is no number. Send a number or nothing.")
@@ -33,7 +33,7 @@ def read_number(cells: Mapping[str, Cell], name: str) -> float | None:
 
 
 def read_time(cells: Mapping[str, Cell], name: str) -> float:
-    """Give a row's time [s]. Raises BadRow where there is none."""
+    """Return a row's time [s]. Raises BadRow where there is none."""
     time_s = read_number(cells, name)
     if time_s is None or not -TIME_MAX_S <= time_s <= TIME_MAX_S:
         raise BadRow(
@@ -46,15 +46,15 @@ def read_time(cells: Mapping[str, Cell], name: str) -> float:
 def read_stride(
     cells: Mapping[str, Cell], number: int, side: Side, now_s: float
 ) -> tuple[Measurement, list[str]]:
-    """Give the stride that a row tells, and the names of cells that cannot travel with it.
+    """Return the stride in a row, and the names of cells that cannot be sent with it.
 
     Parameters
     ----------
     cells
-        ``value``, and as far as there are any ``time_s`` [s], ``side``, ``valid``, ``reason``;
-        all others are further named values.
+        ``value``, and as far as there are any ``time_s`` [s], ``side``, ``valid``, ``reason``; all
+        others are further named values.
     number
-        Counts the strides.
+        Of the stride.
     side, now_s
         For rows without a side, or without a time.
 
@@ -66,13 +66,13 @@ def read_stride(
     value = read_number(cells, VALUE)
     time_name = next((name for name in TIMES if name in cells), None)
     reasons = _read_reasons(cells)
-    left_out = []
+    excluded = []
     extra: dict[str, float] = {}
     for name, cell in cells.items():
         if name in _KNOWN or cell is None:
             continue
         if not NAME.fullmatch(name) or isinstance(cell, str) or len(extra) >= MAX_EXTRA:
-            left_out.append(name)
+            excluded.append(name)
         elif math.isfinite(cell):
             extra[name] = cell
     stride = Measurement(
@@ -83,7 +83,7 @@ def read_stride(
         reasons=reasons,
         extra=extra,
     )
-    return stride, left_out
+    return stride, excluded
 
 
 def _read_side(cell: Cell, side: Side) -> Side:
@@ -96,11 +96,11 @@ def _read_side(cell: Cell, side: Side) -> Side:
 
 
 def _read_reasons(cells: Mapping[str, Cell]) -> tuple[str, ...]:
-    """Give the sender's own doubts."""
+    """Return why the sender doubts the stride."""
     reasons = tuple(str(cells.get("reason") or "").split())
     if not all(NAME.fullmatch(reason) for reason in reasons):
         raise BadRow("A reason is a word of letters, digits or _, with blanks between several.")
     is_doubted = str(cells.get("valid", "")).lower() in _NO
     if is_doubted and not reasons:
-        return (Reason.FLAGGED,)
+        return (InvalidReason.FLAGGED,)
     return reasons[:MAX_REASONS]

@@ -1,4 +1,4 @@
-"""What has to be known of signals that cannot be seen in them."""
+"""What has to be known of signals that cannot be read from them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-from rehab.gait.columns import CHANNELS, LAYOUTS, ColumnMap, read_column_map
+from rehab.gait.recordings.columns import CHANNELS, SIGNAL_LAYOUTS, ColumnMap, read_column_map
 from rehab.gait.settings import LOOK_AHEAD_MAX_S, MASS_MAX_KG, MASS_MIN_KG
-from rehab.sources.source import Unusable
+from rehab.sources.reporting import SourceError
 from rehab.training.steps import Side
 
 LOOK_AHEAD_S = 0.05  # takes the error of A2 from 1.0 to 0.14 % (moore2013)
@@ -38,26 +38,26 @@ class IntakeSettings:
     mass_kg: float | None = None
     rate_hz: float | None = None
     look_ahead_s: float = LOOK_AHEAD_S
-    columns: ColumnMap = LAYOUTS["garry"]
+    columns: ColumnMap = SIGNAL_LAYOUTS["garry"]
     side: Side | None = None
     keep: Path | None = None
 
     @classmethod
     def read(cls, options: Namespace) -> Self:
-        """Take them from a command line. Raises Unusable or GaitInputError, with the cure."""
+        """Return those of a command line. Raises SourceError or GaitInputError, with the cure."""
         mass_kg, look_ahead_s = options.mass, options.look_ahead
         if mass_kg is not None and not MASS_MIN_KG <= mass_kg <= MASS_MAX_KG:
-            raise Unusable(
+            raise SourceError(
                 f"A body mass of {mass_kg:g} kg cannot be used. Give --mass {MASS_MIN_KG:g} to "
                 f"{MASS_MAX_KG:g}."
             )
         if not 0 <= look_ahead_s <= LOOK_AHEAD_MAX_S:
-            raise Unusable(
+            raise SourceError(
                 f"A look-ahead of {look_ahead_s:g} s cannot be used. Give --look-ahead 0 to "
                 f"{LOOK_AHEAD_MAX_S:g}."
             )
         if options.keep is not None and options.keep.exists():
-            raise Unusable(
+            raise SourceError(
                 f"{options.keep} is there already, and recordings are never written over. "
                 "Give --keep another name."
             )
@@ -73,7 +73,7 @@ class IntakeSettings:
 
 
 def add_signal_arguments(parser: ArgumentParser) -> None:
-    """Let a command line say what has to be known of signals."""
+    """Add the options for signals to a command line."""
     signals = parser.add_argument_group("raw signals")
     signals.add_argument("--mass", type=float, metavar="KG", help="the walker's body mass")
     signals.add_argument("--rate", type=float, metavar="HZ", help="default: by the samples' times")

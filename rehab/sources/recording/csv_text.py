@@ -22,10 +22,10 @@ _SAVE_AGAIN = 'Open it in a spreadsheet and save it as "CSV UTF-8".'
 
 
 def parse_table(data: bytes, name: str) -> Table:
-    """Give the table that a file's bytes hold. Raises RecordingError for anything but a clean one.
+    """Return the table in a file's bytes. Raises RecordingError for anything but a clean one.
 
-    Read are UTF-8 and, with a byte order mark, UTF-16; commas, semicolons or tabs between cells;
-    any line ends; decimal commas where commas do not separate cells.
+    Accepted are UTF-8 and, with a byte order mark, UTF-16; commas, semicolons or tabs between
+    cells; any line ends; decimal commas where commas do not separate cells.
     """
     text = _decode(data, name)
     first_line = re.match(r"[^\r\n]*", text)
@@ -62,7 +62,7 @@ def _decode(data: bytes, name: str) -> str:
 
 
 def _split(text: str, delimiter: str, name: str) -> list[list[str]]:
-    """Give all rows up to the last one that is not blank."""
+    """Return all rows up to the last one that is not blank."""
     rows: list[list[str]] = []
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
     try:
@@ -82,7 +82,7 @@ def _split(text: str, delimiter: str, name: str) -> list[list[str]]:
 
 
 def _check_header(header: list[str], name: str) -> dict[str, int]:
-    """Give the place of every column. Raises RecordingError for a name that is missing or twice."""
+    """Return the place of every column. Raises RecordingError for blank and repeated names."""
     if not any(header):
         raise RecordingError(f"Row 1 of recording {name} is blank. Put the column names there.")
     for place, column in enumerate(header, start=1):

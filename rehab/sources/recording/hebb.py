@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import re
 
-from rehab.sources.recording.layout import Layout, make_phase
+from rehab.sources.recording.layout import Layout, make_row_phase
 from rehab.sources.recording.table import Row, quote
 from rehab.training.phases import PHASE_KINDS, Phase
-from rehab.training.steps import Reason
+from rehab.training.steps import InvalidReason
 
 # hebb03: what each part of the protocol in column Task is for (docs/reference/gait.md#columns). A
 # number before "A2" is the share of the real value that was shown, in percent: the gain.
@@ -33,14 +33,14 @@ def _read_task(row: Row) -> Phase:
             "Task",
         )
     gain = int(shown_percent[1]) / 100 if shown_percent else 1.0
-    return make_phase(row, "Task", kind, task, PHASE_KINDS[kind].feedback, gain)
+    return make_row_phase(row, "Task", kind, task, PHASE_KINDS[kind].feedback, gain)
 
 
 def _read_use(row: Row) -> tuple[str, ...]:
     use = row.flag_in("iStrideUse")
     if use is None:
         raise row.error("blank. Write 1 for a usable stride, 0 for one that is not.", "iStrideUse")
-    return () if use else (Reason.FLAGGED,)
+    return () if use else (InvalidReason.FLAGGED,)
 
 
 HEBB03 = Layout(
@@ -77,7 +77,7 @@ def _read_contact(row: Row) -> tuple[str, ...]:
     force = row.number_in("iVGRF_max")
     # Without a force there was nothing that A2 could have been computed from.
     lost = force is None or not math.isfinite(force) or force < MIN_CONTACT_N_KG
-    return (Reason.FORCE_LOST,) if lost else ()
+    return (InvalidReason.FORCE_LOST,) if lost else ()
 
 
 def _read_no_phase(_row: Row) -> Phase:

@@ -1,4 +1,4 @@
-"""What a layout says: which columns hold what, and how to read what no column name can give."""
+"""What a layout defines: which columns hold what, and how to read what no name can tell."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from rehab.training.steps import Side
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Which columns hold what, and the two readings that no column name can give.
+    """Which columns hold what, and two functions for what a column's name cannot tell.
 
     ``required`` columns must be there; any other that is named here may be missing. Without a
-    column ``time_s``, strides lie ``stride_s`` [s] apart. ``extra`` columns go along as further
-    named values; None takes every column that has no other use.
+    column ``time_s``, strides lie ``stride_s`` [s] apart. ``extra`` columns are kept as further
+    named values; None keeps every column that has no other use.
     """
 
     name: str
@@ -36,11 +36,11 @@ class Layout:
     extra: tuple[str, ...] | None = None
 
     def missing_in(self, table: Table) -> list[str]:
-        """Give the required columns that a table does not have."""
+        """Return the required columns that a table does not have."""
         return [column for column in self.required if column not in table.columns]
 
     def extra_in(self, table: Table) -> list[str]:
-        """Give the columns of a table that go along as further named values."""
+        """Return the columns of a table that are kept as further named values."""
         if self.extra is not None:
             return [column for column in self.extra if column in table.columns]
         used = {self.number, self.time_s, self.side, self.value, self.goal, self.shown, self.hit}
@@ -52,7 +52,7 @@ _SIDES = {"l": Side.LEFT, "left": Side.LEFT, "r": Side.RIGHT, "right": Side.RIGH
 
 
 def read_side(row: Row, layout: Layout) -> Side | None:
-    """Give the leg of a row, None where the file has no column for it."""
+    """Return the leg of a row, None where the file has no column for it."""
     if not row.has(layout.side):
         return None
     side = _SIDES.get(row.text(layout.side).lower())
@@ -62,8 +62,10 @@ def read_side(row: Row, layout: Layout) -> Side | None:
     return side
 
 
-def make_phase(row: Row, column: str, kind: str, name: str, feedback: bool, gain: float) -> Phase:
-    """Give a row's phase. Raises RecordingError where the column's gain cannot be used."""
+def make_row_phase(
+    row: Row, column: str, kind: str, name: str, feedback: bool, gain: float
+) -> Phase:
+    """Return a row's phase. Raises RecordingError where the column's gain cannot be used."""
     try:
         return Phase(kind=kind, name=name, feedback=feedback, gain=gain)
     except InvalidSetting as problem:

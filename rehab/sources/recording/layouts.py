@@ -1,4 +1,4 @@
-"""The layouts that are known, and how a file's header chooses among them."""
+"""The known layouts, and how a file's header chooses among them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ LAYOUTS: dict[str, Layout] = {layout.name: layout for layout in (HEBB03, HEBB91,
 
 
 def choose_layout(table: Table, name: str | None = None) -> Layout:
-    """Give the layout of that name, or the one whose required columns the table has.
+    """Return the layout of that name, or the one whose required columns the table has.
 
     Raises RecordingError where the name is unknown, columns are missing or several layouts fit.
     """

@@ -1,13 +1,13 @@
-"""The layout for everybody else: time and value, and whatever more there is to say."""
+"""The layout for everybody else: time and value, and optional columns for the rest."""
 
 from __future__ import annotations
 
 import re
 
-from rehab.sources.recording.layout import Layout, make_phase
+from rehab.sources.recording.layout import Layout, make_row_phase
 from rehab.sources.recording.table import Row, quote
 from rehab.training.phases import PHASE_KINDS, Phase
-from rehab.training.steps import Reason
+from rehab.training.steps import InvalidReason
 
 _REASON = re.compile(r"[a-z][a-z0-9_]{0,39}", re.ASCII)
 
@@ -25,10 +25,10 @@ def _read_plain_reasons(row: Row) -> tuple[str, ...]:
     if valid and reasons:
         raise row.error("a valid stride has no reason. Write valid 0 or no reason.", "valid")
     if valid is False and not reasons:
-        return (Reason.FLAGGED,)
+        return (InvalidReason.FLAGGED,)
     # Scoring finds a missing value by itself; said twice, it would count as another fault.
     missing = row.number_in("value") is None
-    return tuple(reason for reason in reasons if not (missing and reason == Reason.MISSING))
+    return tuple(reason for reason in reasons if not (missing and reason == InvalidReason.MISSING))
 
 
 def _read_plain_phase(row: Row) -> Phase:
@@ -44,7 +44,7 @@ def _read_plain_phase(row: Row) -> Phase:
         )
     feedback = row.flag_in("feedback")
     gain = row.number_in("gain")
-    return make_phase(
+    return make_row_phase(
         row,
         "gain",
         kind.slug,

@@ -1,4 +1,4 @@
-"""From a file to a recorded session: everything is checked before anything is given."""
+"""From a file to a recorded session: everything is checked before anything is returned."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MAX_TIME_S = 1e12
 def read_recording(
     path: str | Path, layout: str | None = None, *, trained_side: Side | None = None
 ) -> Recording:
-    """Give the recording in a file; see ``parse_recording``.
+    """Return the recording in a file; see ``parse_recording``.
 
     Raises RecordingError also where there is no such file or it cannot be read.
     """
@@ -55,7 +55,7 @@ def read_recording(
 def parse_recording(
     data: bytes, name: str, layout: str | None = None, *, trained_side: Side | None = None
 ) -> Recording:
-    """Give the recording that a file's bytes hold.
+    """Return the recording in a file's bytes.
 
     Parameters
     ----------
@@ -71,15 +71,15 @@ def parse_recording(
     Raises
     ------
     RecordingError
-        For the first thing found that cannot be used, naming row, column and cure. Nothing is
-        returned before every row has been checked. Values that are missing, not finite or out of
-        bounds are not errors: scoring gives such a stride its reason.
+        For the first problem found, naming row, column and cure. Nothing is returned before every
+        row has been checked. Values that are missing, not finite or out of bounds are not errors:
+        scoring gives such a stride its reason.
     """
     table = parse_table(data, name)
     used = choose_layout(table, layout)
     rows = table.rows
     sides = [read_side(row, used) for row in rows]
-    trained = _choose_trained(name, sides, trained_side)
+    trained = _choose_trained_side(name, sides, trained_side)
     phases, places = _read_phases(rows, [side in (None, trained) for side in sides], used)
     return Recording(
         name=name,
@@ -91,7 +91,7 @@ def parse_recording(
     )
 
 
-def _choose_trained(name: str, sides: list[Side | None], wanted: Side | None) -> Side | None:
+def _choose_trained_side(name: str, sides: list[Side | None], wanted: Side | None) -> Side | None:
     found = {side for side in sides if side is not None}
     if not found:
         return wanted
@@ -111,7 +111,7 @@ def _choose_trained(name: str, sides: list[Side | None], wanted: Side | None) ->
 def _read_phases(
     rows: list[Row], trained: list[bool], layout: Layout
 ) -> tuple[tuple[Phase, ...], list[int]]:
-    """Give the runs of rows with the same phase, and for each row the index of its run."""
+    """Return the runs of rows with the same phase, and for each row the index of its run."""
     phases: list[Phase] = []
     places: list[int] = []
     pairs = zip(rows, trained, strict=True)
@@ -129,7 +129,7 @@ def _read_phases(
 
 
 def _read_goal(rows: list[Row], layout: Layout) -> float | None:
-    """Give the goal that all rows share, None where all are blank."""
+    """Return the goal that all rows share, None where all are blank."""
     goal = rows[0].number_in(layout.goal)
     for row in rows:
         here = row.number_in(layout.goal)
@@ -193,7 +193,7 @@ def _check_number(row: Row, layout: Layout, expected: int) -> None:
 
 
 def _read_time(row: Row, layout: Layout, number: int, last_s: float) -> float:
-    """Give a stride's time [s]. Raises RecordingError where it goes back."""
+    """Return a stride's time [s]. Raises RecordingError where it decreases."""
     if not layout.time_s:
         return (number - 1) * layout.stride_s
     time_s = row.finite_in(layout.time_s)

@@ -43,5 +43,5 @@ class Recording:
         return (stride.measurement for stride in self.strides)
 
     def phases_at_gain_one(self) -> tuple[Phase, ...]:
-        """Give the same phases with the real value shown in each."""
+        """Return the same phases with the real value shown in each."""
         return tuple(replace(phase, gain=1.0) for phase in self.phases)

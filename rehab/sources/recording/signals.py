@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rehab.gait import check_signals, measure_both_legs, measure_strides
-from rehab.gait.files import find_mass, find_rate, read_signals
-from rehab.sources.intake.strides import name_stride
+from rehab.gait.recordings.csv_files import estimate_rate, read_mass, read_signals
+from rehab.sources.intake.measurements import to_measurement
 from rehab.sources.recording.table import RecordingError
 from rehab.training.steps import Measurement, Side
 
@@ -20,17 +20,17 @@ def measure_file(
     look_ahead_s: float,
     side: Side | None,
 ) -> tuple[list[Measurement], list[str]]:
-    """Give the strides of a file in the order walked, and what its self-check found.
+    """Return the strides of a file in the order walked, and what its self-check found.
 
-    ``side`` picks a leg; None gives both. Raises RecordingError for a file that cannot be read and
-    GaitInputError for signals that nothing can be measured from.
+    ``side`` selects a leg; None returns both. Raises RecordingError for a file that cannot be read
+    and GaitInputError for signals that nothing can be measured from.
     """
     try:
         t_s, legs = read_signals(path, columns)
     except OSError as problem:
         raise RecordingError(f"{path} cannot be read: {problem.strerror}.") from None
-    rate_hz = find_rate(t_s, path) if rate_hz is None else rate_hz
-    mass_kg = find_mass(path) if mass_kg is None else mass_kg
+    rate_hz = estimate_rate(t_s, path) if rate_hz is None else rate_hz
+    mass_kg = read_mass(path) if mass_kg is None else mass_kg
     if len(legs) == 2:
         found = measure_both_legs(
             t_s,
@@ -50,7 +50,7 @@ def measure_file(
     )
     strides: list[Measurement] = []
     for stride in found:
-        named = name_stride(stride, len(strides) + 1, side or Side.LEFT)
+        named = to_measurement(stride, len(strides) + 1, side or Side.LEFT)
         if named is not None and side in {None, named.side}:
             strides.append(named)
     return strides, [finding.message for finding in check.findings]

@@ -11,10 +11,11 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
-from rehab.sources.client import Walk, write_step
+from rehab.sources.client import NextStride, write_step
 from rehab.sources.recording.layouts import LAYOUTS
 from rehab.sources.recording.reading import read_recording
-from rehab.sources.source import PlayedSource, Say, Unusable
+from rehab.sources.reporting import Notify, SourceError
+from rehab.sources.source import PlayedSource
 from rehab.training.phases import Phase
 from rehab.training.steps import Measurement, Side
 
@@ -24,7 +25,7 @@ class RecordingSource(PlayedSource):
 
     @classmethod
     def add_arguments(cls, parser: ArgumentParser) -> None:
-        """Say what its command line can hold."""
+        """Add the options of this source to a command line."""
         parser.add_argument("file", type=Path, metavar="FILE")
         parser.add_argument(
             "--layout", choices=sorted(LAYOUTS), help="of a session (default: by its header)"
@@ -35,9 +36,9 @@ class RecordingSource(PlayedSource):
         signals.add_argument("--look-ahead", type=float, default=0.05, metavar="S")
         signals.add_argument("--columns", nargs="+", metavar="CHANNEL=COLUMN")
 
-    def __init__(self, options: Namespace, say: Say) -> None:
+    def __init__(self, options: Namespace, notify: Notify) -> None:
         """Read the whole file. Raises RecordingError, GaitInputError or UnsendableStride."""
-        self._say = say
+        self._notify = notify
         self._limit: int | None = options.strides
         wanted = Side(options.side) if options.side else None
         self._recorded_side: Side | None = None  # the only one there is
@@ -51,10 +52,10 @@ class RecordingSource(PlayedSource):
         for stride in self._strides:
             write_step(stride, stride.number)
 
-    def open_walk(self, trained_side: Side) -> Walk:
-        """Play it from its beginning."""
+    def open_walk(self, trained_side: Side) -> NextStride:
+        """Play the recording from its beginning."""
         if self._recorded_side not in {None, trained_side}:
-            self._say(
+            self._notify(
                 f"The session trains the {trained_side} leg, the recording the other one: its "
                 "strides are stored and not scored."
             )
@@ -66,26 +67,26 @@ class RecordingSource(PlayedSource):
         return walk
 
     def _measure(self, options: Namespace, wanted: Side | None) -> Sequence[Measurement]:
-        """Give the strides of recorded signals, of the wanted leg or of both."""
+        """Return the strides of recorded signals, of the wanted leg or of both."""
         from rehab.sources.recording.signals import measure_file
 
         strides, findings = measure_file(
             options.file, options.columns, options.mass, options.rate, options.look_ahead, wanted
         )
         for finding in findings:
-            self._say(f"{options.file.name}: {finding}")
+            self._notify(f"{options.file.name}: {finding}")
         if not strides:
-            raise Unusable(
+            raise SourceError(
                 f"{options.file.name} holds no stride of {wanted or 'either'} leg. Check the "
                 "columns, the units and the body mass."
             )
         valid = sum(not stride.reasons for stride in strides)
-        self._say(f"{options.file.name}: {len(strides)} strides measured, {valid} valid.")
+        self._notify(f"{options.file.name}: {len(strides)} strides measured, {valid} valid.")
         return strides
 
 
 def holds_signals(path: Path) -> bool:
-    """Say whether a file's header is one of signals; files that cannot be read are not."""
+    """Return whether a file's header is one of signals; not so for files that cannot be read."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             first = file.readline(64 * 1024)

@@ -1,4 +1,4 @@
-"""A table of text whose cells know where they stand and read themselves as numbers."""
+"""A table of text whose cells know their place and can be read as numbers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class RecordingError(ValueError):
 
 
 def quote(text: str) -> str:
-    """Give a cell's text for a message: in quotation marks, harmless and short."""
+    """Return a cell's text for a message: in quotation marks, escaped and short."""
     return repr(text if len(text) <= 40 else f"{text[:39]}…")
 
 
@@ -46,23 +46,23 @@ class Row:
     cells: list[str]
 
     def error(self, problem: str, column: str = "") -> RecordingError:
-        """Give the error that names this row, and the column if one is to blame."""
+        """Return the error that names this row, and the column if one is to blame."""
         place = f"Row {self.number} of recording {self.table.name}"
         return RecordingError(
             f"{place}, column {column}: {problem}" if column else f"{place}: {problem}"
         )
 
     def has(self, column: str) -> bool:
-        """Say whether the file has this column."""
+        """Return whether the file has this column."""
         return column in self.table.columns
 
     def text(self, column: str) -> str:
-        """Give a cell's text without surrounding blanks."""
+        """Return a cell's text without surrounding blanks."""
         place = self.table.columns.get(column)
         return "" if place is None else self.cells[place]
 
     def number_in(self, column: str) -> float | None:
-        """Give a cell's number: None where it is blank or NaN; infinities are passed on.
+        """Return a cell's number: None where it is blank or NaN; infinities are passed on.
 
         Raises RecordingError for text.
         """
@@ -82,21 +82,21 @@ class Row:
         return float(plain)
 
     def finite_in(self, column: str) -> float:
-        """Give a cell's number. Raises RecordingError where it is missing or not finite."""
+        """Return a cell's number. Raises RecordingError where it is missing or not finite."""
         number = self.number_in(column)
         if number is None or not math.isfinite(number):
             raise self.error(f"{quote(self.text(column))} is no finite number. Write one.", column)
         return number
 
     def whole_in(self, column: str) -> int:
-        """Give a cell's whole number. Raises RecordingError for anything else."""
+        """Return a cell's whole number. Raises RecordingError for anything else."""
         number = self.finite_in(column)
         if not number.is_integer() or abs(number) > _LARGEST_WHOLE:
             raise self.error(f"{quote(self.text(column))} is no whole number. Write one.", column)
         return int(number)
 
     def flag_in(self, column: str) -> bool | None:
-        """Give a cell's yes (1, true) or no (0, false), None where it is blank or NaN.
+        """Return a cell's yes (1, true) or no (0, false), None where it is blank or NaN.
 
         Raises RecordingError for anything else.
         """

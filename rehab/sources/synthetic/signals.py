@@ -62,7 +62,7 @@ class LegSignals:
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class SyntheticRecording:
     """Signals of a walk and the strides that they were made from, in order of time."""
 
     t_s: Floats
@@ -104,8 +104,8 @@ class Sensors:
 
 
 @dataclass(slots=True)
-class LegUnderWay:
-    """The channels of one leg without sensors, on the samples' times."""
+class LegBuilder:
+    """The channels of one leg before sensors, at the samples' times."""
 
     t_s: Floats
     mass_kg: float
@@ -128,9 +128,9 @@ class LegUnderWay:
         angle_delay_s: float,
         pace_s: float | None = None,
     ) -> None:
-        """Add one stride that begins with a contact, or as much of it as the samples' times hold.
+        """Add one stride that begins with a contact, or the part of it within the samples' times.
 
-        Its stance is that of a stride of ``pace_s``, else of its own time.
+        Its stance time is that of a stride of ``pace_s`` if given, else of its own time.
         """
         pace_s = pace_s or stride_s
         stance_s = pace_s * min(0.8, STANCE_SHARE + 0.08 * (pace_s - 1.1))
@@ -161,8 +161,8 @@ def make_signals(
     sensors: Sensors | None = None,
     seed: int = 0,
     other_a2_w_kg: float = A2_DEFAULT_W_KG,
-) -> Recording:
-    """Make the signals of a walk whose strides of one leg are given, as ``walk`` gives them.
+) -> SyntheticRecording:
+    """Return the signals of a walk whose strides of one leg are given, as ``walk`` yields them.
 
     A stride lasts until the next one's time; where that is no stride time (pauses between trials),
     it lasts 1.1 s. The other leg steps half a stride later. A stride with reasons loses its force
@@ -180,7 +180,7 @@ def make_signals(
     t_s = t_s + np.clip(jitter, -0.4 / sensors.rate_hz, 0.4 / sensors.rate_hz)
     trained = strides[0].side.value
     other = "right" if trained == "left" else "left"
-    legs = {side: LegUnderWay(t_s, mass_kg, side) for side in (trained, other)}
+    legs = {side: LegBuilder(t_s, mass_kg, side) for side in (trained, other)}
     begin_s = 1.0
     legs[other].walk(
         begin_s - lengths[0] / 2, lengths[0], other_a2_w_kg, None, sensors.angle_delay_s
@@ -202,11 +202,13 @@ def make_signals(
     truth = sorted(
         (s for leg in legs.values() for s in leg.strides), key=lambda s: s.terminal_contact_s
     )
-    return Recording(t_s, signals["left"], signals["right"], sensors.rate_hz, mass_kg, tuple(truth))
+    return SyntheticRecording(
+        t_s, signals["left"], signals["right"], sensors.rate_hz, mass_kg, tuple(truth)
+    )
 
 
-def add_sensors(leg: LegUnderWay, sensors: Sensors, rng: np.random.Generator) -> LegSignals:
-    """Add what the sensors add."""
+def add_sensors(leg: LegBuilder, sensors: Sensors, rng: np.random.Generator) -> LegSignals:
+    """Return a leg's signals with the sensors' noise, offset and drift."""
 
     def add(values: Floats, noise: float) -> Floats:
         return np.asarray(values + rng.normal(0, noise, len(values)))
@@ -221,7 +223,7 @@ def add_sensors(leg: LegUnderWay, sensors: Sensors, rng: np.random.Generator) ->
 
 
 def _make_angle(stance_s: float, stride_s: float, push_rad_s: float) -> PchipInterpolator:
-    """Give the ankle angle of a stride by time, whose velocity peaks at ``push_rad_s``.
+    """Return the ankle angle of a stride by time, whose velocity peaks at ``push_rad_s``.
 
     The velocity is set where it is known, and swing takes the angle back to where it began.
     """
@@ -244,7 +246,7 @@ def _make_angle(stance_s: float, stride_s: float, push_rad_s: float) -> PchipInt
 
 
 def _find_push(a2_w_kg: float, peak_nm_kg: float, stance_s: float) -> float:
-    """Give the push-off velocity with which moment × velocity peaks at the A2 asked for."""
+    """Return the push-off velocity with which moment × velocity peaks at the given A2."""
     times = np.linspace(PUSH_FROM, 1, 400) * stance_s
     shape = PchipInterpolator(
         [PUSH_FROM * stance_s, *(stance_s + after_s for after_s, _ in PUSH)],

@@ -8,8 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rehab.sources.client import Walk
-from rehab.sources.source import PlayedSource, Say
+from rehab.sources.client import NextStride
+from rehab.sources.reporting import Notify
+from rehab.sources.source import PlayedSource
 from rehab.sources.synthetic.profiles import PROFILES
 from rehab.sources.synthetic.walker import SyntheticWalker
 from rehab.training.phases import Phase
@@ -19,14 +20,14 @@ if TYPE_CHECKING:
     from rehab.sources.synthetic.streaming import SignalWalker
 
 
-class Synthetic(PlayedSource):
+class SyntheticSource(PlayedSource):
     """A simulated patient. Every stride depends on the phase that the one before may have ended."""
 
-    ahead = 1
+    max_unacknowledged = 1
 
     @classmethod
     def add_arguments(cls, parser: ArgumentParser) -> None:
-        """Say what its command line can hold."""
+        """Add the options of this source to a command line."""
         parser.add_argument("--seed", type=int, default=0, help="the same seed walks the same")
         parser.add_argument("--profile", choices=sorted(PROFILES), default="good")
         parser.add_argument(
@@ -40,16 +41,16 @@ class Synthetic(PlayedSource):
             "--keep", type=Path, metavar="FILE", help="write the signals to a new file, here only"
         )
 
-    def __init__(self, options: Namespace, say: Say) -> None:
-        """Look at the command line. Raises Unusable or GaitInputError."""
+    def __init__(self, options: Namespace, notify: Notify) -> None:
+        """Read the command line. Raises SourceError or GaitInputError."""
         self._profile = PROFILES[options.profile]
         self._seed: int = options.seed
         self._side = Side(options.side) if options.side else None
-        self._open_signals = make_opener(options, say) if options.signals else None
+        self._open_signals = make_opener(options, notify) if options.signals else None
         self._limit: float = math.inf if options.strides is None else options.strides
 
-    def open_walk(self, trained_side: Side) -> Walk:
-        """Begin to walk."""
+    def open_walk(self, trained_side: Side) -> NextStride:
+        """Return the strides of a walk, one a call."""
         strider: SyntheticWalker | SignalWalker
         strider = SyntheticWalker(self._profile, self._seed, self._side or trained_side)
         if self._open_signals is not None:
@@ -64,11 +65,11 @@ class Synthetic(PlayedSource):
         return walk
 
 
-def make_opener(options: Namespace, say: Say) -> Callable[[SyntheticWalker], SignalWalker]:
-    """Give how walkers get signals. Raises Unusable or GaitInputError for settings of no use."""
+def make_opener(options: Namespace, notify: Notify) -> Callable[[SyntheticWalker], SignalWalker]:
+    """Return what adds signals to a walker. Raises SourceError or GaitInputError."""
     from rehab.gait import TwoLegDetector
     from rehab.sources.intake import IntakeSettings
-    from rehab.sources.intake.keeping import Keeper
+    from rehab.sources.intake.recorder import SignalRecorder
     from rehab.sources.synthetic.signals import Sensors
     from rehab.sources.synthetic.streaming import SignalMaker, SignalWalker
 
@@ -79,7 +80,7 @@ def make_opener(options: Namespace, say: Say) -> Callable[[SyntheticWalker], Sig
         return TwoLegDetector(rate_hz, mass_kg, look_ahead_s=look_ahead_s)
 
     make_detector()
-    keep = Keeper(settings.keep, say).write if settings.keep else None
+    keep = SignalRecorder(settings.keep, notify).write if settings.keep else None
     sensors = Sensors(rate_hz=rate_hz)
 
     def open_signals(walker: SyntheticWalker) -> SignalWalker:
@@ -90,4 +91,4 @@ def make_opener(options: Namespace, say: Say) -> Callable[[SyntheticWalker], Sig
     return open_signals
 
 
-SOURCE = Synthetic
+SOURCE = SyntheticSource

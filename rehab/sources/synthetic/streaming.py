@@ -10,11 +10,11 @@ import numpy as np
 
 from rehab.gait import LegSamples, TwoLegDetector
 from rehab.sources.intake.alignment import Channel, Floats
-from rehab.sources.intake.strides import name_stride
+from rehab.sources.intake.measurements import to_measurement
 from rehab.sources.synthetic.signals import (
     A2_DEFAULT_W_KG,
+    LegBuilder,
     LegSignals,
-    LegUnderWay,
     Sensors,
     add_sensors,
 )
@@ -27,9 +27,9 @@ STRIDE_S = 1.1  # for one that has no time, as after a pause
 
 
 class SignalMaker:
-    """Makes signals of both legs that end where the newest stride does, in constant memory.
+    """Makes signals of both legs that end with the newest stride, in constant memory.
 
-    The other leg steps half a stride later. What a stride is made with is as in ``make_signals``.
+    The other leg steps half a stride later. Strides are made as in ``make_signals``.
     """
 
     def __init__(self, mass_kg: float, sensors: Sensors, seed: int, side: Side) -> None:
@@ -43,13 +43,13 @@ class SignalMaker:
         self._begin_s = BEGIN_S
 
     def walk(self, stride: Measurement, stride_s: float) -> tuple[Floats, dict[Side, LegSignals]]:
-        """Give the samples up to this stride's end: their times, and the legs' signals."""
+        """Return the samples up to this stride's end: their times, and the legs' signals."""
         sensors, begin_s = self._sensors, self._begin_s
         stop = math.ceil((begin_s + stride_s) * sensors.rate_hz)
         t_s = np.arange(self._index, stop) / sensors.rate_hz
         most_s = 0.4 / sensors.rate_hz
         t_s += np.clip(self._random.normal(0, sensors.jitter_s, len(t_s)), -most_s, most_s)
-        legs = {side: LegUnderWay(t_s, self._mass_kg, side) for side in (self._side, self._other)}
+        legs = {side: LegBuilder(t_s, self._mass_kg, side) for side in (self._side, self._other)}
         delay_s = sensors.angle_delay_s
         value = A2_DEFAULT_W_KG if stride.value is None else stride.value
         legs[self._side].walk(begin_s, stride_s, value, stride, delay_s)
@@ -91,7 +91,7 @@ class SignalWalker:
         self._number = 0
 
     def next_stride(self, phase: Phase) -> Measurement:
-        """Walk in this phase until the next stride of either leg is known."""
+        """Walk in this phase until the next stride of either leg is measured, and return it."""
         while not self._ready:
             self._walk(phase)
         return self._ready.popleft()
@@ -113,7 +113,7 @@ class SignalWalker:
         )
         found = self._detector.feed(t_s, *(LegSamples(*_channels(legs[s])) for s in Side))
         for measured in found:
-            named = name_stride(measured, self._number + 1, stride.side)
+            named = to_measurement(measured, self._number + 1, stride.side)
             if named is not None:
                 self._number += 1
                 self._ready.append(named)

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 
 from rehab.sources.synthetic.profiles import GOOD, WalkerProfile
 from rehab.training.phases import Phase, make_phase
-from rehab.training.steps import Measurement, Reason, Side
+from rehab.training.steps import InvalidReason, Measurement, Side
 
 # The lab recorded trials of at most two minutes, with 3.2-5.2 s between them
 # (docs/reference/gait.md#protocol).
@@ -27,10 +27,10 @@ STRIDE_MAX_S = 2.5
 
 
 class SyntheticWalker:
-    """Somebody who walks on and on, one stride at a time, in constant memory.
+    """A person who walks without end, one stride at a time, in constant memory.
 
-    The caller says which phase each stride is walked in; the walker answers with one stride of the
-    trained leg. A change of phase, and two minutes in one, begin a new trial after a short pause.
+    The caller says in which phase each stride is walked and gets one stride of the trained leg. A
+    change of phase, and two minutes in one, begin a new trial after a short pause.
     """
 
     def __init__(self, profile: WalkerProfile, seed: int, side: Side = Side.LEFT) -> None:
@@ -50,7 +50,7 @@ class SyntheticWalker:
         self._fatigue = 0.0
 
     def next_stride(self, phase: Phase) -> Measurement:
-        """Walk one stride in a phase. ``time_s`` is the moment at which the stride ends."""
+        """Return the next stride, walked in a phase. ``time_s`` is the moment at which it ends."""
         profile = self.profile
         # Every stride draws the same numbers, whatever the phase: chance does not depend on rules.
         white, drift, pace = self._draw_normal(), self._draw_normal(), self._draw_normal()
@@ -74,7 +74,7 @@ class SyntheticWalker:
             time_s=round(self._time_s, 3),
             side=self.side,
             value=None if is_missing else round(value, 4),
-            reasons=(Reason.FLAGGED,) if self._is_bad else (),
+            reasons=(InvalidReason.FLAGGED,) if self._is_bad else (),
         )
 
     def _begin_trial(self, phase: Phase, rest: float) -> None:
@@ -85,7 +85,7 @@ class SyntheticWalker:
         self._fatigue *= 1 - self.profile.recovery
 
     def _spread_in(self, phase: Phase) -> tuple[float, float]:
-        """Give the sds of the white and the slow component, as ratios to the baseline."""
+        """Return the sds of the white and the slow component, as ratios to the baseline."""
         profile = self.profile
         if phase.kind in ("familiarization", "catch"):
             return profile.brief_noise, profile.calm_slow_sd
@@ -94,7 +94,7 @@ class SyntheticWalker:
         return profile.calm_noise, profile.calm_slow_sd
 
     def _next_level(self, phase: Phase) -> float:
-        """Give the mean that this stride varies about, as a ratio to the baseline."""
+        """Return the mean that this stride varies about, as a ratio to the baseline."""
         profile = self.profile
         if phase.kind == "catch":
             return profile.catch_level
@@ -115,7 +115,7 @@ class SyntheticWalker:
         return profile.exploration_level + way * (1 - self._unlearned) - self._fatigue
 
     def _draw_normal(self) -> float:
-        """Draw from the standard normal distribution: twelve uniform numbers less their mean.
+        """Return a standard normal number: twelve uniform ones less their mean.
 
         Tails end at ±6 sd. Written out, since ``sum`` rounds differently from Python 3.12 on.
         """
@@ -139,9 +139,9 @@ def walk(
     strides: int | None = None,
     side: Side = Side.LEFT,
 ) -> Iterator[Measurement]:
-    """Walk through phases until their last one is over or ``strides`` are walked; else forever.
+    """Yield strides through phases until the last one is over or ``strides`` are walked.
 
-    Phases end as ``SessionFold`` ends them, so that both always agree on where a stride belongs.
+    Phases end as ``SessionFold`` ends them, so that both always agree on a stride's phase.
     """
     walker = SyntheticWalker(profile, seed, side)
     left = math.inf if strides is None else strides

@@ -1,5 +1,5 @@
-// One soft tone a step. Its pitch says how much of the goal was reached, alike in every feedback type;
-// a second tone, higher or lower, says what the emblem says: gained or lost.
+// One soft tone a step. Its pitch tells how much of the goal was reached, alike in every feedback type;
+// a second tone, higher or lower, tells what the emblem shows: gained or lost.
 
 const GOAL_HZ = 440; // at the goal; an octave for as much again
 const LOWEST = 0.5;
@@ -13,7 +13,7 @@ export function createSounds(button) {
   let audio;
   let on = button.dataset.on === "yes";
 
-  // A browser plays nothing before the page was touched: until then the button says so.
+  // A browser plays nothing before the page was touched: until then the button shows it.
   function show() {
     const heard = on && audio?.state === "running";
     button.setAttribute("aria-pressed", String(heard));

@@ -9,7 +9,7 @@ import pytest
 from rehab.sessions.live.consumers import source as source_module
 from rehab.sessions.live.lateness import Lateness
 from rehab.sessions.log import Step
-from rehab.training.clocks import LATE_S, LEAK
+from rehab.training.clocks import DRIFT_MAX, LATE_S
 from tests.support.callers import a_step
 
 
@@ -23,7 +23,7 @@ def test_lateness_is_told_by_the_clock_in_hello(speed):
     assert not is_late(50.0 + 10 * speed, 110.0)
     assert not is_late(50.0 - slack, 100.0)
     assert is_late(50.0 - slack - 0.01, 100.0)
-    assert is_late(50.0, 100.0 + (1 + 2 * LEAK) * slack / speed)
+    assert is_late(50.0, 100.0 + (1 + 2 * DRIFT_MAX) * slack / speed)
 
 
 def test_nothing_is_late_at_full_speed():

@@ -14,9 +14,8 @@ from rehab.sessions.live import session as sessions
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.phases import make_phase
-from rehab.training.valences import Cue
-from tests.sessions.live.test_robots import restart
-from tests.support.callers import turns
+from rehab.training.valences import CueGestures
+from tests.support.callers import restart, turns
 from tests.support.world import NOW
 
 TWO = (make_phase("training", "First", strides=2), make_phase("training", "Last"))
@@ -76,15 +75,15 @@ async def test_the_next_phase_has_the_other_feedback_type_for_everyone(place, be
 
 
 async def test_a_robot_that_was_silenced_stays_so_in_every_type(place, ready):
-    session = await ready(place, *TWO, valence="positive", cue=Cue())
+    session = await ready(place, *TWO, valence="positive", cue=CueGestures())
     plan = session.to_plan()
     assert [one.cue.above for one in plan.alternatives] == [None] * 3
     other = await ready(place, *TWO, valence="positive", at_station=False)
     cues = {one.slug: one.cue for one in other.to_plan().alternatives}
     assert cues == {
-        "negative": Cue(below="droop"),
-        "binary": Cue("celebrate", "droop"),
-        "explicit": Cue(),
+        "negative": CueGestures(below="droop"),
+        "binary": CueGestures("celebrate", "droop"),
+        "explicit": CueGestures(),
     }
 
 
@@ -156,7 +155,8 @@ async def test_words_and_chart_hold_from_the_next_step_and_are_in_the_log(place,
 
 
 @pytest.mark.parametrize(
-    ("kind", "value"), [("words", "Go!"), ("valence", None), ("valence", 3), ("chart_style", {})]
+    ("kind", "value"),
+    [("feedback_text", "Go!"), ("valence", None), ("valence", 3), ("chart_style", {})],
 )
 async def test_what_is_no_change_of_a_page_is_not_the_protocol(place, begun, kind, value):
     monitor = place.monitor(await begun(place))

@@ -29,6 +29,8 @@ from rehab.training.steps import Measurement, Side
 from tests.support.callers import a_step, change, turns
 from tests.support.world import NOW
 
+pytestmark = pytest.mark.postgres
+
 
 class Bench:
     """A writer on its own, the transactions it made, and what it reported."""

@@ -14,7 +14,7 @@ from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import LiveSession, Peer
 from rehab.sessions.payloads import Message
 from rehab.stations.models import Device
-from rehab.training.changes import ENDED
+from rehab.training.changes import ENDED_STATES
 
 
 class DeviceSocket(Socket):
@@ -92,7 +92,7 @@ class DeviceSocket(Socket):
 
     def session_opened(self, session_id: int) -> None:
         """Take up a session that has just been made for this station."""
-        if self.live is None or self.live.actor.fold.state in ENDED:
+        if self.live is None or self.live.actor.fold.state in ENDED_STATES:
             self.start(self._attach(session_id))
 
     async def _attach(self, session_id: int) -> None:

@@ -21,7 +21,7 @@ from rehab.sessions.live.messages import (
 from rehab.sessions.live.session import LiveSession, source_phase
 from rehab.sessions.payloads import Message
 from rehab.stations.models import Device
-from rehab.training.changes import ENDED, State
+from rehab.training.changes import ENDED_STATES, State
 from rehab.training.steps import Measurement, Side
 
 MAX_UNACKNOWLEDGED = 256
@@ -98,7 +98,7 @@ class SourceConsumer(DeviceSocket):
                 raise BadFrame(
                     f"Step {measurement.number} leaves a gap: send {live.next_number} next.", "gap"
                 )
-            elif live.actor.fold.state in ENDED:
+            elif live.actor.fold.state in ENDED_STATES:
                 raise Closing(4410, "ended", "The session has ended; it takes no more steps.")
             elif live.actor.fold.state is State.READY:
                 await self._complain("not_running", "The session has not started. Wait for start.")
@@ -130,7 +130,7 @@ class SourceConsumer(DeviceSocket):
         live = self.live
         if live is not None:
             await live.admission()
-        if live is None or live.actor.fold.state in (State.READY, *ENDED):
+        if live is None or live.actor.fold.state in (State.READY, *ENDED_STATES):
             await self._complain("not_running", "No session is running at this station.")
             return
         fold = live.actor.fold

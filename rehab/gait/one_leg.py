@@ -1,0 +1,250 @@
+"""Strides of one leg, detected and measured as they end, in a buffer that others fill."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from rehab.gait.contacts.force_plate import Contact, ContactFinder
+from rehab.gait.settings import DetectorSettings
+from rehab.gait.signals.buffer import LegBuffer
+from rehab.gait.signals.filters import find_maximum, find_minimum
+from rehab.gait.signals.samples import FORCE, TIME
+from rehab.gait.stances.analysis import Stance, StanceAnalyzer
+from rehab.gait.stances.plausibility import STANCE_MAX_S, STANCE_MIN_S
+from rehab.gait.strides import Flag, RejectionReason, Stride
+
+GRAVITY_M_S2 = 9.81
+KEEP_S = 8.0  # the longest cycle, the longest stance after it, and the piece they came in
+LONGEST_CHUNK_S = 1.0  # of a long chunk is taken at a time
+STRIDE_MAX_S = 4.0
+LONGEST_GAP_S = 0.25  # in a cycle; longer ones may hide a contact
+OFFSET_N = 15.0
+# A leg that never bears 80 % of the weight has help: even slow walking reaches 95 %.
+FULL_LOAD = 0.8
+USUAL_STANCES = 9
+USUAL_MIN, USUAL_MAX = 0.6, 1.5  # of the median of the last stances
+
+
+@dataclass(frozen=True, slots=True)
+class OtherLeg:
+    """What the other leg and its plate add to a stride.
+
+    Attributes
+    ----------
+    reasons, flags
+        Why the stride is invalid, and what is worth knowing of it.
+    step_s, step_length_m, step_symmetry
+        As in ``Stride``.
+    first_double_support_s, second_double_support_s, weight_ratio
+        As in ``Stride``.
+    """
+
+    reasons: list[RejectionReason]
+    flags: list[Flag]
+    step_s: float | None = None
+    step_length_m: float | None = None
+    step_symmetry: float | None = None
+    first_double_support_s: float | None = None
+    second_double_support_s: float | None = None
+    weight_ratio: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class OneLegStride:
+    """A stride as its own leg gives it, before the other leg is considered.
+
+    Attributes
+    ----------
+    index
+        The sample that completed it.
+    contact, stance
+        Its contact with the plate, and what was measured of the stance.
+    reasons
+        Those of its own leg.
+    cycle_index
+        Where the cycle before it began; None where that was not observed whole.
+    stride_s, swing_s
+        Of that cycle [s].
+    """
+
+    index: int
+    contact: Contact
+    stance: Stance
+    reasons: list[RejectionReason]
+    cycle_index: int | None
+    stride_s: float | None
+    swing_s: float | None
+
+
+class LegDetector:
+    """Detects and measures the strides of one leg in a buffer that others fill.
+
+    Parameters
+    ----------
+    buffer
+        The leg's samples.
+    settings
+        How they are measured.
+    side
+        Which leg it is, if that is known.
+    """
+
+    def __init__(self, buffer: LegBuffer, settings: DetectorSettings, side: str | None) -> None:
+        rate_hz = settings.rate_hz
+        self.buffer = buffer
+        self.mass_kg = float(settings.mass_kg)
+        self.weight_n = self.mass_kg * GRAVITY_M_S2
+        self.side = side
+        self.contacts = ContactFinder(
+            buffer, rate_hz, self.weight_n, settings.contact_n, settings.release_n
+        )
+        self._samples = buffer.samples
+        self.longest_chunk = int(LONGEST_CHUNK_S * rate_hz)
+        # Contacts of so many samples are there, whatever the rest of a piece and the wait brought.
+        self.reliable_samples = self._samples.keep - 2 * self.longest_chunk
+        self._cycle_max = STRIDE_MAX_S * rate_hz
+        self._analyzer = StanceAnalyzer(
+            buffer,
+            float(rate_hz),
+            self.mass_kg,
+            self.weight_n,
+            settings.cutoff_hz,
+            settings.is_velocity,
+        )
+        self._wait = math.ceil(settings.look_ahead_s * rate_hz - 1e-9)
+        self._pending: deque[Contact] = deque()
+        self._previous: Contact | None = None  # the stance before, with its bounces
+        self._last_terminal: tuple[int, float] | None = None  # where it really ended
+        self._stances: deque[float] = deque(maxlen=USUAL_STANCES)
+        self._number = 0
+
+    def advance(self, start: int, stop: int) -> list[OneLegStride]:
+        """Process samples ``start:stop``, a second at most; return the strides they complete."""
+        ended = self.contacts.advance(start, stop)
+        if not ended and not self._pending:
+            return []
+        self._pending.extend(ended)
+        strides = []
+        while self._pending:
+            due = (self._pending[0].end_index or 0) + self._wait
+            if due >= stop:
+                break
+            contact = self._pending.popleft()
+            if self._is_measurable(contact):
+                strides.append(self._measure(contact, due))
+        return strides
+
+    def finish(self) -> list[OneLegStride]:
+        """Return the strides that still wait, and the one that the record's end cuts off."""
+        last = self._samples.end - 1
+        strides = [self._measure(one, last) for one in self._pending if self._is_measurable(one)]
+        self._pending.clear()
+        current = self.contacts.truncate()
+        if current is not None and (current.end_s or 0.0) - current.begin_s <= STANCE_MAX_S:
+            cycle = self._find_cycle(current)
+            stance = self._analyzer.locate(current)
+            strides.append(OneLegStride(last, current, stance, [RejectionReason.CUT_OFF], *cycle))
+        return strides
+
+    def complete(self, stride: OneLegStride, other_leg: OtherLeg) -> Stride:
+        """Return the whole stride, from its own leg's part and the other leg's."""
+        contact, stance, push_off = stride.contact, stride.stance, stride.stance.push_off
+        reasons, flags = stride.reasons + other_leg.reasons, other_leg.flags
+        if abs(contact.offset_n) > OFFSET_N:
+            flags = [Flag.OFFSET, *flags]
+        if contact.peak_n < FULL_LOAD * self.weight_n and Flag.SUPPORTED not in flags:
+            flags = [*flags, Flag.SUPPORTED]
+        begin_s, end_s = contact.begin_s, contact.end_s or 0.0
+        self._number += 1
+        return Stride(
+            number=self._number,
+            initial_contact_s=begin_s,
+            terminal_contact_s=end_s,
+            a2_w_kg=push_off.a2_w_kg if push_off else None,
+            a2_time_s=push_off.a2_time_s if push_off else None,
+            valid=not reasons,
+            reasons=tuple(reasons),
+            flags=tuple(flags),
+            stance_s=end_s - begin_s,
+            stride_s=stride.stride_s,
+            swing_s=stride.swing_s,
+            force_peak_n_kg=contact.peak_n / self.mass_kg,
+            moment_peak_nm_kg=push_off.moment_peak_nm_kg if push_off else None,
+            a2_moment_nm_kg=push_off.a2_moment_nm_kg if push_off else None,
+            a2_velocity_rad_s=push_off.a2_velocity_rad_s if push_off else None,
+            propulsion_n_kg=stance.propulsion_n_kg,
+            position_m=stance.position_m,
+            offset_n=contact.offset_n,
+            side=self.side,
+            step_s=other_leg.step_s,
+            step_length_m=other_leg.step_length_m,
+            step_symmetry=other_leg.step_symmetry,
+            first_double_support_s=other_leg.first_double_support_s,
+            second_double_support_s=other_leg.second_double_support_s,
+            weight_ratio=other_leg.weight_ratio,
+        )
+
+    def compute_mean_load(self, begin: int, end: int, offset_n: float) -> float:
+        """Return the mean force above the plate's zero between two samples, by body weight.
+
+        Parameters
+        ----------
+        begin, end
+            Indices of the first sample and of the one behind the last.
+        offset_n
+            The plate's zero [N].
+
+        Returns
+        -------
+        NaN where samples have no force, are no longer buffered or are more than a cycle's.
+        """
+        if begin < self._samples.first or not 0 < end - begin <= self._cycle_max:
+            return math.nan
+        force = self.buffer.channel(FORCE, begin, end)
+        return (float(force.sum()) / (end - begin) - offset_n) / self.weight_n
+
+    def _is_measurable(self, contact: Contact) -> bool:
+        """Return whether a contact is a stance to be measured; remember where it ended if not."""
+        is_cut = contact.begin_index == 0  # the record began in the middle of it
+        if is_cut or contact.is_bounce:
+            self._previous = None if is_cut else self._previous
+            self._last_terminal = (contact.end_index or 0, contact.end_s or 0.0)
+        return not is_cut and not contact.is_bounce
+
+    def _measure(self, contact: Contact, due: int) -> OneLegStride:
+        """Measure a stance that sample ``due`` completes."""
+        end_s = contact.end_s or 0.0
+        stance = self._analyzer.measure(contact, due + 1)
+        cycle = self._find_cycle(contact)
+        reasons = stance.reasons
+        if self._is_unusual(end_s - contact.begin_s):
+            reasons = [*reasons, RejectionReason.IRREGULAR]
+        self._previous, self._last_terminal = contact, (contact.end_index or 0, end_s)
+        return OneLegStride(due, contact, stance, reasons, *cycle)
+
+    def _find_cycle(self, contact: Contact) -> tuple[int | None, float | None, float | None]:
+        """Return begin, stride and swing time of the cycle before a contact, if observed whole."""
+        if self._previous is None or self._last_terminal is None or not contact.is_onset_seen:
+            return None, None, None
+        left_index, left_s = self._last_terminal
+        begin = self._previous.begin_index
+        stride_s = contact.begin_s - self._previous.begin_s
+        if contact.begin_index - begin > self._cycle_max or stride_s > STRIDE_MAX_S:
+            return None, None, None
+        if left_index - 1 < self._samples.first:
+            return None, None, None
+        times = self.buffer.channel(TIME, left_index - 1, contact.begin_index + 1)
+        steps = times[1:] - times[:-1]
+        shortest, longest = find_minimum(steps), find_maximum(steps)
+        if not (stride_s > 0 and shortest > 0 and longest <= LONGEST_GAP_S):
+            return None, None, None
+        return begin, stride_s, contact.begin_s - left_s
+
+    def _is_unusual(self, stance_s: float) -> bool:
+        """Compare a stance time with the last ones, valid or not, and remember it."""
+        usual = sorted(self._stances)[len(self._stances) // 2] if len(self._stances) > 1 else None
+        if STANCE_MIN_S <= stance_s <= STANCE_MAX_S:
+            self._stances.append(stance_s)
+        return usual is not None and not USUAL_MIN < stance_s / usual < USUAL_MAX

@@ -1,0 +1,141 @@
+"""Which column of a recording is which channel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from rehab.gait.strides import GaitInputError
+
+# A leg's channels as they are called on the command line, in the order of ``LegSamples``.
+CHANNELS = ("force", "moment", "angle", "forward", "position")
+REQUIRED = CHANNELS[:3]
+SIDES = ("left", "right")
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column by name, and the factor that its numbers take to SI units and our signs."""
+
+    name: str
+    factor: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnMap:
+    """The time column [s], and for each measured side the columns of its channels."""
+
+    time: Column
+    legs: dict[str, dict[str, Column]] = field(default_factory=dict)
+
+    @property
+    def columns(self) -> list[Column]:
+        """All columns that a recording needs to have."""
+        return [self.time, *(column for leg in self.legs.values() for column in leg.values())]
+
+    def find_in(self, header: Sequence[str]) -> ColumnMap | None:
+        """Return the part of this map that a header has: the time and whole legs, or None.
+
+        A leg is whole without forward force and position.
+        """
+        legs = {}
+        for side, leg in self.legs.items():
+            there = {channel: column for channel, column in leg.items() if column.name in header}
+            if there.keys() >= set(REQUIRED):
+                legs[side] = there
+        return ColumnMap(self.time, legs) if legs and self.time.name in header else None
+
+
+def _moore_leg(side: str) -> dict[str, Column]:
+    return {
+        "force": Column(f"{side}GRF_y"),
+        "moment": Column(f"{side}AnklePlantarFlexionMoment"),
+        "angle": Column(f"{side}AnklePlantarFlexionAngle"),
+        "forward": Column(f"{side}GRF_x"),
+        "position": Column(f"{side}Foot_x"),
+    }
+
+
+def _own_leg(side: str) -> dict[str, Column]:
+    names = ("force_n", "moment_nm", "angle_rad", "forward_n", "position_m")
+    return {
+        channel: Column(f"{side}_{name}") for channel, name in zip(CHANNELS, names, strict=True)
+    }
+
+
+SIGNAL_LAYOUTS = {
+    # What our sources send and keep.
+    "garry": ColumnMap(Column("time_s"), {side: _own_leg(side) for side in SIDES}),
+    # Moore, Hnat, van den Bogert 2015 (PeerJ 3:e918), as written by their GaitAnalysisToolKit.
+    "moore2013": ColumnMap(
+        Column("time"), {"left": _moore_leg("Left"), "right": _moore_leg("Right")}
+    ),
+}
+
+
+def read_column_map(pairs: Sequence[str]) -> ColumnMap:
+    """Return the map that command-line pairs such as ``left.angle=ANK_L*0.01745`` describe.
+
+    Parameters
+    ----------
+    pairs
+        ``time=COLUMN`` and ``SIDE.CHANNEL=COLUMN``; ``COLUMN*FACTOR`` changes unit or sign.
+
+    Raises
+    ------
+    GaitInputError
+        With the cure, for pairs of another form and for too few to measure a leg with.
+    """
+    time: Column | None = None
+    legs: dict[str, dict[str, Column]] = {}
+    for pair in pairs:
+        channel, _, text = pair.partition("=")
+        side, _, what = channel.partition(".")
+        if channel == "time" and text:
+            time = _read_column(text)
+        elif side in SIDES and what in CHANNELS and text:
+            legs.setdefault(side, {})[what] = _read_column(text)
+        else:
+            raise GaitInputError(
+                f"'{pair}' maps no column. Write time=COLUMN and SIDE.CHANNEL=COLUMN with SIDE "
+                f"{' or '.join(SIDES)} and CHANNEL one of {', '.join(CHANNELS)}."
+            )
+    if time is None or not legs:
+        raise GaitInputError("Map the time and at least one leg: time=t left.force=Fz …")
+    for side, leg in legs.items():
+        missing = [channel for channel in REQUIRED if channel not in leg]
+        if missing:
+            raise GaitInputError(
+                f"The {side} leg has no {' and no '.join(missing)}. Map "
+                + " ".join(f"{side}.{channel}=COLUMN" for channel in missing)
+                + "."
+            )
+    return ColumnMap(time, legs)
+
+
+def find_layout(header: Sequence[str]) -> ColumnMap:
+    """Return the known layout whose time and whole legs a header has.
+
+    Raises
+    ------
+    GaitInputError
+        Naming the known layouts, where none fits.
+    """
+    for layout in SIGNAL_LAYOUTS.values():
+        columns = layout.find_in(header)
+        if columns is not None:
+            return columns
+    raise GaitInputError(
+        f"The columns fit no known layout ({', '.join(SIGNAL_LAYOUTS)}). Say which is which with "
+        "--columns time=… left.force=… left.moment=… left.angle=…"
+    )
+
+
+def _read_column(text: str) -> Column:
+    name, star, factor = text.rpartition("*")
+    if not star:
+        return Column(text)
+    try:
+        return Column(name, float(factor))
+    except ValueError:
+        return Column(text)

@@ -1,0 +1,266 @@
+"""Whether signals are what they should be, told plainly to the therapist during baseline."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rehab.gait.one_leg import GRAVITY_M_S2, OFFSET_N
+from rehab.gait.online import StrideDetector
+from rehab.gait.selfcheck.cures import CURES
+from rehab.gait.selfcheck.lag import DECELERATION_S, PERSON_TOLERANCE_S, find_deceleration_peak
+from rehab.gait.signals.filters import Floats
+from rehab.gait.signals.samples import LegSamples
+from rehab.gait.stances.continuity import RATE_TOLERANCE
+from rehab.gait.strides import Stride
+from rehab.gait.two_legs import SUPPORTED_BELOW, TwoLegDetector
+
+OFTEN = 0.2  # of the strides; what is wrong with fewer is the walker's, not the set-up's
+WEIGHT_ABOVE = 1.05  # shoes and instrumentation weigh up to 3 % (moore2013)
+USUAL_LOAD = (0.42, 0.58)  # of body weight on one leg; 0.52 on each of moore2013's
+OWN_TOLERANCE_S = 0.003  # against the person's own mark
+USUAL_MOMENT = (0.8, 2.0)  # Nm/kg, healthy (docs/reference/gait.md#usual-values)
+USUAL_A2 = (0.3, 7.0)  # W/kg (docs/reference/gait.md#usual-values)
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something to put right before training.
+
+    Attributes
+    ----------
+    code, message
+        What it is, for programs, and the cure, for people.
+    side
+        None where it concerns both legs.
+    """
+
+    code: str
+    message: str
+    side: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SignalCheck:
+    """Result of a self-check.
+
+    Attributes
+    ----------
+    findings
+        What to put right; empty if nothing.
+    strides, valid
+        How many strides were seen, and how many of them are valid.
+    rate_hz
+        Median rate of the samples.
+    weight_ratio
+        Median force of both plates by body weight; None with one leg.
+    lag_s, deceleration_s
+        By how much the angles come later than the forces [s] (mean of the legs), and when each
+        ankle brakes hardest after terminal contact [s] (``find_deceleration_peak``), by side. Keep
+        ``deceleration_s`` of a session whose synchronization was measured: given as
+        ``own_deceleration_s``, it reduces the uncertainty of later checks of that person from 8 to
+        3 ms.
+    """
+
+    findings: tuple[Finding, ...]
+    strides: int
+    valid: int
+    rate_hz: float
+    weight_ratio: float | None
+    lag_s: float | None
+    deceleration_s: dict[str, float | None]
+
+    @property
+    def is_good(self) -> bool:
+        """Whether there is nothing to put right."""
+        return not self.findings
+
+
+def check_signals(
+    t_s: ArrayLike,
+    left: LegSamples | Sequence[ArrayLike] | None,
+    right: LegSamples | Sequence[ArrayLike] | None,
+    *,
+    rate_hz: float,
+    mass_kg: float,
+    own_deceleration_s: dict[str, float] | None = None,
+) -> SignalCheck:
+    """Return the check of signs, units, weight and force–kinematics lag of half a minute or more.
+
+    Parameters
+    ----------
+    t_s, left, right
+        As for ``TwoLegDetector.feed``; a leg that is not measured is None.
+    rate_hz, mass_kg
+        As for ``TwoLegDetector``.
+    own_deceleration_s
+        ``deceleration_s`` of an earlier check of this person, by side.
+
+    Raises
+    ------
+    GaitInputError
+        For settings or channels that nothing can be measured from.
+    """
+    time = np.asarray(t_s, dtype=np.float64)
+    legs = {"left": left, "right": right}
+    given = {side: LegSamples(*leg) for side, leg in legs.items() if leg is not None}
+    if len(given) == 2:
+        both = TwoLegDetector(rate_hz, mass_kg)
+        strides = both.feed(time, given["left"], given["right"])
+    else:
+        strides = []
+        for side, leg in given.items():
+            strides += StrideDetector(rate_hz, mass_kg, side=side).feed(time, *leg)
+    findings = _check_rate(time, rate_hz)
+    decelerations: dict[str, float | None] = {}
+    for side, leg in given.items():
+        own = [stride for stride in strides if stride.side == side]
+        force = np.asarray(leg.force_n, dtype=np.float64)
+        found = _check_force(force, own, mass_kg * GRAVITY_M_S2) + _check_strides(own)
+        decelerations[side] = find_deceleration_peak(time, leg.angle_rad, own)
+        findings += [Finding(code, message, side) for code, message in found]
+    ratios = [s.weight_ratio for s in strides if s.weight_ratio is not None]
+    ratio = float(np.median(ratios)) if ratios else None
+    findings += _check_weight(ratio, mass_kg)
+    if len(given) == 1:
+        ((side, leg),) = given.items()
+        findings += _check_load(
+            _compute_mean_load(time, leg, strides) / GRAVITY_M_S2, mass_kg, side
+        )
+    lag_s = _find_lag(decelerations, own_deceleration_s)
+    findings += _check_lag(lag_s, OWN_TOLERANCE_S if own_deceleration_s else PERSON_TOLERANCE_S)
+    return SignalCheck(
+        findings=tuple(findings),
+        strides=len(strides),
+        valid=sum(stride.valid for stride in strides),
+        rate_hz=_find_rate(time),
+        weight_ratio=ratio,
+        lag_s=lag_s,
+        deceleration_s=decelerations,
+    )
+
+
+def _find_rate(time: Floats) -> float:
+    steps = np.diff(time[np.isfinite(time)])
+    steps = steps[steps > 0]
+    return float(1 / np.median(steps)) if len(steps) else 0.0
+
+
+def _check_rate(time: Floats, rate_hz: float) -> list[Finding]:
+    real_hz = _find_rate(time)
+    if abs(real_hz / rate_hz - 1) <= RATE_TOLERANCE:
+        return []
+    message = f"Samples come at {_round(real_hz)} Hz, not {_round(rate_hz)} Hz. "
+    if real_hz < 10:
+        message += "Send the times in seconds, not milliseconds, and let them count on."
+    else:
+        message += "Set the rate that the lab really sends."
+    return [Finding("rate", message)]
+
+
+def _round(rate_hz: float) -> str:
+    return f"{rate_hz:.0f}" if rate_hz >= 10 else f"{rate_hz:.2g}"
+
+
+def _check_force(force: Floats, strides: list[Stride], weight_n: float) -> list[tuple[str, str]]:
+    """Check the force itself, where no strides or no usable ones come of it."""
+    finite = force[np.isfinite(force)]
+    if not len(finite):
+        return [("force_lost", "No vertical force arrives. Look at the plate and its channel.")]
+    low, high = np.percentile(finite, [1, 99]).tolist()
+    if -low > high and -low > 0.3 * weight_n:
+        return [("force_sign", "The vertical force has the wrong sign. Turn it: up is positive.")]
+    if high < 0.01 * weight_n and high - low > 0.0002 * weight_n:
+        return [("force_unit", f"The vertical force reaches only {high:.2g} N. Send newtons, not "
+                 "kilonewtons, and check that the plate is on.")]  # fmt: skip
+    if high > 5 * weight_n:
+        return [("force_unit", f"The vertical force reaches {high:.2g} N. Send newtons, not "
+                 "millinewtons, and check the body mass.")]  # fmt: skip
+    if not strides:
+        return [("no_strides", "No stride was seen. Walk for half a minute, and check that the "
+                 "plate is on and zeroed.")]  # fmt: skip
+    offset = strides[-1].offset_n
+    if abs(offset) > OFFSET_N:
+        return [("offset", f"The plate reads {offset:.0f} N while the foot swings. Zero it: the "
+                 "contacts are corrected for it, the lab's moment is not.")]  # fmt: skip
+    return []
+
+
+def _check_strides(strides: list[Stride]) -> list[tuple[str, str]]:
+    counts = Counter(reason for stride in strides for reason in stride.reasons)
+    found = [
+        (str(reason), CURES[reason])
+        for reason, count in counts.most_common()
+        if reason in CURES and count > OFTEN * len(strides)
+    ]
+    good = [stride for stride in strides if stride.valid]
+    if found or not good:
+        return found
+    moment = float(np.median([s.moment_peak_nm_kg or 0.0 for s in good]))
+    a2 = float(np.median([s.a2_w_kg or 0.0 for s in good]))
+    if not USUAL_MOMENT[0] <= moment <= USUAL_MOMENT[1]:
+        found.append(("moment_unusual", f"The ankle moment peaks at {moment:.2f} Nm/kg; usual are "
+                      "0.8 to 2.0. Right for a weak leg; else check unit and mass."))  # fmt: skip
+    if not USUAL_A2[0] <= a2 <= USUAL_A2[1]:
+        found.append(("a2_unusual", f"A2 is {a2:.2f} W/kg; usual are 0.3 to 7. Right for a weak "
+                      "leg; else check units and mass."))  # fmt: skip
+    return found
+
+
+def _check_weight(ratio: float | None, mass_kg: float) -> list[Finding]:
+    if ratio is None or SUPPORTED_BELOW <= ratio <= WEIGHT_ABOVE:
+        return []
+    message = f"The plates carry {ratio * 100:.0f} % of {mass_kg:g} kg. Check the body mass"
+    if ratio < 1:
+        message += "; if it is right, a handrail or harness carries the rest, and A2 is lower"
+    return [Finding("weight", message + ".")]
+
+
+def _compute_mean_load(time: Floats, leg: LegSamples, strides: list[Stride]) -> float:
+    """Return the median of a plate's mean force over whole strides [N], NaN without one."""
+    force = np.asarray(leg.force_n, dtype=np.float64)
+    means = []
+    for stride in strides:
+        if stride.stride_s is not None:
+            end_s = stride.initial_contact_s
+            part = slice(*np.searchsorted(time, (end_s - stride.stride_s, end_s)))
+            means.append(force[part].mean() - stride.offset_n)
+    return float(np.median(means)) if means else math.nan
+
+
+def _check_load(load_kg: float, mass_kg: float, side: str) -> list[Finding]:
+    """Check the load of one leg: of the weight it should carry about half."""
+    share = load_kg / mass_kg
+    if not (share < USUAL_LOAD[0] or share > USUAL_LOAD[1]):
+        return []
+    message = (
+        f"The plate carries {share * 100:.0f} % of {mass_kg:g} kg over whole strides; half is "
+        "usual. Right for a leg that is spared or favored; else check the body mass."
+    )
+    return [Finding("weight_unusual", message, side)]
+
+
+def _find_lag(decelerations: dict[str, float | None], own: dict[str, float] | None) -> float | None:
+    """Return the mean lag of the legs [s]: both plates have one clock, both ankles another."""
+    lags = [
+        deceleration_s - (DECELERATION_S if own is None else own[side])
+        for side, deceleration_s in decelerations.items()
+        if deceleration_s is not None and (own is None or side in own)
+    ]
+    return float(np.mean(lags)) if lags else None
+
+
+def _check_lag(lag_s: float | None, tolerance_s: float) -> list[Finding]:
+    if lag_s is None or abs(lag_s) <= tolerance_s:
+        return []
+    order = "later" if lag_s > 0 else "earlier"
+    message = (
+        f"The ankle angle comes about {abs(lag_s) * 1000:.0f} ms {order} than the force; 5 ms "
+        "shift A2 by 6 to 8 %. Synchronize plate and motion capture."
+    )
+    return [Finding("lag", message)]

@@ -1,0 +1,1 @@
+"""Samples as they come: chunks, the buffer of the last seconds, filters."""

@@ -1,0 +1,75 @@
+"""The last seconds of samples, in constant memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rehab.gait.signals.filters import Floats
+
+TIME, FORCE, MOMENT, ANGLE, FORWARD, POSITION = range(6)
+CHANNEL_NAMES = ("force_n", "moment_nm", "angle_rad", "forward_n", "position_m")
+
+
+class SampleBuffer:
+    """The newest samples of one or two legs. Indices count samples since the start.
+
+    Parameters
+    ----------
+    keep
+        How many of the newest samples are certain to be kept; no more may be appended at once.
+    legs
+        How many legs, one or two; ``legs`` of the buffer then are the views of each.
+    """
+
+    def __init__(self, keep: int, legs: int = 1) -> None:
+        self.keep = keep
+        self.end = 0
+        self.first = 0  # the oldest sample that is still there
+        # Time lies between the legs, so that each has its six channels side by side.
+        table = np.full((1 + legs * len(CHANNEL_NAMES), 3 * keep), np.nan)
+        tables = (
+            [table] if legs == 1 else [table[len(CHANNEL_NAMES) :: -1], table[len(CHANNEL_NAMES) :]]
+        )
+        self.legs = [LegBuffer(self, leg) for leg in tables]
+        self._table = table
+        self._rows = [tables[0][TIME], *(row for leg in tables for row in leg[FORCE:])]
+        self._sent = [False] * len(self._rows)  # what never is, stays NaN
+
+    def append(self, chunk: Sequence[Floats | None], count: int) -> None:
+        """Append ``count`` samples of each channel: times, then those of each leg; None for NaN."""
+        begin = self.end - self.first
+        end = begin + count
+        if end > self._table.shape[1]:
+            self._table[:, : self.keep] = self._table[:, begin - self.keep : begin]
+            self.first = self.end - self.keep
+            begin, end = self.keep, self.keep + count
+        for place, values in enumerate(chunk):
+            if values is not None:
+                self._rows[place][begin:end] = values
+                self._sent[place] = True
+            elif self._sent[place]:
+                self._rows[place][begin:end] = np.nan
+        self.end += count
+
+
+class LegBuffer:
+    """One leg's channels in a ``SampleBuffer``."""
+
+    def __init__(self, samples: SampleBuffer, table: Floats) -> None:
+        self.samples = samples
+        self._table: Floats = table
+        self._rows = list(table)
+
+    def view(self, start: int, stop: int) -> Floats:
+        """Return samples ``start:stop`` of all channels, shape (6, samples), without copying."""
+        first = self.samples.first
+        part: Floats = self._table[:, start - first : stop - first]
+        return part
+
+    def channel(self, row: int, start: int, stop: int) -> Floats:
+        """Return samples ``start:stop`` of one channel, shape (samples,), without copying."""
+        first = self.samples.first
+        part: Floats = self._rows[row][start - first : stop - first]
+        return part

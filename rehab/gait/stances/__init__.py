@@ -1,0 +1,1 @@
+"""One stance at a time: resampled, checked, and its push-off measured."""

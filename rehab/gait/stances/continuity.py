@@ -1,0 +1,157 @@
+"""Whether the samples of a stance are continuous: gaps, frozen values, jumps, spikes and steps.
+
+These are faults of sensors and of the way from them; what a person cannot walk is checked in
+``plausibility``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rehab.gait.signals.filters import Floats, find_maximum, find_minimum, find_upper_median
+from rehab.gait.signals.samples import ANGLE, FORCE, MOMENT, TIME
+from rehab.gait.stances.kinetics import PushOff
+from rehab.gait.stances.resampling import ResampledStance
+from rehab.gait.strides import RejectionReason
+
+GAP_S = 0.05  # bridged by a straight line up to here (docs/reference/gait.md#time-base)
+RATE_TOLERANCE = 0.2
+# One value for so long is no measurement. The moment changes all through stance; the angle rests
+# where the ankle turns, but not to the last digit.
+FROZEN_S = {MOMENT: 0.02, ANGLE: 0.04}
+MOMENT_JUMP = (0.15, 40.0)  # Nm/kg at once, and Nm/kg/s; walking reaches 20
+ANGLE_JUMP = (0.05, 15.0)  # rad at once, and rad/s; walking reaches 8
+VELOCITY_JUMP = (5.0, 400.0)  # rad/s, where velocities are sent
+
+# Spikes and steps are looked for h = 10 ms apart: in the angle by its bend, x(t−h) − 2x(t) +
+# x(t+h); in the moment, which falls steeply, by the change of its distance from its own smooth
+# curve. Of both a walker makes less than k × range × (h / stance)², since the curves of walkers
+# differ in size and in the time that they take more than in form: where nothing was wrong, k was
+# 150 at most for the angle and 110 for the moment (both legs of moore2013; synthetic people, 0.3 to
+# 6.5 W/kg). Beside it: a little, and so many times the median, for the sensor's noise.
+APART_S = 0.01
+ANGLE_BEND = (160.0, 0.008, 6.0)  # rad
+MOMENT_STEP = (110.0, 0.02, 6.0)  # Nm/kg
+LOOK_FROM = 0.3  # of stance. What comes before is too far from push-off to change it
+MOMENT_TO_S = 0.02  # before its end; a moment that labs make from the force ends with a step
+
+
+def check_samples(
+    window: Floats, stance: int, rate_hz: float, mass_kg: float, is_velocity: bool
+) -> list[RejectionReason]:
+    """Return what is wrong with the samples of a stance, before anything is measured from them.
+
+    Parameters
+    ----------
+    window
+        Shape (channels, n): time, force, moment, angle, …
+    stance
+        The sample at which the stance begins.
+    rate_hz, mass_kg
+        Nominal rate, and body mass.
+    is_velocity
+        Whether the angle is a velocity [rad/s].
+    """
+    rows = slice(TIME, ANGLE + 1)
+    steps = window[rows, stance + 1 :] - window[rows, stance:-1]
+    low, high = steps.min(axis=1).tolist(), steps.max(axis=1).tolist()
+    if not low[TIME] > 0:
+        return [RejectionReason.TIME_BACKWARDS]
+    reasons = []
+    gap_s = high[TIME]
+    if gap_s > max(GAP_S, 2.5 / rate_hz):
+        reasons.append(RejectionReason.GAP)
+    else:
+        taken_s = float(window[TIME, -1] - window[TIME, stance])
+        if abs(steps.shape[1] / (taken_s * rate_hz) - 1) > RATE_TOLERANCE:
+            reasons.append(RejectionReason.RATE)
+    for row, scale, (at_once, by_time), reason in (
+        (MOMENT, mass_kg, MOMENT_JUMP, RejectionReason.MOMENT_LOST),
+        (ANGLE, 1.0, VELOCITY_JUMP if is_velocity else ANGLE_JUMP, RejectionReason.ANGLE_LOST),
+    ):
+        jump = max(high[row], -low[row])
+        if not math.isfinite(jump):  # some are missing
+            time, values = window[TIME, stance:], window[row, stance:]
+            known = np.flatnonzero(np.isfinite(values))
+            if _has_gap(time, known):
+                reasons.append(reason)
+                continue
+            values = values[known]
+            moved = np.diff(values)
+            jump = find_maximum(np.abs(moved))
+        else:
+            values, moved = window[row, stance:], steps[row]
+        limit = scale * (at_once + by_time * max(gap_s, 1 / rate_hz))
+        if jump > limit or _is_frozen(values, moved, FROZEN_S[row] * rate_hz):
+            reasons.append(reason)
+    return reasons
+
+
+def check_steps(
+    stance: ResampledStance, push_off: PushOff, gap_s: float, is_velocity: bool
+) -> list[RejectionReason]:
+    """Return which channels of a stance have a spike or a step where it changes push-off.
+
+    Parameters
+    ----------
+    stance
+        With moment and angle.
+    push_off
+        What was measured of the stance.
+    gap_s
+        Longest time between two samples: over it, a straight line stands for the walker's curve.
+    is_velocity
+        Whether the angle is a velocity [rad/s]; it is not checked then.
+    """
+    apart = max(1, round(APART_S * stance.rate_hz))
+    apart_s = apart / stance.rate_hz
+    duration_s = stance.end_s - stance.begin_s
+    walking = apart_s * max(apart_s, (apart_s + gap_s) / 2) / duration_s**2
+    first = stance.index(LOOK_FROM)
+    last = stance.end + 1 - round(MOMENT_TO_S * stance.rate_hz)
+    angle = stance.signals[ANGLE - FORCE, first:]
+    if last - first <= apart or len(angle) <= 2 * apart:
+        return []
+    reasons = []
+    moment = push_off.moment_nm_kg[first:last]
+    rough = stance.signals[MOMENT - FORCE, first:last] / push_off.mass_kg - moment
+    steps = np.abs(rough[apart:] - rough[:-apart])
+    if _is_discontinuous(
+        steps, walking * (find_maximum(moment) - find_minimum(moment)), *MOMENT_STEP
+    ):
+        reasons.append(RejectionReason.MOMENT_LOST)
+    bends = np.abs(angle[2 * apart :] - 2 * angle[apart:-apart] + angle[: -2 * apart])
+    if not is_velocity and _is_discontinuous(
+        bends, walking * (find_maximum(angle) - find_minimum(angle)), *ANGLE_BEND
+    ):
+        reasons.append(RejectionReason.ANGLE_LOST)
+    return reasons
+
+
+def _is_discontinuous(
+    found: Floats, walking: float, by_walking: float, at_once: float, by_noise: float
+) -> bool:
+    """Return whether the largest change exceeds what walking and noise can make."""
+    highest, limit = find_maximum(found), by_walking * walking + at_once
+    return highest > limit and highest > limit + by_noise * find_upper_median(found)
+
+
+def _has_gap(time_s: Floats, known: NDArray[np.intp]) -> bool:
+    """Return whether more is missing than may be bridged, given the indices of what is known."""
+    if len(known) < 2 or known[-1] < len(time_s) - 1:
+        return True
+    holes = np.diff(time_s[known]).max()
+    return bool(max(holes, time_s[known[0]] - time_s[0]) > GAP_S)
+
+
+def _is_frozen(values: Floats, steps: Floats, longest: float) -> bool:
+    """Return whether a channel repeats one value, not zero, for more than ``longest`` samples."""
+    still = steps == 0
+    if not still.any():
+        return False
+    still &= values[1:] != 0
+    edges = np.concatenate(([-1], np.flatnonzero(~still), [len(still)]))
+    return bool(np.diff(edges).max() - 1 >= max(2, longest))

@@ -1,0 +1,180 @@
+"""Whether a person can have walked a stance: physiological limits, and channels that must agree.
+
+The comments of the limits name their sources.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rehab.gait.signals.filters import Floats, find_maximum, find_minimum, find_upper_median
+from rehab.gait.stances.kinetics import PushOff
+from rehab.gait.stances.resampling import ResampledStance
+from rehab.gait.strides import RejectionReason
+
+STANCE_MIN_S = 0.2
+STANCE_MAX_S = 2.2  # 0.3 m/s after a stroke: strides of up to 2.5 s with 75-80 % stance
+# A force that falls from half the body weight to nothing in 20 ms was cut off: unloading takes
+# 110 ms and more (Moore 2013: half the weight is left 50 ms before terminal contact).
+CUT_S = 0.02
+CUT_SHARE = 0.5
+FORCE_MAX = 2.0  # of body weight; fast walking reaches 1.5
+# Mean force of one plate over a cycle, by body weight, where the other plate is not known: half of
+# what two may carry (``legs``) and, as the sound leg carries more after a stroke (60 ± 7 % when
+# standing, PMC4777057), rather more than half of the weight. Pounds for kilograms give 0.23.
+LOAD_MIN, LOAD_MAX = 0.25, 0.75
+# Nm/kg. Healthy people reach 0.8-2.0 (docs/reference/gait.md#usual-values), after a stroke 0.3; a
+# fast runner 3.5.
+MOMENT_MIN = 0.1  # below, the force passes within 1 cm of the ankle all through stance
+MOMENT_MAX = 3.5
+MOMENT_SWING = 0.4  # of the stance's peak, at any moment of the swing before
+MOMENT_DRIFT = 0.08  # Nm/kg, for most of that swing; the foot's weight alone gives 0.03
+LEVER_MAX_M = 0.3  # moment by force in late stance: ankle to toes are 0.16 (moore2013) to 0.23
+LEVER_FROM = 0.7  # of stance
+LEVER_FORCE = 0.15  # of body weight
+# As the heel rises the force goes forward under the foot, so that its lever, when 30 % of the force
+# are left, is that at the peak of the moment or longer: 1.0 to 1.25 of it (moore2013). A moment
+# that comes 30 ms early has 0.4 to 0.7, one that comes 50 ms late 1.5 to 2.2.
+LEAVING_SHARE = 0.3
+LEVER_CHANGE = (0.45, 2.5)
+# rad. A stiff ankle in an orthosis moves by 0.05, a free one by 0.4-0.6 in stance.
+ANGLE_RANGE_MIN = 0.02
+ANGLE_RANGE_MAX = 1.6
+A2_MAX = 12.0  # W/kg: 2 Nm/kg at 6 rad/s
+PEAK_FROM = 0.6  # of stance. Push-off peaks at 0.88-0.90 of it; what peaks earlier is none
+REVERSED_SHARE = 0.5  # of the peak; an ankle that pushed does not brake so much before it leaves
+# A foot that leaves the floor has been plantarflexing, or resting, to the last: there the ankle
+# turns 1.1 to 1.9 times as fast as at A2 (moore2013). The other leg's rolls over its foot by then.
+BACKWARD_RAD_S = (0.05, 0.5)
+BACKWARD_SHARE = 0.1  # of the velocity at A2, between these limits
+BACKWARD_S = 0.04
+SWING_S = 0.03  # before initial contact; later, the filter has some of the stance
+
+
+def check_force(
+    force_n: Floats, peak_n: float, weight_n: float, rate_hz: float
+) -> list[RejectionReason]:
+    """Return what is wrong with the vertical force of a stance.
+
+    Parameters
+    ----------
+    force_n
+        Above the plate's zero [N], from contact to contact, shape (n,).
+    peak_n, weight_n
+        Its peak, and body weight [N].
+    rate_hz
+        Of the samples.
+    """
+    reasons = []
+    tail = force_n[-max(2, round(CUT_S * rate_hz) + 1) : -1]
+    if not np.isfinite(force_n).all() or (len(tail) and tail[0] > CUT_SHARE * weight_n):
+        reasons.append(RejectionReason.FORCE_LOST)
+    if peak_n > FORCE_MAX * weight_n:
+        reasons.append(RejectionReason.FORCE_TOO_LARGE)
+    return reasons
+
+
+def check_load(load: float) -> list[RejectionReason]:
+    """Return what is wrong with the mean force of one plate over a cycle, by body weight."""
+    return [RejectionReason.WEIGHT] if load < LOAD_MIN or load > LOAD_MAX else []  # neither, if NaN
+
+
+def check_lever(stance: ResampledStance, offset_n: float, weight_n: float) -> list[RejectionReason]:
+    """Return what is wrong with a moment, given the force that it should come from.
+
+    Parameters
+    ----------
+    stance
+        With force and moment.
+    offset_n, weight_n
+        The plate's zero, and body weight [N].
+    """
+    half = stance.index(0.5)
+    late = slice(half, stance.end + 1)
+    force, moment = stance.signals[0, late] - offset_n, stance.signals[1, late]
+    toes = stance.index(LEVER_FROM) - half
+    loaded = force[toes:] > LEVER_FORCE * weight_n
+    if (loaded & (moment[toes:] > LEVER_MAX_M * force[toes:])).any():
+        return [RejectionReason.MOMENT_OUT_OF_STEP]
+    leaving = np.flatnonzero(force > LEAVING_SHARE * find_maximum(force))
+    if not len(leaving):  # there is no force, or not all of it
+        return []
+    lever_m = _find_lever(force, moment, int(moment.argmax()))
+    last_m = _find_lever(force, moment, int(leaving[-1]))
+    low, high = LEVER_CHANGE
+    # A moment that is not positive then is judged by others.
+    if lever_m > 0 and not low * lever_m <= last_m <= high * lever_m:
+        return [RejectionReason.MOMENT_OUT_OF_STEP]
+    return []
+
+
+def _find_lever(force_n: Floats, moment_nm: Floats, at: int) -> float:
+    """Return the lever of the force about the ankle at a sample and its neighbors [m]."""
+    part = slice(max(0, at - 1), at + 2)
+    moment: float = sum(moment_nm[part].tolist())
+    force: float = sum(force_n[part].tolist())
+    return moment / force
+
+
+def check_push_off(
+    push_off: PushOff, stance: ResampledStance, is_velocity: bool
+) -> list[RejectionReason]:
+    """Return what is wrong with the push-off of a stance.
+
+    Parameters
+    ----------
+    push_off
+        What was measured of the stance.
+    stance
+        The stance itself.
+    is_velocity
+        Whether its angle is a velocity [rad/s].
+    """
+    reasons = []
+    begin, end = stance.begin, stance.end
+    highest, lowest = (
+        push_off.moment_peak_nm_kg,
+        find_minimum(push_off.moment_nm_kg[begin : end + 1]),
+    )
+    if highest < -lowest:
+        reasons.append(RejectionReason.MOMENT_SIGN)
+    elif highest < MOMENT_MIN:
+        reasons.append(RejectionReason.MOMENT_TOO_SMALL)
+    elif highest > MOMENT_MAX:
+        reasons.append(RejectionReason.MOMENT_TOO_LARGE)
+    swing = np.abs(push_off.moment_nm_kg[: max(0, begin - round(SWING_S * stance.rate_hz))])
+    if len(swing):
+        usual = find_upper_median(swing)
+        if usual > MOMENT_DRIFT or find_maximum(swing) > MOMENT_SWING * highest:
+            reasons.append(RejectionReason.MOMENT_IN_SWING)
+    reasons += _check_motion(push_off, stance, is_velocity)
+    peak_w_kg = push_off.a2_w_kg
+    share = (push_off.a2_time_s - stance.begin_s) / (stance.end_s - stance.begin_s)
+    if peak_w_kg <= 0 or share < PEAK_FROM or push_off.peak >= end:
+        reasons.append(RejectionReason.NO_PUSH_OFF)
+    elif find_minimum(push_off.power_w_kg[push_off.peak : end + 1]) < -REVERSED_SHARE * peak_w_kg:
+        reasons.append(RejectionReason.POWER_REVERSED)
+    if not peak_w_kg <= A2_MAX:
+        reasons.append(RejectionReason.OUT_OF_BOUNDS)
+    return reasons
+
+
+def _check_motion(
+    push_off: PushOff, stance: ResampledStance, is_velocity: bool
+) -> list[RejectionReason]:
+    begin, end = stance.begin, stance.end
+    reasons = []
+    angle = push_off.angle_rad[begin : end + 1]
+    highest, lowest = find_maximum(angle), find_minimum(angle)
+    # Of velocities, the fastest: a swing of 0.1 s.
+    moved = max(highest, -lowest) / 10 if is_velocity else highest - lowest
+    if moved < ANGLE_RANGE_MIN:
+        reasons.append(RejectionReason.ANGLE_FLAT)
+    elif moved > ANGLE_RANGE_MAX:
+        reasons.append(RejectionReason.ANGLE_TOO_LARGE)
+    last = end - round(BACKWARD_S * stance.rate_hz)
+    backward = -find_minimum(push_off.velocity_rad_s[last : end + 1])
+    least, most = BACKWARD_RAD_S
+    if backward > min(most, max(least, BACKWARD_SHARE * push_off.a2_velocity_rad_s)):
+        reasons.append(RejectionReason.ANGLE_OUT_OF_STEP)
+    return reasons

@@ -1,0 +1,195 @@
+"""Follows the sessions of a station as the server reports them: no sockets, no waiting."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rehab.sources.client.live import LiveFeed
+from rehab.sources.client.playback import StridePlayback
+from rehab.sources.client.step_queue import StepQueue
+from rehab.training.changes import ENDED_STATES, State
+from rehab.training.measures import InvalidSetting
+from rehab.training.phases import Phase, make_phase
+from rehab.training.steps import Side
+from robot.link import NOT_PROTOCOL, LinkRefused, Message
+
+
+class SessionFollower:
+    """Lets the feed play and the queue send as the session requires.
+
+    Parameters
+    ----------
+    feed
+        Plays while the session runs.
+    queue
+        Keeps the strides that the server may not have stored.
+    stay
+        Whether to go on with the station's later sessions.
+    on_ack
+        Called with session and number of each acknowledgment.
+    notify
+        Called with lines for the person who runs the source.
+
+    Attributes
+    ----------
+    state, goal, unit
+        Of the session, as last reported.
+    is_welcome
+        Whether the server has sent its welcome on this connection.
+    is_over
+        Whether nothing more will come.
+    acknowledged, lost
+        How many strides are stored, and how many were not when their session ended.
+    """
+
+    def __init__(
+        self,
+        feed: StridePlayback | LiveFeed,
+        queue: StepQueue,
+        *,
+        stay: bool,
+        on_ack: Callable[[int, int], None],
+        notify: Callable[[str], None],
+    ) -> None:
+        self.state: str | None = None
+        self.goal: float | None = None
+        self.unit = ""
+        self.is_welcome = self.is_over = False
+        self.acknowledged = self.lost = 0
+        self._feed, self._queue = feed, queue
+        self._stay, self._on_ack, self._notify = stay, on_ack, notify
+
+    @property
+    def may_send(self) -> bool:
+        """Whether the server would take the next stride."""
+        if not self.is_welcome or not self._queue.can_send:
+            return False
+        # What was walked before a pause waits for its end: a paused session would not count it.
+        during_pause = self.state == State.PAUSED and self._queue.next_is_paused
+        return self.state == State.RUNNING or during_pause
+
+    @property
+    def is_done(self) -> bool:
+        """Whether the strides are over and stored, or the session is over."""
+        has_walked = self._queue.session is not None and self._feed.is_over
+        all_stored = has_walked and not self._queue.unacknowledged
+        return self.is_over or (all_stored and not self._stay)
+
+    def handle(self, message: Message) -> None:
+        """Follow a message of the server. Raises LinkRefused where it is not the protocol's."""
+        match message["type"]:
+            case "welcome":
+                self._join(message)
+            case "ack":
+                self._acknowledge(_read(message, "number", int))
+            case "start" | "resume":
+                self._enter(State.RUNNING)
+            case "pause":
+                self._enter(State.PAUSED)
+            case "stop":
+                self.leave()
+            case "goal":
+                self.goal = _read_goal(message)
+            case "phase":
+                self._feed.phase = self._read_phase(message)
+            case "error":
+                self._notify(str(message.get("message", "The server reports an error.")))
+                if message.get("code") == "not_running" and self.state == State.RUNNING:
+                    self._queue.rewind()
+                    self._enter(State.READY)
+
+    def _join(self, message: Message) -> None:
+        self.is_welcome = True
+        session = message.get("session")
+        is_open = session is not None and message.get("state") not in ENDED_STATES
+        if self._queue.session is not None and not (is_open and session == self._queue.session):
+            self.leave()  # it ended while the server was out of reach
+        if self.is_over:
+            return
+        if not is_open:
+            self._notify("No session is open at this station. Waiting for one.")
+            return
+        is_new = session != self._queue.session
+        self._queue.join(_read(message, "session", int), _read(message, "next", int))
+        self.goal = _read_goal(message)
+        self.unit = str(message.get("unit", ""))
+        self._feed.phase = self._read_phase(message)
+        if is_new:
+            self._begin_walk(message)
+        self._enter(_read(message, "state", str))
+
+    def _begin_walk(self, message: Message) -> None:
+        try:
+            side = Side(message.get("trained_side", Side.LEFT))
+        except ValueError:
+            raise _misunderstood(message) from None
+        self._feed.start_session(side, _read(message, "next", int) - 1)
+        self._notify(f"Joined session {self._queue.session}.")
+
+    def _enter(self, state: str) -> None:
+        if self._queue.session is None:
+            return
+        if state != self.state:
+            self._notify(f"Session {self._queue.session} is {state}.")
+        self.state = state
+        if state == State.RUNNING:
+            self._feed.resume()
+        else:
+            self._feed.pause()
+
+    def leave(self) -> None:
+        """Leave a session that has ended, and drop the strides that it does not have."""
+        session, lost = self._queue.session, self._queue.leave()
+        self.state = None
+        self._feed.end_session()
+        self.lost += lost
+        self.is_over = not self._stay
+        if session is not None:
+            rest = f" without the last {lost} strides" if lost else ""
+            self._notify(f"Session {session} has ended{rest}.")
+
+    def _acknowledge(self, number: int) -> None:
+        before = self._queue.unacknowledged
+        self._queue.acknowledge(number)
+        self.acknowledged += before - self._queue.unacknowledged
+        if self._queue.session is not None:
+            self._on_ack(self._queue.session, number)
+
+    def _read_phase(self, message: Message) -> Phase:
+        """Return the phase in a message; training where the server sends none."""
+        told = message.get("phase")
+        if not isinstance(told, dict):
+            return make_phase("training")
+        try:
+            return make_phase(
+                told["kind"],
+                str(told.get("name", "")),
+                feedback=told.get("feedback"),
+                gain=float(told.get("gain", 1.0)),
+            )
+        except (InvalidSetting, KeyError, TypeError, ValueError) as problem:
+            self._notify(f"The server told a phase that is not known here ({problem}).")
+            return self._feed.phase
+
+
+def _read(message: Message, name: str, kind: type[Any]) -> Any:
+    """Return a field of a message. Raises LinkRefused where it is missing or of another type."""
+    value = message.get(name)
+    if not isinstance(value, kind):
+        raise _misunderstood(message)
+    return value
+
+
+def _read_goal(message: Message) -> float | None:
+    """Return the goal; None where it is not known yet."""
+    goal = message.get("goal")
+    return goal if isinstance(goal, int | float) else None
+
+
+def _misunderstood(message: Message) -> LinkRefused:
+    return LinkRefused(
+        NOT_PROTOCOL,
+        f"The server sent a {str(message['type'])[:40]!r} that this client does not understand. "
+        "Use the version that fits the server.",
+    )

@@ -1,0 +1,136 @@
+"""Plays strides in time, or as fast as they are acknowledged; knows no sockets and never waits."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+from rehab.sources.client.clock import PlaybackClock
+from rehab.sources.client.step_queue import WINDOW
+from rehab.training.phases import Phase, make_phase
+from rehab.training.steps import Measurement, Side
+
+# Gives the next stride, walked in that phase; None at the end.
+NextStride = Callable[[Phase], Measurement | None]
+
+# Nobody begins the next stride before this much of it has passed
+# (docs/reference/gait.md#plausible-strides): there is time to hear of a new phase.
+STRIDE_MIN_S = 0.5
+# Out of reach of the server somebody may walk on for hours (a day of it takes 80,000 strides).
+KEPT_MAX = 80_000
+
+
+class StridePlayback:
+    """Decides which stride is due, and how long none will be.
+
+    Parameters
+    ----------
+    open_walk
+        Returns the strides of a session that trains a leg.
+    speed
+        1 for true cadence; None for as fast as the server acknowledges.
+    max_unacknowledged
+        How many strides may be unacknowledged before the next is played, where ``speed`` is None.
+    monotonic
+        Our clock [s].
+    resumes
+        Whether to skip the strides that the session has already.
+
+    Attributes
+    ----------
+    phase
+        In which the next stride is walked.
+    """
+
+    def __init__(
+        self,
+        open_walk: Callable[[Side], NextStride],
+        speed: float | None = 1.0,
+        max_unacknowledged: int = WINDOW,
+        monotonic: Callable[[], float] = time.monotonic,
+        *,
+        resumes: bool = False,
+    ) -> None:
+        self._resumes = resumes
+        self.phase = make_phase("training")
+        self._open_walk = open_walk
+        self._clock = PlaybackClock(speed, monotonic)
+        self._max_unacknowledged = max_unacknowledged
+        self._walk: NextStride | None = None
+        self._stride: Measurement | None = None  # begun, not yet due
+        self._last_s: float | None = None  # when the last one was, on the source's clock
+        self._may_walk = False
+
+    @property
+    def speed(self) -> float | None:
+        """How fast its clock runs; None for as fast as possible."""
+        return self._clock.speed
+
+    @property
+    def clock_s(self) -> float | None:
+        """What its clock shows [s]; None while paused, and where strides wait for no clock."""
+        return self._clock.now_s if self._clock.is_running and self.speed is not None else None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the last stride has been played."""
+        return self._walk is None and self._stride is None
+
+    def start_session(self, trained_side: Side, walked: int = 0) -> None:
+        """Begin another walk, paused. ``walked`` strides are in its session already."""
+        self.pause()
+        self._walk = self._open_walk(trained_side)
+        for _ in range(walked if self._resumes else 0):
+            self._walk(self.phase)
+        self._stride = self._last_s = None
+
+    def end_session(self) -> None:
+        """End the walk."""
+        self.pause()
+        self._walk = self._stride = None
+
+    def resume(self) -> None:
+        """Play, or play on."""
+        self._may_walk = True
+        if self._stride is not None or self._last_s is not None:
+            self._clock.start()
+
+    def pause(self) -> None:
+        """Pause, with the clock."""
+        self._may_walk = False
+        self._clock.pause()
+
+    def poll(self, unacknowledged: int) -> Measurement | float:
+        """Return the stride that is due, or how long none will be [s], infinity if unknown.
+
+        ``unacknowledged`` strides are with the caller.
+        """
+        limit = self._max_unacknowledged if self.speed is None else KEPT_MAX
+        if not self._may_walk or unacknowledged >= limit:
+            return math.inf
+        if self._stride is None and self._walk is not None:
+            # The last stride may have ended the phase. What the server knows of that comes no later
+            # than its ack; the next stride is not begun without, unless it takes too long.
+            if unacknowledged and self._last_s is not None:
+                wait_s = self._clock.wait_s(self._last_s + STRIDE_MIN_S)
+                if wait_s > 0:
+                    return wait_s
+            self._begin_stride(self._walk)
+        stride = self._stride
+        if stride is None:
+            return math.inf
+        wait_s = self._clock.wait_s(stride.time_s)
+        if wait_s > 0:
+            return wait_s
+        self._stride, self._last_s = None, stride.time_s
+        return stride
+
+    def _begin_stride(self, walk: NextStride) -> None:
+        self._stride = walk(self.phase)
+        if self._stride is None:
+            self._walk = None
+        elif self._last_s is None:
+            # The first one is due at once, whatever its clock shows.
+            self._clock.set(self._stride.time_s)
+            self._clock.start()

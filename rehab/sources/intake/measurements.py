@@ -1,0 +1,44 @@
+"""Strides of ``rehab.gait`` as measurements, which a source sends."""
+
+from __future__ import annotations
+
+import math
+
+from rehab.gait import Stride
+from rehab.sources.client.step_queue import MAX_REASONS
+from rehab.training.steps import Measurement, Side
+
+# What travels with a step beside its A2, under the names that rehab.gait gives.
+EXTRA = (
+    *("initial_contact_s", "stance_s", "swing_s", "stride_s", "step_s"),
+    *("first_double_support_s", "second_double_support_s"),
+    *("step_length_m", "step_symmetry", "propulsion_n_kg"),
+    *("force_peak_n_kg", "moment_peak_nm_kg", "a2_moment_nm_kg", "a2_velocity_rad_s"),
+    *("weight_ratio", "offset_n"),
+)
+
+
+def to_measurement(stride: Stride, number: int, side: Side) -> Measurement | None:
+    """Return a stride as a measurement: A2 at its terminal contact, other figures as extras.
+
+    ``side`` is for strides whose leg is not named. None for a stride without a time: no clock could
+    place it.
+    """
+    time_s = stride.terminal_contact_s
+    if not math.isfinite(time_s):
+        return None
+    value = stride.a2_w_kg
+    extra = {name: getattr(stride, name) for name in EXTRA}
+    extra |= {f"flag_{flag}": 1.0 for flag in stride.flags}
+    return Measurement(
+        number=number,
+        time_s=time_s,
+        side=side if stride.side is None else Side(stride.side),
+        value=None if value is None or not math.isfinite(value) else value,
+        reasons=tuple(str(reason) for reason in stride.reasons[:MAX_REASONS]),
+        extra={
+            name: float(number)
+            for name, number in extra.items()
+            if number is not None and math.isfinite(number)
+        },
+    )

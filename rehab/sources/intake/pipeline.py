@@ -1,0 +1,169 @@
+"""From samples to strides: finds out rate and legs, then feeds the detectors of ``rehab.gait``."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rehab.gait import (
+    Finding,
+    GaitInputError,
+    LegSamples,
+    Stride,
+    StrideDetector,
+    TwoLegDetector,
+    check_signals,
+)
+from rehab.gait.recordings.columns import REQUIRED, SIDES
+from rehab.gait.settings import RATE_MIN_HZ, check_rate
+from rehab.sources.intake.alignment import Channel, Floats, Samples
+from rehab.sources.reporting import Notify
+
+FIRST_SAMPLES = 100  # show which legs are sent, and how fast
+CHECK_S = 30.0
+
+
+class SignalPipeline:
+    """Measures the strides of one or both legs of a walker.
+
+    Parameters
+    ----------
+    mass_kg
+        Body mass of the walker.
+    rate_hz
+        Samples per second; None to find out.
+    look_ahead_s
+        How long strides wait after terminal contact.
+    notify
+        Called with what has to be put right.
+    """
+
+    def __init__(
+        self, mass_kg: float, rate_hz: float | None, look_ahead_s: float, notify: Notify
+    ) -> None:
+        self.mass_kg = mass_kg
+        self.rate_hz = rate_hz
+        self._look_ahead_s = look_ahead_s
+        self._notify = notify
+        self._held: list[Samples] = []
+        self._detector: TwoLegDetector | StrideDetector | None = None
+        self._sides: tuple[str, ...] = ()
+        self._others: set[str] = set()  # sides that came too late
+        self._checked: list[Samples] | None = []
+
+    def add(self, t_s: Floats, values: dict[Channel, Floats]) -> list[Stride]:
+        """Add samples and return the strides that they complete."""
+        if not len(t_s):
+            return []
+        self._keep_for_check(t_s, values)
+        if self._detector is not None:
+            return self._feed(t_s, values)
+        self._held.append((t_s, values))
+        return self._begin() if sum(len(t) for t, _ in self._held) >= FIRST_SAMPLES else []
+
+    def finish(self) -> list[Stride]:
+        """Return the strides that still wait, once no more samples come."""
+        strides = self._begin() if self._held else []
+        return strides + (self._detector.finish() if self._detector is not None else [])
+
+    def check(self) -> tuple[Finding, ...]:
+        """Return what the self-check of the first half minute found, once; nothing before."""
+        held = self._checked
+        if not held or self.rate_hz is None or held[-1][0][-1] - held[0][0][0] < CHECK_S:
+            return ()
+        self._checked = None
+        t_s = np.concatenate([t for t, _ in held])
+        whole = {
+            channel: np.concatenate([_values(values, channel, len(t)) for t, values in held])
+            for channel in {channel for _, values in held for channel in values}
+        }
+        legs = [_leg(whole, side, t_s) if side in self._sides else None for side in SIDES]
+        return check_signals(
+            t_s, legs[0], legs[1], rate_hz=self.rate_hz, mass_kg=self.mass_kg
+        ).findings
+
+    def _keep_for_check(self, t_s: Floats, values: dict[Channel, Floats]) -> None:
+        if self._checked is None:
+            return
+        if self._checked and not t_s[0] > self._checked[-1][0][-1]:
+            self._checked = []  # the clock went back: what follows is another half minute
+        self._checked.append((t_s, values))
+
+    def _begin(self) -> list[Stride]:
+        """Set up the detectors for the samples that were held, and feed these to them."""
+        held, self._held = self._held, []
+        channels = {channel for _, values in held for channel in values}
+        sides = tuple(s for s in SIDES if all((s, name) in channels for name in REQUIRED))
+        if not sides:
+            missing = sorted({f"{s}.{n}" for s, _ in channels for n in REQUIRED} - {
+                ".".join(channel) for channel in channels
+            })  # fmt: skip
+            self._notify(
+                f"No leg can be measured without {', '.join(missing)}. Send it, or map it."
+            )
+            return []
+        try:
+            rate_hz = self.rate_hz or estimate_rate(
+                np.concatenate([t for t, _ in held])[:FIRST_SAMPLES]
+            )
+            check_rate(rate_hz)
+            self._sides, self.rate_hz = sides, rate_hz
+            if len(sides) == 2:
+                self._detector = TwoLegDetector(
+                    rate_hz, self.mass_kg, look_ahead_s=self._look_ahead_s
+                )
+            else:
+                self._detector = StrideDetector(
+                    rate_hz, self.mass_kg, look_ahead_s=self._look_ahead_s, side=sides[0]
+                )
+        except GaitInputError as problem:
+            self._notify(f"{problem} Times have to be the device's own, in seconds.")
+            return []
+        legs = " and ".join(sides)
+        self._notify(f"Signals of the {legs} leg come at {self.rate_hz:.0f} Hz.")
+        return [stride for t, values in held for stride in self._feed(t, values)]
+
+    def _feed(self, t_s: Floats, values: dict[Channel, Floats]) -> list[Stride]:
+        late = {side for side, _ in values} - set(self._sides) - self._others
+        if late:
+            self._others |= late
+            self._notify(
+                f"Signals of the {' and '.join(sorted(late))} leg came too late to be measured. "
+                "Start this source again while both legs send."
+            )
+        if isinstance(self._detector, TwoLegDetector):
+            return self._detector.feed(t_s, *(_leg(values, side, t_s) for side in SIDES))
+        assert self._detector is not None  # noqa: S101 (set by _begin)
+        return self._detector.feed(t_s, *_leg(values, self._sides[0], t_s))
+
+
+def estimate_rate(t_s: Floats) -> float:
+    """Return the rate of samples [Hz] by their times, gaps excluded. Raises GaitInputError."""
+    steps = np.diff(t_s)
+    steps = steps[steps > 0]
+    if not len(steps):
+        raise GaitInputError("The times of the samples do not go on.")
+    usual_s = float(np.sort(steps)[len(steps) // 2])  # one of them, not between two
+    usual = steps[np.abs(steps - usual_s) < 0.5 * usual_s]
+    if len(usual) <= len(steps) / 2:
+        raise GaitInputError("The times of the samples tell no rate. Give it with --rate.")
+    # Their mean: jitter adds up to nothing, and A2 is as wrong as the rate.
+    rate_hz = float(1 / usual.mean())
+    if rate_hz < RATE_MIN_HZ / 100:
+        raise GaitInputError(
+            f"Samples lie {1 / rate_hz:g} s apart by their own times: milliseconds? Send seconds, "
+            "or map the time with a factor (--columns time=t*0.001 …)."
+        )
+    whole_hz = float(round(rate_hz)) or 1.0
+    return whole_hz if abs(rate_hz / whole_hz - 1) < 0.001 else rate_hz
+
+
+def _values(values: dict[Channel, Floats], channel: Channel, count: int) -> Floats:
+    found = values.get(channel)
+    return np.full(count, np.nan) if found is None else found
+
+
+def _leg(values: dict[Channel, Floats], side: str, t_s: Floats) -> LegSamples:
+    """Return a leg's channels; NaN for a required one that these samples lack."""
+    force, moment, angle = (_values(values, (side, name), len(t_s)) for name in REQUIRED)
+    optional = values.get((side, "forward")), values.get((side, "position"))
+    return LegSamples(force, moment, angle, *optional)

@@ -1,0 +1,58 @@
+"""Raw signals recorded beside the session, on this machine only."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from rehab.gait.recordings.columns import SIGNAL_LAYOUTS
+from rehab.sources.intake.alignment import Channel, Floats
+from rehab.sources.reporting import Notify, SourceError
+
+
+class SignalRecorder:
+    """Records samples in SI units as CSV, in the layout ``garry`` of ``rehab.gait``.
+
+    The first samples define the channels; a channel that comes later is not written. A full disk
+    ends the file, not the session.
+    """
+
+    def __init__(self, path: Path, notify: Notify) -> None:
+        self.path = path
+        self._notify = notify
+        self._channels: list[Channel] = []
+        self._file: TextIO | None
+        try:
+            self._file = path.open("x", encoding="utf-8", newline="")
+        except OSError as problem:
+            raise SourceError(
+                f"The recording {path} cannot be written: {problem.strerror}. Give --keep the name "
+                "of a new file."
+            ) from None
+
+    def write(self, t_s: Floats, values: dict[Channel, Floats]) -> None:
+        """Write samples to the file."""
+        if self._file is None:
+            return
+        nothing = np.full(len(t_s), np.nan)
+        try:
+            if not self._channels:
+                self._channels = sorted(values)
+                names = [
+                    SIGNAL_LAYOUTS["garry"].legs[side][name].name for side, name in self._channels
+                ]
+                self._file.write(",".join(["time_s", *names]) + "\n")
+            columns = [t_s, *(values.get(channel, nothing) for channel in self._channels)]
+            np.savetxt(self._file, np.column_stack(columns), "%.9g", ",")
+            self._file.flush()
+        except OSError as problem:
+            self._notify(f"{self.path} ends here: {problem.strerror}. The session goes on without.")
+            self._file = None
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None

@@ -1,0 +1,84 @@
+// The form of a leaderboard: hides what does not apply, keeps choices consistent, and shows the board as it
+// would be after each change.
+
+import { showPreview } from "garry/admin/form_preview";
+
+const SUMS = ["steps", "score", "active_minutes", "attended", "target_met"];
+const COUNTED = ["attended", "target_met"];
+
+const form = document.querySelector("#leaderboard_form");
+const preview = document.querySelector(".preview");
+if (form && preview) build();
+
+function build() {
+  const facts = preview.querySelector(".facts");
+
+  function value(name) {
+    const field = form.elements[name];
+    return field && "value" in field ? field.value : "";
+  }
+
+  function set(name, wanted) {
+    const field = form.elements[name];
+    if (field && value(name) !== wanted) field.value = wanted;
+  }
+
+  function show(name, wanted) {
+    const field = form.querySelector(`.field-${name}`);
+    if (field) field.hidden = !wanted;
+  }
+
+  // What was just chosen stays; what no longer goes with it follows.
+  function follow(changed) {
+    const own = value("among") === "self";
+    const total = value("display") === "total";
+    if (changed === "metric" && COUNTED.includes(value("metric"))) {
+      if (own) set("among", "clinic");
+      set("entry", "sum");
+    }
+    if (changed === "display" && total && own) set("among", "clinic");
+    if (changed === "display" && total) {
+      set("entry", "sum");
+      if (!SUMS.includes(value("metric"))) set("metric", "active_minutes");
+    }
+    if (changed === "among") {
+      if (own) set("entry", "each");
+      else if (value("entry") === "each") set("entry", "best");
+      if (own && total) set("display", "neighbors");
+    }
+    if (changed === "occasion" && value("occasion") === "waiting") {
+      if (value("among") === "self") set("among", "clinic");
+      if (value("entry") === "each") set("entry", "best");
+      if (!["top", "total"].includes(value("display"))) set("display", "top");
+      if (value("types") === "same") set("types", "all");
+    }
+    if (changed === "metric" && value("entry") === "sum" && !SUMS.includes(value("metric"))) {
+      set("entry", value("among") === "self" ? "each" : "best");
+      if (total) set("display", "neighbors");
+    }
+  }
+
+  function hide() {
+    const own = value("among") === "self";
+    const [display, entry] = [value("display"), value("entry")];
+    show("group", value("among") === "group");
+    show("entry", !own);
+    show("mean_of", entry === "mean");
+    show("valences", value("types") === "chosen");
+    show("period_from", value("period") === "dates"); // a row of both dates
+    show("top_n", display === "top" || display === "top_and_me");
+    show("total_goal", display === "total");
+    show("show_ranks", display !== "total");
+    show("names", !own && display !== "total");
+    show("min_participants", !own);
+  }
+
+  form.addEventListener("change", ({ target }) => {
+    follow(target.name);
+    hide();
+  });
+  hide();
+  showPreview(form, preview, (drawn) => {
+    facts.textContent = drawn.body?.dataset.facts ?? "";
+  });
+}

@@ -1,0 +1,73 @@
+// A protocol drawn as it will be walked: a block for each phase, as wide as it is long and as high as its gain.
+
+import { fitText, shape, text, title } from "garry/shared/svg";
+
+const NARROWEST = 58; // pixels of a phase
+const OPEN_PHASE_S = 300; // a phase without an end is drawn as if it took this long
+const GROUND = 130;
+const MINUTE_FROM_S = 90;
+
+// Divide the room by weight, so that no part is narrower than can be read.
+function divide(room, weights) {
+  const narrow = new Set();
+  for (;;) {
+    const left = room - NARROWEST * narrow.size;
+    const sum = weights.reduce((all, weight, index) => (narrow.has(index) ? all : all + weight), 0) || 1;
+    const widths = weights.map((weight, index) => (narrow.has(index) ? NARROWEST : (weight / sum) * left));
+    const next = widths.findIndex((width, index) => width < NARROWEST && !narrow.has(index));
+    if (next < 0) return widths;
+    narrow.add(next);
+  }
+}
+
+// Return a phase's length in seconds; null where it has no end.
+function lengthOf({ strides, seconds }, stride_s) {
+  const limits = [seconds, strides && strides * stride_s].filter(Boolean);
+  return limits.length ? Math.min(...limits) : null;
+}
+
+// `labels`: how an open end and minutes are written; `stride_s`: how long a stride takes.
+export function drawProtocol(svg, phases, { width: room, stride_s, labels }) {
+  const lengths = phases.map((phase) => lengthOf(phase, stride_s));
+
+  function formatLength(seconds) {
+    if (seconds === null) return labels.open;
+    return seconds < MINUTE_FROM_S ? `${Math.round(seconds)} s` : `${Math.round(seconds / 60)} ${labels.minutes}`;
+  }
+
+  function drawPhase(phase, index, left, width) {
+    const letters = Math.floor((width - 12) / 8.2);
+    const isOpen = lengths[index] === null;
+    const height = phase.feedback ? (92 * Math.min(Math.max(phase.gain, 0.5), 1.5)) / 1.5 + 8 : 22;
+    const kind = `${phase.feedback ? "on" : "off"}${isOpen ? " endless" : ""}`;
+    const block = { x: left + 2, y: GROUND - height, width: width - 4, height, rx: 4 };
+    const gain = { class: "gain", x: left + width / 2, y: 148 - height };
+    const length = formatLength(lengths[index]);
+    return shape(
+      "g",
+      {},
+      title(phase.name) +
+        shape("rect", { class: kind, ...block }) +
+        text(fitText(phase.name, letters), { class: "name", x: left + 6, y: 20 }) +
+        (phase.feedback && phase.gain !== 1 ? text(`×${phase.gain}`, gain) : "") +
+        text(isOpen && length.length > letters ? "…" : length, { class: "length", x: left + 6, y: 150 }),
+    );
+  }
+
+  // Widths grow with the square root, so that a block of ten minutes leaves room for one of 13 s.
+  const weights = lengths.map((seconds) => Math.sqrt(seconds ?? OPEN_PHASE_S));
+  const widths = divide(room, weights);
+  const width = widths.reduce((all, one) => all + one, 0);
+  let left = 0;
+  const drawn = phases.map((phase, index) => {
+    const block = drawPhase(phase, index, left, widths[index]);
+    left += widths[index];
+    return block;
+  });
+  svg.setAttribute("viewBox", `0 0 ${Math.max(width, 1)} 160`);
+  svg.setAttribute("width", Math.max(width, 1));
+  svg.innerHTML = drawn.join("") + shape("path", { class: "ground", d: `M0 ${GROUND + 1}H${width}` });
+
+  const known_s = lengths.reduce((all, one) => all + (one ?? 0), 0);
+  return phases.length ? `${formatLength(known_s)}${lengths.includes(null) ? " +" : ""}` : "";
+}

@@ -1,0 +1,26 @@
+// A waiting tablet shows the clinic's boards, each for a while, as they are at that moment: patients who no
+// longer agree are gone with the next request.
+
+import { guardLeaving } from "garry/walk/leave_guard";
+
+const EVERY_MS = 5_000;
+const container = document.querySelector("[data-boards]");
+const idleText = document.querySelector(".waits");
+let shown = "";
+
+async function showNext() {
+  try {
+    const answer = await fetch(container.dataset.boards, { cache: "no-store" });
+    const board = answer.ok ? await answer.text() : "";
+    if (board !== shown) container.innerHTML = board;
+    shown = board;
+    container.hidden = !board;
+    idleText.hidden = Boolean(board);
+  } catch {
+    // poll.js shows that the server cannot be reached
+  }
+  setTimeout(showNext, EVERY_MS);
+}
+
+if (container) showNext();
+guardLeaving(document.querySelector("dialog.leave"));

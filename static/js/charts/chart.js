@@ -1,0 +1,105 @@
+// Charts of the PT's pages: uPlot for axes, scales and cursor, our own marks on top of it.
+import uPlot from "uplot";
+
+export const paths = uPlot.paths;
+
+export function color(name) {
+  return getComputedStyle(document.body).getPropertyValue(`--${name}`).trim();
+}
+
+function axis(extra) {
+  const font = `500 14px ${getComputedStyle(document.body).fontFamily}`;
+  const lines = { stroke: color("border"), width: 1 };
+  return { font, stroke: color("muted"), grid: lines, ticks: { show: false }, gap: 8, ...extra };
+}
+
+// Draw a chart that fills its element and keeps its size. `under(marks)` draws before the series and
+// `paint(marks)` after them; `onCursor` gets the index under the pointer; the rest is uPlot's own.
+export function draw(element, { data, series, xAxis, yAxis, under, paint, onCursor, ...more }) {
+  const hooks = {
+    drawClear: under ? [(chart) => under(new Marks(chart))] : [],
+    draw: paint ? [(chart) => paint(new Marks(chart))] : [],
+    setCursor: onCursor ? [(chart) => onCursor(chart.cursor.idx)] : [],
+  };
+  const size = () => ({ width: element.clientWidth, height: element.clientHeight });
+  const options = {
+    ...size(),
+    series: [{}, ...series],
+    axes: [axis({ size: 34, grid: { show: false }, ...xAxis }), axis({ size: 56, ...yAxis })],
+    legend: { show: false },
+    hooks,
+    ...more,
+  };
+  const chart = new uPlot(options, data, element);
+  new ResizeObserver(() => chart.setSize(size())).observe(element);
+  return chart;
+}
+
+// Shapes at places of a chart, in its own values. Shape repeats the meaning of color.
+export class Marks {
+  constructor(chart) {
+    this.chart = chart;
+    this.ctx = chart.ctx;
+    this.unit = devicePixelRatio;
+    this.box = chart.bbox;
+  }
+
+  x(value) {
+    return this.chart.valToPos(value, "x", true);
+  }
+
+  y(value) {
+    return this.chart.valToPos(value, "y", true);
+  }
+
+  disc(x, y, size, fill) {
+    this.ctx.fillStyle = fill;
+    this.ctx.beginPath();
+    this.ctx.arc(this.x(x), this.y(y), size * this.unit, 0, 7);
+    this.ctx.fill();
+  }
+
+  square(x, y, size, fill, shift = 0) {
+    const half = size * this.unit;
+    this.ctx.fillStyle = fill;
+    this.ctx.fillRect(this.x(x) - half + shift * this.unit, this.y(y) - half, 2 * half, 2 * half);
+  }
+
+  // A short level line through x, at most as wide as its share of the chart.
+  dash(x, y, stroke, room) {
+    const half = Math.min(34 * this.unit, (0.4 * this.box.width) / room);
+    this.line(this.x(x) - half, this.y(y), this.x(x) + half, this.y(y), stroke, 3);
+  }
+
+  bar(x, low, high, stroke) {
+    this.line(this.x(x), this.y(low), this.x(x), this.y(high), stroke, 5);
+  }
+
+  line(x0, y0, x1, y1, stroke, width, dashes = []) {
+    const { ctx, unit } = this;
+    ctx.save();
+    ctx.strokeStyle = stroke;
+    ctx.lineWidth = width * unit;
+    ctx.setLineDash(dashes.map((dash) => dash * unit));
+    ctx.beginPath();
+    ctx.moveTo(x0, y0);
+    ctx.lineTo(x1, y1);
+    ctx.stroke();
+    ctx.restore();
+  }
+
+  // Draw text at device pixels; return its width.
+  text(content, x, y, { size = 14, weight = 500, fill = color("muted"), align = "center" } = {}) {
+    this.ctx.font = `${weight} ${size * this.unit}px ${getComputedStyle(document.body).fontFamily}`;
+    this.ctx.fillStyle = fill;
+    this.ctx.textAlign = align;
+    this.ctx.textBaseline = "alphabetic";
+    this.ctx.fillText(content, x, y);
+    return this.ctx.measureText(content).width;
+  }
+
+  widthOf(content, size = 14) {
+    this.ctx.font = `700 ${size * this.unit}px ${getComputedStyle(document.body).fontFamily}`;
+    return this.ctx.measureText(content).width;
+  }
+}

@@ -1,0 +1,177 @@
+// One session: every stride against the goal, phases behind it, what was changed above it.
+import { _, fill, number } from "garry/shared/language";
+import { reasonName } from "garry/shared/labels";
+import { color, draw, paths } from "garry/charts/chart";
+
+const data = document.getElementById("session");
+const { strides, phases, marks: changes, unit } = data ? JSON.parse(data.textContent) : {};
+const DENSE_PX = 2; // a stride; with less they are drawn smaller
+
+function valuesOf(wanted) {
+  return strides.shown.map((shown, i) => (shown !== null && wanted(strides.hit[i]) ? shown : null));
+}
+
+function describeVerdict(index) {
+  if (strides.shown[index] === null)
+    return fill(_("does not count (%(why)s)"), {
+      why: strides.why[index] ? strides.why[index].split(", ").map(reasonName).join(", ") : _("no value"),
+    });
+  if (strides.hit[index] === null) return _("no goal yet");
+  return strides.hit[index] ? _("hit") : _("below the goal");
+}
+
+function formatValue(value) {
+  return value === null ? "–" : `${number(value, 2)} ${unit}`;
+}
+
+function showReadout(index) {
+  if (index === null || index === undefined) return;
+  const goal =
+    strides.goal[index] === null ? "" : fill(_(", goal %(goal)s"), { goal: formatValue(strides.goal[index]) });
+  document.querySelector(".readout").textContent = fill(_("Stride %(number)s: %(value)s, %(verdict)s"), {
+    number: strides.number[index],
+    value: formatValue(strides.shown[index]) + goal,
+    verdict: describeVerdict(index),
+  });
+}
+
+function pointSeries(size, width, stroke, fill) {
+  return { paths: () => null, points: { show: true, size, width, stroke, fill, space: 0 } };
+}
+
+function drawPhases(marks) {
+  const { ctx, box } = marks;
+  for (const phase of phases) {
+    const left = Math.max(box.left, marks.x(phase.from - 0.5));
+    const right = Math.min(box.left + box.width, marks.x(phase.to + 0.5));
+    if (right <= left) continue;
+    ctx.fillStyle = color(phase.feedback ? "card" : "well");
+    ctx.fillRect(left, box.top, right - left, box.height);
+    marks.line(left, box.top - 44 * marks.unit, left, box.top + box.height, color("border"), 1);
+    if (marks.widthOf(phase.name) < right - left - 12 * marks.unit) {
+      const fill = color("text");
+      const from = { align: "left", weight: 700, fill };
+      marks.text(phase.name, left + 7 * marks.unit, box.top - 30 * marks.unit, from);
+    }
+  }
+}
+
+// Return one label for all that was changed after a stride.
+function groupChanges() {
+  const groups = new Map();
+  for (const { after, kind, words } of changes) {
+    const group = groups.get(after) ?? { after, isGoal: false, words: [] };
+    group.isGoal ||= kind === "goal";
+    group.words.push(words);
+    groups.set(after, group);
+  }
+  return [...groups.values()].map((group) => ({ ...group, words: group.words.join(" · ") }));
+}
+
+function drawChanges(marks) {
+  const { box, unit: pixel } = marks;
+  let free = box.left; // labels never run into each other
+  for (const change of groupChanges()) {
+    const x = marks.x(change.after + 0.5);
+    if (x < box.left || x > box.left + box.width) continue;
+    const { isGoal } = change;
+    const paint = color(isGoal ? "c-goal" : "c-third");
+    marks.line(x, box.top - 8 * pixel, x, box.top + box.height, paint, isGoal ? 2 : 1.5, isGoal ? [] : [5, 4]);
+    const wide = marks.widthOf(change.words, 13);
+    const start = Math.min(x, box.left + box.width - wide);
+    if (start < free) continue;
+    marks.text(change.words, start, box.top - 11 * pixel, { size: 13, weight: 700, align: "left", fill: paint });
+    free = start + wide + 10 * pixel;
+  }
+}
+
+function drawGaps(marks) {
+  const bottom = marks.box.top + marks.box.height;
+  strides.shown.forEach((shown, index) => {
+    if (shown !== null) return;
+    const x = marks.x(strides.number[index]);
+    if (x >= marks.box.left && x <= marks.box.left + marks.box.width) {
+      marks.line(x, bottom - 12 * marks.unit, x, bottom, color("c-gap"), 2);
+    }
+  });
+}
+
+function drawStrides(element) {
+  const seen = [...strides.shown, ...strides.goal].filter((value) => value !== null);
+  const top = Math.max(...seen, 0.001) * 1.06;
+  const isDense = element.clientWidth / strides.number.length < DENSE_PX;
+  const [size, width] = isDense ? [5, 1.5] : [8, 2];
+  draw(element, {
+    data: [
+      strides.number,
+      valuesOf((hit) => hit === null),
+      valuesOf((hit) => hit === false),
+      valuesOf((hit) => hit === true),
+      strides.goal,
+    ],
+    series: [
+      { paths: () => null, points: { show: false } },
+      pointSeries(size, width, color("c-miss"), color("card")),
+      pointSeries(size, width, color("c-hit"), color("c-hit")),
+      { stroke: color("c-goal"), width: 2.5, paths: paths.stepped({ align: 1 }), points: { show: false } },
+    ],
+    scales: { x: { time: false }, y: { range: () => [0, top] } },
+    padding: [56, 26, 0, 0],
+    cursor: { y: false, points: { show: false }, drag: { x: true, y: false } },
+    under: drawPhases,
+    paint: (marks) => {
+      strides.shown.forEach((shown, index) => {
+        if (shown === null || strides.hit[index] !== null) return;
+        const x = marks.x(strides.number[index]);
+        if (x >= marks.box.left && x <= marks.box.left + marks.box.width) {
+          marks.square(strides.number[index], shown, size / 2.6, color("c-third"));
+        }
+      });
+      drawGaps(marks);
+      drawChanges(marks);
+    },
+    onCursor: showReadout,
+    yAxis: { values: (_, ticks) => ticks.map((tick) => number(tick, 1)), label: unit, labelSize: 22, space: 44 },
+    xAxis: { space: 70 },
+  });
+}
+
+function cell(tag, text) {
+  const made = document.createElement(tag);
+  made.textContent = text;
+  return made;
+}
+
+// Thousands of rows are only made when somebody opens them.
+function fillTable(place) {
+  const table = document.createElement("table");
+  const head = table.createTHead().insertRow();
+  for (const name of [
+    _("Stride"),
+    fill(_("Shown, %(unit)s"), { unit }),
+    fill(_("Goal, %(unit)s"), { unit }),
+    _("Verdict"),
+  ]) {
+    const title = cell("th", name);
+    title.scope = "col";
+    head.append(title);
+  }
+  const body = table.createTBody();
+  strides.number.forEach((stride, index) => {
+    const row = body.insertRow();
+    const title = cell("th", stride);
+    title.scope = "row";
+    const value = (column) => (strides[column][index] === null ? "–" : number(strides[column][index], 2));
+    row.append(title, cell("td", value("shown")), cell("td", value("goal")), cell("td", describeVerdict(index)));
+  });
+  place.append(table);
+}
+
+if (strides) {
+  drawStrides(document.querySelector(".chart"));
+  const details = document.querySelector("details");
+  const place = details.querySelector(".strides");
+  details.addEventListener("toggle", () => {
+    if (details.open && !place.hasChildNodes()) fillTable(place);
+  });
+}

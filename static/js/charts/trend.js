@@ -1,0 +1,81 @@
+// Trend of a patient's sessions: hits against what was wanted, mean against goal and baseline.
+import { number } from "garry/shared/language";
+import { color, draw } from "garry/charts/chart";
+
+const LABELED = 14; // more points leave no room for figures
+const data = document.getElementById("trend");
+const { hits, values } = data ? JSON.parse(data.textContent) : {};
+
+function days(labels) {
+  return {
+    xAxis: {
+      space: 76,
+      incrs: [1, 2, 5, 10],
+      values: (_, ticks) => ticks.map((tick) => labels[tick] ?? ""),
+    },
+    padding: [18, 30, 0, 0],
+    cursor: { show: false },
+  };
+}
+
+// The range of x leaves half a session on each side, so that marks are whole.
+function sessions(count) {
+  return { x: { time: false, range: () => [-0.5, count - 0.5] } };
+}
+
+function drawHits(element) {
+  const count = hits.days.length;
+  draw(element, {
+    ...days(hits.days),
+    data: [hits.days.map((_, index) => index), hits.hit],
+    series: [{ stroke: color("c-hit"), width: 3, points: { show: false } }],
+    scales: { ...sessions(count), y: { range: () => [0, 100] } },
+    yAxis: { values: (_, ticks) => ticks.map((tick) => `${number(tick)} %`), incrs: [20, 25, 50] },
+    paint: (marks) => {
+      hits.hit.forEach((hit, index) => {
+        const wanted = hits.wanted[index];
+        if (wanted) marks.dash(index, wanted, color("c-goal"), count);
+        marks.disc(index, hit, 7, color("c-hit"));
+        if (count > LABELED) return;
+        const below = hit > 88 || (wanted && wanted > hit && wanted - hit < 16);
+        const y = marks.y(hit) + (below ? 26 : -14) * marks.unit;
+        marks.text(number(hit), marks.x(index), y, { size: 17, weight: 800, fill: color("text") });
+      });
+    },
+  });
+}
+
+function drawValues(element) {
+  const count = values.days.length;
+  const span = (index) => [values.mean[index] - values.deviation[index], values.mean[index] + values.deviation[index]];
+  const seen = values.days.flatMap((_, i) => [
+    ...(values.mean[i] === null ? [] : span(i)),
+    ...[values.goal[i], values.baseline[i]].filter((value) => value !== null),
+  ]);
+  const [low, high] = [Math.min(...seen), Math.max(...seen)];
+  const air = 0.08 * (high - low || 1);
+  draw(element, {
+    ...days(values.days),
+    data: [values.days.map((_, index) => index), values.mean],
+    series: [{ paths: () => null, points: { show: false } }],
+    scales: { ...sessions(count), y: { range: () => [Math.max(0, low - air), high + air] } },
+    yAxis: { values: (_, ticks) => ticks.map((tick) => number(tick, 1)), space: 40 },
+    paint: (marks) => {
+      values.days.forEach((_, index) => {
+        if (values.mean[index] !== null) {
+          marks.bar(index, ...span(index), `${color("c-hit")}59`);
+          marks.disc(index, values.mean[index], 7, color("c-hit"));
+        }
+        if (values.goal[index] !== null) marks.dash(index, values.goal[index], color("c-goal"), count);
+        if (values.baseline[index] !== null) {
+          marks.square(index, values.baseline[index], 6, color("c-third"), count > LABELED ? 0 : -20);
+        }
+      });
+    },
+  });
+}
+
+if (hits) {
+  drawHits(document.querySelector("[data-chart=hits]"));
+  drawValues(document.querySelector("[data-chart=values]"));
+}

@@ -1,0 +1,61 @@
+// How well sensor, tablet and robot are heard, in text and a sign before it: ✓ well, ! needs a look, – not there.
+
+import { _, fill } from "garry/shared/language";
+
+const SILENT_S = { stride: 5, tablet: 12 };
+const ENOUGH = 0.8; // valid strides among the last 20; fewer and the goal is met by chance
+const LAST = 20;
+
+function ago(seconds) {
+  if (seconds < 1.5) return _("now");
+  if (seconds < 90) return fill(_("%(count)s s ago"), { count: Math.round(seconds) });
+  return fill(_("%(count)s min ago"), { count: Math.round(seconds / 60) });
+}
+
+function describeSource(isThere, strides, silent_s, isRunning) {
+  if (!isThere) {
+    const since = silent_s !== null && fill(_("not connected, last stride %(ago)s"), { ago: ago(silent_s) });
+    return ["–", since || _("not connected")];
+  }
+  if (!strides.length || silent_s === null) return ["✓", _("connected, no stride yet")];
+  const valid = strides.filter((stride) => stride.valid).length;
+  const count = strides.length;
+  const words = fill(_("%(valid)s of %(count)s valid, last %(ago)s"), { valid, count, ago: ago(silent_s) });
+  if (isRunning && silent_s > SILENT_S.stride) return ["!", fill(_("silent: %(words)s"), { words })];
+  return [valid < ENOUGH * count ? "!" : "✓", words];
+}
+
+function describeTablets(count, silent_s) {
+  if (!count) return ["–", _("none; only this mirror")];
+  const what = count > 1 ? fill(_("%(count)s connected"), { count }) : _("connected");
+  if (silent_s === null) return ["✓", what];
+  if (silent_s > SILENT_S.tablet) return ["!", fill(_("silent, last heard %(ago)s"), { ago: ago(silent_s) })];
+  return ["✓", fill(_("%(what)s, heard %(ago)s"), { what, ago: ago(silent_s) })];
+}
+
+export function createConnections({ state }, robot) {
+  function describeAll({ presence, state: sessionState }) {
+    const silent = (seconds) => (seconds == null ? null : seconds + state.sincePresence_s);
+    const strides = state.strides.slice(-LAST);
+    const { text, isLow } = robot.connection;
+    return {
+      source: describeSource(presence.source, strides, silent(presence.stride_ago_s), sessionState === "running"),
+      tablets: describeTablets(presence.tablets, silent(presence.tablet_ago_s)),
+      robot: presence.robot ? [isLow ? "!" : "✓", text] : ["–", _("none")],
+    };
+  }
+
+  return {
+    draw(session) {
+      const described = describeAll(session);
+      for (const row of document.querySelectorAll("[data-presence]")) {
+        const [sign, words] = described[row.dataset.presence];
+        row.classList.toggle("there", sign !== "–");
+        row.classList.toggle("low", sign === "!");
+        const text = `${sign} ${words}`;
+        const place = row.querySelector("small");
+        if (place.textContent !== text) place.textContent = text;
+      }
+    },
+  };
+}

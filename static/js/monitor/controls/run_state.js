@@ -1,0 +1,66 @@
+// Start, pause, go on, end (which is asked twice), why the session pauses, and the clock beside the planned time.
+
+import { _, fill } from "garry/shared/language";
+import { clock } from "garry/shared/format";
+import { icon } from "garry/shared/svg";
+import { update } from "garry/monitor/state";
+
+// The one main button, by the session's state: the change it asks for, its label and icon.
+const MAIN = {
+  ready: ["start", _("Start"), "play"],
+  running: ["pause", _("Pause"), "pause"],
+  paused: ["resume", _("Go on"), "play"],
+};
+const PAUSE_REASONS = {
+  restart: _("The server was restarted; nothing was lost. Go on when ready."),
+  patient: _("Paused on the patient’s page. Go on when ready."),
+  therapist: _("Paused by the therapist."),
+};
+
+export function createRunState({ state, show, onPress, change }) {
+  const main = document.querySelector("[data-main]");
+  const end = document.querySelector("[data-end]");
+  const confirmEnd = document.getElementById("sure");
+  const pauseNote = document.querySelector(".notice.why");
+
+  onPress("[data-main]", ({ value }) => change(value));
+  onPress("[data-end]", () => confirmEnd.showModal());
+  confirmEnd.addEventListener("close", () => {
+    if (confirmEnd.returnValue === "end") change(state.session.state === "ready" ? "abort" : "finish");
+    confirmEnd.returnValue = "";
+  });
+
+  function drawTime({ active_s: active, target, completed }) {
+    const planned = target.duration_s;
+    const isOver = Boolean(completed || (planned && active >= planned));
+    show("clock", clock(active));
+    if (isOver) show("planned", _("planned time reached"));
+    else show("planned", planned ? fill(_("of %(time)s"), { time: clock(planned) }) : _("walked"));
+    document.querySelector(".end").classList.toggle("over", isOver);
+  }
+
+  function drawPause(session) {
+    pauseNote.hidden = session.state !== "paused";
+    const text = PAUSE_REASONS[session.pause_reason] ?? _("Paused.");
+    if (pauseNote.textContent !== text) pauseNote.textContent = text; // announced once, not with each drawing
+  }
+
+  function drawButtons(session) {
+    const [kind, label, iconId] = MAIN[session.state] ?? [""];
+    main.disabled = end.disabled = !kind;
+    if (main.dataset.of === kind) return;
+    main.dataset.of = main.value = kind;
+    main.innerHTML = kind ? `${icon(iconId)}<span>${label}</span>` : _("Ended");
+  }
+
+  return {
+    draw(session) {
+      drawTime(session);
+      drawPause(session);
+      drawButtons(session);
+    },
+    events: {
+      state: (session, event) => update(session, event, ["state", "pause_reason"]),
+    },
+  };
+}

@@ -1,0 +1,55 @@
+// The last stride in figures: performance, value, verdict, and what else was measured.
+
+import { _, fill, number } from "garry/shared/language";
+import { percent, signed } from "garry/shared/format";
+import { phaseName, reasonName } from "garry/shared/labels";
+
+export function createLastStride({ state, show }) {
+  const dot = document.querySelector(".verdict .dot");
+
+  function describeGoal({ goal, unit, obstacle }) {
+    if (goal !== null) return fill(_("goal %(goal)s"), { goal: `${number(goal, 2)} ${unit}` });
+    return obstacle || _("The goal follows from the baseline.");
+  }
+
+  // What the patient sees is gain × value, and the goal is compared with that.
+  function describeValue({ value, gain }, unit) {
+    if (value == null) return "";
+    const scaled = gain && gain !== 1 ? ` × ${number(gain, 2)} = ${number(gain * value, 2)}` : "";
+    return `${number(value, 2)}${scaled} ${unit}`;
+  }
+
+  function describeVerdict(stride, phase) {
+    if (stride.performance != null) {
+      return (stride.hit ? _("hit") : _("below")) + (stride.points ? `, ${signed(stride.points)}` : "");
+    }
+    if (stride.valid) return fill(_("%(phase)s: no goal yet"), { phase: phaseName(phase.name) });
+    const why = (stride.reasons ?? []).map(reasonName).join(", ") || _("no value");
+    return fill(_("does not count: %(why)s"), { why });
+  }
+
+  function describeExtra([name, value]) {
+    return `${name} ${number(+value.toPrecision(3), null)}`;
+  }
+
+  return {
+    draw(session) {
+      show("goal-line", describeGoal(session));
+      const stride = state.lastStride;
+      if (!stride) return;
+      const isJudged = stride.performance != null;
+      show("number", fill(_("no. %(number)s"), { number: stride.number }));
+      show("performance", isJudged ? percent(stride.performance) : "—");
+      show("value", describeValue(stride, session.unit));
+      show(
+        "extras",
+        Object.entries(stride.extra ?? {})
+          .map(describeExtra)
+          .join("\n"),
+      );
+      show("verdict", describeVerdict(stride, session.phase));
+      dot.hidden = !isJudged;
+      dot.classList.toggle("miss", !stride.hit);
+    },
+  };
+}

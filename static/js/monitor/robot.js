@@ -1,0 +1,192 @@
+// The robot on the PT's page: where it is, what it does, why it did or did not move, and its stop.
+
+import { _, fill } from "garry/shared/language";
+import { percent } from "garry/shared/format";
+import { cureOf, describeReason, describeState } from "garry/monitor/robot_text";
+import { drawTrail } from "garry/monitor/robot_trail";
+
+const KEPT_POSES = 240;
+const ANSWER_MS = 2_000; // after which a link that nobody has closed is not believed
+// Reasons in its status that somebody should know of; the others are expected.
+const NOTABLE = new Set([
+  "unwatched",
+  "charging",
+  "battery_low",
+  "away_from_home",
+  "base_silent",
+  "firmware_unknown",
+  "firmware_refused",
+  "bump",
+  "cliff",
+  "wheel_drop",
+  "over_current",
+  "button",
+  "nobody_listens",
+  "feeler_missing",
+  "other_driver",
+]);
+
+export class RobotPanel {
+  #page;
+  #root;
+  #trail = [];
+  #isConnected = false;
+  #isStopped = false;
+  #status = null;
+  #decision = null;
+  #breakReason = ""; // why the gesture after that decision did not end as it should
+  #pendingOrder = "";
+  #orderFailure = "";
+  #timer;
+
+  constructor(root, page) {
+    this.#root = root;
+    this.#page = page;
+    page.onPress("[data-robot]", ({ dataset }) => this.#order(dataset.robot));
+  }
+
+  reset({ robot, robot_stopped: stopped, presence }) {
+    this.#status = robot?.status ?? null;
+    this.#decision = robot?.decision ?? null;
+    this.#breakReason = "";
+    this.#isStopped = stopped ?? false;
+    this.#isConnected = presence?.robot ?? false;
+    this.#orderFailure = "";
+    this.#settleOrder();
+    this.#keepPose();
+  }
+
+  handleEvent(event) {
+    if (event.kind === "robot_stopped") {
+      this.#isStopped = event.stopped;
+      this.#orderFailure = "";
+      this.#settleOrder();
+    }
+    if (event.kind === "presence") this.#isConnected = event.presence.robot;
+    if (event.kind === "robot") this.#handleReport(event.report);
+  }
+
+  #handleReport(report) {
+    if (report.kind === "status") this.#status = report;
+    if (report.kind === "decision") {
+      this.#decision = report;
+      this.#breakReason = "";
+    }
+    const isBroken = report.kind === "gesture" && report.phase === "ended" && report.outcome !== "done";
+    if (isBroken) this.#breakReason = report.outcome;
+    this.#keepPose();
+  }
+
+  #keepPose() {
+    const pose = this.#status?.pose;
+    if (!pose) return;
+    this.#trail.push(pose);
+    if (this.#trail.length > KEPT_POSES) this.#trail.shift();
+  }
+
+  // An order looks heard only while it may be: when it cannot be sent, or is not answered, the page says so.
+  #order(order) {
+    this.#forgetOrder();
+    this.#orderFailure = "";
+    if (this.#page.orderRobot(order)) {
+      this.#pendingOrder = order;
+      this.#button(order).classList.add("asked");
+      this.#timer = setTimeout(() => this.#reportUnanswered(order), ANSWER_MS);
+    } else this.#reportUnsent(order);
+    this.draw();
+  }
+
+  #reportUnanswered(order) {
+    const stop = _("No answer. If the robot moves, use its own switch.");
+    this.#reportFailure(order === "stop" ? stop : _("No answer. Try again."));
+  }
+
+  #reportUnsent(order) {
+    const stop = _("Not sent: no connection. Use the robot’s own switch.");
+    this.#reportFailure(order === "stop" ? stop : _("There is no connection. Try again in a moment."));
+  }
+
+  #reportFailure(text) {
+    this.#forgetOrder();
+    this.#orderFailure = text;
+    this.#page.announce(text);
+    this.draw();
+  }
+
+  #settleOrder() {
+    if (this.#pendingOrder && this.#isStopped === (this.#pendingOrder === "stop")) this.#forgetOrder();
+  }
+
+  #forgetOrder() {
+    clearTimeout(this.#timer);
+    if (this.#pendingOrder) this.#button(this.#pendingOrder).classList.remove("asked");
+    this.#pendingOrder = "";
+  }
+
+  #button(order) {
+    return this.#root.querySelector(`[data-robot=${order}]`);
+  }
+
+  draw() {
+    const { show } = this.#page;
+    const share = this.#decision?.activated_share;
+    show("robot-state", this.#describeState());
+    show("share", share == null ? "" : fill(_("%(share)s of windows"), { share: percent(share) }));
+    show("robot-why", this.#orderFailure || this.#describeHold());
+    show("robot-cure", this.#describeCure());
+    show("robot-last", this.#isHeld || this.#orderFailure ? "" : this.#describeDecision());
+    // A real base waits for a person from the start; a stop stays until a person lifts it.
+    this.#root.classList.toggle("still", this.#isHeld);
+    this.#button("stop").hidden = this.#isStopped;
+    this.#button("arm").hidden = !this.#isHeld;
+    drawTrail(this.#root.querySelector("svg"), this.#trail);
+  }
+
+  // Whether it moves only after a person lets it.
+  get #isHeld() {
+    if (this.#isStopped) return true;
+    const { state, reason } = this.#status ?? {};
+    return this.#isConnected && (state === "stopped" || state === "disarmed" || reason === "place_unknown");
+  }
+
+  #describeState() {
+    if (!this.#isConnected) return _("not connected");
+    if (!this.#status) return "";
+    if (this.#isStopped) return _("stopped");
+    return this.#status.gesture ? `${this.#status.gesture}…` : describeState(this.#status.state);
+  }
+
+  #describeHold() {
+    const reason = this.#isConnected && this.#status?.reason;
+    if (this.#isHeld) return fill(_("It stands: %(why)s."), { why: describeReason(reason || "stopped") });
+    return NOTABLE.has(reason) ? fill(_("It would not move: %(why)s."), { why: describeReason(reason) }) : "";
+  }
+
+  #describeCure() {
+    const cure = cureOf(this.#status?.reason);
+    return this.#isHeld ? `${cure} ${_("Put it on its mark, nobody near it, then:")}`.trim() : cure;
+  }
+
+  // What the last window came to, and what followed.
+  #describeDecision() {
+    if (!this.#decision) return _("Decides every five seconds of walking.");
+    const { mean, threshold, gesture, intensity, reason } = this.#decision;
+    const size = intensity == null || intensity === 1 ? "" : fill(_(" at %(share)s"), { share: percent(intensity) });
+    const end = this.#breakReason && fill(_(", broken off: %(why)s"), { why: describeReason(this.#breakReason) });
+    return fill(_("Last window %(mean)s, acts from %(threshold)s: %(what)s."), {
+      mean: percent(mean),
+      threshold: percent(threshold),
+      what: gesture ? gesture + size + end : describeReason(reason),
+    });
+  }
+
+  // Return its line among those who are connected; `isLow` asks for a charger.
+  get connection() {
+    if (!this.#isConnected) return { text: _("none"), isLow: false };
+    const { battery_share: share, battery_low: low, simulated, open_loop: open, bumpers } = this.#status ?? {};
+    const lacks = simulated === false ? `${open ? _(", open loop") : ""}${bumpers ? "" : _(", no bumper")}` : "";
+    if (share == null) return { text: _("connected") + lacks, isLow: false };
+    const battery = fill(_("battery %(share)s"), { share: percent(share) });
+    return { text: battery + (low ? _(": charge it") : "") + lacks, isLow: Boolean(low) };
+  }
+}

@@ -1,0 +1,72 @@
+// What a robot's reasons and states are called on the PT's page.
+
+import { _ } from "garry/shared/language";
+
+// Why it does not move, or did not end what it began.
+const REASONS = {
+  no_gesture: _("no gesture for that"),
+  off: _("the robot is off"),
+  late: _("the steps came late"),
+  performing: _("still moving"),
+  resting: _("resting"),
+  unknown_gesture: _("it does not know the gesture"),
+  bad_gesture: _("it cannot perform the gesture; compose it anew"),
+  base_cannot_move: _("this base does not move"),
+  stopped: _("somebody stopped it"),
+  disarmed: _("nobody has let it move yet"),
+  away_from_home: _("away from its place"),
+  no_session: _("no session"),
+  not_running: _("the session does not run"),
+  unwatched: _("no therapist's page is open"),
+  base_silent: _("the base does not answer"),
+  order_lapsed: _("the order came too late"),
+  battery_low: _("its battery is low"),
+  battery_empty: _("its battery is empty"),
+  charging: _("it is charging"),
+  bump: _("it bumped into something"),
+  cliff: _("there is an edge"),
+  wheel_drop: _("a wheel hangs free"),
+  over_current: _("a wheel is blocked"),
+  stalled: _("a wheel is blocked"),
+  tether: _("it left its place"),
+  slipped: _("it slipped"),
+  button: _("its stop button was pressed"),
+  restarted: _("the base was restarted"),
+  nobody_listens: _("no driver listens to it"),
+  feeler_missing: _("what should feel for it is not there"),
+  other_driver: _("another program drives it"),
+  open_loop: _("too long for a base that does not tell where it is"),
+  place_unknown: _("nobody has looked for long whether it is at its place"),
+  firmware_unknown: _("the base's version is not known yet"),
+  firmware_refused: _("the base's version is too old"),
+  paused: _("the session paused"),
+  finished: _("the session ended"),
+  aborted: _("the session ended"),
+  out_of_time: _("it did not get there in time"),
+  bad_odometry: _("it does not know where it is"),
+  no_link: _("the connection was lost"),
+  replaced: _("another session began"),
+};
+
+// What has to be done before it may move again.
+const CURES = {
+  bump: _("Clear its way."),
+  cliff: _("Take it away from the edge."),
+  wheel_drop: _("Put it down on both wheels."),
+  over_current: _("Free its wheels."),
+  stalled: _("Free its wheels."),
+  slipped: _("Look at the floor and its wheels."),
+  base_silent: _("Look at its switch and its cable."),
+  charging: _("Take it off the charger."),
+  battery_low: _("Charge it."),
+  battery_empty: _("Charge it."),
+  button: _("Let go of its button."),
+  nobody_listens: _("Start its driver."),
+  feeler_missing: _("Start its driver."),
+  other_driver: _("Stop the other program."),
+};
+const STATES = { idle: _("waiting"), performing: _("moving"), stopped: _("stopped"), disarmed: _("not armed") };
+
+export const describeReason = (reason) => REASONS[reason] ?? reason;
+export const cureOf = (reason) => CURES[reason] ?? "";
+export const describeState = (state) => STATES[state] ?? state;

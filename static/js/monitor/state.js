@@ -1,0 +1,62 @@
+// What the PT's page knows of its session: the server's snapshot, kept current by events. Nothing is computed here.
+
+const KEPT_STRIDES = 400;
+const TOTALS = ["hit_rate", "hits", "judged", "score"];
+const TIMES = ["active_s", "phase_s", "phase_strides"];
+
+// Copy those of the named fields that an event has.
+export function update(target, event, names) {
+  for (const name of names) if (event[name] !== undefined) target[name] = event[name];
+}
+
+export class MonitorState {
+  session = null; // the last snapshot, brought up to date by events
+  strides = [];
+  annotations = []; // changes and remarks, each after a stride
+  lastStride = null;
+  #presenceAt = 0;
+
+  reset(snapshot) {
+    this.session = snapshot;
+    this.strides = snapshot.steps.slice(-KEPT_STRIDES);
+    this.annotations = snapshot.marks;
+    this.lastStride ??= this.strides.at(-1) ?? null;
+    this.#presenceAt = performance.now();
+  }
+
+  // Add strides that were walked while the connection was lost.
+  addMissed(strides) {
+    const known = new Set(this.strides.map(({ number }) => number));
+    const missed = strides.filter(({ number }) => !known.has(number));
+    this.strides = [...this.strides, ...missed].sort((a, b) => a.number - b.number).slice(-KEPT_STRIDES);
+  }
+
+  apply(event) {
+    if (event.mark) this.annotations.push(event.mark);
+    if (event.kind === "step") this.#addStride(event);
+    if (event.kind === "presence") {
+      this.session.presence = event.presence;
+      this.#presenceAt = performance.now();
+    }
+  }
+
+  #addStride(event) {
+    const { session } = this;
+    update(session, event, TIMES);
+    session.number = event.number;
+    if (event.side !== session.trained_side) return;
+    update(session, event, TOTALS);
+    this.strides.push(event);
+    if (this.strides.length > KEPT_STRIDES) this.strides.shift();
+    if (event.live) this.lastStride = event;
+    const { tablet_ago_s: tablet } = session.presence;
+    session.presence.stride_ago_s = 0;
+    session.presence.tablet_ago_s = tablet == null ? null : tablet + this.sincePresence_s;
+    this.#presenceAt = performance.now();
+  }
+
+  // Seconds since the server said who is connected.
+  get sincePresence_s() {
+    return (performance.now() - this.#presenceAt) / 1000;
+  }
+}

@@ -1,0 +1,50 @@
+// The strides in drawings: the strip of all recent ones with its legend, the last twenty, and the share of hits.
+
+import { _, fill } from "garry/shared/language";
+import { percent } from "garry/shared/format";
+import { legendOf } from "garry/monitor/annotations";
+import { drawHitRing } from "garry/monitor/hit_ring";
+import { drawLastStrides } from "garry/monitor/last_strides";
+import { drawStrip } from "garry/monitor/strip";
+
+const LAST = 20;
+
+export function createStrideCharts({ state, show }) {
+  const [strip, twenty, ring] = ["strip", "twenty", "ring"].map((id) => document.getElementById(id));
+  const legend = document.querySelector(".legend");
+
+  function drawLegend() {
+    const entries = legendOf(state.annotations);
+    const written = entries.map((entry) => entry.join(" ")).join();
+    if (legend.dataset.of === written) return;
+    legend.dataset.of = written;
+    const items = entries.map(([sign, text]) => {
+      const item = document.createElement("li");
+      item.append(Object.assign(document.createElement("b"), { textContent: sign }), ` ${text}`);
+      return item;
+    });
+    legend.replaceChildren(...items);
+  }
+
+  function describeLast() {
+    const judged = state.strides.filter(({ performance }) => performance !== null).slice(-LAST);
+    const hits = judged.filter(({ hit }) => hit).length;
+    return judged.length ? fill(_("%(hits)s of %(count)s hit"), { hits, count: judged.length }) : "";
+  }
+
+  function describeRate({ hits, judged, target }) {
+    show("wanted", target.hit_rate ? fill(_("Wanted %(rate)s"), { rate: percent(target.hit_rate) }) : _("No rate set"));
+    show("judged", judged === undefined ? "" : fill(_("%(hits)s of %(count)s strides"), { hits, count: judged }));
+  }
+
+  return {
+    draw(session) {
+      drawStrip(strip, state.strides, state.annotations, session.phases);
+      drawLegend();
+      show("of-twenty", describeLast());
+      drawLastStrides(twenty, state.strides.slice(-LAST), LAST);
+      drawHitRing(ring, session.hit_rate, session.target.hit_rate);
+      describeRate(session);
+    },
+  };
+}

@@ -1,0 +1,70 @@
+// Labels, in the page's language, of what the server sends by name: feedback types, phases, reasons, remarks.
+// A name without a label stays as it is.
+import { _ } from "garry/shared/language";
+
+const TYPES = { positive: _("Positive"), negative: _("Negative"), binary: _("Binary"), explicit: _("Explicit") };
+const PHASES = {
+  Baseline: _("Baseline"),
+  Familiarization: _("Familiarization"),
+  Training: _("Training"),
+  "Training 100 %": _("Training 100 %"),
+  "Training 85 %": _("Training 85 %"),
+  Catch: _("Catch"),
+  Washout: _("Washout"),
+  Retention: _("Retention"),
+};
+const REMARKS = {
+  rest: _("rest"),
+  pain: _("pain"),
+  dizziness: _("dizziness"),
+  near_fall: _("near fall"),
+  fall: _("fall"),
+  handrail: _("handrail"),
+  verbal_cue: _("verbal cue"),
+  borg: _("Borg"),
+};
+// Why a stride does not count (rehab/training/steps.py, rehab/gait/strides.py).
+const REASONS = {
+  missing: _("no value"),
+  not_finite: _("no number"),
+  out_of_bounds: _("out of bounds"),
+  time_backwards: _("the sensor’s clock jumped"),
+  paused: _("paused"),
+  flagged: _("doubtful"),
+  gap: _("samples are missing"),
+  rate: _("another sampling rate"),
+  force_lost: _("the force is missing"),
+  force_too_large: _("the force is too large"),
+  short_stance: _("stance too short"),
+  long_stance: _("stance too long"),
+  cut_off: _("cut off"),
+  irregular: _("irregular step"),
+  cross_step: _("crossed step"),
+  weight: _("another weight"),
+  moment_lost: _("the moment is missing"),
+  moment_sign: _("the moment’s sign is turned"),
+  moment_too_small: _("the moment is too small"),
+  moment_too_large: _("the moment is too large"),
+  moment_in_swing: _("moment in swing"),
+  moment_out_of_step: _("the moment is out of step"),
+  angle_lost: _("the angle is missing"),
+  angle_flat: _("the angle is flat"),
+  angle_too_large: _("the angle is too large"),
+  angle_out_of_step: _("the angle is out of step"),
+  power_reversed: _("the power’s sign is turned"),
+  no_push_off: _("no push-off"),
+};
+
+// What ends a page's connection or refuses an order, by its code; others come with a text of their own.
+const REFUSALS = {
+  sign_in: _("Sign in again, or pair the tablet again."),
+  no_session: _("There is no such session for you."),
+  not_open: _("The session is not open. Load the page again."),
+  not_stored: _("It could not be stored. Try again."),
+};
+
+export const refusal = ({ code, message }) => REFUSALS[code] ?? message;
+export const typeName = (slug, label = slug) => TYPES[slug] ?? label;
+export const phaseName = (name) => PHASES[name] ?? name;
+export const remarkName = (kind) => REMARKS[kind] ?? kind.replaceAll("_", " ");
+export const reasonName = (reason) => REASONS[reason] ?? reason.replaceAll("_", " ");

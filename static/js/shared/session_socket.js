@@ -1,0 +1,189 @@
+// The socket of a session's page: stays connected, passes everything on once and in order.
+//
+//   const socket = connect("/ws/session/7/patient/", { onSnapshot, onSteps, onEvent, onLink });
+//
+// onSnapshot(snapshot): all that the page shows, as of now; after each connection. It replaces what
+//   the page knew: totals come from here and from events, never from counting.
+// onSteps(steps): past steps that this page does not have, oldest first, after a break.
+// onEvent(event): what has just happened.
+// onLink(state, reason): "open", "lost" (it comes back by itself) or "closed" (it does not; `reason`
+//   is a text for people).
+
+import { _ } from "garry/shared/language";
+import { refusal } from "garry/shared/labels";
+
+const SILENCE_MS = 12_000; // the server sends something every 5 s
+const DOUBT_MS = 6_000; // after which an old socket is not trusted when the tablet wakes up
+const CONFIRM_MS = 50;
+const ANSWER_MS = 8_000;
+const FIRST_PAUSE_MS = 200;
+const LONGEST_PAUSE_MS = 5_000;
+const FINAL = new Set([4001, 4004, 4009, 4400, 4410]); // docs/protocol.md: do not retry as it is
+const STEPS = new Set(["step", "missing", "calm"]);
+
+export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
+  const pending = new Map(); // changes that have not been answered
+  let socket, retryTimer, watchdog, confirmation, closeReason;
+  let state = "";
+  let retryPause = FIRST_PAUSE_MS;
+  let receivedAt = 0;
+  let lastNumber = null; // the last step that this page has
+  let catchUpTo = null; // steps up to this one are being sent after a break
+  let requests = 0;
+
+  function open() {
+    clearTimeout(retryTimer);
+    const url = new URL(path, location.href);
+    url.protocol = url.protocol.replace("http", "ws");
+    if (lastNumber !== null) url.searchParams.set("after", lastNumber);
+    closeReason = null;
+    receivedAt = performance.now();
+    const own = (socket = new WebSocket(url));
+    own.onmessage = ({ data }) => own === socket && receive(JSON.parse(data));
+    own.onclose = ({ code }) => own === socket && handleClose(code);
+    clearInterval(watchdog);
+    watchdog = setInterval(() => performance.now() - receivedAt > SILENCE_MS && drop(), 1_000);
+  }
+
+  function receive(message) {
+    receivedAt = performance.now();
+    switch (message.type) {
+      case "snapshot":
+        retryPause = FIRST_PAUSE_MS;
+        catchUpTo = message.number;
+        if (lastNumber === null || lastNumber > catchUpTo) lastNumber = catchUpTo;
+        setLink("open");
+        onSnapshot?.(message);
+        break;
+      case "steps": {
+        const missed = message.steps.filter(({ number }) => number > lastNumber);
+        if (missed.length) {
+          lastNumber = missed.at(-1).number;
+          onSteps?.(missed);
+        }
+        break;
+      }
+      case "events":
+        caughtUp();
+        for (const event of message.events) {
+          if (STEPS.has(event.kind)) {
+            if (event.number <= lastNumber) continue;
+            lastNumber = event.number;
+          }
+          onEvent?.(event);
+        }
+        break;
+      case "heartbeat":
+        caughtUp();
+        confirm(0); // there is a page behind this socket, though it has nothing new to show
+        if (message.presence) onEvent?.({ kind: "presence", presence: message.presence });
+        break;
+      case "done":
+        settle(message.id);
+        break;
+      case "error":
+        closeReason = refusal(message);
+        if (message.id) settle(message.id, new Error(closeReason));
+    }
+    if (message.frame) confirm(message.frame);
+  }
+
+  function caughtUp() {
+    lastNumber = Math.max(lastNumber, catchUpTo);
+  }
+
+  // Confirm the newest frame, at most 20 times a second.
+  function confirm(frame) {
+    if (confirmation) confirmation.frame = Math.max(confirmation.frame, frame);
+    else {
+      const own = (confirmation = { frame, socket });
+      setTimeout(() => {
+        confirmation = null;
+        if (own.socket === socket) send({ type: "seen", frame: own.frame });
+      }, CONFIRM_MS);
+    }
+  }
+
+  function send(message) {
+    if (socket?.readyState !== WebSocket.OPEN) return false;
+    socket.send(JSON.stringify(message));
+    return true;
+  }
+
+  function settle(id, problem) {
+    const { resolve, reject, timer } = pending.get(id) ?? {};
+    pending.delete(id);
+    clearTimeout(timer);
+    if (problem) reject?.(problem);
+    else resolve?.();
+  }
+
+  function handleClose(code) {
+    socket = null;
+    confirmation = null;
+    clearInterval(watchdog);
+    for (const id of [...pending.keys()]) settle(id, new Error(_("The connection was lost. Try again.")));
+    if (FINAL.has(code)) {
+      setLink("closed", closeReason ?? _("The connection has ended."));
+      return;
+    }
+    setLink("lost", closeReason);
+    retryTimer = setTimeout(open, retryPause * (0.75 + Math.random() / 2));
+    retryPause = Math.min(2 * retryPause, LONGEST_PAUSE_MS);
+  }
+
+  // Give up a socket that may be dead; closing it properly would take too long.
+  function drop() {
+    const old = socket;
+    handleClose(1006);
+    old?.close();
+  }
+
+  function setLink(next, reason) {
+    if (next !== state || next === "closed") {
+      state = next;
+      onLink?.(state, reason);
+    }
+  }
+
+  function reconnectIfStale() {
+    if (state === "closed" || document.hidden) return;
+    if (socket && performance.now() - receivedAt < DOUBT_MS) return;
+    if (socket) drop();
+    retryPause = FIRST_PAUSE_MS;
+    open();
+  }
+
+  function close() {
+    const old = socket;
+    socket = null;
+    state = "closed";
+    clearTimeout(retryTimer);
+    clearInterval(watchdog);
+    removeEventListener("online", reconnectIfStale);
+    document.removeEventListener("visibilitychange", reconnectIfStale);
+    old?.close();
+  }
+
+  // Ask for a change; resolves when the server has stored it, rejects with the reason otherwise.
+  const change = (kind, value) => ask({ type: "change", kind, ...(value === undefined ? {} : { value }) });
+
+  // Send a message that the server answers.
+  function ask(message) {
+    return new Promise((resolve, reject) => {
+      const id = `c${++requests}`;
+      const request = { ...message, id };
+      if (!send(request)) {
+        reject(new Error(_("There is no connection. Try again in a moment.")));
+        return;
+      }
+      const late = () => settle(id, new Error(_("No answer. Try again.")));
+      pending.set(id, { resolve, reject, timer: setTimeout(late, ANSWER_MS) });
+    });
+  }
+
+  addEventListener("online", reconnectIfStale);
+  document.addEventListener("visibilitychange", reconnectIfStale);
+  open();
+  return { change, ask, send, close };
+}

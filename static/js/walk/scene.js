@@ -1,0 +1,81 @@
+// The landscape: horizon, thermometer and figures. Everything is drawn once for each orientation and
+// then only moved, so a step costs a handful of attributes.
+
+import { append } from "garry/shared/svg";
+import { createDots } from "garry/walk/stride_dots";
+
+const TOP = 1.5; // the scale's end; the goal is always at two thirds of it
+const TUBE_RADIUS = 68;
+const BULB_RADIUS = 94;
+const TICKS = [0.25, 0.5, 0.75, 1.25];
+const LAYOUTS = {
+  portrait: { box: "0 0 800 1280", x: 600, y150: 484, y0: 1068, chart: [60, 476], figure: [400, 930, 1.66] },
+  landscape: { box: "0 0 1280 800", x: 1066, y150: 150, y0: 612, chart: [520, 930], figure: [900, 560, 1.36] },
+};
+
+export function createScene(svg) {
+  const find = (selector) => svg.querySelector(selector);
+  const stage = svg.parentElement;
+  const thermometer = find(".thermometer");
+  const liquids = svg.querySelectorAll(".liquid");
+  const arrow = find(".way");
+  const ticks = TICKS.map(() => append(find(".ticks"), "path"));
+  const dots = createDots(svg);
+  const portrait = matchMedia("(orientation: portrait)");
+  let layout, shown;
+
+  const y = (performance) => layout.y0 - ((layout.y0 - layout.y150) * Math.min(Math.max(performance, 0), TOP)) / TOP;
+
+  function layOut() {
+    layout = LAYOUTS[portrait.matches ? "portrait" : "landscape"];
+    const { x, y0, y150, figure } = layout;
+    const [goal, top, bottom] = [y(1), y150 - 36, y0 + 78];
+    const join = bottom - Math.sqrt(BULB_RADIUS ** 2 - TUBE_RADIUS ** 2);
+    const r = TUBE_RADIUS;
+    const tube = `M${-r} ${join}V${top + r}A${r} ${r} 0 0 1 ${r} ${top + r}V${join}`;
+    const shell = `${tube}A${BULB_RADIUS} ${BULB_RADIUS} 0 1 1 ${-r} ${join}Z`;
+    for (const drawing of [svg, stage.querySelector(".backdrop")]) drawing.setAttribute("viewBox", layout.box);
+    stage.style.setProperty("--goal", `${goal}px`);
+    for (const path of svg.querySelectorAll(".shell")) path.setAttribute("d", shell);
+    find(".glass").setAttribute("transform", `translate(${x} 0)`);
+    find(".above").setAttribute("height", goal - 3);
+    place(".hatched", 0, top, { height: y0 - top });
+    place(".shined", 0, top, { height: y0 - top - 8 });
+    place(".bulb", 0, bottom);
+    place(".foot", 0, bottom, {}, " rotate(14) scale(1.08)");
+    place(".pennant", TUBE_RADIUS + 10, goal);
+    place(".sparkles", 0, top);
+    for (const line of svg.querySelectorAll(".goal")) line.setAttribute("transform", `translate(0 ${goal})`);
+    ticks.forEach((tick, i) =>
+      tick.setAttribute("d", `M${TUBE_RADIUS - 3} ${y(TICKS[i])}h${TICKS[i] === 0.5 ? -32 : -20}`),
+    );
+    place(".figures", figure[0], figure[1], {}, ` scale(${figure[2]})`);
+    dots.layOut({ chart: layout.chart, end: x - TUBE_RADIUS - 6, y });
+    if (shown) show(shown);
+  }
+
+  function place(selector, x, y, attributes = {}, more = "") {
+    const element = find(selector);
+    element.setAttribute("transform", `translate(${x} ${y})${more}`);
+    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  }
+
+  // Show the last step's performance (null: not measured; undefined: none yet) and the strides.
+  function show({ performance, hit, strides: entries }) {
+    shown = { performance, hit, strides: entries };
+    const level = y(performance ?? 0);
+    const height = performance === null ? layout.y0 + 60 : level;
+    for (const liquid of liquids) liquid.style.transform = `translateY(${height}px)`;
+    ticks.forEach((tick, i) => tick.classList.toggle("wet", performance !== null && y(TICKS[i]) > level));
+    const goesOn = performance > 0 && !hit && level - 20 > y(1) + 14;
+    arrow.setAttribute("d", goesOn ? `M0 ${level - 20}V${y(1) + 14}` : "");
+    thermometer.dataset.hit = hit ? "yes" : "no";
+    thermometer.toggleAttribute("data-missing", performance === null);
+    thermometer.toggleAttribute("data-over", performance > TOP);
+    dots.draw(entries);
+  }
+
+  portrait.addEventListener("change", layOut);
+  layOut();
+  return { show };
+}

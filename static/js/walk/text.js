@@ -1,0 +1,84 @@
+// The page's own texts. What a step means comes as text from the server.
+
+import { clock } from "garry/shared/format";
+import { _, fill, n_, number } from "garry/shared/language";
+
+const SAFE = _("Your score is safe.");
+
+// Return what a screen without a step says: [the phrase, the line below it]. `reason`: why the connection ended.
+export function messageFor(screen, session, name, reason) {
+  const safe = session?.has_points === false ? "" : SAFE;
+  switch (screen) {
+    case "ready":
+      return [
+        fill(_("Hello, %(name)s."), { name }),
+        session.presence.source ? _("The sensor is ready.") : _("Waiting for the sensor."),
+      ];
+    case "begin":
+      return [_("Begin to walk."), _("The sensor is ready.")];
+    case "calm":
+      return [session.phase.calm_words, session.has_points ? _("No score in this part.") : ""];
+    case "waiting":
+      return [_("Waiting for the sensor."), _("Please wait. No score yet.")];
+    case "lost":
+      return [_("The sensor is silent."), safe || _("Please wait.")];
+    case "still":
+      return [_("Waiting for your next step."), safe];
+    case "paused":
+      if (session.pause_reason === "restart") return [_("Pause."), _("The server was restarted; nothing was lost.")];
+      if (session.pause_reason === "therapist") return [_("Pause."), `${_("Your therapist paused.")} ${safe}`];
+      return [_("Pause."), `${_("Rest now.")} ${safe}`];
+    case "ask":
+      return [_("End this session?"), _("You cannot walk on after that.")];
+    case "offline":
+      return [_("No connection."), `${_("Please wait.")} ${safe}`];
+    case "ended":
+      return [_("This session has ended."), _("Your scores come next.")];
+    case "closed":
+      return [_("This screen has stopped."), reason];
+  }
+  return ["", ""];
+}
+
+const timer = (seconds) => clock(Math.max(0, Math.ceil(seconds)));
+
+export function timeLeft(session) {
+  const planned = session.target.duration_s;
+  if (session.state === "ready") return planned ? fill(_("%(time)s to walk"), { time: timer(planned) }) : "";
+  if (!planned) return fill(_("%(time)s walked"), { time: timer(session.active_s) });
+  return session.active_s < planned
+    ? fill(_("%(time)s left"), { time: timer(planned - session.active_s) })
+    : _("Time reached");
+}
+
+// Return how much of the phase is done (0 to 1; null where it has no end), and a text of what is left.
+export function phaseLeft({ phase, phase_s, phase_strides }) {
+  const limits = [];
+  if (phase.seconds)
+    limits.push([
+      phase_s / phase.seconds,
+      fill(_("%(time)s left in this part"), { time: timer(phase.seconds - phase_s) }),
+    ]);
+  if (phase.strides) {
+    const left = Math.max(0, phase.strides - phase_strides);
+    limits.push([
+      phase_strides / phase.strides,
+      n_("%(count)s step left in this part", "%(count)s steps left in this part", left),
+    ]);
+  }
+  return limits.sort(([a], [b]) => b - a)[0] ?? [null, ""];
+}
+
+// Return one line for screen readers: "Strong push. Plus 2. 128 points."
+export function describeStep(step, session) {
+  if (step.kind === "missing") return _("Step not measured.");
+  const words = step.words && step.words.replace(/[!.]*$/, ".");
+  if (step.points === null)
+    return [words, step.shown !== null && `${number(step.shown, 2)} ${session.unit}.`].filter(Boolean).join(" ");
+  const change =
+    step.points &&
+    fill(step.points > 0 ? _("Plus %(points)s.") : _("Minus %(points)s."), { points: Math.abs(step.points) });
+  return [words, change, n_("%(score)s point.", "%(score)s points.", session.score, { score: number(session.score) })]
+    .filter(Boolean)
+    .join(" ");
+}

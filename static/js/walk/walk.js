@@ -1,0 +1,106 @@
+// The patient's page: what the socket sends goes into the session, and once a frame onto the screen.
+
+import { fillScreen, keepAwake } from "garry/walk/wake_lock";
+import { createCelebration } from "garry/walk/confetti";
+import { createControls } from "garry/walk/controls";
+import { createFeedback } from "garry/walk/feedback";
+import { createFitting } from "garry/walk/fit_text";
+import { guardLeaving } from "garry/walk/leave_guard";
+import { connect } from "garry/shared/session_socket";
+import { createScene } from "garry/walk/scene";
+import { applyEvent, fromSnapshot, screenOf } from "garry/walk/state";
+import { createSounds } from "garry/walk/sounds";
+
+const PATIENCE_MS = 2_000; // a shorter break of the connection is not shown
+const STILL_MS = 10_000; // after so long without a step the last one is no longer shown as current
+const LEAVE_MS = 1_500;
+const NOT_WALKING = new Set(["presence", "robot_stopped"]); // events that are no sign of walking
+
+const { body } = document;
+const isMirror = body.classList.contains("mirrored"); // in a frame on the therapist's page
+const scene = createScene(body.querySelector(".scene"));
+const { celebrate, clear } = createCelebration(body.querySelector(".confetti"));
+const sound = isMirror ? () => {} : createSounds(body.querySelector(".sound"));
+const drawFeedback = createFeedback(body);
+const fitCalm = createFitting(body);
+const page = { link: "", asking: false, still: false };
+let session, closeReason, stillTimer, linkTimer, frame, leaveTimer;
+let confetti = "none";
+
+const socket = connect(body.dataset.socket, {
+  onSnapshot(snapshot) {
+    session = fromSnapshot(snapshot);
+    awaitStep();
+  },
+  onEvent(event) {
+    applyEvent(session, event);
+    if (event.kind === "step" && event.live && !document.hidden) {
+      confetti = event.confetti;
+      sound(event);
+    }
+    if (NOT_WALKING.has(event.kind)) redraw();
+    else awaitStep();
+  },
+  onLink(state, reason) {
+    clearTimeout(linkTimer);
+    const note = () => {
+      page.link = state;
+      closeReason = reason;
+      redraw();
+    };
+    if (state === "lost") linkTimer = setTimeout(note, PATIENCE_MS);
+    else note();
+  },
+});
+const { showRobot, keepFocus } = createControls(body, socket, (asking) => {
+  page.asking = asking;
+  redraw();
+});
+
+// Begin to wait for the next step.
+function awaitStep() {
+  page.still = false;
+  clearTimeout(stillTimer);
+  stillTimer = setTimeout(() => {
+    page.still = true;
+    redraw();
+  }, STILL_MS);
+  redraw();
+}
+
+function redraw() {
+  frame ??= requestAnimationFrame(draw);
+}
+
+function draw() {
+  frame = undefined;
+  const screen = screenOf(session, page);
+  const theme = screen === "feedback" ? session.phase.theme : "calm";
+  if (body.dataset.theme !== theme) body.dataset.theme = theme;
+  const hasChanged = body.dataset.look !== screen;
+  if (hasChanged) body.dataset.look = screen;
+  if (screen !== "paused" && screen !== "ask") page.asking = false;
+  drawFeedback(screen, session, closeReason);
+  if (session) showRobot(session);
+  if (hasChanged) keepFocus();
+  if (screen !== "feedback") fitCalm();
+  if (screen === "feedback") {
+    const { last, steps } = session;
+    scene.show({
+      performance: last?.kind === "missing" ? null : last?.performance,
+      hit: last?.hit ?? false,
+      strides: steps,
+    });
+    celebrate(confetti);
+  } else clear();
+  confetti = "none";
+  if (session) body.dataset.step = session.number;
+  if (screen === "ended" && !isMirror) leaveTimer ??= setTimeout(() => location.replace(body.dataset.scores), LEAVE_MS);
+}
+
+redraw();
+if (!isMirror) {
+  keepAwake();
+  guardLeaving(body.querySelector("dialog.leave"));
+}
+if (body.classList.contains("alone")) fillScreen();

@@ -1,0 +1,114 @@
+"""``python -m rehab.gait`` on files good and bad."""
+
+import importlib.util
+import json
+
+import numpy as np
+import pytest
+
+from rehab.gait.__main__ import main
+from tests.gait.walks import make_walk, read_moore
+from tests.support.data import signals
+
+COLUMNS = ["time=t", "left.force=Fz", "left.moment=M*1000", "left.angle=A*-1"]
+
+
+@pytest.fixture
+def lab_file(tmp_path):
+    """Return a recording of a lab that sends kilonewton meters and dorsiflexion."""
+    walk, _ = make_walk(strides=12)
+    path = tmp_path / "walk.csv"
+    table = np.column_stack(
+        [walk.t_s, walk.left[0], walk.left[1] / 1000, -walk.left[2], walk.right[0]]
+    )
+    np.savetxt(path, table, delimiter=";", header="t;Fz;M;A;Fz right", comments="", fmt="%.9f")
+    return path, walk
+
+
+def test_moore_is_ready_made(capsys):
+    path = signals("moore2013_s15_pre") / "UnpertPre_data.csv"
+    assert main([str(path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+
+    walk, _ = read_moore()
+    expected = walk.both_legs(look_ahead_s=0.05)
+    assert found["mass_kg"] == 79.4
+    assert found["rate_hz"] == 100
+    assert [s["a2_w_kg"] for s in found["strides"]] == [s.a2_w_kg for s in expected]
+    assert {s["side"] for s in found["strides"]} == {"left", "right"}
+    assert found["check"]["findings"] == []
+
+
+def test_columns_units_and_signs(lab_file, capsys):
+    path, walk = lab_file
+    arguments = [str(path), str(path), "--json", "--mass", "75", "--rate", "100"]
+    assert main([*arguments, "--columns", *COLUMNS]) == 0
+    first, second = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+    assert first == second
+    expected = walk.one_leg(look_ahead_s=0.05)
+    assert [s["a2_w_kg"] for s in first["strides"]] == pytest.approx(
+        [s.a2_w_kg for s in expected], rel=1e-3
+    )
+
+
+def test_a_table_to_read(lab_file, capsys):
+    path, _ = lab_file
+    assert main([str(path), "--mass", "75", "--columns", *COLUMNS[:3], "left.angle=A"]) == 0
+    shown = capsys.readouterr().out
+
+    assert "12 strides, 0 valid" in shown
+    assert "Turn the sign of the angle" in shown
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--columns", *COLUMNS], "Give it in kg: --mass 75"),
+        (["--mass", "0", "--columns", *COLUMNS], "Weigh the patient"),
+        (["--mass", "75"], "no known layout (garry, moore2013)"),
+        (["--mass", "75", "--columns", "time=t"], "at least one leg"),
+        (["--mass", "75", "--columns", "time=t", "left.force=Fz"], "no moment and no angle"),
+        (["--mass", "75", "--columns", "zeit=t"], "'zeit=t' maps no column"),
+        (["--mass", "75", "--columns", "time=T", *COLUMNS[1:]], "has no column T. It has: t, Fz"),
+    ],
+)
+def test_errors_say_the_cure(lab_file, capsys, arguments, message):
+    path, _ = lab_file
+    assert main([str(path), *arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "no known layout"),
+        ("t,Fz,M,A\n", "no samples"),
+        ("t,Fz,M,A\n0,x,1,1\n1,y,1,1\n", "holds no numbers"),
+        ("t,Fz,M,A\n1,1,1,1\n1,1,1,1\n", "the times do not go on"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:Empty input|genfromtxt")
+def test_files_without_samples(tmp_path, capsys, text, message):
+    path = tmp_path / "empty.csv"
+    path.write_text(text)
+    columns = ["--columns", *COLUMNS] if text else []
+    assert main([str(path), "--mass", "75", *columns]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_missing_file(capsys):
+    assert main(["nowhere.csv"]) == 2
+    assert "nowhere.csv" in capsys.readouterr().err
+
+
+def test_plot(lab_file, tmp_path, capsys):
+    path, _ = lab_file
+    picture = tmp_path / "out.png"
+    result = main([str(path), "--mass", "75", "--plot", str(picture), "--columns", *COLUMNS])
+    if importlib.util.find_spec("matplotlib") is None:
+        assert result == 2
+        assert "pip install matplotlib" in capsys.readouterr().err
+    else:
+        assert result == 0
+        assert picture.read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,197 @@
+"""What each page and robot hears of a session, and heartbeats whatever else fails."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rehab.sessions.live import owners
+from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.session import LiveSession
+from rehab.training.phases import make_phase
+from tests.support.callers import (
+    change,
+    turns,
+)
+
+PHASES = (
+    make_phase("training", strides=4),
+    make_phase("catch", strides=2),
+    make_phase("training", gain=0.9),
+)
+
+
+async def test_a_patient_hears_no_values_where_there_is_no_feedback(place, begun):
+    session = await begun(place, make_phase("catch", strides=3), make_phase("training"))
+    tablet, monitor, robot = place.tablet(session), place.monitor(session), place.robot()
+    await tablet.watch()
+    await monitor.watch()
+    await (await robot.dial()).hello()
+    source = await place.source().dial()
+    await source.hello()
+    await source.walk(4.017, 2.0)
+    await source.walk(4.0, side="right")
+    await source.walk(None)
+    await monitor.until_step(4)
+    await tablet.until(lambda event: event["kind"] == "phase")
+    heard = [e for e in tablet.events if e["kind"] not in ("presence", "phase")]
+    assert [(e["kind"], e["number"]) for e in heard] == [("calm", 1), ("calm", 2), ("calm", 4)]
+    assert [e["phase_strides"] for e in heard] == [1, 2, 0]
+    assert set(heard[0]) == {"kind", "number", "active_s", "phase_s", "phase_strides"}
+    await source.walk(4.0, side="right")
+    await source.walk(25.0)
+    await source.walk(3.3)
+    step = await tablet.until_step(7)
+    assert (step["kind"], step["performance"], step["shown"]) == ("step", 1.1, None)
+    assert [e["kind"] for e in tablet.events if e.get("number") == 6] == ["missing"]
+    await monitor.until_step(7)
+    assert monitor.steps == [1, 2, 3, 4, 5, 6, 7]
+    assert (await monitor.until_step(1))["value"] == 4.017
+    assert (await monitor.until_step(3))["side"] == "right"
+    assert (await monitor.until_step(6))["reasons"] == ["out_of_bounds"]
+    heard = await robot.hear("step")
+    assert (heard["number"], heard["performance"]) == (7, pytest.approx(1.1))
+    everything = str(tablet.heard)
+    for secret in ("4.017", "'goal'", "code-elm", "25.0", "value"):
+        assert secret not in everything
+    assert "nick-elm" in everything
+
+
+FEEDBACK: dict[str, list[tuple[Any, ...]]] = {
+    "positive": [(1, 1, "gain", 1), (0, 1, "neutral", 0)],
+    "negative": [(0, 0, "neutral", None), (-1, -1, "loss", None)],
+    "binary": [(1, 1, "gain", 1), (-1, 0, "loss", 0)],
+    "explicit": [(None, None, "neutral", None), (None, None, "neutral", None)],
+}
+
+
+@pytest.mark.parametrize("valence", FEEDBACK)
+async def test_a_step_carries_the_feedback_of_its_valence(place, begun, valence):
+    session = await begun(place, valence=valence)
+    tablet = place.tablet(session)
+    await tablet.watch()
+    source = await place.source().dial()
+    await source.hello()
+    await source.walk(3.6, 2.0)
+    await tablet.until_step(2)
+    for number, (points, score, emblem, streak) in enumerate(FEEDBACK[valence], start=1):
+        step = await tablet.until_step(number)
+        assert (step["points"], step["score"]) == (points, score)
+        assert (step["emblem"], step["streak"]) == (emblem, streak)
+        assert step["shown"] == ((3.6, 2.0)[number - 1] if valence == "explicit" else None)
+        praises = step["confetti"] != "none"
+        assert praises == (number == 1 and valence in ("positive", "binary"))
+        assert step["live"] is True
+
+
+async def test_a_robot_hears_its_cue_states_and_steps(place, begun, ready, monkeypatch):
+    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.005)
+    session = await begun(place)
+    robot = await place.robot().dial()
+    welcome = await robot.hello()
+    assert welcome["cue"]["above"] == "celebrate"
+    assert welcome["cue"]["threshold"] == 0.9
+    monitor = place.monitor(session)
+    await monitor.watch()
+    await robot.hear("heartbeat")
+    await change(session, "activation_threshold", 0.8)
+    assert (await robot.hear("cue"))["cue"]["threshold"] == 0.8
+    await change(session, "pause")
+    assert (await robot.hear("state"))["state"] == "paused"
+    await robot.say({"type": "report", "report": {"gesture": "celebrate"}})
+    assert (await monitor.until(lambda e: e["kind"] == "robot"))["report"]["gesture"] == "celebrate"
+    await change(session, "abort")
+    assert (await robot.hear("state"))["state"] == "aborted"
+    old = await runtimes.current().session(session.pk)
+    later = await ready(place)
+    assert (await robot.hear("welcome"))["session"] == later.pk
+    await turns()
+    assert len(old.channel.viewers) == 1  # the monitor's: the robot listens to the new one alone
+
+
+async def test_a_robot_waits_for_a_session_at_its_station(place, ready):
+    robot = await place.robot().dial()
+    assert await robot.hello() == {"type": "welcome", "session": None}
+    await robot.say({"type": "report", "report": {"pose": [0, 0, 0]}})
+    session = await ready(place)
+    assert (await robot.hear("welcome"))["session"] == session.pk
+
+
+async def test_pages_hear_a_heartbeat(place, begun, monkeypatch):
+    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+    session = await begun(place)
+    tablet = place.tablet(session)
+    await tablet.watch()
+    await tablet.hear("heartbeat")
+
+
+async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch):
+    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+    disk, database = threading.Event(), asyncio.Event()
+    waiting: set[str] = set()
+
+    def move_log() -> None:
+        waiting.add("checkpoint")
+        assert disk.wait(10)
+
+    def release(*_: Any) -> None:
+        waiting.add("release")
+        assert disk.wait(10)
+
+    async def keep_signed_in(*_: Any) -> None:
+        waiting.add("sign-ins")
+        await database.wait()
+
+    session = await begun(place)
+    robot, tablet = await place.robot().dial(), place.tablet(session)
+    await robot.hello()
+    await tablet.watch()
+    monkeypatch.setattr(runtimes, "_checkpoint", move_log)
+    monkeypatch.setattr(runtimes, "keep_signed_in", keep_signed_in)
+    monkeypatch.setattr(owners, "release", release)
+    await runtimes.current().session((await ready(place, at_station=False)).pk)  # soon idle
+    while len(waiting) < 3:
+        await robot.hear("heartbeat")
+    await robot.overhear()
+    for _ in range(50):
+        await robot.hear("heartbeat")
+    await tablet.overhear()
+    for _ in range(3):
+        await tablet.hear("heartbeat")
+    assert not disk.is_set()
+    disk.set()
+    database.set()
+
+
+async def test_heartbeats_and_housekeeping_go_on_whatever_fails(place, begun, monkeypatch, caplog):
+    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+    failed: Counter[str] = Counter()
+
+    def fail(what: str) -> Callable[..., None]:
+        def failing(*_: Any) -> None:
+            failed[what] += 1
+            raise RuntimeError(what)
+
+        return failing
+
+    session = await begun(place)
+    robot = await place.robot().dial()
+    await robot.hello()
+    for name in ("_checkpoint", "keep_signed_in"):
+        monkeypatch.setattr(runtimes, name, fail(name))
+    with monkeypatch.context() as patch:
+        patch.setattr(LiveSession, "is_watched", property(fail("robots")))
+        patch.setattr(LiveSession, "presence", fail("pages"))
+        patch.setattr(LiveSession, "is_idle", property(fail("idle")))
+        while len(failed) < 5 or min(failed.values()) < 2:  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
+    await robot.overhear()
+    await robot.hear("heartbeat")
+    await place.tablet(session).watch()
+    told = {str(record.exc_info[1]) for record in caplog.records if record.exc_info}
+    assert told == set(failed)

@@ -1,0 +1,147 @@
+"""Who may listen to a session, who no longer may, and what is kept in memory for nobody."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+from asgiref.sync import sync_to_async
+from django.contrib.sessions.models import Session
+from django.utils import timezone
+
+from rehab.people.models import Clinic, User
+from rehab.people.roles import Role
+from rehab.sessions.live import runtime as runtimes
+from tests.support.callers import (
+    Message,
+    MonitorPage,
+    PatientPage,
+    build_place,
+    change,
+    sign_in,
+)
+
+
+async def test_who_may_open_which_page(place, elsewhere, begun):
+    session = await begun(place)
+    neighbor = await sync_to_async(build_place)("neighbor", place.clinic)
+    tries: list[tuple[Message, int | None, int | None]] = [
+        ({}, 4001, 4001),
+        ({"token": "wrong"}, 4001, 4001),
+    ]
+    for role, user in place.people.items():
+        closed = None if role in (Role.LEAD, Role.PT) else 4004
+        tries.append(({"user": user}, closed, closed))
+    tries += [({"user": user}, 4004, 4004) for user in elsewhere.people.values()]
+    tries += [
+        ({"token": place.tokens["tablet"]}, None, 4004),
+        ({"token": place.tokens["source"]}, 4004, 4004),
+        ({"token": place.tokens["robot"]}, 4004, 4004),
+    ]
+    for other in (neighbor, elsewhere):
+        tries += [({"token": token}, 4004, 4004) for token in other.tokens.values()]
+    tries.append(({"user": neighbor.pt}, None, None))
+    for options, patient, monitor in tries:
+        for kind, expected in ((PatientPage, patient), (MonitorPage, monitor)):
+            page = kind(session.pk, **options)
+            if expected is None:
+                await page.watch()
+                await page.hang_up()
+            else:
+                await page.dial()
+                code, error = await page.sent_away()
+                assert code == expected, (options, kind)
+                assert error["message"]
+                assert len(page.heard) == 1
+
+
+async def test_from_elsewhere_people_watch_with_consent_and_the_tablet_stays(place, begun):
+    session = await begun(place)
+    await sync_to_async(Clinic.everywhere.update)(networks="192.168.1.0/24")
+
+    async def code_of(
+        kind: type[PatientPage | MonitorPage], address: str, **who: Any
+    ) -> int | None:
+        page = kind(session.pk, **who)
+        page.wire.scope["client"] = (address, 1)
+        if address == "192.168.1.7" or "token" in who:
+            await page.watch()
+            await page.hang_up()
+            return None
+        await page.dial()
+        return (await page.sent_away())[0]
+
+    for kind in (PatientPage, MonitorPage):
+        assert await code_of(kind, "192.168.1.7", user=place.pt) is None
+        assert await code_of(kind, "203.0.113.9", user=place.pt) == 4004
+    assert await code_of(PatientPage, "203.0.113.9", token=place.tokens["tablet"]) is None
+
+
+@pytest.mark.parametrize("origin", ["https://evil.example", None, "http://localhost.evil.example"])
+async def test_cookies_count_on_sockets_of_our_own_pages_only(place, begun, origin):
+    session = await begun(place)
+    for kind in (PatientPage, MonitorPage):
+        page = kind(session.pk, user=place.pt, origin=origin)
+        await page.dial()
+        assert (await page.sent_away())[0] == 4001
+
+
+async def test_cookies_count_from_every_name_of_the_server(place, begun):
+    session = await begun(place)
+    for origin in ("http://localhost:8000", "http://127.0.0.1", "http://[::1]:8000"):
+        await MonitorPage(session.pk, user=place.pt, origin=origin).watch()
+
+
+async def test_a_switched_off_account_opens_nothing(place, begun):
+    session = await begun(place)
+    place.pt.is_active = False
+    await sync_to_async(place.pt.save)()
+    page = await place.monitor(session).dial()
+    assert (await page.sent_away())[0] == 4001
+
+
+async def test_open_sockets_end_with_their_token_or_sign_in(place, begun, monkeypatch):
+    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+    session = await begun(place)
+    source, robot = await place.source().dial(), await place.robot().dial()
+    await source.hello()
+    await robot.hello()
+    tablet, monitor = place.tablet(session), place.monitor(session)
+    other = MonitorPage(session.pk, user=place.people[Role.LEAD])
+    for page in (tablet, monitor, other):
+        await page.watch()
+    for name in ("source", "tablet"):  # one revoked, one renewed
+        device = place.devices[name]
+        if name == "source":
+            device.revoked_at = timezone.now()
+        else:
+            device.new_token()
+        await device.asave()
+    assert (await source.sent_away())[0] == 4001
+    assert (await tablet.sent_away())[0] == 4001
+    await Session.objects.filter(session_key=sign_in(place.pt)).adelete()  # signed out
+    assert (await monitor.sent_away())[0] == 4001
+    await robot.hear("heartbeat")
+    assert other.code is None
+    await User.everywhere.filter(pk=place.people[Role.LEAD].pk).aupdate(is_active=False)
+    assert (await other.sent_away())[0] == 4001
+
+
+async def test_idle_sessions_leave_memory_but_not_while_someone_comes(place, ready, monkeypatch):
+    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.001)
+    session = await ready(place)
+    runtime = runtimes.current()
+    live = await runtime.session(session.pk)
+    while session.pk in runtime.sessions:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    assert (await runtime.session(session.pk)) is not live
+    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 60)
+    tablet = place.tablet(session)
+    await tablet.watch()
+    await change(session, "start")
+    await tablet.until(lambda event: event["kind"] == "state")
+    await tablet.hang_up()
+    assert not runtime.sessions[session.pk].channel.viewers
+    assert not runtime.sockets
+    assert not any(runtime.waiting.values())

@@ -1,0 +1,100 @@
+"""What is noted with one tap, and sessions that a page of the site makes and changes."""
+
+from __future__ import annotations
+
+from asgiref.sync import ThreadSensitiveContext, sync_to_async
+
+from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.actor import SessionActor
+from rehab.sessions.log import Remark, SessionEvent
+from rehab.sessions.services import change_session, create_session
+from rehab.training.changes import ChangeKind
+from rehab.training.goals import GoalRule
+from rehab.training.phases import make_phase
+from tests.support.callers import (
+    change,
+)
+
+PHASES = (
+    make_phase("training", strides=4),
+    make_phase("catch", strides=2),
+    make_phase("training", gain=0.9),
+)
+
+
+async def test_a_page_of_the_site_may_create_and_change_sessions(place, elsewhere):
+    """In the thread and context of a request, as Django runs its views."""
+    source = await place.source().dial()
+    await source.hello()
+    robot = await place.robot().dial()
+    await robot.hello()
+
+    def view():
+        session = create_session(
+            place.patient,
+            valence="positive",
+            goal=GoalRule(value=3.0),
+            phases=PHASES,
+            station=place.station,
+        )
+        change_session(session, ChangeKind.START, by=place.pt)
+        change_session(session, ChangeKind.GOAL, 4.0, by=place.pt)
+        return session
+
+    async with ThreadSensitiveContext():
+        session = await sync_to_async(view)()
+    assert (await source.hear("welcome"))["session"] == session.pk
+    assert (await robot.hear("welcome"))["session"] == session.pk
+    await source.overhear()
+    source.number = 0
+    await source.walk(4.0)
+    await robot.hear("step")
+    assert runtimes.current().sessions[session.pk].actor.fold.goal == 4.0
+
+
+async def test_remarks_are_kept_in_the_log_and_alter_no_score(place, begun):
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    await source.walk(4.0, 4.0)
+    monitor, other, tablet = place.monitor(session), place.monitor(session), place.tablet(session)
+    for page in (monitor, other, tablet):
+        await page.watch()
+    for index, what in enumerate(Remark):
+        value = {"value": 7} if what is Remark.BORG else {}
+        await monitor.say({"type": "remark", "what": what.value, "id": f"r{index}", **value})
+        assert (await monitor.hear("done"))["id"] == f"r{index}"
+        seen = await other.until(lambda event, what=what: event.get("what") == what.value)
+        assert (seen["number"], seen["value"]) == (2, 7.0 if value else None)
+    await source.walk(4.0)
+    assert (await tablet.until_step(3))["score"] == 3
+    assert not [event for event in tablet.events if event["kind"] == "remark"]
+    rows = SessionEvent.everywhere.filter(session=session, kind__in=list(Remark)).order_by("pk")
+    kept = [row async for row in rows.values_list("kind", "after_number", "value", "by")]
+    assert kept == [
+        (what.value, 2, 7.0 if what is Remark.BORG else None, place.pt.pk) for what in Remark
+    ]
+    rebuilt = await sync_to_async(SessionActor.load)(session)
+    assert rebuilt.fold.score == 3
+    marks = [
+        {"after": 2, "kind": what.value, "value": 7.0 if what is Remark.BORG else None}
+        for what in Remark
+    ]
+    assert list(rebuilt.marks) == (await place.monitor(session).watch())["marks"] == marks
+
+
+async def test_what_cannot_be_noted(place, begun):
+    session = await begun(place)
+    tablet, monitor = place.tablet(session), place.monitor(session)
+    for page in (tablet, monitor):
+        await page.watch()
+    await tablet.say({"type": "remark", "what": "pain", "id": "r"})
+    assert (await tablet.hear("error"))["code"] == "refused"
+    await change(session, "abort")
+    await monitor.say({"type": "remark", "what": "pain", "id": "r"})
+    assert (await monitor.hear("error"))["message"] == "The session has ended."
+    for bad in ({"what": "joy"}, {"what": "borg"}, {"what": "borg", "value": 11}, {}):
+        page = place.monitor(session)
+        await page.watch()
+        await page.say({"type": "remark", "id": "r", **bad})
+        assert (await page.sent_away())[0] == 4400

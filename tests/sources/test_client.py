@@ -1,0 +1,464 @@
+"""A source against a server that obeys the protocol, hangs up, pauses, restarts and refuses."""
+
+import asyncio
+import json
+from contextlib import asynccontextmanager
+from functools import partial
+
+import pytest
+
+from rehab.sources.client import SourceClient, StepsLost, StridePlayback
+from rehab.sources.synthetic import GOOD, SyntheticWalker
+from rehab.training.phases import make_phase
+from rehab.training.steps import Measurement, Side
+from robot.link import Link, LinkRefused, Timing
+from tests.sources.fake_garry import TOKEN, FakeGarry, serve_garry
+
+QUICK = Timing(retry_first_s=0.005, retry_longest_s=0.02, close_within_s=0.1)
+
+
+@pytest.fixture
+def garry():
+    return FakeGarry()
+
+
+def even_walk(count=1000, every_s=1.0):
+    """Walk evenly; each session from the beginning."""
+
+    def open_walk(side):
+        strides = (
+            Measurement(number=n, time_s=n * every_s, side=side, value=3.0 + n / 1000)
+            for n in range(1, count + 1)
+        )
+        return lambda _phase: next(strides, None)
+
+    return open_walk
+
+
+PLAYED = ("speed", "max_unacknowledged", "monotonic")
+
+
+def make_client(garry, open_walk, token=TOKEN, **settings):
+    dial = partial(Link, garry.url, token, timing=QUICK)
+    how = {"speed": None} | {name: settings.pop(name) for name in PLAYED if name in settings}
+    return SourceClient(dial, StridePlayback(open_walk, **how), **settings)
+
+
+async def until(condition):
+    """Wait until something holds that nobody will tell us of."""
+    async with asyncio.timeout(5):
+        while not condition():  # noqa: ASYNC110
+            await asyncio.sleep(0.002)
+
+
+@asynccontextmanager
+async def running(client):
+    """Run a client beside the test."""
+    task = asyncio.create_task(client.run())
+    try:
+        yield task
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+async def run(client):
+    async with asyncio.timeout(5):
+        await client.run()
+
+
+async def test_a_walk_is_stored_whole_and_in_order(garry):
+    acks = []
+    async with serve_garry(garry):
+        client = make_client(
+            garry, even_walk(1000), run="b7c1", on_ack=lambda *ack: acks.append(ack)
+        )
+        await run(client)
+
+    assert garry.numbers == list(range(1, 1001))
+    assert {step["side"] for step in garry.log} == {"right"}  # the leg that the session trains
+    assert garry.hellos == [
+        {"type": "hello", "version": 1, "run": "b7c1", "last": 0, "speed": None}
+    ]
+    assert acks[-1] == (7, 1000)
+    assert (client.acknowledged, client.unacknowledged, client.lost) == (1000, 0, 0)
+    assert len(garry.frames) < 200  # strides that wait together travel together
+
+
+async def test_never_more_than_the_window_is_on_the_way(garry):
+    garry.holds_acks = True
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(1000))
+        async with running(client) as task:
+            await until(lambda: len(garry.log) == 256)
+            await asyncio.sleep(0.05)
+            assert len(garry.log) == 256
+            await garry.acknowledge()
+            await asyncio.wait_for(task, 5)
+
+    assert garry.unacknowledged_max == 256
+    assert garry.numbers == list(range(1, 1001))
+
+
+@pytest.mark.parametrize("code", [1001, 4011, 4012])
+async def test_after_a_drop_it_resumes_where_the_server_is(garry, code):
+    garry.close_after = {100: code, 101: code, 500: code}
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(600))
+        await run(client)
+
+    assert garry.numbers == list(range(1, 601))
+    assert len(garry.hellos) == 4
+    assert len({hello["run"] for hello in garry.hellos}) == 1
+    assert garry.hellos[1]["last"] >= 100
+    assert client.unacknowledged == 0
+    assert 0 < len(garry.repeated) <= 3  # one each, to have its ack again
+
+
+async def test_steps_that_the_server_had_seen_but_not_stored_are_sent_again(garry):
+    """It dies with 10 of 20 steps in memory: nothing that was not acknowledged is forgotten."""
+    garry.holds_acks = True
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(20))
+        async with running(client) as task:
+            await until(lambda: len(garry.log) == 20)
+            await garry.sockets[-1].close(1001)  # welcomes with next 21 …
+            await until(lambda: len(garry.hellos) == 2 and garry.repeated)
+            assert client.unacknowledged == 20
+            del garry.log[10:]  # … and dies before it has stored them
+            garry.holds_acks = False
+            await garry.sockets[-1].close(1001)
+            await asyncio.wait_for(task, 5)
+
+    assert garry.numbers == list(range(1, 21))
+
+
+async def test_when_nothing_but_the_last_ack_was_lost_it_ends(garry):
+    garry.close_after = {5: 4012}
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(5))
+        await run(client)
+
+    assert garry.numbers == [1, 2, 3, 4, 5]
+    assert garry.repeated == [5]
+
+
+async def test_a_server_that_comes_up_later_is_waited_for(garry):
+    async with serve_garry(garry) as server:
+        port = server.sockets[0].getsockname()[1]
+    notices: list[str] = []
+    async with running(make_client(garry, even_walk(5), notify=notices.append)) as task:
+        await until(lambda: len(notices) > 2)
+        async with serve_garry(garry, port):
+            await asyncio.wait_for(task, 5)
+
+    assert garry.numbers == [1, 2, 3, 4, 5]
+    assert "No server at" in notices[0]
+
+
+async def test_another_content_under_the_same_number_stops_it_with_the_servers_words(garry):
+    garry.close_after = {3: 4012}
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(3))
+        async with running(client) as task:
+            await until(lambda: len(garry.log) == 3)
+            garry.log[2]["value"] = 9.9
+            with pytest.raises(LinkRefused, match="Step 3 is stored with other content") as refused:
+                await asyncio.wait_for(task, 5)
+
+    assert refused.value.code == 4400
+
+
+async def test_a_server_that_lost_acknowledged_steps_is_found_out(garry):
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(), speed=1.0, stay=True)
+        async with running(client) as task:
+            await until(lambda: client.acknowledged == 1)
+            garry.log.clear()
+            await garry.sockets[-1].close(4012)
+            with pytest.raises(StepsLost, match="older copy"):
+                await asyncio.wait_for(task, 5)
+
+
+async def test_a_wrong_token_stops_it_with_the_servers_words(garry):
+    async with serve_garry(garry):
+        with pytest.raises(LinkRefused, match="Unknown token") as refused:
+            await run(make_client(garry, even_walk(), token="t-2"))
+
+    assert refused.value.code == 4001
+    assert len(garry.sockets) == 1
+
+
+async def test_a_run_that_begins_anew_goes_on_in_the_session(garry):
+    async with serve_garry(garry):
+        await run(make_client(garry, even_walk(10)))
+        await run(make_client(garry, even_walk(10)))
+
+    assert garry.numbers == list(range(1, 21))
+    assert garry.hellos[0]["run"] != garry.hellos[1]["run"]
+    assert garry.hellos[1]["last"] == 0
+
+
+async def test_it_waits_for_the_start(garry):
+    garry.state = "ready"
+    async with serve_garry(garry), running(make_client(garry, even_walk(5))) as task:
+        await until(lambda: garry.hellos)
+        await asyncio.sleep(0.03)
+        assert not garry.frames
+        await garry.change("start")
+        await asyncio.wait_for(task, 5)
+
+    assert garry.numbers == [1, 2, 3, 4, 5]
+
+
+async def test_steps_that_were_refused_before_the_start_are_sent_after_it(garry):
+    garry.holds_acks = True
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(5))
+        async with running(client) as task:
+            await until(lambda: garry.sockets)
+            garry.state = "ready"  # the welcome may still have said something else
+            garry.log.clear()
+            await garry.tell(type="error", code="not_running", message="Wait for start.")
+            await asyncio.sleep(0.02)
+            garry.holds_acks = False
+            await garry.change("start")
+            await asyncio.wait_for(task, 5)
+
+    assert garry.numbers == [1, 2, 3, 4, 5]
+
+
+class Time:
+    """Passes only while somebody sleeps, or when told to."""
+
+    now_s = 100.0
+
+    def __call__(self):
+        return self.now_s
+
+    async def sleep(self, seconds):
+        await asyncio.sleep(0.002)
+        self.now_s += seconds + 1e-6  # no clock stops for want of digits
+
+
+async def test_who_is_paused_stands_still_and_so_does_the_clock(garry):
+    ours = Time()
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(), speed=1.0, monotonic=ours, sleep=ours.sleep)
+        async with running(client):
+            await until(lambda: len(garry.log) >= 3)
+            await garry.change("pause")
+            await until(lambda: "paused" in client.describe())
+            await asyncio.sleep(0.02)
+            stored, ours.now_s = len(garry.log), ours.now_s + 600
+            await garry.sockets[-1].close(4012)
+            await until(lambda: len(garry.hellos) == 2)
+            assert "clock_s" not in garry.hellos[1]  # it stands
+            await asyncio.sleep(0.02)
+            assert len(garry.log) == stored
+            await garry.change("resume")
+            await until(lambda: len(garry.log) >= stored + 3)
+            await garry.sockets[-1].close(4012)
+            await until(lambda: len(garry.hellos) == 3)
+
+    hello = garry.hellos[2]
+    assert hello["last"] <= hello["clock_s"] < hello["last"] + 1.1
+    assert garry.numbers == list(range(1, len(garry.log) + 1))
+
+
+async def test_what_was_walked_before_a_crash_waits_until_the_paused_session_goes_on(garry):
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(8))
+        garry.close_after[3] = 4011
+        garry.holds_acks = True
+        async with running(client) as task:
+            await until(lambda: len(garry.log) >= 3)
+            garry.state = "paused"  # as the server comes back
+            garry.log.clear()  # and what it had not acknowledged was lost
+            garry.holds_acks = False
+            await until(lambda: len(garry.hellos) == 2)
+            await asyncio.sleep(0.03)
+            assert not garry.log
+            await garry.change("resume")
+            await asyncio.wait_for(task, 5)
+
+    assert garry.numbers == list(range(1, 9))
+
+
+async def test_out_of_reach_it_walks_on_and_sends_everything_later(garry):
+    async with serve_garry(garry) as server:
+        port = server.sockets[0].getsockname()[1]
+        client = make_client(garry, even_walk(60), speed=500.0)
+        task = asyncio.create_task(client.run())
+        await until(lambda: len(garry.log) >= 5)
+    await until(lambda: client.unacknowledged >= 20)
+    garry.frames.clear()
+    async with serve_garry(garry, port):
+        await asyncio.wait_for(task, 5)
+
+    assert garry.numbers == list(range(1, 61))
+    assert len(garry.frames[0]["steps"]) >= 20
+    assert garry.hellos[-1]["last"] >= 20
+
+
+async def test_a_stop_ends_it(garry):
+    notices: list[str] = []
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(), speed=100.0, notify=notices.append)
+        async with running(client) as task:
+            await until(lambda: client.acknowledged >= 3)
+            await garry.change("stop")
+            await asyncio.wait_for(task, 5)
+
+    assert "Session 7 has ended" in notices[-1]
+
+
+async def test_steps_that_the_end_overtook_are_counted_as_lost(garry):
+    garry.holds_acks = True
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(300))
+        async with running(client) as task:
+            await until(lambda: len(garry.log) == 256)
+            garry.state = "finished"
+            await garry.acknowledge()  # the rest meets a session that has ended
+            await asyncio.wait_for(task, 5)
+
+    assert (client.acknowledged, client.lost) == (256, 44)
+
+
+async def test_a_session_that_ended_while_the_server_was_away_ends_it(garry):
+    garry.close_after = {5: 4012}
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(5))
+        async with running(client) as task:
+            await until(lambda: len(garry.log) == 5)
+            garry.session = None
+            await asyncio.wait_for(task, 5)
+
+    assert client.lost == 5
+
+
+async def test_a_named_session_that_has_ended_is_an_error(garry):
+    garry.state = "finished"
+
+    async def refuse(socket):
+        await garry.refuse(socket, 4410, "ended", "Session 7 has ended.")
+
+    garry._welcome = refuse
+    async with serve_garry(garry):
+        with pytest.raises(LinkRefused, match="Session 7 has ended"):
+            await run(make_client(garry, even_walk(), session=7))
+
+
+async def test_without_a_session_it_waits_for_one(garry):
+    garry.session = None
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(5))
+        async with running(client) as task:
+            await until(lambda: garry.hellos)
+            assert not garry.frames
+            await garry.open(8, "running")
+            await asyncio.wait_for(task, 5)
+
+    assert len(garry.steps[8]) == 5
+
+
+async def test_who_stays_walks_anew_in_every_session(garry):
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(5), stay=True)
+        async with running(client):
+            await until(lambda: client.acknowledged == 5)
+            await garry.change("stop")
+            await garry.open(None)
+            await garry.open(8, "ready")
+            await garry.change("start")
+            await until(lambda: client.acknowledged == 10)
+
+    assert [step["number"] for step in garry.steps[8]] == [1, 2, 3, 4, 5]
+    assert garry.steps[8] == garry.steps[7]
+
+
+@pytest.mark.parametrize("speed", [None, 1.0])
+async def test_a_simulated_patient_walks_in_the_phases_that_the_server_tells(garry, speed):
+    """The same walk as without a server in between."""
+    garry.phase = {"kind": "baseline", "name": "Baseline", "feedback": False, "gain": 1.0}
+    told = {"kind": "training", "name": "Training", "feedback": True, "gain": 0.85}
+    garry.phases = {20: told}
+    walker = SyntheticWalker(GOOD, 3, Side.RIGHT)
+    strides = iter(range(40))
+
+    def open_walk(side):
+        return lambda phase: walker.next_stride(phase) if next(strides, None) is not None else None
+
+    ours = Time()
+
+    async def sleep(seconds):
+        await until(lambda: not client.unacknowledged)  # here, acks take no time
+        await ours.sleep(seconds)
+
+    async with serve_garry(garry):
+        client = make_client(
+            garry, open_walk, speed=speed, max_unacknowledged=1, monotonic=ours, sleep=sleep
+        )
+        await run(client)
+
+    other = SyntheticWalker(GOOD, 3, Side.RIGHT)
+    phases = [make_phase("baseline")] * 20 + [make_phase("training", gain=0.85)] * 20
+    assert [step["time_s"] for step in garry.log] == [other.next_stride(p).time_s for p in phases]
+
+
+async def test_a_phase_that_nobody_knows_is_no_reason_to_stop(garry):
+    garry.phase = {"kind": "levitation"}
+    notices: list[str] = []
+    async with serve_garry(garry):
+        await run(make_client(garry, even_walk(5), notify=notices.append))
+
+    assert garry.numbers == [1, 2, 3, 4, 5]
+    assert any("levitation" in notice for notice in notices)
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        {"type": "welcome", "session": 7, "state": "running"},
+        {"type": "welcome", "session": "7", "state": "running", "next": 1},
+        {"type": "welcome", "session": 7, "next": 1},
+        {"type": "welcome", "session": 7, "next": 1, "state": "running", "trained_side": "third"},
+        {"type": "ack"},
+    ],
+)
+async def test_a_server_that_does_not_speak_the_protocol_is_refused(garry, message):
+    async def welcome(socket):
+        await socket.send(json.dumps(message))
+
+    garry._welcome = welcome
+    async with serve_garry(garry):
+        with pytest.raises(LinkRefused, match="Use the version that fits"):
+            await run(make_client(garry, even_walk()))
+
+
+async def test_words_that_it_does_not_know_are_no_reason_to_stop(garry):
+    garry.state = "ready"
+    async with serve_garry(garry), running(make_client(garry, even_walk(5))) as task:
+        await until(lambda: garry.hellos)
+        await garry.tell(type="weather", sun=True)
+        await garry.tell(type="goal", goal=4.2)
+        await garry.tell(type="goal", goal=None)
+        await garry.change("start")
+        await asyncio.wait_for(task, 5)
+
+    assert len(garry.log) == 5
+
+
+async def test_it_says_how_it_goes(garry):
+    notices: list[str] = []
+    async with serve_garry(garry):
+        client = make_client(garry, even_walk(5), notify=notices.append, stay=True)
+        assert client.describe() == "Waiting for the server."
+        async with running(client):
+            await until(lambda: client.acknowledged == 5)
+            assert client.describe() == (
+                "Session 7 running: 5 strides, 0 not acknowledged, 0% unusable, goal 3.9 W/kg"
+            )
+
+    assert notices == ["Joined session 7.", "Session 7 is running."]

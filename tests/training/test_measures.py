@@ -1,0 +1,129 @@
+"""Measures and the comparison with a goal."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from rehab.training.measures import A2, GAIN_MAX, GAIN_MIN, MEASURES, InvalidSetting, check_gain
+from rehab.training.plans import check_activation_threshold
+from rehab.training.scoring import PERFORMANCE_MAX, judge
+from tests.training.sessions import SWAY
+
+SIGNED = dataclasses.replace(A2, slug="signed", value_min=-20)
+LOW_SIGNED = dataclasses.replace(SWAY, slug="low_signed", value_min=-50)
+
+gains = st.floats(GAIN_MIN, GAIN_MAX)
+
+
+@pytest.mark.parametrize("slug", MEASURES)
+def test_every_measure_can_be_trained(slug: str) -> None:
+    measure = MEASURES[slug]
+    assert measure.slug == slug
+    assert measure.name
+    assert measure.unit
+    assert measure.check_goal(measure.goal_max) == measure.goal_max
+    shown = judge(measure, measure.goal_max, 1.0, measure.goal_max).shown
+    assert shown == measure.goal_max <= measure.value_max, "its highest goal can be reached"
+
+
+@pytest.mark.parametrize("goal", [5e-324, 0.1, 3.9, 15, 15.0])
+def test_a_goal_within_bounds_is_a_number(goal: float) -> None:
+    checked = A2.check_goal(goal)
+    assert checked == goal
+    assert type(checked) is float
+
+
+@pytest.mark.parametrize("goal", [0, -0.0, -1, 15.001, 1e308, math.inf, -math.inf, math.nan])
+def test_a_goal_out_of_bounds_is_refused_with_the_cure(goal: float) -> None:
+    with pytest.raises(InvalidSetting, match=r"Give one above 0 and up to 15 W/kg\."):
+        A2.check_goal(goal)
+
+
+@pytest.mark.parametrize(
+    ("check", "good", "bad", "cure"),
+    [
+        (check_gain, [0.5, 0.85, 1, 1.5], [0, 0.499, 1.501, -1, math.nan, math.inf], "0.5 to 1.5"),
+        (
+            check_activation_threshold,
+            [0.01, 0.9, 2],
+            [0, -0.9, 2.001, 90, math.nan, math.inf],
+            r"0\.9 for 90 %",
+        ),
+    ],
+)
+def test_settings_have_bounds(
+    check: Callable[[float], float], good: list[float], bad: list[float], cure: str
+) -> None:
+    for setting in good:
+        assert check(setting) == setting
+    for setting in bad:
+        with pytest.raises(InvalidSetting, match=cure):
+            check(setting)
+
+
+@pytest.mark.parametrize(
+    "bounds",
+    [
+        {"value_min": 20},
+        {"value_min": math.nan},
+        {"value_max": math.inf},
+        {"value_min": -1e300},
+        {"goal_min": -1},
+        {"goal_min": 15},
+        {"goal_max": math.nan},
+        {"goal_max": math.inf},
+    ],
+)
+def test_a_measure_without_room_is_refused(bounds: dict[str, float]) -> None:
+    with pytest.raises(InvalidSetting, match="ankle push-off power A2: "):
+        dataclasses.replace(A2, **bounds)  # type: ignore[arg-type]
+
+
+@given(st.floats(0, 20), gains, st.floats(0, 15, exclude_min=True))
+@example(20.0, 1.5, 5e-324)
+@example(5e-324, 0.5, 5e-324)
+@example(math.nextafter(1, 0), 1.0, 1.0)
+@example(math.nextafter(3.908, 0), 1.0, 3.908)
+@example(-0.0, 1.0, 15.0)
+def test_a_hit_is_a_shown_value_at_or_above_the_goal(
+    value: float, gain: float, goal: float
+) -> None:
+    verdict = judge(A2, value, gain, goal)
+    assert verdict.shown == gain * value
+    assert verdict.hit == (verdict.shown >= goal) == (verdict.performance >= 1)
+    assert 0 <= verdict.performance <= PERFORMANCE_MAX
+
+
+@given(st.floats(0, 50), gains, st.floats(0, 40, exclude_min=True))
+@example(0.0, 1.0, 40.0)
+@example(5e-324, 0.5, 40.0)
+def test_where_lower_is_better_a_hit_is_a_shown_value_at_or_below_the_goal(
+    value: float, gain: float, goal: float
+) -> None:
+    verdict = judge(SWAY, value, gain, goal)
+    assert verdict.shown == gain * value
+    assert verdict.hit == (verdict.shown <= goal) == (verdict.performance >= 1)
+    assert 0 <= verdict.performance <= PERFORMANCE_MAX
+
+
+@pytest.mark.parametrize("measure", [SIGNED, LOW_SIGNED], ids=lambda measure: measure.slug)
+@given(value=st.floats(-20, 20), gain=gains, goal=st.floats(0, 15, exclude_min=True))
+@example(value=-20.0, gain=1.5, goal=5e-324)
+def test_a_performance_fits_every_reader(measure, value, gain, goal) -> None:
+    verdict = judge(measure, value, gain, goal)
+    assert abs(verdict.performance) <= PERFORMANCE_MAX
+    assert json.loads(json.dumps(verdict.performance)) == verdict.performance
+    better = verdict.shown >= goal if measure.higher_is_better else verdict.shown <= goal
+    assert verdict.hit == better
+
+
+@pytest.mark.parametrize(("value", "performance"), [(10, 2.0), (20, 1.0), (40, 0.5), (0, 1000.0)])
+def test_where_lower_is_better_performance_is_the_inverse(value: float, performance: float) -> None:
+    assert judge(SWAY, value, 1.0, 20.0).performance == performance
