@@ -120,7 +120,7 @@ def fill(count: int) -> None:
 
 
 def measure(count: int) -> dict[str, float]:
-    """Give what a look takes, in ms, and the rest in s."""
+    """Return what a look at the board takes [ms], and filling and building it [s]."""
     from django.utils import timezone
 
     from rehab.boards.building import entries
@@ -142,7 +142,7 @@ def measure(count: int) -> dict[str, float]:
     found = {"rows": count, "fill_s": filled - began, "build_s": built - filled}
 
     def timed(name: str, look: Callable[[int], object]) -> None:
-        """Look as each patient some times; the best look is what the board takes, all of them what
+        """Look as each patient some times: the best look is what the board takes, all of them what
         it took beside whatever else ran on this machine.
         """
         best, every = [], []

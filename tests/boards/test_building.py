@@ -28,7 +28,7 @@ PEOPLE = 9
 
 @pytest.fixture
 def woken(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
-    """Let more than four patients be many, and note who wakes the builder."""
+    """Leave more than four patients to the thread, and record who wakes it."""
     calls: list[bool] = []
     monkeypatch.setattr(scheduler, "MAX_INLINE", 4)
     monkeypatch.setattr(scheduler.board_builder, "wake", lambda: calls.append(True))

@@ -63,7 +63,7 @@ def fill() -> None:
 
 
 def rows() -> dict[str, list[dict[str, Any]]]:
-    """Give everything there is, as it is stored."""
+    """Return everything there is, as it is stored."""
     return {
         model._meta.label_lower: [
             json.loads(line)

@@ -1,4 +1,4 @@
-"""Patients, boards and walks for tests of boards."""
+"""Patients, boards and sessions for tests of boards."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ def board_of(clinic: Clinic | None, **fields) -> Leaderboard:
 
 
 def walk_down(people: list[Patient], valence: str = "positive", **how) -> list[TrainingSession]:
-    """Let each patient hit a little less often than the one before: 20 of 20, 19 of 20, …"""
+    """Walk a session of each patient, each with one hit less than the last: 20 of 20, 19 of 20, …"""
     return [walk(one, valence, strides(20 - n, n), **how) for n, one in enumerate(people)]
 
 
 def see(session: TrainingSession, now=NOW):
-    """Look at the only board after a session, with what is stored and with what is counted anew."""
+    """Return the only board that is shown after a session."""
     (shown,) = make_session_panels(session, now)
     return shown
 
