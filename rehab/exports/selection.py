@@ -77,7 +77,7 @@ class Selection:
                 session.state,
                 session.valence,
                 session.changed_to,
-                session.left_out,
+                session.excluded,
                 session.measure.slug,
                 session.measure.unit,
                 session.trained_side,
@@ -125,7 +125,7 @@ class Selection:
 
     def correction_rows(self) -> Iterator[tuple[Any, ...]]:
         """Yield the rows of ``CORRECTIONS``."""
-        names = ("pk", "at", "part", "old", "new", "reason", "by__username")
+        names = ("pk", "at", "field", "old", "new", "reason", "by__username")
         corrections = SessionCorrection.objects.visible_to(self.user).order_by("pk")
         for session in self.read_sessions():
             head = (session.pk, session.patient.pseudonym)

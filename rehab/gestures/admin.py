@@ -16,9 +16,10 @@ from rehab.gestures.models import Gesture, GestureStep
 from rehab.gestures.path_drawing import draw_path
 from rehab.people.web.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
 from rehab.people.web.refusals import in_words
-from robot.composed import MOVES_MAX, to_data
-from robot.gestures import TETHER_M, BadGesture
-from robot.trial import Trial, admit_gesture, try_gesture
+from robot.motion.dry_run import DryRun, dry_run, validate_gesture
+from robot.motion.gesture import TETHER_M
+from robot.motion.gesture_errors import BadGesture
+from robot.motion.gesture_spec import MOVES_MAX, to_data
 
 WINDOW_S = 5.0  # of the robot's decisions; a longer gesture still runs at the next one
 
@@ -40,7 +41,7 @@ class StepFormSet(RowFormSet):
             kept.append(form.instance)
         kept.sort(key=lambda step: step.position)
         try:
-            admit_gesture(to_data("composed", [step.to_move() for step in kept]))
+            validate_gesture(to_data("composed", [step.to_move() for step in kept]))
         except BadGesture as problem:
             raise ValidationError(in_words(problem)) from problem
 
@@ -70,13 +71,13 @@ class StepRows(ScopedOptions, admin.TabularInline):
         return 0 if obj else 4
 
 
-def describe_trial(trial: Trial) -> str:
+def describe_dry_run(run: DryRun) -> str:
     """Return how long a gesture takes and how far it goes, in words."""
     words = gettext(
         "Takes %(took).1f s, goes up to %(far).2f m from home (tether %(tether).2f m), "
         "ends at home."
-    ) % {"took": trial.took_s, "far": trial.farthest_m, "tether": TETHER_M}
-    if trial.took_s > WINDOW_S:
+    ) % {"took": run.took_s, "far": run.farthest_m, "tether": TETHER_M}
+    if run.took_s > WINDOW_S:
         words += " " + gettext("Longer than a window: it may miss the next.")
     return words
 
@@ -95,7 +96,7 @@ class GestureAdmin(ScopedAdmin):
     def simulated(self, gesture: Gesture) -> str:
         """Return how long it takes and how far it goes, or what is wrong with it."""
         try:
-            return describe_trial(try_gesture(admit_gesture(gesture.to_data())))
+            return describe_dry_run(dry_run(validate_gesture(gesture.to_data())))
         except BadGesture as problem:
             return in_words(problem)
 
@@ -105,8 +106,8 @@ class GestureAdmin(ScopedAdmin):
         if not gesture.pk:
             return gettext("Save it to see where it goes. Its last step has to end at home.")
         try:
-            trial = try_gesture(admit_gesture(gesture.to_data()))
+            run = dry_run(validate_gesture(gesture.to_data()))
         except BadGesture as problem:
             return in_words(problem)
-        words = describe_trial(trial)
-        return format_html("{}<p>{}</p>", draw_path(gesture.to_moves(), trial, words), words)
+        words = describe_dry_run(run)
+        return format_html("{}<p>{}</p>", draw_path(gesture.to_moves(), run, words), words)

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
 
-from robot.composed import Move, places
-from robot.gestures import TETHER_M
-from robot.motion import Pose
-from robot.trial import Trial
+from robot.motion.dry_run import DryRun
+from robot.motion.gesture import TETHER_M
+from robot.motion.gesture_spec import Move, step_poses
+from robot.motion.pose import Pose
 
 BASE_M = 0.175  # radius of a Kobuki
 HEADING_M = 0.05  # length of the line that shows the heading
@@ -32,15 +32,15 @@ HEADING = (
 )
 
 
-def draw_path(moves: Sequence[Move], trial: Trial, words: str) -> SafeString:
+def draw_path(moves: Sequence[Move], dry_run: DryRun, words: str) -> SafeString:
     """Return an SVG of a gesture's path, with the base's heading at the end of each step.
 
     ``words`` describe it to screen readers.
     """
     headings: dict[tuple[float, float, int], list[str]] = {}
-    for number, place in enumerate(places(moves), start=1):
-        degrees = round(math.degrees(place.heading_rad)) % 360
-        at = (round(place.x_m, 3), round(place.y_m, 3), degrees)
+    for number, pose in enumerate(step_poses(moves), start=1):
+        degrees = round(math.degrees(pose.heading_rad)) % 360
+        at = (round(pose.x_m, 3), round(pose.y_m, 3), degrees)
         headings.setdefault(at, []).append(str(number))
     return format_html(
         DRAWING,
@@ -48,14 +48,14 @@ def draw_path(moves: Sequence[Move], trial: Trial, words: str) -> SafeString:
         words=words,
         tether=TETHER_M,
         base=BASE_M,
-        way="M" + "L".join(_place(pose) for pose in trial.way[::2]),
+        way="M" + "L".join(_point(pose) for pose in dry_run.poses[::2]),
         headings=format_html_join(
             "", HEADING, (_heading(at, numbers) for at, numbers in headings.items())
         ),
     )
 
 
-def _place(pose: Pose) -> str:
+def _point(pose: Pose) -> str:
     return f"{-pose.y_m:.4f} {-pose.x_m:.4f}"
 
 

@@ -36,7 +36,7 @@ def board_of(clinic: Clinic | None, **fields) -> Leaderboard:
 
 
 def walk_down(people: list[Patient], valence: str = "positive", **how) -> list[TrainingSession]:
-    """Walk a session of each patient, each with one hit less than the last: 20 of 20, 19 of 20, …"""
+    """Walk a session of each patient, each with one hit less: 20 of 20, 19 of 20, …"""
     return [walk(one, valence, strides(20 - n, n), **how) for n, one in enumerate(people)]
 
 

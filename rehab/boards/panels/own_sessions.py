@@ -22,7 +22,7 @@ from rehab.boards.ranking.results import own_results
 from rehab.boards.ranking.sessions import read_sessions
 from rehab.boards.ranking.standings import ComputedStandings
 from rehab.boards.ranking.visibility import find_own_sessions
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.training.valences import Valence
@@ -97,7 +97,7 @@ def make_own_panels(session: TrainingSession, now: datetime) -> list[BoardPanel]
         .order_by()  # by key; the model's own order would lead through the clinic's other rows
         .in_bulk({each.row.session_id for rows in visible for each in rows})
     )
-    local = at_clinic(now, session.clinic)
+    local = clinic_time(now, session.clinic)
     return [
         BoardPanel(
             slug=slug,

@@ -32,7 +32,7 @@ from rehab.boards.ranking.standings import (
 )
 from rehab.boards.ranking.visibility import find_visible_rows
 from rehab.people.models import Clinic, Patient
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 
@@ -211,7 +211,7 @@ class BoardViewer:
         rows = format_rows(board, find_visible_rows(shown_as, standings, me))
         walked = TrainingSession.everywhere.only("created_at", "started_at", "active_s")
         found = walked.in_bulk([row.session_id for row in rows])
-        now = at_clinic(self.now, patient.clinic)
+        now = clinic_time(self.now, patient.clinic)
         dated = date_rows(rows, found, self.session, now)
         return self._panel(rows=dated, note=note, summary=summary)
 

@@ -13,7 +13,7 @@ from rehab.boards.ranking.eligibility import eligible_patients
 from rehab.boards.ranking.sessions import SHARES
 from rehab.boards.ranking.visibility import VisibleRow
 from rehab.people.aliases import say_alias
-from rehab.sessions.formatting import SPACE, say_day, say_duration, say_number
+from rehab.sessions.formatting import NBSP, format_day, format_duration, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.training.metrics import METRICS
 
@@ -41,25 +41,26 @@ class PanelRow:
 def format_figure(slug: str, value: int) -> str:
     """Return a metric's figure as boards show it."""
     unit = "%" if slug in SHARES else METRICS[slug].unit
-    return say_number(value, 0) + (f"{SPACE}{unit}" if unit in UNITS else "")
+    return format_number(value, 0) + (f"{NBSP}{unit}" if unit in UNITS else "")
 
 
 def format_rows(board: Leaderboard, visible: Sequence[VisibleRow]) -> list[PanelRow]:
     """Return rows with their figures and ranks, without names or days."""
     full = 100 if board.metric in SHARES else max([1, *(each.row.figure for each in visible)])
-    return [
-        PanelRow(
-            value=format_figure(board.metric, each.row.figure),
-            bar=to_percent(each.row.figure, each.row.points_at_stake or full),
-            rank=each.row.rank if shows_rank(board, each) else None,
-            points_at_stake=(
-                "" if each.row.points_at_stake is None else say_number(each.row.points_at_stake, 0)
-            ),
-            follows_gap=each.follows_gap,
-            session_id=each.row.session_id,
+    rows: list[PanelRow] = []
+    for each in visible:
+        at_stake = each.row.points_at_stake
+        rows.append(
+            PanelRow(
+                value=format_figure(board.metric, each.row.figure),
+                bar=to_percent(each.row.figure, at_stake or full),
+                rank=each.row.rank if shows_rank(board, each) else None,
+                points_at_stake="" if at_stake is None else format_number(at_stake, 0),
+                follows_gap=each.follows_gap,
+                session_id=each.row.session_id,
+            )
         )
-        for each in visible
-    ]
+    return rows
 
 
 def shows_rank(board: Leaderboard, visible: VisibleRow) -> bool:
@@ -117,11 +118,11 @@ def date_rows(
     dated: list[PanelRow] = []
     for row in rows:
         start = began[row.session_id or 0]
-        walked = say_duration(sessions[row.session_id or 0].active_s)
+        walked = format_duration(sessions[row.session_id or 0].active_s)
         dated.append(
             replace(
                 row,
-                title=say_day(start.date(), now.date()).replace(" ", SPACE),
+                title=format_day(start.date(), now.date()).replace(" ", NBSP),
                 detail=f"{start:%H:%M} · {walked}" if a_day[start.date()] > 1 else walked,
                 you=at_hand is not None and row.session_id == at_hand.pk,
             )

@@ -129,7 +129,7 @@ def _narrow(
 ) -> QuerySet[SessionMetric]:
     """Leave the metrics of sessions that a board's settings admit."""
     rows = rows.filter(session__state=State.FINISHED.value, session__started_at__isnull=False)
-    rows = rows.filter(session__left_out=False)
+    rows = rows.filter(session__excluded=False)
     if not board.include_simulated:
         rows = rows.filter(session__simulated=False)
     if needs_one_valence(board):
