@@ -19,7 +19,7 @@ from rehab.boards.building import entries
 from rehab.boards.choices import Aggregation, Occasion, Participants
 from rehab.boards.forms import LeaderboardForm
 from rehab.boards.models import Leaderboard
-from rehab.boards.panels.panel import BoardViewer
+from rehab.boards.panels.viewer import BoardViewer
 from rehab.boards.ranking.eligibility import find_group
 from rehab.boards.ranking.results import Result, read_results
 from rehab.people.access import person

@@ -2,8 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from django.db.models import TextChoices
 from django.utils.translation import gettext_lazy as _
+
+from rehab.training.metrics import METRICS
+
+METRIC_LABELS = {
+    "hit_rate": _("Steps at the goal (%)"),
+    "mean_performance": _("Mean step, in % of the own goal"),
+    "improvement_over_baseline": _("Improvement over the own baseline (%)"),
+    "retention_in_washout": _("Improvement kept in the washout (%)"),
+    "active_minutes": _("Minutes walked"),
+    "target_met": _("Days on which the target was met"),
+}
 
 
 class Participants(TextChoices):
@@ -74,3 +87,9 @@ class Occasion(TextChoices):
     AFTER_SESSION = "after_session", _("After a session")
     WAITING = "waiting", _("While the tablet waits")
     PT_ONLY = "pt_only", _("Only here, to therapists")
+
+
+def metric_choices() -> list[tuple[str, Any]]:
+    """Return the metrics that can be ranked by, the hit rate first."""
+    slugs = sorted(METRICS, key=lambda slug: slug != "hit_rate")
+    return [(slug, METRIC_LABELS.get(slug, _(METRICS[slug].label))) for slug in slugs]

@@ -20,11 +20,11 @@ from rehab.boards.choices import (
     Participants,
     PeriodKind,
     TieRule,
+    metric_choices,
 )
 from rehab.boards.validation import find_invalid_settings
 from rehab.people.models import Boards, Clinic, Patient
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
-from rehab.training.metrics import METRICS
 from rehab.training.valences import VALENCES
 
 # How rows are shown, and when. All other fields decide what a board's rows are.
@@ -42,21 +42,6 @@ DISPLAY_FIELDS = frozenset(
         "built_to",
     }
 )
-
-METRIC_LABELS = {
-    "hit_rate": _("Steps at the goal (%)"),
-    "mean_performance": _("Mean step, in % of the own goal"),
-    "improvement_over_baseline": _("Improvement over the own baseline (%)"),
-    "retention_in_washout": _("Improvement kept in the washout (%)"),
-    "active_minutes": _("Minutes walked"),
-    "target_met": _("Days on which the target was met"),
-}
-
-
-def metric_choices() -> list[tuple[str, Any]]:
-    """Return the metrics that can be ranked by, the hit rate first."""
-    slugs = sorted(METRICS, key=lambda slug: slug != "hit_rate")
-    return [(slug, METRIC_LABELS.get(slug, _(METRICS[slug].label))) for slug in slugs]
 
 
 @dataclass(frozen=True)

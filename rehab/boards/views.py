@@ -9,7 +9,8 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_POST, require_safe
 
 from rehab.boards.panels.own_sessions import make_own_panels
-from rehab.boards.panels.panel import BoardPanel, make_session_panels, make_waiting_panels
+from rehab.boards.panels.panel import BoardPanel
+from rehab.boards.panels.viewer import make_session_panels, make_waiting_panels
 from rehab.people.access import actor_of, for_roles
 from rehab.people.consent.models import Purpose, withdraw
 from rehab.people.models import User

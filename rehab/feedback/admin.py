@@ -146,7 +146,7 @@ class FeedbackTypeAdmin(PreviewAdmin):
         """Show the form, and beside it the type's name and the languages of the preview."""
         obj = kwargs.get("obj")
         slug = obj.slug if obj else request.GET.get("slug") or request.POST.get("slug")
-        context["usual"] = VALENCES.get(str(slug))
+        context["default"] = VALENCES.get(str(slug))
         context["languages"] = LANGUAGES
         context["show_save_and_add_another"] = False
         return super().render_change_form(request, context, *args, **kwargs)

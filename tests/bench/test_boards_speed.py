@@ -125,7 +125,7 @@ def measure(count: int) -> dict[str, float]:
 
     from rehab.boards.building import entries
     from rehab.boards.models import BoardEntry, Leaderboard
-    from rehab.boards.panels.panel import BoardViewer
+    from rehab.boards.panels.viewer import BoardViewer
     from rehab.boards.ranking.standings import StoredStandings
     from rehab.people.models import Patient
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from rehab.boards.building import entries, scheduler
 from rehab.boards.choices import DisplayMode, TieRule
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
-from rehab.boards.panels.panel import make_session_panels
+from rehab.boards.panels.viewer import make_session_panels
 from rehab.boards.ranking.standings import ComputedStandings, StoredStandings
 from rehab.boards.ranking.visibility import cutoff_rank, find_visible_rows
 from rehab.people.models import Clinic, Patient

@@ -10,7 +10,7 @@ from django.utils import timezone
 
 from rehab.boards.building import entries
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
-from rehab.boards.panels.panel import make_session_panels
+from rehab.boards.panels.viewer import make_session_panels
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession

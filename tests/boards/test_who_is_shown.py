@@ -11,7 +11,7 @@ from django.urls import reverse
 
 from rehab.boards.building import entries
 from rehab.boards.models import BoardEntry, Leaderboard
-from rehab.boards.panels.panel import BoardViewer, make_session_panels, make_waiting_panels
+from rehab.boards.panels.viewer import BoardViewer, make_session_panels, make_waiting_panels
 from rehab.boards.ranking.results import read_results
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric

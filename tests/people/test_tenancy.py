@@ -16,7 +16,7 @@ from django.urls import URLPattern, get_resolver, path, reverse
 from garry_site import urls as site_urls
 from rehab.boards.admin import LeaderboardAdmin
 from rehab.boards.models import BoardEntry, Leaderboard
-from rehab.boards.panels import panel, rows
+from rehab.boards.panels import rows, viewer
 from rehab.boards.ranking.standings import StoredStandings
 from rehab.people import api as people_api
 from rehab.people.access import for_roles, public
@@ -260,7 +260,7 @@ def test_rows_of_another_clinics_board_are_caught(worlds, monkeypatch):
 
 def test_a_board_of_another_clinic_is_caught(worlds, monkeypatch):
     monkeypatch.setattr(
-        panel, "boards_on", lambda occasion, clinic: list(Leaderboard.everywhere.all())
+        viewer, "boards_on", lambda occasion, clinic: list(Leaderboard.everywhere.all())
     )
     leaks, _ = find_leaks(worlds, all_actors(*worlds), under="/sessions/")
     url = reverse("scores", kwargs={"session_id": worlds[0].session.pk})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
-from rehab.boards.panels.panel import make_session_panels
+from rehab.boards.panels.viewer import make_session_panels
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.models import TrainingSession
 from tests.support.walks import strides, walk
