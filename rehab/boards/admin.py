@@ -22,10 +22,10 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.panels.viewer import BoardViewer
 from rehab.boards.ranking.eligibility import find_group
 from rehab.boards.ranking.results import Result, read_results
-from rehab.people.access import person
+from rehab.people.access import user_of
 from rehab.people.models import Boards, Patient
 from rehab.people.roles import Role
-from rehab.people.web.admin_preview import PreviewAdmin, find_faults
+from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
 
@@ -100,7 +100,7 @@ class LeaderboardAdmin(PreviewAdmin):
         """Offer what this person may build: a host boards across clinics, others all the rest."""
         if db_field.name == "among":
             across = Participants.ACROSS
-            hosts = person(request).role == Role.HOST
+            hosts = user_of(request).role == Role.HOST
             kwargs["choices"] = [
                 choice for choice in Participants.choices if (choice[0] == across) == hosts
             ]
@@ -115,7 +115,7 @@ class LeaderboardAdmin(PreviewAdmin):
 
     def get_changeform_initial_data(self, request: HttpRequest) -> dict[str, Any]:
         """Return initial values that can be saved as they are."""
-        if person(request).role == Role.HOST:
+        if user_of(request).role == Role.HOST:
             return {"among": Participants.ACROSS, "entry": Aggregation.BEST}
         return {}
 
@@ -128,13 +128,13 @@ class LeaderboardAdmin(PreviewAdmin):
         context["built"] = None if board is None else entries.measure_progress(board)
         return super().render_change_form(request, context, *args, **kwargs)
 
-    def draw(self, request: HttpRequest, row: Leaderboard | None) -> HttpResponse:
+    def render_preview(self, request: HttpRequest, row: Leaderboard | None) -> HttpResponse:
         """Show the board, computed from the clinic's own sessions."""
         given = request.GET.copy()
         given["name"] = given.get("name", "").strip() or gettext("Leaderboard")
         form = self.get_form(request, row, change=row is not None)(given, instance=row)
         if not form.is_valid():
-            faults = list(find_faults(form))
+            faults = list(iter_form_errors(form))
             return render(request, "boards/preview_faults.html", {"faults": faults})
         if form.instance.clinic_id is None:
             fault = gettext(

@@ -14,7 +14,7 @@ from rehab.boards.panels.panel import BoardPanel
 from rehab.boards.panels.viewer import BoardViewer, make_session_panels
 from rehab.people.access import for_roles
 from rehab.people.roles import Role
-from rehab.people.web.api_base import Key, Page, Paging, answers, caller, cut
+from rehab.people.web.api_base import Key, Page, Paging, caller, paginate, responses
 from rehab.sessions.models import TrainingSession
 
 router = Router(tags=["Boards"])
@@ -61,14 +61,14 @@ class BoardPanelOut(Schema):
         return None if panel.total is None else panel.total.value
 
 
-@router.get("/boards", response=answers(Page[BoardOut]))
+@router.get("/boards", response=responses(Page[BoardOut]))
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
 def list_boards(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
     """List the clinic's leaderboards."""
-    return cut(Leaderboard.objects.visible_to(caller(request)).order_by("pk"), wanted)
+    return paginate(Leaderboard.objects.visible_to(caller(request)).order_by("pk"), wanted)
 
 
-@router.get("/boards/{board_id}/rows", response=answers(BoardPanelOut, 404))
+@router.get("/boards/{board_id}/rows", response=responses(BoardPanelOut, 404))
 @for_roles(Role.LEAD, Role.PT)
 def show_board(request: HttpRequest, board_id: Path[Key]) -> BoardPanel:
     """Show a board as it is for anybody, with the patients who agreed to be on it."""
@@ -76,7 +76,7 @@ def show_board(request: HttpRequest, board_id: Path[Key]) -> BoardPanel:
     return BoardViewer(get_object_or_404(boards, pk=board_id), timezone.now()).make_panel()
 
 
-@router.get("/sessions/{session_id}/boards", response=answers(list[BoardPanelOut], 404))
+@router.get("/sessions/{session_id}/boards", response=responses(list[BoardPanelOut], 404))
 @for_roles(Role.LEAD, Role.PT)
 def list_session_boards(request: HttpRequest, session_id: Path[Key]) -> list[BoardPanel]:
     """Show the boards that the patient sees after a session."""

@@ -24,7 +24,7 @@ from rehab.boards.choices import (
 )
 from rehab.boards.validation import find_invalid_settings
 from rehab.people.models import Boards, Clinic, Patient
-from rehab.people.scope import ClinicRow, Scope, ScopedModel
+from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.training.valences import VALENCES
 
 # How rows are shown, and when. All other fields decide what a board's rows are.
@@ -48,13 +48,13 @@ DISPLAY_FIELDS = frozenset(
 class BoardScope(Scope):
     """Boards of the own clinic, and those across clinics while it takes part in them."""
 
-    def of_clinic(self, clinic_id: int) -> Q:
+    def clinic_filter(self, clinic_id: int) -> Q:
         """Return the condition for boards that a member of this clinic may see."""
         takes_part = Exists(Clinic.everywhere.filter(pk=clinic_id, boards_across=True))
         return Q(clinic=clinic_id) | Q(takes_part, clinic__isnull=True)
 
 
-class Leaderboard(ClinicRow):
+class Leaderboard(ClinicModel):
     """Who is compared with whom, by what, over which time, and how it is shown.
 
     A board without a clinic is the host's and compares patients of all clinics that take part.
@@ -163,7 +163,7 @@ class Leaderboard(ClinicRow):
         help_text="Key of the last patient whose rows are built; empty when all are.",
     )
 
-    class Meta(ClinicRow.Meta):
+    class Meta(ClinicModel.Meta):
         verbose_name = _("leaderboard")
         verbose_name_plural = _("leaderboards")
         ordering: ClassVar = ["name"]

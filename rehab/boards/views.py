@@ -12,10 +12,11 @@ from rehab.boards.panels.own_sessions import make_own_panels
 from rehab.boards.panels.panel import BoardPanel
 from rehab.boards.panels.viewer import make_session_panels, make_waiting_panels
 from rehab.people.access import actor_of, for_roles
-from rehab.people.consent.models import Purpose, withdraw
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import withdraw_consent
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.web.language import speak_to
+from rehab.people.web.language import activate_patient_language
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN_STATES, State
 
@@ -31,7 +32,7 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
     An open session leads to its page. In a blinded study there is nothing to compare.
     """
     session = find_session(request, session_id)
-    speak_to(session.patient)
+    activate_patient_language(session.patient)
     if State(session.state) in OPEN_STATES:
         return redirect("walk", session_id=session.pk)
     boards: list[BoardPanel] = []
@@ -56,7 +57,7 @@ def leave_boards(request: HttpRequest, session_id: int) -> HttpResponse:
     """Take the session's patient off all boards, at once. Only a therapist brings one back."""
     session = find_session(request, session_id)
     by = request.user if isinstance(request.user, User) else None
-    withdraw(session.patient, Purpose.BOARDS, by, timezone.now())
+    withdraw_consent(session.patient, Purpose.BOARDS, by, timezone.now())
     return redirect("scores", session_id=session.pk)
 
 

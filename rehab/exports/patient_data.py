@@ -104,12 +104,12 @@ def describe_patient(patient: Patient) -> dict[str, Any]:
         "animal_name": patient.alias,
         "in_a_blinded_study": patient.blinded,
         "simulated": patient.simulated,
-        "participant_of_the_original": patient.original_id,
+        "participant_of_the_original": patient.legacy_id,
         "created_at": patient.created_at,
         "program_ended_at": patient.ended_at,
-        "program_ended_because": patient.ended_because or None,
+        "program_end_reason": patient.end_reason or None,
         "erased_at": patient.erased_at,
-        "erased_because": patient.erased_because or None,
+        "erasure_reason": patient.erasure_reason or None,
     }
 
 
@@ -152,10 +152,10 @@ def list_boards(user: User, patient: Patient) -> list[dict[str, Any]]:
 
 def list_changes(user: User, patient: Patient) -> list[dict[str, Any]]:
     """Return the history of the details; erased values are null, and staff is not named."""
-    noun = Patient.__name__
-    changes = HistoryEntry.objects.visible_to(user).filter(noun=noun, row=patient.pk)
+    model = Patient.__name__
+    changes = HistoryEntry.objects.visible_to(user).filter(model_name=model, object_id=patient.pk)
     return [
-        {"at": change.at, "kind": change.kind, "before_and_after": change.values}
+        {"at": change.at, "kind": change.kind, "before_and_after": change.changes}
         for change in changes.order_by("pk")
     ]
 

@@ -13,7 +13,7 @@ from django.views.decorators.http import require_GET, require_safe
 from rehab.exports.archive import ZipResponse
 from rehab.exports.patient_data import patient_files, session_files
 from rehab.patients.pages.records import get_patient
-from rehab.people.access import for_roles, person
+from rehab.people.access import for_roles, user_of
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.models import Patient
@@ -26,7 +26,7 @@ from rehab.sessions.models import TrainingSession
 @require_GET
 def download_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Return everything stored of one patient as a file."""
-    user, now = person(request), timezone.now()
+    user, now = user_of(request), timezone.now()
     patient = get_patient(user, patient_id)
     audit_export(request, now, patient)
     name = f"garry-{patient.pseudonym}-{now:%Y-%m-%d}.zip"
@@ -37,7 +37,7 @@ def download_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
 @require_safe
 def show_export(request: HttpRequest) -> HttpResponse:
     """Show what the export of all sessions contains."""
-    user = person(request)
+    user = user_of(request)
     sessions = TrainingSession.objects.visible_to(user)
     context = {
         "sessions": sessions.count(),
@@ -51,16 +51,16 @@ def show_export(request: HttpRequest) -> HttpResponse:
 @require_GET
 def download_sessions(request: HttpRequest) -> HttpResponse:
     """Return all sessions that the user may see as a file, by pseudonyms."""
-    user, now = person(request), timezone.now()
+    user, now = user_of(request), timezone.now()
     audit_export(request, now)
     return _stream(session_files(user, now), f"garry-sessions-{now:%Y-%m-%d}.zip")
 
 
 def audit_export(request: HttpRequest, now: datetime, patient: Patient | None = None) -> None:
     """Record an export in the audit log; where that fails, nothing is exported."""
-    audit_log.note(
+    audit_log.record(
         Act.EXPORT,
-        person(request),
+        user_of(request),
         patient=None if patient is None else patient.pk,
         about=request.path,
         address=client_address(request),

@@ -34,7 +34,7 @@ class Migration(migrations.Migration):
                     models.CharField(
                         default="UTC",
                         max_length=64,
-                        validators=[rehab.people.models.check_time_zone],
+                        validators=[rehab.people.models.validate_time_zone],
                     ),
                 ),
                 (
@@ -192,7 +192,7 @@ class Migration(migrations.Migration):
                 "default_manager_name": "everywhere",
             },
             managers=[
-                ("everywhere", rehab.people.models.AccountManager()),
+                ("everywhere", rehab.people.models.ServerUserManager()),
             ],
         ),
         migrations.CreateModel(
@@ -830,7 +830,7 @@ class Migration(migrations.Migration):
                 (
                     "pseudonym",
                     models.CharField(
-                        default=rehab.people.models.new_pseudonym,
+                        default=rehab.people.models.generate_pseudonym,
                         editable=False,
                         max_length=16,
                         unique=True,

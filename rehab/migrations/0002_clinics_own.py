@@ -377,7 +377,7 @@ class Migration(migrations.Migration):
             field=models.CharField(
                 default="UTC",
                 max_length=64,
-                validators=[rehab.people.models.check_time_zone],
+                validators=[rehab.people.models.validate_time_zone],
                 verbose_name="time zone",
             ),
         ),
@@ -642,7 +642,7 @@ class Migration(migrations.Migration):
             model_name="patient",
             name="pseudonym",
             field=models.CharField(
-                default=rehab.people.models.new_pseudonym,
+                default=rehab.people.models.generate_pseudonym,
                 editable=False,
                 max_length=16,
                 unique=True,
@@ -1399,7 +1399,9 @@ class Migration(migrations.Migration):
                 (
                     "noun",
                     models.CharField(
-                        choices=rehab.people.audit.history.nouns, max_length=32, verbose_name="what"
+                        choices=rehab.people.audit.history.model_choices,
+                        max_length=32,
+                        verbose_name="what",
                     ),
                 ),
                 ("row", models.BigIntegerField(verbose_name="number")),

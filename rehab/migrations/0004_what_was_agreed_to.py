@@ -51,7 +51,7 @@ class Migration(migrations.Migration):
                 blank=True,
                 help_text="One a line, such as 192.168.1.0/24. From elsewhere a session is watched only with the patient's consent to remote view; say so in your words. Empty: from anywhere, and nobody is asked.",
                 max_length=1000,
-                validators=[rehab.people.networks.check_networks],
+                validators=[rehab.people.networks.validate_networks],
                 verbose_name="the clinic's own networks",
             ),
         ),

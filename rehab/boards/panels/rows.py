@@ -12,7 +12,7 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.ranking.eligibility import eligible_patients
 from rehab.boards.ranking.sessions import SHARES
 from rehab.boards.ranking.visibility import VisibleRow
-from rehab.people.aliases import say_alias
+from rehab.people.aliases import format_alias
 from rehab.sessions.formatting import NBSP, format_day, format_duration, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.training.metrics import METRICS
@@ -91,7 +91,7 @@ def name_rows(board: Leaderboard, visible: Sequence[VisibleRow], me: int | None)
         elif board.names == NameStyle.INITIALS:
             name = "".join(f"{word[0].upper()}." for word in patient.nickname.split())
         else:
-            name = say_alias(patient.alias) if patient.alias else patient.pseudonym
+            name = format_alias(patient.alias) if patient.alias else patient.pseudonym
         seen[name] += 1
         if seen[name] > 1:  # initials may repeat: each row has a name of its own
             name = f"{name} {seen[name]}"

@@ -6,14 +6,14 @@ from django.db.models import Q, QuerySet
 
 from rehab.boards.choices import Participants
 from rehab.boards.models import Leaderboard
-from rehab.people.consent.models import Purpose, agreed
+from rehab.people.consent.models import Purpose, has_consented
 from rehab.people.models import Patient
 
 
 def eligible_patients(board: Leaderboard) -> QuerySet[Patient]:
     """Return the patients who have agreed to be on a board and are in no blinded study."""
     patients = Patient.everywhere.filter(boards__in=board.accepted_levels, blinded=False)
-    patients = patients.filter(Q(simulated=True) | agreed(Purpose.BOARDS))
+    patients = patients.filter(Q(simulated=True) | has_consented(Purpose.BOARDS))
     if board.among == Participants.ACROSS:
         return patients.filter(clinic__boards_across=True)
     patients = patients.filter(clinic=board.clinic_id)

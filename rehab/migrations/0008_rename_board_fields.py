@@ -1,10 +1,10 @@
-"""Boards call what can be kept points_at_stake, and when they are shown occasion."""
+"""Rename board fields: stake to points_at_stake, moment to occasion."""
 
 from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-    dependencies = [("rehab", "0006_rename_session_fields")]
+    dependencies = [("rehab", "0007_people_words")]
 
     operations = [
         migrations.RenameField("boardentry", "stake", "points_at_stake"),
