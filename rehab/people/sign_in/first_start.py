@@ -7,8 +7,9 @@ from pathlib import Path
 
 from django.conf import settings
 from django.core.management import CommandError, call_command
-from django.db import DatabaseError, connection, transaction
+from django.db import DEFAULT_DB_ALIAS, DatabaseError, connection, connections, transaction
 from django.db.migrations.executor import MigrationExecutor
+from django.db.migrations.recorder import MigrationRecorder
 
 from rehab.people.models import Clinic, User
 from rehab.people.random_codes import random_code
@@ -16,6 +17,8 @@ from rehab.people.roles import Role
 
 FIRST_USERNAME = "pt"
 FIRST_CLINIC = "My clinic"
+# What development versions from before 22 November 2026 began with; today's begins otherwise.
+DEVELOPMENT_MIGRATION = ("rehab", "0001_initial")
 
 
 def prepare_database() -> None:
@@ -24,6 +27,7 @@ def prepare_database() -> None:
     Raises CommandError, with the cure, where the database cannot be reached or is not up to date.
     """
     try:
+        refuse_development_database()
         executor = MigrationExecutor(connection)
         pending = executor.migration_plan(executor.loader.graph.leaf_nodes())
     except DatabaseError as problem:
@@ -38,6 +42,19 @@ def prepare_database() -> None:
             "`manage.py migrate`."
         )
     call_command("migrate", verbosity=0, interactive=False)
+
+
+def refuse_development_database(using: str = DEFAULT_DB_ALIAS) -> None:
+    """Raise CommandError, with the cure, for a database whose tables a development version made."""
+    if DEVELOPMENT_MIGRATION not in MigrationRecorder(connections[using]).applied_migrations():
+        return
+    name = connections[using].settings_dict["NAME"]
+    raise CommandError(
+        f"The database {name} was made by a development version of GARRY from before 22 November "
+        "2026, and this one cannot read it. Nothing was changed. To begin anew, move it away or "
+        "name another one (GARRY_DATA_DIR, GARRY_DATABASE_URL); to see what it holds, run the "
+        "version that made it."
+    )
 
 
 def first_clinic() -> Clinic:
