@@ -1082,7 +1082,7 @@ class Migration(migrations.Migration):
                     ),
                 ),
                 (
-                    "moment",
+                    "occasion",
                     models.CharField(
                         choices=[
                             ("after_session", "After a session"),
@@ -1098,7 +1098,7 @@ class Migration(migrations.Migration):
                     "built_to",
                     models.BigIntegerField(
                         editable=False,
-                        help_text="The patient whom building its rows has come to; nothing once they are built.",
+                        help_text="Key of the last patient whose rows are built; empty when all are.",
                         null=True,
                     ),
                 ),
@@ -1581,15 +1581,19 @@ class Migration(migrations.Migration):
                         max_length=16,
                     ),
                 ),
-                ("figure", models.IntegerField(help_text="As it is shown: in whole numbers.")),
+                ("figure", models.IntegerField(help_text="As it is shown: a whole number.")),
                 (
-                    "stake",
+                    "points_at_stake",
                     models.IntegerField(
-                        help_text="What could be kept, where points are lost.", null=True
+                        help_text="The points that could be kept, where points can only be lost.",
+                        null=True,
                     ),
                 ),
                 ("key", models.CharField(max_length=48)),
-                ("stale_on", models.DateField(help_text="When time alone alters it.", null=True)),
+                (
+                    "stale_on",
+                    models.DateField(help_text="The day from which it is out of date.", null=True),
+                ),
                 (
                     "board",
                     models.ForeignKey(
