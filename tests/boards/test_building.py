@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import threading
 from datetime import timedelta
-from importlib import import_module
 
 import pytest
-from django.apps import apps
 from django.core.management import call_command
 from django.db.models import Sum
 from django.test import Client
@@ -151,30 +149,6 @@ def test_another_measure_or_group_is_another_board(sessions):
     board.save()
     build(board)
     assert stored() == ([], [])
-
-
-def test_what_broke_ties_by_points_of_several_types_is_settled_when_garry_is_updated(sessions):
-    boards = {
-        (types, tie): make_board(sessions[0], name=f"{types} {tie}", types=types)
-        for types in ("all", "same")
-        for tie in ("", "score")
-    }
-    for (_types, tie), board in boards.items():
-        build(board)
-        Leaderboard.everywhere.filter(pk=board.pk).update(tie_breaker=tie)
-    import_module("rehab.migrations.0005_settle_tie_breakers").settle(apps, None)
-    now = {key: Leaderboard.everywhere.get(pk=board.pk) for key, board in boards.items()}
-    assert {key for key, board in now.items() if board.is_being_built} == {
-        ("all", "score"),
-        ("same", "score"),
-    }
-    assert {key for key, board in now.items() if board.tie_breaker} == {("same", "score")}
-    for board in now.values():
-        board.full_clean()
-        build(board)
-        kept = stored()
-        entries.refresh(board, now=NOW)
-        assert stored() == kept
 
 
 def test_how_a_board_is_shown_alters_no_row_and_hides_nothing(sessions, woken):
