@@ -34,7 +34,7 @@ from rehab.sessions.schemas import (
 from rehab.sessions.services import change_session
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Station
-from rehab.training.changes import ChangeKind, NotAllowed
+from rehab.training.changes import NotAllowed
 from rehab.training.measures import InvalidSetting
 
 router = Router(tags=["Sessions"])
@@ -127,7 +127,7 @@ def change(request: HttpRequest, session_id: Path[Key], given: ChangeGiven) -> T
     user = caller(request)
     session = find_session(user, session_id)
     try:
-        change_session(session, ChangeKind(given.kind), given.value, by=user)
+        change_session(session, given.kind, given.value, by=user)
     except (NotAllowed, OwnedElsewhere) as problem:
         raise HttpError(409, str(problem)) from problem
     except InvalidSetting as problem:

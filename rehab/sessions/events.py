@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import Protocol
 
 from rehab.sessions.payloads import (
@@ -14,26 +13,19 @@ from rehab.sessions.payloads import (
     describe_cue,
     describe_now,
     describe_phase,
+    describe_source_phase,
     describe_state,
     describe_types,
     describe_walked,
     type_mark,
 )
-from rehab.training.changes import ChangeKind, ChangeValue
+from rehab.training.changes import ChangeValue
+from rehab.training.controls import CONTROLS, Audience, Control, Payload
 from rehab.training.fold import SessionFold
 from rehab.training.phases import Phase
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import InvalidReason, ScoredStep
 from rehab.training.valences import Valence
-
-
-class Audience(StrEnum):
-    """Who listens."""
-
-    PATIENT = "patient"
-    MONITOR = "monitor"
-    ROBOT = "robot"
-
 
 _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
 
@@ -122,6 +114,8 @@ def step_event(fold: SessionFold, told: Told, step: ScoredStep, *, live: bool) -
                 return _monitor_step(step, live=live) | totals
             case Audience.ROBOT:
                 return _robot_step(told.phase, step, live=live)
+            case Audience.SOURCE:
+                return None
 
     return LiveEvent(step.number, build)
 
@@ -195,57 +189,102 @@ def _robot_step(phase: Phase, step: ScoredStep, *, live: bool) -> Message | None
     }
 
 
-def state_event(fold: SessionFold) -> LiveEvent:
-    """Give the event that a session started, paused, went on or ended."""
-    page = {"kind": "state", **describe_state(fold)}
-    robot = {"type": "state", "state": fold.state.value}
-    return _to_each(fold, patient=page, monitor=page, robot=robot)
+def change_event(fold: SessionFold, kind: str, value: ChangeValue = None) -> LiveEvent:
+    """Return the event of a change, with what its control tells each audience."""
+    control = CONTROLS[kind]
+    messages = {
+        audience.value: PAYLOADS[audience, payload](fold, control, value)
+        for audience, payload in control.tells.items()
+        if audience is not Audience.SOURCE  # which hears of it before its acknowledgment
+    }
+    return _to_each(fold, **messages)
 
 
 def phase_event(fold: SessionFold, *, switched: bool = False) -> LiveEvent:
-    """Give the event that a phase began; ``switched`` where it has another feedback type."""
-    phase = {"kind": "phase", **describe_now(fold)}
-    streak = {"streak": fold.feedback.streak if fold.valence.rewards else None}
-    monitor = phase | {"goal": fold.goal, "gain": fold.gain, "obstacle": fold.obstacle}
-    monitor |= describe_types(fold)
+    """Return the event that a phase began; ``switched`` where it has another feedback type."""
+    patient, monitor = _phase_for_patient(fold), _phase_for_monitor(fold)
     if not switched:
-        return _to_each(fold, patient=phase | streak, monitor=monitor)
+        return _to_each(fold, patient=patient, monitor=monitor)
     monitor["mark"] = type_mark(fold.last_number, fold.valence.slug)
-    return _to_each(fold, patient=phase | streak, monitor=monitor, robot=_cue(fold))
+    return _to_each(fold, patient=patient, monitor=monitor, robot=_cue(fold))
 
 
-def change_event(fold: SessionFold, kind: ChangeKind, value: ChangeValue = None) -> LiveEvent:
-    """Give the event of any change that a person made."""
-    told: Message
-    match kind:
-        case ChangeKind.GOAL:
-            value, told = fold.goal, {"goal": fold.goal}
-        case ChangeKind.GAIN:
-            value, told = fold.gain, {"gain": fold.gain}
-        case ChangeKind.ACTIVATION_THRESHOLD:
-            value, told = fold.activation_threshold, {"value": fold.activation_threshold}
-        case ChangeKind.ROBOT_INTENSITY:
-            value, told = fold.robot_intensity, {"value": fold.robot_intensity}
-        case ChangeKind.VALENCE:
-            told = describe_types(fold)
-        case ChangeKind.FEEDBACK_TEXT:
-            told = {}
-        case ChangeKind.WORDS_SHOWN:
-            value, told = float(fold.words_shown), {"value": fold.words_shown}
-        case ChangeKind.CHART_STYLE:
-            value, told = fold.chart_style.value, {"value": fold.chart_style.value}
-        case ChangeKind.PHASE:
-            return phase_event(fold)
-        case _:
-            return state_event(fold)
-    monitor = {"kind": kind.value, **told, "mark": change_mark(fold.last_number, kind, value)}
-    if kind in (ChangeKind.ACTIVATION_THRESHOLD, ChangeKind.ROBOT_INTENSITY):
-        return _to_each(fold, monitor=monitor, robot=_cue(fold))
-    return _to_each(fold, monitor=monitor)
+def source_message(fold: SessionFold, kind: str) -> Message | None:
+    """Return what a source is told of a change, as of now; None for nothing."""
+    control = CONTROLS[kind]
+    payload = control.tells.get(Audience.SOURCE)
+    return None if payload is None else PAYLOADS[Audience.SOURCE, payload](fold, control, None)
+
+
+def _state(fold: SessionFold) -> Message:
+    return {"kind": "state", **describe_state(fold)}
+
+
+def _phase_for_patient(fold: SessionFold) -> Message:
+    streak = fold.feedback.streak if fold.valence.rewards else None
+    return {"kind": "phase", **describe_now(fold), "streak": streak}
+
+
+def _phase_for_monitor(fold: SessionFold) -> Message:
+    return {
+        "kind": "phase",
+        **describe_now(fold),
+        "goal": fold.goal,
+        "gain": fold.gain,
+        "obstacle": fold.obstacle,
+        **describe_types(fold),
+    }
 
 
 def _cue(fold: SessionFold) -> Message:
     return {"type": "cue", "cue": describe_cue(fold), "valence": fold.valence.slug}
+
+
+def _marked(fold: SessionFold, control: Control, value: ChangeValue, told: Message) -> Message:
+    """Return a change as the PT's page hears it, with its mark where charts have one."""
+    message: Message = {"kind": str(control.kind), **told}
+    if control.mark is not None:
+        in_force = control.value_for_log(fold)
+        shown = value if in_force is None else in_force
+        message["mark"] = change_mark(fold.last_number, control.kind, shown)
+    return message
+
+
+def _value(fold: SessionFold, control: Control) -> Message:
+    return {control.event_field: control.value_in_force(fold)}
+
+
+# What each audience is told of a change (`Control.tells`).
+PAYLOADS: dict[tuple[Audience, Payload], Callable[[SessionFold, Control, ChangeValue], Message]] = {
+    (Audience.PATIENT, Payload.STATE): lambda fold, _control, _value: _state(fold),
+    (Audience.PATIENT, Payload.PHASE): lambda fold, _control, _value: _phase_for_patient(fold),
+    (Audience.MONITOR, Payload.KIND): lambda fold, control, value: _marked(
+        fold, control, value, {}
+    ),
+    (Audience.MONITOR, Payload.VALUE): lambda fold, control, value: _marked(
+        fold, control, value, _value(fold, control)
+    ),
+    (Audience.MONITOR, Payload.TYPES): lambda fold, control, value: _marked(
+        fold, control, value, describe_types(fold)
+    ),
+    (Audience.MONITOR, Payload.STATE): lambda fold, _control, _value: _state(fold),
+    (Audience.MONITOR, Payload.PHASE): lambda fold, _control, _value: _phase_for_monitor(fold),
+    (Audience.ROBOT, Payload.STATE): lambda fold, _control, _value: {
+        "type": "state",
+        "state": fold.state.value,
+    },
+    (Audience.ROBOT, Payload.CUE): lambda fold, _control, _value: _cue(fold),
+    (Audience.SOURCE, Payload.KIND): lambda _fold, control, _value: {"type": str(control.kind)},
+    (Audience.SOURCE, Payload.VALUE): lambda fold, control, _value: {
+        "type": str(control.kind),
+        control.event_field: control.value_in_force(fold),
+    },
+    (Audience.SOURCE, Payload.PHASE): lambda fold, control, _value: {
+        "type": str(control.kind),
+        "phase": describe_source_phase(fold),
+    },
+    (Audience.SOURCE, Payload.STOP): lambda _fold, _control, _value: {"type": "stop"},
+}
 
 
 def presence_event(fold: SessionFold, presence: Message) -> LiveEvent:
@@ -331,7 +370,7 @@ def snapshot(
         "streak": fold.feedback.streak
         if fold.valence.rewards or audience is Audience.MONITOR
         else None,
-        "chart": fold.chart_style.value,
+        **_controls_for(audience, fold),
         "target": {"hit_rate": plan.target.hit_rate, "duration_s": plan.target.duration_s},
         "presence": presence if audience is Audience.MONITOR else _near(presence),
         "robot_stopped": robot_stopped,
@@ -342,13 +381,8 @@ def snapshot(
     if audience is Audience.MONITOR:
         message |= {
             **describe_types(fold),
-            "words_shown": fold.words_shown,
             "trained_side": plan.trained_side,
             "marks": list(marks),
-            "goal": fold.goal,
-            "gain": fold.gain,
-            "activation_threshold": fold.activation_threshold,
-            "robot_intensity": fold.robot_intensity,
             "hit_rate": fold.feedback.hit_rate,
             "hits": fold.feedback.hits,
             "judged": fold.feedback.judged,
@@ -359,6 +393,14 @@ def snapshot(
             ],
         }
     return message
+
+
+def _controls_for(audience: Audience, fold: SessionFold) -> Message:
+    return {
+        control.snapshot_field: control.value_in_force(fold)
+        for control in CONTROLS.values()
+        if control.snapshot_field and audience in control.snapshot_for
+    }
 
 
 def _last_step(fold: SessionFold, recent: Sequence[StoredStep]) -> Message | None:

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from django.utils.translation import gettext, override
 
-from rehab.training.changes import ChangeKind, ChangeValue, State
+from rehab.training.changes import ChangeValue, State
+from rehab.training.controls import CONTROLS
 from rehab.training.fold import SessionFold
 from rehab.training.phases import find_phase_kind
 from rehab.training.plans import SessionPlan
 from rehab.training.valences import VALENCES, Valence
 
 Message = dict[str, Any]
-
-# Changes that a PT's chart points out; a phase it shows by itself.
-MARKED_CHANGES = frozenset(ChangeKind) - {
-    ChangeKind.START,
-    ChangeKind.FINISH,
-    ChangeKind.ABORT,
-    ChangeKind.PHASE,
-}
 
 
 def describe_walked(fold: SessionFold) -> Message:
@@ -63,6 +55,17 @@ def describe_now(fold: SessionFold) -> Message:
     }
 
 
+def describe_source_phase(fold: SessionFold) -> Message:
+    """Return the phase as a simulated patient needs to know it."""
+    phase = fold.phase
+    return {
+        "kind": phase.kind,
+        "name": phase.name,
+        "feedback": phase.feedback,
+        "gain": phase.gain,
+    }
+
+
 def describe_types(fold: SessionFold) -> Message:
     """Give which feedback type is in force and which comes next, and which it may be."""
     return {
@@ -98,13 +101,9 @@ def describe_state(fold: SessionFold) -> Message:
     }
 
 
-def change_mark(after: int, kind: ChangeKind, value: ChangeValue) -> Message:
-    """Give a change as a PT's chart points it out; of edited words only whose they are."""
-    return {
-        "after": after,
-        "kind": kind.value,
-        "value": value.get("valence") if isinstance(value, Mapping) else value,
-    }
+def change_mark(after: int, kind: str, value: ChangeValue) -> Message:
+    """Return a change as a PT's chart points it out; of edited words only whose they are."""
+    return {"after": after, "kind": str(kind), "value": CONTROLS[kind].part_shown(value)}
 
 
 def type_mark(after: int, slug: str) -> Message:

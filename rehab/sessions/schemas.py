@@ -12,7 +12,8 @@ from rehab.people.api import PatientName, Short
 from rehab.people.web.api_base import Given, Key, Moment, Paging, Whole, Words, left_out, sees_names
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import REQUESTABLE, ChangeKind, State
+from rehab.training.changes import State
+from rehab.training.controls import requestable_kinds
 from rehab.training.metrics import METRICS
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES, find_valence
@@ -25,15 +26,16 @@ FeedbackType = Annotated[
 ]
 
 
-def read_kind(kind: str) -> ChangeKind:
-    """Give the change of that name. Raises ValueError for one that is not made here."""
-    if kind not in REQUESTABLE:
-        raise ValueError(f"A change is one of: {', '.join(REQUESTABLE)}.")
-    return ChangeKind(kind)
+def read_kind(kind: str) -> str:
+    """Return the kind of change. Raises ValueError for one that nobody may ask for."""
+    known = requestable_kinds()
+    if kind not in known:
+        raise ValueError(f"A change is one of: {', '.join(known)}.")
+    return kind
 
 
 AskedKind = Annotated[
-    str, AfterValidator(read_kind), Field(json_schema_extra={"enum": list(REQUESTABLE)})
+    str, AfterValidator(read_kind), Field(json_schema_extra={"enum": requestable_kinds()})
 ]
 
 

@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 from rehab.people.models import User
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent, SessionMetric
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.payloads import MARKED_CHANGES, change_mark
+from rehab.sessions.payloads import change_mark
 from rehab.sessions.replay import fold_log
 from rehab.training.changes import ENDED_STATES, Change, ChangeKind, ChangeValue, State
+from rehab.training.controls import CONTROLS, marked_kinds
 from rehab.training.fold import SessionFold
 from rehab.training.metrics import compute_metrics
 from rehab.training.steps import Measurement, ScoredStep
@@ -29,7 +30,6 @@ class StepRow(NamedTuple):
 
 
 Row = StepRow | SessionEvent | SessionMetric
-MARKED = frozenset({*MARKED_CHANGES, *(remark.value for remark in Remark)})
 MARKS = 100  # the newest; more would hide the strides
 Summary = dict[str, Any]
 
@@ -53,17 +53,19 @@ class SessionActor:
         """Rebuild the actor of a session from its log."""
         actor = cls(session)
         fold_log(actor.fold, session)
-        marked = SessionEvent.everywhere.filter(session=session, kind__in=MARKED).order_by("-pk")
+        marked = SessionEvent.everywhere.filter(
+            session=session, kind__in=[*marked_kinds(), *Remark]
+        ).order_by("-pk")
         for event in reversed(marked[:MARKS]):
             actor.mark(event)
         return actor
 
     def mark(self, event: SessionEvent) -> None:
-        """Keep an event at hand for those who join later."""
+        """Keep an event at hand for those who join later, where charts point it out."""
         kind, value = event.kind, event.data.get("value", event.value)
-        if kind in MARKED_CHANGES:
-            self.marks.append(change_mark(event.after_number, ChangeKind(kind), value))
-        else:
+        if kind in marked_kinds():
+            self.marks.append(change_mark(event.after_number, kind, value))
+        elif kind in list(Remark):
             self.marks.append({"after": event.after_number, "kind": kind, "value": value})
 
     def take(self, measurement: Measurement, received_at: datetime) -> StepRow:
@@ -75,20 +77,19 @@ class SessionActor:
 
         Raises what ``SessionFold.change`` raises; nothing has then happened.
         """
-        old = self._current(change.kind)
+        old = CONTROLS[change.kind].value_for_log(self.fold)
         self.fold.change(change)
         event = SessionEvent(
             session=self.session,
             after_number=self.fold.last_number,
-            kind=change.kind.value,
+            kind=str(change.kind),
             by=by,
             at=at,
             **_to_columns(old, change.value),
         )
-        if event.kind in MARKED:
-            self.mark(event)
+        self.mark(event)
         rows: list[Row] = [event]
-        if change.kind is ChangeKind.START:
+        if change.kind == ChangeKind.START:
             self.session.started_at = at
         if self.fold.state in ENDED_STATES:
             self.session.ended_at = at
@@ -117,8 +118,7 @@ class SessionActor:
             at=at,
             data=data,
         )
-        if event.kind in MARKED:
-            self.mark(event)
+        self.mark(event)
         return event
 
     def summary(self) -> Summary:
@@ -131,26 +131,6 @@ class SessionActor:
             "ended_at": self.session.ended_at,
             "changed_to": ",".join(self.fold.changed_to),
         }
-
-    def _current(self, kind: ChangeKind) -> float | str | None:
-        match kind:
-            case ChangeKind.GOAL:
-                return self.fold.goal
-            case ChangeKind.GAIN:
-                return self.fold.gain
-            case ChangeKind.PHASE:
-                return self.fold.phase_index
-            case ChangeKind.ACTIVATION_THRESHOLD:
-                return self.fold.activation_threshold
-            case ChangeKind.ROBOT_INTENSITY:
-                return self.fold.robot_intensity
-            case ChangeKind.VALENCE:
-                return self.fold.next_valence or self.fold.valence.slug
-            case ChangeKind.WORDS_SHOWN:
-                return float(self.fold.words_shown)
-            case ChangeKind.CHART_STYLE:
-                return self.fold.chart_style.value
-        return None
 
 
 def _to_columns(old: ChangeValue, value: ChangeValue) -> dict[str, Any]:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from channels.db import database_sync_to_async
 
 from rehab.sessions.log import SessionEvent, Step
-from rehab.training.changes import ChangeKind
+from rehab.training.changes import ChangeKind, State
+from rehab.training.controls import CONTROLS
 from rehab.training.measures import Measure
 from rehab.training.steps import InvalidReason, Measurement, add_reason, find_invalid_reasons
 
 PAGE = 256  # past steps at a time
-MOVES = (ChangeKind.START, ChangeKind.PAUSE, ChangeKind.RESUME)
 
 
 @database_sync_to_async
@@ -41,8 +41,11 @@ def _find_reasons(session_id: int, measurement: Measurement, measure: Measure) -
     before = Step.everywhere.filter(session_id=session_id, number=number - 1).first()
     if before is not None and measurement.time_s < before.time_s:
         reasons = add_reason(reasons, InvalidReason.TIME_BACKWARDS)
+    moving = [
+        kind for kind, one in CONTROLS.items() if one.leads_to in (State.RUNNING, State.PAUSED)
+    ]
     moves = SessionEvent.everywhere.filter(
-        session_id=session_id, after_number__lt=number, kind__in=MOVES
+        session_id=session_id, after_number__lt=number, kind__in=moving
     )
     if moves.order_by("-pk").values_list("kind", flat=True).first() == ChangeKind.PAUSE:
         reasons = add_reason(reasons, InvalidReason.PAUSED)

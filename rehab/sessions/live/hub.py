@@ -10,7 +10,8 @@ import asyncio
 from collections import deque
 from collections.abc import Awaitable, Callable
 
-from rehab.sessions.events import Audience, LiveEvent
+from rehab.sessions.events import LiveEvent
+from rehab.training.controls import Audience
 
 RING = 512  # events a session; at two steps a second four minutes
 MAX_UNSEEN = 32  # frames that may be on their way to a page

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from rehab.sessions.log import Remark
-from rehab.training.changes import REQUESTABLE, ChangeKind
+from rehab.training.controls import CONTROLS, ValueKind, requestable_kinds
 from rehab.training.steps import InvalidMeasurement, Measurement, Side
 
 MAX_FRAME = 64 * 1024
@@ -124,17 +124,14 @@ def read_plain(text: str) -> tuple[float | None, float | None] | None:
     return (value if math.isfinite(value) else None, goal if math.isfinite(goal) else None)
 
 
-NAMED = frozenset({ChangeKind.VALENCE, ChangeKind.CHART_STYLE})  # changed to a name
-
-
-def read_change(message: dict[str, Any]) -> tuple[ChangeKind, float | str | None]:
+def read_change(message: dict[str, Any]) -> tuple[str, float | str | None]:
     """Read what a person wants changed. Raises BadFrame."""
-    kind = message.get("kind")
-    if kind not in REQUESTABLE:
-        raise BadFrame(f'"kind" is one of: {", ".join(REQUESTABLE)}.')
-    if kind in NAMED:
-        return ChangeKind(kind), read_name(message, "value")
-    return ChangeKind(kind), _optional_number(message, "value")
+    kind, known = message.get("kind"), requestable_kinds()
+    if kind not in known:
+        raise BadFrame(f'"kind" is one of: {", ".join(known)}.')
+    if CONTROLS[kind].value is ValueKind.NAME:
+        return kind, read_name(message, "value")
+    return kind, _optional_number(message, "value")
 
 
 def read_name(message: dict[str, Any], name: str) -> str:

@@ -19,7 +19,7 @@ from django.db import DatabaseError, connection
 from django.utils import timezone
 
 from rehab.people.models import User
-from rehab.sessions.events import Audience, to_text
+from rehab.sessions.events import to_text
 from rehab.sessions.live import owners, sources
 from rehab.sessions.live.audit_queue import Notes
 from rehab.sessions.live.auth import find_unwelcome, keep_signed_in
@@ -38,6 +38,7 @@ from rehab.training.changes import (
     PauseReason,
     State,
 )
+from rehab.training.controls import CONTROLS, Audience
 
 log = logging.getLogger(__name__)
 
@@ -176,15 +177,13 @@ class Runtime:
             if getattr(socket, "live", None) is live:
                 socket.close_soon(4012)
 
-    async def change(
-        self, session_id: int, kind: ChangeKind, value: ChangeValue, by: User | None
-    ) -> None:
+    async def change(self, session_id: int, kind: str, value: ChangeValue, by: User | None) -> None:
         """Start, pause, steer or end a session; committed when this returns.
 
         Raises InvalidSetting where it is refused and NotStored where it could not be committed.
         """
         live = await self.admitted(session_id)
-        if live.source_clock is not None and kind in (ChangeKind.START, ChangeKind.RESUME):
+        if live.source_clock is not None and CONTROLS[kind].leads_to is State.RUNNING:
             live.source_clock.slacken(time.monotonic())
         await live.change(Change(kind, value), by, timezone.now())
         if live.actor.fold.state not in ENDED_STATES:

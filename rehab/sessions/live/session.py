@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from datetime import datetime
 from typing import NamedTuple, Protocol
 
 from rehab.people.models import User
 from rehab.sessions.events import (
-    Audience,
     LiveEvent,
     Told,
     change_event,
@@ -20,6 +19,7 @@ from rehab.sessions.events import (
     report_event,
     robot_stopped_event,
     snapshot,
+    source_message,
     step_event,
 )
 from rehab.sessions.live.actor import Row, SessionActor
@@ -29,20 +29,11 @@ from rehab.sessions.live.writer import Job, Writer
 from rehab.sessions.log import Remark, RobotEntry, Step
 from rehab.sessions.payloads import Message, type_mark
 from rehab.training.changes import Change, ChangeKind, State
+from rehab.training.controls import Audience
 from rehab.training.steps import Measurement, ScoredStep
 
 RECENT = 60  # strides that a page's chart may begin with
 LOGGED = {"decision": RobotEntry.DECISION, "gesture": RobotEntry.GESTURE}  # of a robot's reports
-# What a source hears nothing of.
-UNTOLD = {
-    ChangeKind.GAIN,
-    ChangeKind.ACTIVATION_THRESHOLD,
-    ChangeKind.ROBOT_INTENSITY,
-    ChangeKind.VALENCE,
-    ChangeKind.FEEDBACK_TEXT,
-    ChangeKind.WORDS_SHOWN,
-    ChangeKind.CHART_STYLE,
-}
 
 
 class NotStored(RuntimeError):
@@ -154,13 +145,13 @@ class LiveSession:
         moved = (fold.phase_index, fold.goal, fold.obstacle) != (index, goal, had_obstacle)
         if moved:
             events.append(phase_event(fold, switched=len(fold.switches) > switches))
-        told: list[Message] = []
+        changed: list[str] = []
         if fold.phase_index != index:
-            told.append(self._source_change(ChangeKind.PHASE))
+            changed.append(ChangeKind.PHASE)
         if fold.goal != goal:
             events.append(change_event(fold, ChangeKind.GOAL))
-            told.append(self._source_change(ChangeKind.GOAL))
-        self._submit([row], events, told, summarize=moved, step=row.step)
+            changed.append(ChangeKind.GOAL)
+        self._submit([row], events, changed, summarize=moved, step=row.step)
 
     def change(self, change: Change, by: User | None, at: datetime) -> asyncio.Future[None]:
         """Apply a change from the next step on; done when the future is.
@@ -175,12 +166,10 @@ class LiveSession:
             events = [phase_event(fold, switched=True)]
         else:
             events = [change_event(fold, change.kind, change.value)]
-        told = []
-        if change.kind not in UNTOLD:
-            told.append(self._source_change(change.kind))
-        if change.kind is ChangeKind.PHASE and fold.goal != goal:
-            told.append(self._source_change(ChangeKind.GOAL))
-        self._submit(rows, events, told, summarize=True, stored=stored)
+        changed = [change.kind]
+        if change.kind == ChangeKind.PHASE and fold.goal != goal:
+            changed.append(ChangeKind.GOAL)
+        self._submit(rows, events, changed, summarize=True, stored=stored)
         return stored
 
     def remark(
@@ -240,13 +229,20 @@ class LiveSession:
         self,
         rows: list[Row],
         events: list[LiveEvent],
-        told: list[Message],
+        changed: Sequence[str],
         *,
         summarize: bool,
         step: ScoredStep | None = None,
         stored: asyncio.Future[None] | None = None,
         stop: Stop | None = None,
     ) -> None:
+        """Queue rows; after their commit tell the source what changed, and everyone the events."""
+        for_source = [
+            message
+            for kind in changed
+            if (message := source_message(self.actor.fold, kind)) is not None
+        ]
+
         def done(problem: Exception | None) -> None:
             self.unwritten -= 1
             if problem is not None:
@@ -257,7 +253,7 @@ class LiveSession:
             if stop is not None and self.unlogged_stop is stop:
                 self.unlogged_stop = None
             if self.source is not None:
-                for message in told:  # before the ack: a simulated patient waits for that
+                for message in for_source:  # before the ack: a simulated patient waits for that
                     self.source.tell(message)
                 if step is not None:
                     self.source.acknowledge(step.number)
@@ -280,17 +276,6 @@ class LiveSession:
                 done=done,
             )
         )
-
-    def _source_change(self, kind: ChangeKind) -> Message:
-        """Say to the source what has changed, as of now."""
-        match kind:
-            case ChangeKind.GOAL:
-                return {"type": "goal", "goal": self.actor.fold.goal}
-            case ChangeKind.PHASE:
-                return {"type": "phase", "phase": source_phase(self)}
-            case ChangeKind.FINISH | ChangeKind.ABORT:
-                return {"type": "stop"}
-        return {"type": kind.value}
 
     def presence(self, now: datetime) -> Message:
         """Say who is there, and how long ago the sensor and a tablet were last heard."""
@@ -357,17 +342,6 @@ class LiveSession:
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._submit([], [], [], summarize=False, stored=stored)
         await stored
-
-
-def source_phase(live: LiveSession) -> Message:
-    """Give the phase as a simulated patient needs to know it."""
-    phase = live.actor.fold.phase
-    return {
-        "kind": phase.kind,
-        "name": phase.name,
-        "feedback": phase.feedback,
-        "gain": phase.gain,
-    }
 
 
 def _ago_s(moment: datetime | None, now: datetime) -> float | None:

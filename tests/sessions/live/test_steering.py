@@ -8,11 +8,12 @@ import pytest
 from asgiref.sync import sync_to_async
 
 from rehab.people.models import Clinic, User
-from rehab.sessions.events import Audience, snapshot
+from rehab.sessions.events import snapshot
 from rehab.sessions.live import runtime
 from rehab.sessions.live import session as sessions
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
+from rehab.training.controls import Audience
 from rehab.training.phases import make_phase
 from rehab.training.valences import CueGestures
 from tests.support.callers import restart, turns

@@ -6,13 +6,13 @@ import asyncio
 
 from django.utils import timezone
 
-from rehab.sessions.events import Audience
 from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.hub import Lagged, Viewer
 from rehab.sessions.live.messages import BadFrame, read_name, read_report
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.payloads import Message, describe_cue
 from rehab.stations.models import Device
+from rehab.training.controls import Audience
 
 MAX_REPORT = 8 * 1024
 

@@ -18,7 +18,7 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.web.language import language_of
 from rehab.people.web.refusals import in_words
-from rehab.sessions.events import Audience, history_entry, to_text
+from rehab.sessions.events import history_entry, to_text
 from rehab.sessions.live.auth import Actor, find_actor, may_open, may_watch
 from rehab.sessions.live.backlog import read_steps
 from rehab.sessions.live.consumers.base import Closing, Socket
@@ -37,6 +37,7 @@ from rehab.sessions.live.session import LiveSession, NotStored
 from rehab.sessions.payloads import Message
 from rehab.stations.models import Device
 from rehab.training.changes import ChangeKind, PauseReason
+from rehab.training.controls import CONTROLS, Audience, Requester
 from rehab.training.measures import InvalidSetting
 
 
@@ -46,11 +47,9 @@ class ScreenConsumer(Socket):
     audience: ClassVar[Audience]
     people: ClassVar[frozenset[Role]] = frozenset({Role.LEAD, Role.PT})
     devices: ClassVar[frozenset[str]] = frozenset()
-    # What may be changed from such a page: by people, and by the station's tablet on its own.
-    changes: ClassVar[frozenset[ChangeKind]]
+    requester: ClassVar[Requester]  # as whom people ask for changes here
     pauses_as: ClassVar[PauseReason]
     robot_orders: ClassVar[tuple[str, ...]] = ("stop",)
-    tablet_changes: ClassVar[frozenset[ChangeKind]] = frozenset()
     viewer: Viewer | None = None
     language = settings.LANGUAGE_CODE
 
@@ -144,12 +143,12 @@ class ScreenConsumer(Socket):
     async def _change(self, message: Message) -> None:
         mark = read_name(message, "id")
         kind, value = read_change(message)
-        if kind is ChangeKind.PAUSE:
+        if kind == ChangeKind.PAUSE:
             value = self.pauses_as.value
         live, by = self.live, self.actor if isinstance(self.actor, User) else None
         if live is None:
             raise Closing(4004, "not_open", "The session is not open. Connect again.")
-        if kind not in (self.changes if by else self.tablet_changes):
+        if (self.requester if by else Requester.TABLET) not in CONTROLS[kind].requesters:
             await self._refuse(mark, "refused", "That is changed on the therapist's page.")
             return
         self.see_through(self._answer(mark, self.runtime.change(live.id, kind, value, by)))
@@ -220,8 +219,7 @@ class PatientConsumer(ScreenConsumer):
 
     audience = Audience.PATIENT
     devices = frozenset({Device.Kind.TABLET.value})
-    changes = frozenset({ChangeKind.START, ChangeKind.PAUSE, ChangeKind.RESUME, ChangeKind.FINISH})
-    tablet_changes = frozenset({ChangeKind.PAUSE})
+    requester = Requester.PATIENT_PAGE
     pauses_as = PauseReason.PATIENT
 
 
@@ -229,7 +227,7 @@ class MonitorConsumer(ScreenConsumer):
     """The PT's page: sees everything and steers."""
 
     audience = Audience.MONITOR
-    changes = frozenset(ChangeKind)
+    requester = Requester.MONITOR
     pauses_as = PauseReason.THERAPIST
     robot_orders = ("stop", "arm")
 

@@ -18,8 +18,8 @@ from rehab.sessions.live.messages import (
     read_plain,
     read_steps,
 )
-from rehab.sessions.live.session import LiveSession, source_phase
-from rehab.sessions.payloads import Message
+from rehab.sessions.live.session import LiveSession
+from rehab.sessions.payloads import Message, describe_source_phase
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED_STATES, State
 from rehab.training.steps import Measurement, Side
@@ -74,7 +74,7 @@ class SourceConsumer(DeviceSocket):
                 "trained_side": fold.plan.trained_side,
                 "measure": fold.plan.measure.slug,
                 "unit": fold.plan.measure.unit,
-                "phase": source_phase(live),
+                "phase": describe_source_phase(fold),
             }
         )
         if live.committed:
