@@ -17,10 +17,10 @@ class RehabConfig(AppConfig):
         from rehab.boards.watching import watch
         from rehab.models import TRACKED
         from rehab.people.audit.history import track
-        from rehab.sessions.defaults import install_defaults
-        from rehab.sessions.feedback_text_updates import listen
+        from rehab.sessions.feedback_text_updates import connect_signals
+        from rehab.sessions.setup.defaults import install_defaults
 
         post_migrate.connect(install_defaults, sender=self)
         watch()
         track(*TRACKED)
-        listen()
+        connect_signals()

@@ -14,8 +14,8 @@ from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.presets import Preset
-from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase
+from rehab.sessions.setup.presets import Preset
+from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
 from rehab.stations.models import Device, LeaveTries, Station
 
 # People and settings. What happens in a session is a log by itself, and so is consent.

@@ -71,11 +71,11 @@ class GarrySite(AdminSite):
         from rehab.people.access import person
         from rehab.people.roles import Role
         from rehab.people.server_status import look_at_server
-        from rehab.sessions.reports.dashboard import look
+        from rehab.sessions.reports.dashboard import dashboard_context
 
         user = person(request)
         now = timezone.now()
-        told = look_at_server(user) if user.role == Role.HOST else look(user, now)
+        told = look_at_server(user) if user.role == Role.HOST else dashboard_context(user, now)
         return super().index(request, {**told, **(extra_context or {})})
 
     def app_index(  # type: ignore[override]

@@ -22,11 +22,16 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from functools import partial
 
-from robot import doctor, solo
+from robot import doctor, play_gesture
 from robot.base_options import add_base_arguments, make_base
 from robot.bases import BadOption, BaseLost, MobileBase
 from robot.bases.twin.__main__ import main as run_twin
-from robot.dialing import CannotDial, add_dialing_arguments, find_token, websocket_url
+from robot.connection_args import (
+    BadConnectionArgs,
+    add_connection_arguments,
+    find_token,
+    websocket_url,
+)
 from robot.link import Link, LinkRefused
 from robot.original_topics import TOPICS, OriginalTopics
 from robot.worker import Worker
@@ -37,7 +42,7 @@ DONE, LOST, UNUSABLE, REFUSED, INTERRUPTED = 0, 1, 2, 3, 130
 
 
 def make_parser() -> ArgumentParser:
-    """Give the command line."""
+    """Return the command line's parser."""
     parser = ArgumentParser(
         prog="python -m robot",
         description=__doc__,
@@ -52,16 +57,16 @@ def make_parser() -> ArgumentParser:
         help="publish on these of the original's topics at the rosbridge, beside any base "
         "(without a name: on all)",
     )
-    add_dialing_arguments(parser)
+    add_connection_arguments(parser)
     return parser
 
 
-def say(text: str) -> None:
-    """Print a line for whoever looks on."""
+def print_notice(text: str) -> None:
+    """Print a line to standard error."""
     print(text, file=sys.stderr, flush=True)
 
 
-async def until_told(is_child: bool) -> None:
+async def wait_for_end(is_child: bool) -> None:
     """Wait for SIGTERM, and for the end of standard input where a server supervises us."""
     loop = asyncio.get_running_loop()
     told = asyncio.Event()
@@ -80,12 +85,12 @@ async def until_told(is_child: bool) -> None:
     await told.wait()
 
 
-async def perform(
+async def run_worker(
     url: str, token: str, base: MobileBase, originals: OriginalTopics | None, is_child: bool
 ) -> None:
-    """Let the base perform until told to end. Raises LinkRefused and BaseLost."""
-    worker = Worker(partial(Link, url, token), base, originals=originals, notice=say)
-    tasks = [asyncio.create_task(worker.run()), asyncio.create_task(until_told(is_child))]
+    """Run a worker until told to end. Raises LinkRefused and BaseLost."""
+    worker = Worker(partial(Link, url, token), base, originals=originals, notice=print_notice)
+    tasks = [asyncio.create_task(worker.run()), asyncio.create_task(wait_for_end(is_child))]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         for task in done:
@@ -97,7 +102,10 @@ async def perform(
 
 
 def run(options: Namespace) -> int:
-    """Run a robot to its end and give the exit status. Raises what cannot be used."""
+    """Run a robot to its end, and return the exit status.
+
+    Raises BadConnectionArgs and BadOption.
+    """
     url = websocket_url(options.server, ROBOT_PATH)
     token = find_token(options, "GARRY_ROBOT_TOKEN", "a robot")
     if options.child:  # Ctrl-C reaches both of us; the server tells when to end
@@ -107,33 +115,33 @@ def run(options: Namespace) -> int:
         originals = OriginalTopics(options.ros_url, options.original_topics or TOPICS)
     with base, originals or contextlib.nullcontext():
         try:
-            asyncio.run(perform(url, token, base, originals, options.child))
+            asyncio.run(run_worker(url, token, base, originals, options.child))
         except KeyboardInterrupt:
-            say("Stopped.")
+            print_notice("Stopped.")
             return INTERRUPTED
         except LinkRefused as refusal:
-            say(f"{refusal}")
+            print_notice(f"{refusal}")
             return REFUSED
         except BaseLost as problem:
-            say(f"{problem}")
+            print_notice(f"{problem}")
             return LOST
     return DONE
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the robot that the command line names and give the exit status."""
+    """Run the command of the command line, and return the exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words[:1] == ["doctor"]:
         return doctor.main(words[1:])
     if words[:1] == ["gesture"]:
-        return solo.main(words[1:])
+        return play_gesture.main(words[1:])
     if words[:1] == ["twin"]:
         return run_twin(words[1:])
     options = make_parser().parse_args(words)
     try:
         return run(options)
-    except (CannotDial, BadOption) as problem:
-        say(f"{problem}")
+    except (BadConnectionArgs, BadOption) as problem:
+        print_notice(f"{problem}")
         return UNUSABLE
     except KeyboardInterrupt:
         return INTERRUPTED

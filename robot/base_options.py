@@ -1,4 +1,4 @@
-"""The base of a command line: which one, where it is, and what it has."""
+"""The base of a command line: which one, its address and its options."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from robot.ros.bridge import find_bridge, is_address
 
 
 def add_base_arguments(parser: ArgumentParser, names: Collection[str] = BASES) -> None:
-    """Let a command line choose one of these bases, with its options."""
+    """Add the choice of one of these bases, and their options, to a command line."""
     parser.add_argument("--base", required=True, choices=sorted(names), help="what to drive")
     parser.add_argument(
         "--port",
@@ -36,7 +36,7 @@ def _read_address(text: str) -> str:
 
 
 def make_base(options: Namespace, monotonic: Callable[[], float]) -> MobileBase:
-    """Give the base of a command line, not open yet. Raises BadOption."""
+    """Return the base of a command line, not open yet. Raises BadOption."""
     base = BASES[options.base](monotonic)
     base.configure(options)
     return base

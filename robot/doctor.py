@@ -1,4 +1,4 @@
-"""`python -m robot doctor`: finds a Kobuki's port and says what is wrong on the way to it."""
+"""`python -m robot doctor`: finds a Kobuki's port, and says what is wrong with it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from argparse import ArgumentParser
 from collections.abc import Iterator, Sequence
 
 from robot.bases.kobuki import KobukiBase
-from robot.safety import BASE_SILENT_S, BATTERY_LOW_V, BATTERY_WARN_V
-from robot.usb import Finding, find_port, list_ports, look_at_port
+from robot.behavior.safety import BASE_SILENT_S, BATTERY_LOW_V, BATTERY_WARN_V
+from robot.port.usb import Diagnosis, check_port, find_port, list_ports
 
 LISTEN_S = 0.5
 FRAMES_PER_S = 45.0  # a base says 50; fewer are lost on the way
@@ -24,8 +24,8 @@ CURES = {
 }
 
 
-def listen(port: str) -> Iterator[Finding]:
-    """Open a port for a second, with the wheels standing, and say what the base tells."""
+def listen(port: str) -> Iterator[Diagnosis]:
+    """Open a port for a second, with the wheels standing, and yield what the base reports."""
     base = KobukiBase(time.monotonic)
     base.port = port
     with base:
@@ -36,30 +36,30 @@ def listen(port: str) -> Iterator[Finding]:
         frames = base.frames - frames
         problem, state, counters = base.problem, base.read(), base.counters
         firmware = base.firmware
-    senses = state.senses
+    sensors = state.sensors
     if problem:
-        yield Finding(f"{port} cannot be opened: {problem}", _cure_opening(problem))
+        yield Diagnosis(f"{port} cannot be opened: {problem}", _cure_opening(problem))
         return
-    if senses.silent_s > BASE_SILENT_S:
-        yield Finding(
+    if sensors.silent_s > BASE_SILENT_S:
+        yield Diagnosis(
             f"{port} is open, and nothing that a Kobuki would say comes from it.",
             "Switch the base on. If it is on: this is another device's port, or the cable only "
             "charges.",
         )
         return
     per_s = frames / LISTEN_S
-    yield Finding(
+    yield Diagnosis(
         f"It tells {per_s:.0f} times a second how it is.",
         "" if per_s >= FRAMES_PER_S else "Take another USB port or cable; look at the latency.",
     )
     bad = counters["bad_checksums"] + counters["malformed"]
-    yield Finding(f"{bad} damaged frames.", "Take another cable." if bad > 1 else "")
-    yield Finding(f"Firmware {firmware or 'unknown'}.", CURES.get(senses.refusal, ""))
-    volts = senses.battery_v or 0.0
+    yield Diagnosis(f"{bad} damaged frames.", "Take another cable." if bad > 1 else "")
+    yield Diagnosis(f"Firmware {firmware or 'unknown'}.", CURES.get(sensors.refusal, ""))
+    volts = sensors.battery_v or 0.0
     cure = "" if volts >= BATTERY_WARN_V else f"Charge it: below {BATTERY_LOW_V} V it stays still."
-    yield Finding(f"Battery {volts:.1f} V{', charging' * senses.is_charging}.", cure)
-    for hazard in sorted(senses.hazards):
-        yield Finding(f"It feels: {hazard}.", CURES.get(hazard, ""))
+    yield Diagnosis(f"Battery {volts:.1f} V{', charging' * sensors.is_charging}.", cure)
+    for hazard in sorted(sensors.hazards):
+        yield Diagnosis(f"It feels: {hazard}.", CURES.get(hazard, ""))
 
 
 def _cure_opening(problem: str) -> str:
@@ -72,15 +72,15 @@ def _cure_opening(problem: str) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Look, and print what was found. Give 0 where nothing is wrong, else 1."""
+    """Print the results of all checks. Return 0 where nothing is wrong, else 1."""
     parser = ArgumentParser(prog="python -m robot doctor", description=__doc__)
     parser.add_argument("--port", help="instead of the one that is found")
     port = parser.parse_args(arguments).port or find_port()
     wrong = 0
-    for look in (look_at_port(port, list_ports()), listen(port)):
-        for finding in look:
-            wrong += bool(finding.cure)
-            cure = f"\n      Cure: {finding.cure}" if finding.cure else ""
-            sys.stdout.write(f"{'  !!' if cure else '  ok'}  {finding.what}{cure}\n")
+    for look in (check_port(port, list_ports()), listen(port)):
+        for diagnosis in look:
+            wrong += bool(diagnosis.cure)
+            cure = f"\n      Cure: {diagnosis.cure}" if diagnosis.cure else ""
+            sys.stdout.write(f"{'  !!' if cure else '  ok'}  {diagnosis.what}{cure}\n")
             sys.stdout.flush()
     return 1 if wrong else 0

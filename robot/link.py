@@ -1,4 +1,4 @@
-"""The websocket by which robots and sources dial in to the server, and dial in again.
+"""The websocket client of robots and sources: it connects to the server, and reconnects.
 
 ::
 
@@ -26,37 +26,39 @@ from urllib.parse import urlsplit
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
 
-MAX_FRAME_BYTES = 64 * 1024
+from robot.wire.close_codes import CloseCode
+from robot.wire.limits import MAX_FRAME_BYTES
 
 Message = dict[str, Any]
-
-UNAUTHORIZED = 4001
-NO_SESSION = 4004
-REPLACED = 4009
-NOT_STORED = 4011
-TOO_MANY = 4029
-NOT_PROTOCOL = 4400
-TAKEN = 4409
-ENDED = 4410
 
 # Close code: what to do, for a server that does not say it itself. Dialing in again as it is would
 # not help; after 4009 it would throw the newer socket out, which would dial in again, and so on.
 REFUSALS: dict[int, str] = {
-    UNAUTHORIZED: "The token is missing, wrong or revoked. Make a new one for this device in the "
-    "admin.",
-    NO_SESSION: "There is no such session for this device. Check the address and the station.",
-    REPLACED: "Another program dialed in with the same token. Stop one of them, or give each its "
-    "own device.",
-    NOT_PROTOCOL: "The server does not understand this client. Use the version that fits the "
-    "server.",
-    TAKEN: "The session has another source or robot. Stop that one first.",
-    ENDED: "The session has ended.",
+    CloseCode.UNAUTHORIZED: (
+        "The token is missing, wrong or revoked. Make a new one for this device in the admin."
+    ),
+    CloseCode.NO_SESSION: (
+        "There is no such session for this device. Check the address and the station."
+    ),
+    CloseCode.REPLACED: (
+        "Another program dialed in with the same token. Stop one of them, or give each its own "
+        "device."
+    ),
+    CloseCode.NOT_PROTOCOL: (
+        "The server does not understand this client. Use the version that fits the server."
+    ),
+    CloseCode.BUSY: "The session has another source or robot. Stop that one first.",
+    CloseCode.ENDED: "The session has ended.",
 }
 # After these the server, or what we send, is in trouble that a quick return would make worse.
-_TROUBLE = frozenset({NOT_STORED, TOO_MANY, 1002, 1003, 1007, 1009})
+_TROUBLE = frozenset({CloseCode.NOT_STORED, CloseCode.TOO_MANY, 1002, 1003, 1007, 1009})
 
 # Handshakes that are refused by a status instead of a close code.
-_STATUS_CODES = {401: UNAUTHORIZED, 403: UNAUTHORIZED, 404: NO_SESSION}
+_STATUS_CODES = {
+    401: CloseCode.UNAUTHORIZED,
+    403: CloseCode.UNAUTHORIZED,
+    404: CloseCode.NO_SESSION,
+}
 _PASSING_STATUSES = frozenset({408, 425, 429})
 
 
@@ -103,31 +105,31 @@ class BackOff:
         self._jitter = jitter
 
     def next_s(self) -> float:
-        """Give the pause before the next attempt [s]."""
+        """Return the pause before the next attempt [s]."""
         pause_s = self._pause_s
         self._pause_s = min(2 * pause_s, self._longest_s)
         return pause_s * (1 - self._jitter() / 2)
 
     def reset(self) -> None:
-        """Begin again with the shortest pause."""
+        """Start again with the shortest pause."""
         self._pause_s = self._first_s
 
 
 def _ignore_loss(_reason: str, _pause_s: float) -> None:
-    """Say nothing of a loss."""
+    """Ignore a lost connection."""
 
 
 class Link:
-    """A connection to the server that comes back by itself. Iterating gives the server's messages.
+    """A connection to the server that reconnects by itself. Iterating yields the server's messages.
 
     Parameters
     ----------
     url
-        The socket's address, see ``dialing.websocket_url``.
+        The socket's address, see ``connection_args.websocket_url``.
     token
         The device's token.
     greet
-        Gives the first message of each connection, asked anew for each.
+        Returns the first message of each connection.
     on_lost
         Called with a reason and the pause before the next attempt [s], each time a connection is
         lost and each time none comes about. A robot stops here.
@@ -168,7 +170,7 @@ class Link:
         return self._socket is not None
 
     async def __aenter__(self) -> Self:
-        """Give the link; iterating connects it."""
+        """Return the link; iterating connects it."""
         return self
 
     async def __aexit__(
@@ -181,11 +183,11 @@ class Link:
         await self.close()
 
     def __aiter__(self) -> Self:
-        """Give the link itself."""
+        """Return the link itself."""
         return self
 
     async def __anext__(self) -> Message:
-        """Give the server's next message, connecting first where there is no connection."""
+        """Return the server's next message, after connecting where there is no connection."""
         while not self._is_closed:
             try:
                 if self._socket is None:
@@ -225,18 +227,18 @@ class Link:
         return False
 
     def hang_up(self) -> None:
-        """Abandon the connection, with all that is still on its way; iterating dials in anew.
+        """Abort the connection, with all that is still on its way; iterating connects again.
 
-        For whoever misses signs of life that come more often than pings.
+        For callers that expect signs of life more often than pings.
         """
         socket, self._socket = self._socket, None
         if socket is not None:
             socket.transport.abort()
 
     async def pause(self, reason: str) -> None:
-        """Tell of a lost connection, and wait before the next attempt.
+        """Report a lost connection, and wait before the next attempt.
 
-        Iterating does, but not where it raises: for whoever dials in again nevertheless.
+        Iterating does so by itself, except where it raises: for callers that connect again anyway.
         """
         pause_s = self._back_off.next_s()
         self._on_lost(reason, pause_s)
@@ -274,13 +276,14 @@ class Link:
             self._socket = socket
 
     def _read(self, text: str | bytes) -> Message:
-        """Give a frame's message. Raises LinkRefused for what no server of ours would send."""
+        """Return a frame's message. Raises LinkRefused for what no GARRY server sends."""
         try:
             message = json.loads(text)
             kind = message["type"]
         except (ValueError, TypeError, KeyError, RecursionError):
             raise LinkRefused(
-                NOT_PROTOCOL, f"What answers at {self.url} is no GARRY server. Check the address."
+                CloseCode.NOT_PROTOCOL,
+                f"What answers at {self.url} is no GARRY server. Check the address.",
             ) from None
         if kind == "error":
             self._error = str(message.get("message", ""))
@@ -290,7 +293,7 @@ class Link:
         return dict(message)
 
     def _explain(self, closed: ConnectionClosed) -> str:
-        """Say why a connection ended. Raises LinkRefused where it need not be tried again."""
+        """Return why a connection ended. Raises LinkRefused where trying again is useless."""
         code = 1006 if closed.rcvd is None else closed.rcvd.code
         said = self._error or ("" if closed.rcvd is None else closed.rcvd.reason)
         if code in REFUSALS:
@@ -303,19 +306,19 @@ class Link:
         return f"The server closed the connection ({code}{': ' if said else ''}{said})"
 
     def _explain_failure(self, problem: OSError | WebSocketException) -> str:
-        """Say why no connection came about. Raises LinkRefused where none ever will."""
+        """Return why there is no connection. Raises LinkRefused where trying again is useless."""
         if isinstance(problem, ssl.SSLCertVerificationError):
             raise LinkRefused(
-                NOT_PROTOCOL,
+                CloseCode.NOT_PROTOCOL,
                 f"The certificate of {self.url} cannot be trusted ({problem.verify_message}). "
                 "Check the address, this computer's date, and the server's certificate.",
             )
         if isinstance(problem, InvalidStatus):
             status = problem.response.status_code
-            code = _STATUS_CODES.get(status, NOT_PROTOCOL)
+            code = _STATUS_CODES.get(status, CloseCode.NOT_PROTOCOL)
             fatal = status < 500 and status not in _PASSING_STATUSES
             # A proxy may answer 404 while the server behind it restarts, but nobody else gives 401.
-            if fatal and (code == UNAUTHORIZED or not self._was_welcome):
+            if fatal and (code == CloseCode.UNAUTHORIZED or not self._was_welcome):
                 cure = REFUSALS[code] if status in _STATUS_CODES else "Check the address."
                 raise LinkRefused(code, f"{self.url} answers with HTTP {status}. {cure}")
             return f"The server answers with HTTP {status}"

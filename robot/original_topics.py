@@ -16,11 +16,10 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Any, Self
 
-from robot.activation import BadMessage, read_number
 from robot.ros.bridge import Bridge
 from robot.ros.frames import (
     Frame,
-    Heard,
+    Incoming,
     Publication,
     Topic,
     advertise,
@@ -30,6 +29,7 @@ from robot.ros.frames import (
     unsubscribe,
 )
 from robot.ros.messages import BOOL, STRING
+from robot.wire.frames import BadFrame, read_number
 
 FEEDBACK_TYPE = Topic("/garry/feedback_type", STRING)
 GOOD_STEP = Topic("/garry/good_step", BOOL)
@@ -52,8 +52,8 @@ LATE_S = 2.0  # what has not come back by then has not arrived
 NUMBER_MAX = 1e6
 
 
-class OriginalTalk:
-    """What is said on the original's topics. Time is told.
+class OriginalTopicClient:
+    """What is published on the original's topics. Time is a parameter.
 
     Parameters
     ----------
@@ -70,12 +70,12 @@ class OriginalTalk:
         self._is_open = False
 
     def follow(self, message: Mapping[str, Any], now_s: float) -> None:
-        """Take a message of the server; what is not told in it is not published."""
+        """Handle a message of the server; what it does not hold is not published."""
         match message:
             case {"type": "welcome" | "cue", "valence": str(valence)}:
                 self._valence = valence
             case {"type": "step"}:
-                with suppress(BadMessage):
+                with suppress(BadFrame):
                     a2, goal = (
                         read_number(message, name, -NUMBER_MAX, NUMBER_MAX)
                         for name in ("shown", "goal")
@@ -83,12 +83,12 @@ class OriginalTalk:
                     self._add(now_s, DATA, {"a2": a2, "goal": goal})
 
     def decide(self, above: bool, now_s: float) -> None:
-        """Take what a window came to."""
+        """Publish a decision: whether the window was above."""
         if self._valence in WITH_GOOD_STEP:
             self._add(now_s, GOOD_STEP, {"data": above})
 
     def open(self, now_s: float) -> Iterator[Frame]:
-        """Give what is said first on a new connection."""
+        """Yield the first frames of a new connection."""
         self.lose(now_s)
         self._is_open = True
         for topic in self._topics:
@@ -96,7 +96,7 @@ class OriginalTalk:
             yield subscribe(topic)
 
     def due(self, now_s: float) -> Iterator[Frame]:
-        """Give what is to be said now."""
+        """Yield the frames to send now."""
         told = FEEDBACK_TYPES.get(self._valence, "")
         if FEEDBACK_TYPE in self._topics and told and told != self._told:
             self._told = told
@@ -106,25 +106,25 @@ class OriginalTalk:
             if now_s - made_s <= FRESH_S:
                 yield self._publish(topic, message, now_s)
 
-    def hear(self, heard: Heard, now_s: float) -> None:
-        """Take note of what has come back."""
+    def hear(self, heard: Incoming, now_s: float) -> None:
+        """Store what has come back."""
         if isinstance(heard, Publication):
             self._out.pop(heard.topic, None)
 
     def lose(self, now_s: float) -> None:
-        """Forget what was to be said: it is past when there is a connection again."""
+        """Drop what was to be sent: it is out of date when there is a connection again."""
         self._is_open, self._told = False, ""
         self._events.clear()
         self._out.clear()
 
     def end(self, now_s: float) -> Iterator[Frame]:
-        """Give what is said last."""
+        """Yield the last frames."""
         for topic in self._topics:
             yield unsubscribe(topic)
             yield unadvertise(topic)
 
     def problem(self, now_s: float) -> str:
-        """Say what does not arrive; nothing where all does."""
+        """Return what does not arrive; empty where all does."""
         for topic in self._topics:
             if now_s - self._out.get(topic.name, math.inf) > LATE_S:
                 cure = "; build the package garry_ros there" if topic is DATA else ""
@@ -153,12 +153,12 @@ class OriginalTopics:
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self._url, self._monotonic = url, monotonic
-        self._talk, self._lock = OriginalTalk(names), threading.Lock()
+        self._client, self._lock = OriginalTopicClient(names), threading.Lock()
         self._bridge: Bridge | None = None
 
     def __enter__(self) -> Self:
-        """Begin to connect."""
-        self._bridge = Bridge(self._url, self._talk, self._lock, self._monotonic)
+        """Start to connect."""
+        self._bridge = Bridge(self._url, self._client, self._lock, self._monotonic)
         return self
 
     def __exit__(
@@ -173,22 +173,22 @@ class OriginalTopics:
 
     @property
     def problem(self) -> str:
-        """Say why nothing arrives; empty where all does."""
+        """Return why nothing arrives; empty where all does."""
         if self._bridge is None:
             return ""
         with self._lock:
-            return self._bridge.problem or self._talk.problem(self._monotonic())
+            return self._bridge.problem or self._client.problem(self._monotonic())
 
     def follow(self, message: Mapping[str, Any]) -> None:
         """Publish what a message of the server tells."""
         with self._lock:
-            self._talk.follow(message, self._monotonic())
+            self._client.follow(message, self._monotonic())
         self._wake()
 
     def decide(self, above: bool) -> None:
         """Publish what a window came to."""
         with self._lock:
-            self._talk.decide(above, self._monotonic())
+            self._client.decide(above, self._monotonic())
         self._wake()
 
     def _wake(self) -> None:

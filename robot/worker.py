@@ -1,4 +1,4 @@
-"""The robot's side of the link: hears the server, keeps the base driven, sends reports."""
+"""The live robot: receives the server's messages, drives the base, sends reports."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from robot.bases import MobileBase
-from robot.link import NOT_PROTOCOL, Link, LinkRefused, Message
-from robot.motion import DEFAULT_LIMITS, TICK_S, Limits
+from robot.behavior.control_loop import control_loop
+from robot.behavior.performer import NO_LINK, Performer
+from robot.link import Link, LinkRefused, Message
+from robot.motion.limits import DEFAULT_LIMITS, Limits
 from robot.original_topics import OriginalTopics
-from robot.performer import NO_LINK, Performer
+from robot.wire.close_codes import CloseCode
 
 
 class Worker:
-    """Lets a base perform for the sessions of its station.
+    """Runs a base for the sessions of its station.
 
     Parameters
     ----------
@@ -28,7 +30,7 @@ class Worker:
     originals
         What publishes on the original's topics; open.
     notice
-        Called with what somebody who looks on should know.
+        Called with what people who watch should know.
     monotonic, sleep
         Our clock [s], and how to wait by it.
     """
@@ -74,7 +76,7 @@ class Worker:
         return {"type": "hello", "version": 1, "base": self._base.name}
 
     def _lose(self, reason: str, pause_s: float) -> None:
-        self.performer.lose(NO_LINK)
+        self.performer.disconnect(NO_LINK)
         self._notice(f"{reason}; standing still, dialing in again in {pause_s:.1f} s.")
 
     async def _listen(self) -> None:
@@ -86,16 +88,16 @@ class Worker:
             except LinkRefused as refusal:
                 # What a server that has welcomed us does not understand, or breaks, does not end
                 # the work. Where it hung up over that, the link is lost like any other.
-                if refusal.code != NOT_PROTOCOL or not self.performer.is_linked:
+                if refusal.code != CloseCode.NOT_PROTOCOL or not self.performer.is_linked:
                     raise
-                self.performer.bad(str(refusal))
+                self.performer.count_bad_message(str(refusal))
                 if not self._link.is_open:
                     await self._link.pause(str(refusal))
 
     def _hear(self, message: Message) -> None:
         was_linked, bad = self.performer.is_linked, self.performer.bad_messages
         decided = self.performer.decision
-        self.performer.hear(message, self._monotonic())
+        self.performer.handle(message, self._monotonic())
         if self._originals is not None:
             self._originals.follow(message)
             decision = self.performer.decision
@@ -104,27 +106,27 @@ class Worker:
         if self.performer.is_linked and not was_linked:
             self._notice(f"Joined session {message.get('session')}.")
         if self.performer.bad_messages > bad:
-            self._notice(f"A message was not understood: {self.performer.last_bad}")
+            self._notice(f"A message was not understood: {self.performer.last_bad_message}")
         self._reported.set()
 
     async def _drive(self) -> None:
-        problem = trouble = ""
-        while True:
-            if problem != self._base.problem:
-                problem = self._base.problem
-                self._notice(problem or "The base answers.")
-            if self._originals is not None and trouble != self._originals.problem:
-                trouble = self._originals.problem
-                self._notice(trouble or "The original's topics are published.")
-            was_linked = self.performer.is_linked
-            self.performer.tick(self._monotonic())
+        problem = topics_problem = ""
+        was_linked = False
+        for pause_s in control_loop(self.performer, self._monotonic):
             if was_linked and not self.performer.is_linked:
                 # What is still on its way would come too late.
                 self._notice("The server is silent; standing still, dialing in again.")
                 self._link.hang_up()
             if self.performer.reports:
                 self._reported.set()
-            await self._sleep(TICK_S)
+            if problem != self._base.problem:
+                problem = self._base.problem
+                self._notice(problem or "The base answers.")
+            if self._originals is not None and topics_problem != self._originals.problem:
+                topics_problem = self._originals.problem
+                self._notice(topics_problem or "The original's topics are published.")
+            await self._sleep(pause_s)
+            was_linked = self.performer.is_linked
 
     async def _report(self) -> None:
         reports = self.performer.reports

@@ -113,7 +113,7 @@ def group_of(board: Leaderboard) -> list[int]:
 def _read(board: Leaderboard, rows: QuerySet[SessionMetric], period: Period) -> Iterator[Walked]:
     """Give the sessions that count, patient by patient, each in the order of time."""
     rows = rows.filter(session__state=State.FINISHED.value, session__started_at__isnull=False)
-    rows = rows.filter(session__left_out=False)
+    rows = rows.filter(session__excluded=False)
     if not board.include_simulated:
         rows = rows.filter(session__simulated=False)
     if board.types != Leaderboard.Types.ALL or {board.metric, board.tie_breaker} & TYPED:

@@ -84,7 +84,7 @@ def read_figures(user: User, session: TrainingSession) -> list[Figures]:
         session__patient=session.patient_id,
         session__state=State.FINISHED.value,
         session__simulated=session.simulated,
-        session__left_out=False,
+        session__excluded=False,
         slug__in=("hit_rate", "score", "best_streak"),
     )
     found: dict[tuple[int, str, bool], dict[str, float]] = defaultdict(dict)

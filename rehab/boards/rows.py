@@ -11,7 +11,7 @@ from rehab.boards.choosing import Chosen
 from rehab.boards.figures import SHARES, standing_on
 from rehab.boards.models import Leaderboard
 from rehab.people.aliases import say_alias
-from rehab.sessions.formatting import SPACE, say_day, say_duration, say_number
+from rehab.sessions.formatting import NBSP, format_day, format_duration, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.training.metrics import METRICS
 
@@ -36,7 +36,7 @@ class Row:
 def say_figure(slug: str, value: int) -> str:
     """Write a metric's figure as boards show it."""
     unit = "%" if slug in SHARES else METRICS[slug].unit
-    return say_number(value, 0) + (f"{SPACE}{unit}" if unit in UNITS else "")
+    return format_number(value, 0) + (f"{NBSP}{unit}" if unit in UNITS else "")
 
 
 def write(board: Leaderboard, chosen: Sequence[Chosen]) -> list[Row]:
@@ -47,7 +47,7 @@ def write(board: Leaderboard, chosen: Sequence[Chosen]) -> list[Row]:
             value=say_figure(board.metric, each.row.figure),
             bar=share(each.row.figure, each.row.stake or full),
             rank=each.row.rank if tells_place(board, each) else None,
-            stake="" if each.row.stake is None else say_number(each.row.stake, 0),
+            stake="" if each.row.stake is None else format_number(each.row.stake, 0),
             skips=each.skips,
             session_id=each.row.session_id,
         )
@@ -110,11 +110,11 @@ def date_rows(
     dated: list[Row] = []
     for row in rows:
         start = began[row.session_id or 0]
-        walked = say_duration(sessions[row.session_id or 0].active_s)
+        walked = format_duration(sessions[row.session_id or 0].active_s)
         dated.append(
             replace(
                 row,
-                title=say_day(start.date(), now.date()).replace(" ", SPACE),
+                title=format_day(start.date(), now.date()).replace(" ", NBSP),
                 detail=f"{start:%H:%M} · {walked}" if a_day[start.date()] > 1 else walked,
                 you=at_hand is not None and row.session_id == at_hand.pk,
             )

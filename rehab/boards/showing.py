@@ -16,7 +16,7 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.rows import Row, date_rows, name_rows, say_figure, share, write
 from rehab.boards.standings import Listed, Placed, Standings, Stored
 from rehab.people.models import Clinic, Patient
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 
 OWN = gettext_noop("These are your own sessions.")
@@ -179,7 +179,7 @@ class Viewer:
         rows = write(board, choose(board if board.is_own else self._alone(), listed, me))
         sessions = TrainingSession.everywhere.only("created_at", "started_at", "active_s")
         found = sessions.in_bulk([row.session_id for row in rows])
-        now = at_clinic(self.now, patient.clinic)
+        now = clinic_time(self.now, patient.clinic)
         dated = date_rows(rows, found, self.session, now)
         return self._shown(rows=dated, note=note, facts=facts)
 

@@ -20,7 +20,7 @@ from rehab.people.consent.models import Purpose, withdraw
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.web.language import speak_to
-from rehab.sessions.formatting import SPACE, at_clinic, say_number
+from rehab.sessions.formatting import NBSP, clinic_time, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN_STATES, State
 
@@ -101,7 +101,7 @@ def own_boards(request: HttpRequest, session: TrainingSession, now: datetime) ->
         ranked = rank(same, by, -(valence.miss_points or 0))
         places["same", pgettext("board", "This type"), by] = ranked
     places["all", pgettext("board", "All types"), By.RATE] = rank(figures, By.RATE)
-    here = at_clinic(now, session.clinic)
+    here = clinic_time(now, session.clinic)
     shown = {key: cut(entries, session.pk) for key, entries in places.items()}
     wanted = {entry.session_id for entries in shown.values() for entry in entries}
     facts = {
@@ -133,8 +133,8 @@ def write_rows(entries: list[Entry], by: By) -> list[Row]:
             Row(
                 session_id=entry.session_id,
                 rank=None if by is By.KEPT else entry.rank,
-                value=say_number(entry.value, 0) + (f"{SPACE}%" if by is By.RATE else ""),
-                stake="" if entry.stake is None else say_number(entry.stake, 0),
+                value=format_number(entry.value, 0) + (f"{NBSP}%" if by is By.RATE else ""),
+                stake="" if entry.stake is None else format_number(entry.stake, 0),
                 bar=share(entry.value, entry.stake or full if by is By.KEPT else full),
                 skips=entry.place != expected,
             )

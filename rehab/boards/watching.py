@@ -15,7 +15,7 @@ from django.utils import timezone
 from rehab.boards import building, entries
 from rehab.boards.models import Leaderboard
 from rehab.people.models import Clinic, Patient
-from rehab.sessions.corrections import Part, SessionCorrection
+from rehab.sessions.corrections import CorrectedField, SessionCorrection
 from rehab.sessions.log import SessionMetric, figures_stored
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
@@ -96,7 +96,7 @@ def on_session(instance: TrainingSession, created: bool = False, **_signal: Any)
 @unless_restored
 def on_correction(instance: SessionCorrection, **_signal: Any) -> None:
     """A session was given to whoever walked it: the one whom it was put down to has one less."""
-    if instance.part == Part.PATIENT:
+    if instance.field == CorrectedField.PATIENT:
         before = Patient.everywhere.filter(pseudonym=instance.old)
         patients = set(before.values_list("pk", flat=True))
         entries.refresh_patients(patients, now=timezone.now(), corrected=True)

@@ -55,7 +55,7 @@ SESSIONS = Table(
         Column("state", "", "ready, running, paused, finished or aborted (ended early)."),
         Column("feedback_type", "", "positive, negative, binary or explicit, as it began."),
         Column("changed_to", "", "Feedback types it was changed to, with commas between."),
-        Column("left_out", "", "true: a therapist left it out of figures (corrections.csv)."),
+        Column("excluded", "", "true: a therapist left it out of figures (corrections.csv)."),
         Column("measure", "", "What was trained; a2 is ankle push-off power."),
         Column("unit", "", "Unit of values and goals of this session."),
         Column("trained_side", "", "The leg whose steps count."),
@@ -122,7 +122,7 @@ CORRECTIONS = Table(
         Column("session", "", "Number of the session that was corrected after its end."),
         Column("patient", "", "Pseudonym of who walked it, as it holds now."),
         Column("at", "UTC", "When it was corrected."),
-        Column("part", "", "patient: who walked; counts: whether it counts; note: a note on it."),
+        Column("field", "", "patient: who walked; counts: whether it counts; note: a note on it."),
         Column("old", "", "What stood there before; patients by pseudonym."),
         Column("new", "", "What holds from then on."),
         Column("reason", "", "Why."),
@@ -182,7 +182,7 @@ class Selection:
                 session.state,
                 session.valence,
                 session.changed_to,
-                session.left_out,
+                session.excluded,
                 session.measure.slug,
                 session.measure.unit,
                 session.trained_side,
@@ -230,7 +230,7 @@ class Selection:
 
     def correction_rows(self) -> Iterator[tuple[Any, ...]]:
         """Give the rows of ``CORRECTIONS``."""
-        names = ("pk", "at", "part", "old", "new", "reason", "by__username")
+        names = ("pk", "at", "field", "old", "new", "reason", "by__username")
         corrections = SessionCorrection.objects.visible_to(self.user).order_by("pk")
         for session in self.read_sessions():
             head = (session.pk, session.patient.pseudonym)

@@ -12,7 +12,7 @@ from django.views.decorators.http import require_GET, require_safe
 
 from rehab.exports.archive import ZipResponse
 from rehab.exports.patient_data import patient_files, session_files
-from rehab.patients.pages.records import find_patient
+from rehab.patients.pages.records import get_patient
 from rehab.people.access import for_roles, person
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
@@ -27,7 +27,7 @@ from rehab.sessions.models import TrainingSession
 def give_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Give all that is kept of one patient as a file."""
     user, now = person(request), timezone.now()
-    patient = find_patient(user, patient_id)
+    patient = get_patient(user, patient_id)
     note_export(request, now, patient)
     name = f"garry-{patient.pseudonym}-{now:%Y-%m-%d}.zip"
     return _send(patient_files(user, patient, now), name)

@@ -16,9 +16,10 @@ from rehab.gestures.models import Gesture, GestureStep
 from rehab.gestures.picture import draw
 from rehab.people.web.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
 from rehab.people.web.refusals import in_words
-from robot.composed import MOVES_MAX, to_data
-from robot.gestures import TETHER_M, BadGesture
-from robot.trial import Trial, admit_gesture, try_gesture
+from robot.motion.dry_run import DryRun, dry_run, validate_gesture
+from robot.motion.gesture import TETHER_M
+from robot.motion.gesture_errors import BadGesture
+from robot.motion.gesture_spec import MOVES_MAX, to_data
 
 WINDOW_S = 5.0  # what takes longer is still running when the next decision comes
 
@@ -40,7 +41,7 @@ class StepFormSet(RowFormSet):
             kept.append(form.instance)
         kept.sort(key=lambda step: step.position)
         try:
-            admit_gesture(to_data("composed", [step.to_move() for step in kept]))
+            validate_gesture(to_data("composed", [step.to_move() for step in kept]))
         except BadGesture as problem:
             raise ValidationError(in_words(problem)) from problem
 
@@ -70,7 +71,7 @@ class StepRows(ScopedOptions, admin.TabularInline):
         return 0 if obj else 4
 
 
-def tell(trial: Trial) -> str:
+def tell(trial: DryRun) -> str:
     """Say how long a gesture takes and how far it goes."""
     words = gettext(
         "Takes %(took).1f s, goes up to %(far).2f m from home (tether %(tether).2f m), "
@@ -95,7 +96,7 @@ class GestureAdmin(ScopedAdmin):
     def simulated(self, gesture: Gesture) -> str:
         """Say how long it takes and how far it goes, or what is wrong with it."""
         try:
-            return tell(try_gesture(admit_gesture(gesture.to_data())))
+            return tell(dry_run(validate_gesture(gesture.to_data())))
         except BadGesture as problem:
             return in_words(problem)
 
@@ -105,7 +106,7 @@ class GestureAdmin(ScopedAdmin):
         if not gesture.pk:
             return gettext("Save it to see where it goes. Its last step has to end at home.")
         try:
-            trial = try_gesture(admit_gesture(gesture.to_data()))
+            trial = dry_run(validate_gesture(gesture.to_data()))
         except BadGesture as problem:
             return in_words(problem)
         words = tell(trial)

@@ -8,7 +8,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.gestures.models import Gesture
 from rehab.people.models import User
-from robot.gestures import GESTURES, ORIGINALS
+from robot.motion.gestures import GESTURES, ORIGINALS
 
 
 def gesture_choices(by: User) -> list[tuple[Any, Any]]:

@@ -12,8 +12,8 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.models import Clinic
 from rehab.people.scope import ClinicRow, Scope, ScopedModel
 from rehab.people.web.refusals import in_words
-from robot.composed import Move, check_name, to_data
-from robot.gestures import BadGesture
+from robot.motion.gesture_errors import BadGesture
+from robot.motion.gesture_spec import Move, check_name, to_data
 
 
 class Gesture(ClinicRow):

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
 
-from robot.composed import Move, places
-from robot.gestures import TETHER_M
-from robot.motion import Pose
-from robot.trial import Trial
+from robot.motion.dry_run import DryRun
+from robot.motion.gesture import TETHER_M
+from robot.motion.gesture_spec import Move, step_poses
+from robot.motion.pose import Pose
 
 BASE_M = 0.175  # radius of a Kobuki
 SIGHT_M = 0.05  # length of the line that says where it looks
@@ -32,10 +32,10 @@ LOOK = (
 )
 
 
-def draw(moves: Sequence[Move], trial: Trial, words: str) -> SafeString:
+def draw(moves: Sequence[Move], dry_run: DryRun, words: str) -> SafeString:
     """Draw the way of a gesture, and where the base looks at the end of each step."""
     looks: dict[tuple[float, float, int], list[str]] = {}
-    for number, place in enumerate(places(moves), start=1):
+    for number, place in enumerate(step_poses(moves), start=1):
         degrees = round(math.degrees(place.heading_rad)) % 360
         at = (round(place.x_m, 3), round(place.y_m, 3), degrees)
         looks.setdefault(at, []).append(str(number))
@@ -45,7 +45,7 @@ def draw(moves: Sequence[Move], trial: Trial, words: str) -> SafeString:
         words=words,
         tether=TETHER_M,
         base=BASE_M,
-        way="M" + "L".join(_place(pose) for pose in trial.way[::2]),
+        way="M" + "L".join(_place(pose) for pose in dry_run.poses[::2]),
         looks=format_html_join("", LOOK, (_look(at, numbers) for at, numbers in looks.items())),
     )
 

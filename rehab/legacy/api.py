@@ -20,8 +20,8 @@ from rehab.people.web.api_base import (
     caller,
     cut,
 )
-from rehab.sessions.api import ORDERS, sessions_of
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.api import ORDERS, visible_sessions
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.schemas import FeedbackType
 
 router = Router(tags=["The paper's calls"])
@@ -64,7 +64,7 @@ class PaperFilter(Paging):
 @router.get("/users/{code}", response=answers(PaperUser, 404))
 @for_roles(Role.LEAD, Role.PT)
 def show_user(request: HttpRequest, code: Path[Short]) -> Patient:
-    """Read a user by the ID that a PT would type."""
+    """Return a user by the ID that a PT would type."""
     return get_object_or_404(patients_of(caller(request)), code=code)
 
 
@@ -84,16 +84,16 @@ def list_user_sessions(
     """List a user's sessions by non-ascending score; those without a score come last."""
     user = caller(request)
     patient = get_object_or_404(Patient.objects.visible_to(user), code=code)
-    sessions = sessions_of(user).filter(patient=patient).select_related("clinic")
+    sessions = visible_sessions(user).filter(patient=patient).select_related("clinic")
     if wanted.feedback_type:
         sessions = sessions.filter(valence=wanted.feedback_type)
     page = cut(sessions.order_by(*ORDERS["best"]), wanted)
-    return page | {"items": [in_paper_words(session) for session in page["items"]]}
+    return page | {"items": [to_paper_session(session) for session in page["items"]]}
 
 
-def in_paper_words(session: Any) -> dict[str, Any]:
-    """Tell a session by the paper's attributes, its date by the clinic's clock."""
-    start = at_clinic(session.started_at or session.created_at, session.clinic)
+def to_paper_session(session: Any) -> dict[str, Any]:
+    """Return a session with the paper's attributes, in the clinic's time zone."""
+    start = clinic_time(session.began_at, session.clinic)
     return {
         "session_id": session.pk,
         "participant_id": session.patient.code,

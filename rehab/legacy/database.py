@@ -1,4 +1,4 @@
-"""The original GARRY's database (`data.db`): what it says, checked whole and never written to.
+"""Reader of the original GARRY's database (`data.db`), which is checked and never written to.
 
 Its columns are typed INTEGER but hold text and decimals as the app sent them
 (docs/reference/original.md#database): numbers as text, a duration as 0:01:22.5, the start as a date
@@ -33,21 +33,21 @@ SESSIONS = (
     "threshold",
 )
 YEARS = range(1970, 2100)
-LONGEST_S = 24 * 3600.0
-HIGHEST_SCORE = 1e9
+MAX_DURATION_S = 24 * 3600.0
+MAX_SCORE = 1e9
 
 
-class Damaged(ValueError):
-    """A file that is no whole database of the original GARRY; the message says why."""
+class InvalidDatabase(ValueError):
+    """A file that is no complete database of the original GARRY; the message says why."""
 
 
-class Unreadable(ValueError):
-    """A row that cannot be understood; the message says why."""
+class InvalidRow(ValueError):
+    """A row that cannot be parsed; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)
-class OriginalSession:
-    """A session of the original. ``row`` has it word for word; ``start`` is by the wall clock."""
+class LegacySession:
+    """A session of the original. ``row`` is its stored row; ``start`` is in local time."""
 
     id: int
     participant: int
@@ -60,65 +60,69 @@ class OriginalSession:
 
 
 @dataclass(slots=True)
-class Original:
-    """All that a file says. ``faults`` tells of sessions that cannot be understood, by their ids,
-    and ``nameless`` of participants who have none that is a number.
+class LegacyDatabase:
+    """The contents of a file.
 
-    ``named`` counts the participants that have a name. None is read any further.
+    ``session_errors`` and ``participant_errors`` say why rows cannot be parsed, by their ids or
+    places. ``name_count`` is the number of participants with a name; no name is kept.
     """
 
     participants: list[int]
-    named: int
-    sessions: list[OriginalSession] = field(default_factory=list)
-    faults: dict[int | str, str] = field(default_factory=dict)
-    nameless: dict[int | str, str] = field(default_factory=dict)
+    name_count: int
+    sessions: list[LegacySession] = field(default_factory=list)
+    session_errors: dict[int | str, str] = field(default_factory=dict)
+    participant_errors: dict[int | str, str] = field(default_factory=dict)
 
 
-def read_original(file: Path) -> Original:
-    """Read a database of the original GARRY. Raises Damaged."""
+def read_database(file: Path) -> LegacyDatabase:
+    """Return the contents of a database of the original GARRY. Raises InvalidDatabase."""
     if not file.is_file():
-        raise Damaged(f"There is no file {file}.")
+        raise InvalidDatabase(f"There is no file {file}.")
     try:
         with closing(sqlite3.connect(f"file:{quote(str(file))}?mode=ro", uri=True)) as database:
             database.text_factory = lambda text: text.decode(errors="replace")
             health = database.execute("PRAGMA quick_check(1)").fetchone()
             if health != ("ok",):
-                raise Damaged(f"{file.name} is damaged: {health and health[0]}. Find a whole copy.")
-            people = _read(database, "Participants", PARTICIPANTS)
-            rows = _read(database, "Sessions", SESSIONS)
+                raise InvalidDatabase(
+                    f"{file.name} is damaged: {health and health[0]}. Find a whole copy."
+                )
+            people = _read_table(database, "Participants", PARTICIPANTS)
+            rows = _read_table(database, "Sessions", SESSIONS)
     except sqlite3.Error as problem:
-        raise Damaged(
+        raise InvalidDatabase(
             f"{file.name} cannot be read as a SQLite database: {problem}. Find a whole copy."
         ) from problem
-    original = Original([], named=sum(bool(row["name"]) for row in people))
+    legacy = LegacyDatabase([], name_count=sum(bool(row["name"]) for row in people))
     for place, row in enumerate(people, 1):
         try:
-            original.participants.append(_whole(row, "participant_id"))
-        except Unreadable as problem:
-            words = f"{problem}. Give it a number of its own, in both tables"
-            original.nameless[f"in row {place}"] = words
-    known = set(original.participants)
+            legacy.participants.append(_parse_integer(row, "participant_id"))
+        except InvalidRow as problem:
+            message = f"{problem}. Give it a number of its own, in both tables"
+            legacy.participant_errors[f"in row {place}"] = message
+    known = set(legacy.participants)
     for place, row in enumerate(rows, 1):
         try:
-            session = read_session(row)
+            session = parse_session(row)
             if session.participant not in known:
-                raise Unreadable(f"participant {session.participant} is not in the file")
-            original.sessions.append(session)
-        except Unreadable as problem:
+                raise InvalidRow(f"participant {session.participant} is not in the file")
+            legacy.sessions.append(session)
+        except InvalidRow as problem:
             key = row["session_id"]
-            original.faults[key if isinstance(key, int) else f"in row {place}"] = str(problem)
-    return original
+            legacy.session_errors[key if isinstance(key, int) else f"in row {place}"] = str(problem)
+    return legacy
 
 
-def _read(
+def _read_table(
     database: sqlite3.Connection, table: str, columns: tuple[str, ...]
 ) -> list[dict[str, Any]]:
-    """Give a table's rows by their keys. Raises Damaged where table or column is missing."""
-    there = [row[1].lower() for row in database.execute(f"PRAGMA table_info({table})")]
-    if not there:
-        raise Damaged(f"There is no table {table}: this is no data.db of the original GARRY.")
-    if missing := [name for name in columns if name not in there]:
-        raise Damaged(
+    """Return a table's rows as dicts. Raises InvalidDatabase for a missing table or column."""
+    existing = [row[1].lower() for row in database.execute(f"PRAGMA table_info({table})")]
+    if not existing:
+        raise InvalidDatabase(
+            f"There is no table {table}: this is no data.db of the original GARRY."
+        )
+    if missing := [name for name in columns if name not in existing]:
+        raise InvalidDatabase(
             f"The table {table} lacks {', '.join(missing)}: this is no whole data.db of the "
             "original GARRY."
         )
@@ -126,53 +130,56 @@ def _read(
     return [dict(zip(columns, row, strict=True)) for row in database.execute(query)]
 
 
-def read_session(row: dict[str, Any]) -> OriginalSession:
-    """Understand a row. Raises Unreadable."""
+def parse_session(row: dict[str, Any]) -> LegacySession:
+    """Return the session of a row. Raises InvalidRow."""
     if any(isinstance(value, bytes) for value in row.values()):
-        raise Unreadable("it holds bytes where text or numbers belong")
+        raise InvalidRow("it holds bytes where text or numbers belong")
     valence = str(row["feedback_type"]).strip().lower()
     if valence not in VALENCES:
-        raise Unreadable(f"feedback type {row['feedback_type']!r} is none of {', '.join(VALENCES)}")
+        raise InvalidRow(f"feedback type {row['feedback_type']!r} is none of {', '.join(VALENCES)}")
     score = row["score"]
-    return OriginalSession(
-        id=_whole(row, "session_id"),
-        participant=_whole(row, "participant_id"),
-        start=_start(row),
-        duration_s=_duration(row["duration"]),
-        score=None if score is None else _number(row, "score", HIGHEST_SCORE),
+    return LegacySession(
+        id=_parse_integer(row, "session_id"),
+        participant=_parse_integer(row, "participant_id"),
+        start=_parse_start(row),
+        duration_s=_parse_duration(row["duration"]),
+        score=None if score is None else _parse_number(row, "score", MAX_SCORE),
         valence=valence,
-        goal=_number(row, "threshold", HIGHEST_SCORE),
+        goal=_parse_number(row, "threshold", MAX_SCORE),
         row=row,
     )
 
 
-def _number(row: dict[str, Any], name: str, most: float) -> float:
+def _parse_number(row: dict[str, Any], name: str, limit: float) -> float:
     try:
         number = float(row[name])
     except (TypeError, ValueError):
         number = math.nan
-    if not abs(number) <= most:
-        raise Unreadable(f"{name} {row[name]!r} is no number")
+    if not abs(number) <= limit:
+        raise InvalidRow(f"{name} {row[name]!r} is no number")
     return number
 
 
-def _whole(row: dict[str, Any], name: str) -> int:
-    number = _number(row, name, 2.0**53)
+def _parse_integer(row: dict[str, Any], name: str) -> int:
+    number = _parse_number(row, name, 2.0**53)
     if number != int(number):
-        raise Unreadable(f"{name} {row[name]!r} is no whole number")
+        raise InvalidRow(f"{name} {row[name]!r} is no whole number")
     return int(number)
 
 
-def _start(row: dict[str, Any]) -> datetime:
-    """Give day and time of the start. The day that was stored is that of the last step: where the
-    start's own date is the day before, midnight lay between them."""
-    year, month, day = (_whole(row, name) for name in ("year", "month", "day"))
+def _parse_start(row: dict[str, Any]) -> datetime:
+    """Return day and time of the start.
+
+    The stored day is that of the last step: where the start's own date is the day before, the
+    session went past midnight.
+    """
+    year, month, day = (_parse_integer(row, name) for name in ("year", "month", "day"))
     try:
         stored = date(year, month, day)
     except (ValueError, OverflowError):
         stored = date.min
     if stored.year not in YEARS:
-        raise Unreadable(f"year {year}, month {month}, day {day} is no date")
+        raise InvalidRow(f"year {year}, month {month}, day {day} is no date")
     text = str(row["start_time"]).strip()
     try:
         clock = time.fromisoformat(text).replace(tzinfo=None)
@@ -180,21 +187,21 @@ def _start(row: dict[str, Any]) -> datetime:
         try:
             start = datetime.fromisoformat(text).replace(tzinfo=None)
         except ValueError:
-            raise Unreadable(f"start_time {row['start_time']!r} is no time of day") from None
+            raise InvalidRow(f"start_time {row['start_time']!r} is no time of day") from None
         if stored - start.date() == timedelta(days=1):
             return start
         clock = start.time()
     return datetime.combine(stored, clock)
 
 
-def _duration(given: Any) -> float:
-    """Give seconds, from 0:01:22.5 or a number of them."""
+def _parse_duration(given: Any) -> float:
+    """Return a duration in seconds, from 0:01:22.5 or a number of seconds."""
     parts = re.fullmatch(r"(\d{1,3}):([0-5]?\d):([0-5]?\d(?:\.\d+)?)", str(given).strip())
     if parts is not None:
         hours, minutes, seconds = parts.groups()
         total = int(hours) * 3600 + int(minutes) * 60 + float(seconds)
     else:
-        total = _number({"duration": given}, "duration", LONGEST_S)
-    if not 0 <= total <= LONGEST_S:
-        raise Unreadable(f"duration {given!r} is no duration")
+        total = _parse_number({"duration": given}, "duration", MAX_DURATION_S)
+    if not 0 <= total <= MAX_DURATION_S:
+        raise InvalidRow(f"duration {given!r} is no duration")
     return total

@@ -6,12 +6,12 @@ from collections import Counter
 from datetime import timedelta
 from zoneinfo import ZoneInfo
 
-from rehab.legacy.database import Original, OriginalSession
+from rehab.legacy.database import LegacyDatabase, LegacySession
 from rehab.people.consent.tombstones import is_kept_away
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Measure
+from rehab.sessions.setup.protocols import Measure
 from rehab.training.changes import State
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
@@ -20,55 +20,57 @@ from rehab.training.plans import SessionPlan
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES, find_valence
 
-SOURCE = "Original GARRY"
+SOURCE = "LegacyDatabase GARRY"
 
 
-class TakeOver:
-    """Takes a file's rows over into a clinic, each once; keeps count of what became of them."""
+class Importer:
+    """Imports a file's rows into a clinic, each once, and counts the outcomes."""
 
-    def __init__(self, clinic: Clinic, original: Original) -> None:
+    def __init__(self, clinic: Clinic, database: LegacyDatabase) -> None:
         self.clinic = clinic
-        self.original = original
-        self.taken: Counter[str] = Counter()
-        self.here: Counter[str] = Counter()
+        self.database = database
+        self.imported: Counter[str] = Counter()
+        self.existing: Counter[str] = Counter()
         self.erased: Counter[str] = Counter()
-        self.faults = {
-            "participants": dict(original.nameless),
-            "sessions": dict(original.faults),
+        self.errors = {
+            "participants": dict(database.participant_errors),
+            "sessions": dict(database.session_errors),
         }
         self._measure = Measure.everywhere.get(clinic=None, slug=A2.slug)
         self._zone = ZoneInfo(clinic.time_zone)
 
     def run(self) -> None:
-        """Take over all that can be; whoever was erased here stays away."""
-        away = {pk for pk in self.original.participants if is_kept_away(self.clinic.pk, pk)}
-        self.erased["participants"] = len(away)
+        """Import everything that can be, except for participants who were erased here."""
+        erased = {pk for pk in self.database.participants if is_kept_away(self.clinic.pk, pk)}
+        self.erased["participants"] = len(erased)
         patients = {
-            pk: self._take_participant(pk) for pk in self.original.participants if pk not in away
+            pk: self._import_participant(pk)
+            for pk in self.database.participants
+            if pk not in erased
         }
-        for found in self.original.sessions:
-            if found.participant in away:
+        for found in self.database.sessions:
+            if found.participant in erased:
                 self.erased["sessions"] += 1
                 continue
             patient = patients[found.participant]
             if patient is None:
-                words = f"participant {found.participant} could not be taken over"
-                self.faults["sessions"][found.id] = words
+                message = f"participant {found.participant} could not be taken over"
+                self.errors["sessions"][found.id] = message
             else:
-                self._take_session(found, patient)
+                self._import_session(found, patient)
 
-    def _take_participant(self, pk: int) -> Patient | None:
+    def _import_participant(self, pk: int) -> Patient | None:
         own = Patient.everywhere.filter(clinic=self.clinic)
         patient = own.filter(original_id=pk).first()
         if patient is not None:
-            self.here["participants"] += 1
+            self.existing["participants"] += 1
             return patient
         if own.filter(code=f"{pk}").exists():
-            self.faults["participants"][pk] = (
+            self.errors["participants"][pk] = (
                 f"another patient of {self.clinic} has the code {pk}. Give that one another code"
             )
             return None
-        self.taken["participants"] += 1
+        self.imported["participants"] += 1
         return Patient.everywhere.create(
             clinic=self.clinic,
             code=f"{pk}",
@@ -77,13 +79,13 @@ class TakeOver:
             original_id=pk,
         )
 
-    def _take_session(self, found: OriginalSession, patient: Patient) -> None:
+    def _import_session(self, found: LegacySession, patient: Patient) -> None:
         before = TrainingSession.everywhere.filter(clinic=self.clinic, original_id=found.id).first()
-        if before is not None and before.original == found.row:
-            self.here["sessions"] += 1
+        if before is not None and before.legacy_row == found.row:
+            self.existing["sessions"] += 1
             return
         if before is not None:
-            self.faults["sessions"][found.id] = (
+            self.errors["sessions"][found.id] = (
                 "a session with this id but other contents was imported before. If this is "
                 "another file, import it into a clinic of its own"
             )
@@ -91,17 +93,17 @@ class TakeOver:
         try:
             self._store(found, patient)
         except InvalidSetting as problem:
-            self.faults["sessions"][found.id] = str(problem).removesuffix(".")
+            self.errors["sessions"][found.id] = str(problem).removesuffix(".")
         else:
-            self.taken["sessions"] += 1
+            self.imported["sessions"] += 1
 
-    def _store(self, found: OriginalSession, patient: Patient) -> None:
-        """Store a finished session without steps. Raises InvalidSetting for a goal that is none."""
+    def _store(self, found: LegacySession, patient: Patient) -> None:
+        """Store a finished session without steps. Raises InvalidSetting for an invalid goal."""
         plan = SessionPlan(
             measure=self._measure.to_rule(),
             valence=find_valence(found.valence),
             phases=(make_phase("training"),),
-            trained_side=Side.LEFT,  # not known, and without a step it scores nothing
+            trained_side=Side.LEFT,  # unknown, and without steps it has no effect
             goal=GoalRule(value=found.goal),
         )
         start = found.start.replace(tzinfo=self._zone)
@@ -120,51 +122,54 @@ class TakeOver:
             ended_at=start + timedelta(seconds=found.duration_s),
             active_s=found.duration_s,
             original_id=found.id,
-            original=found.row,
+            legacy_row=found.row,
         )
         if plan.valence.has_points and found.score is not None:
             SessionMetric.everywhere.create(session=session, slug="score", value=found.score)
 
     @property
-    def is_whole(self) -> bool:
-        """Whether nothing had to be left behind."""
-        return not any(self.faults.values())
+    def is_complete(self) -> bool:
+        """Whether every row was imported, now or before."""
+        return not any(self.errors.values())
 
     def report(self) -> list[str]:
-        """Tell what was read, what became of it, and why some of it could not be taken."""
+        """Return lines that say what was read, what became of it, and what failed and why."""
         read = {
-            "participants": len(self.original.participants) + len(self.original.nameless),
-            "sessions": len(self.original.sessions) + len(self.original.faults),
+            "participants": len(self.database.participants) + len(self.database.participant_errors),
+            "sessions": len(self.database.sessions) + len(self.database.session_errors),
         }
         lines = [f"{'':14}{'read':>6}{'taken over':>12}{'here before':>13}{'could not':>11}"]
         lines += [
-            f"{noun:14}{read[noun]:6}{self.taken[noun]:12}{self.here[noun]:13}{len(faults):11}"
-            for noun, faults in self.faults.items()
+            f"{noun:14}{read[noun]:6}{self.imported[noun]:12}{self.existing[noun]:13}{len(errors):11}"
+            for noun, errors in self.errors.items()
         ]
         lines += [
-            f"  {noun.removesuffix('s')} {pk}: {words}."
-            for noun, faults in self.faults.items()
-            for pk, words in sorted(faults.items(), key=lambda one: (isinstance(one[0], str), one))
+            f"  {noun.removesuffix('s')} {pk}: {message}."
+            for noun, errors in self.errors.items()
+            for pk, message in sorted(
+                errors.items(), key=lambda one: (isinstance(one[0], str), one)
+            )
         ]
-        return lines + self._left_out()
+        return lines + self._omissions()
 
-    def _left_out(self) -> list[str]:
-        unpaid = sum(not VALENCES[one.valence].has_points for one in self.original.sessions)
+    def _omissions(self) -> list[str]:
+        without_points = sum(not VALENCES[one.valence].has_points for one in self.database.sessions)
         lines = [
             "Left out: strides and the trained leg, which the original did not keep.",
         ]
-        if self.original.named:
+        if self.database.name_count:
             lines.append(
-                f"Left out: {self.original.named} name(s). GARRY keeps no real names: patients are "
-                "called P1, P2, … until a therapist gives them a nickname."
+                f"Left out: {self.database.name_count} name(s). GARRY keeps no real names: "
+                "patients are called P1, P2, … until a therapist gives them a nickname."
             )
         if self.erased["participants"]:
             lines.append(
                 f"Left out: {self.erased['participants']} participant(s) who were erased here, and "
                 f"their {self.erased['sessions']} session(s)."
             )
-        if unpaid:
+        if without_points:
             lines.append(
-                f"Left out: the score of {unpaid} explicit session(s). Explicit feedback has none."
+                f"Left out: the score of {without_points} explicit session(s). Explicit feedback "
+                "has none."
             )
         return lines

@@ -1,7 +1,7 @@
-"""How a patient's time with GARRY ends: the program for now, what leads to the person for good.
+"""Ending and reopening a patient's program.
 
-An erased patient stays as figures under a new false name: sessions, steps and what boards never
-show. Nobody can undo it; backups made before still hold the person (docs/privacy.md).
+An erased patient (`erasure`) stays as sessions and steps under a new pseudonym. That cannot be
+undone; backups made before still contain the person (docs/privacy.md).
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN_STATES
 
 
-class StillOpen(ValueError):
-    """A patient whose time cannot end while a session is open."""
+class SessionStillOpen(ValueError):
+    """The patient has an open session, which must be ended first."""
 
 
 def end_program(patient: Patient, because: Ending, now: datetime) -> None:
-    """Take a patient off the lists; nothing can be started until it is reopened.
+    """Take a patient off the lists; no session can be set up until it is reopened.
 
-    Raises StillOpen.
+    Raises SessionStillOpen.
     """
     with transaction.atomic():
-        hold_closed(patient)
+        lock_without_open_session(patient)
         if patient.erased_at is None:
             patient.ended_at, patient.ended_because = now, because
             patient.save(update_fields=["ended_at", "ended_because"])
 
 
 def reopen_program(patient: Patient) -> None:
-    """Put a patient back on the lists. An erased one stays away: nobody is there to come back."""
+    """Put a patient back on the lists, except for an erased one."""
     with transaction.atomic():
         patient.hold()
         if patient.erased_at is None:
@@ -41,12 +41,12 @@ def reopen_program(patient: Patient) -> None:
             patient.save(update_fields=["ended_at", "ended_because"])
 
 
-def hold_closed(patient: Patient) -> None:
-    """Hold the patient's row. Raises StillOpen where a session could still go on."""
+def lock_without_open_session(patient: Patient) -> None:
+    """Lock the patient's row. Raises SessionStillOpen where a session could still go on."""
     patient.hold()
     sessions = TrainingSession.everywhere.filter(
         patient=patient, state__in=[state.value for state in OPEN_STATES]
     )
     if sessions.exists():
-        said = _("%(patient)s still has an open session. End it first.")
-        raise StillOpen(said % {"patient": patient.nickname})
+        message = _("%(patient)s still has an open session. End it first.")
+        raise SessionStillOpen(message % {"patient": patient.nickname})

@@ -1,4 +1,4 @@
-"""Erasing all that leads to a person, and what a clinic no longer keeps."""
+"""Erasure of what identifies a person, and retention periods."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from django.db.models import Exists, F, Max, OuterRef, QuerySet
 from django.db.models.functions import Coalesce, Greatest
 from django.utils.translation import gettext as _
 
-from rehab.patients.closure import hold_closed
+from rehab.patients.closure import lock_without_open_session
 from rehab.patients.visits import Visit
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
@@ -20,18 +20,18 @@ from rehab.people.audit.history import HistoryEntry, forget_values
 from rehab.people.consent.models import Purpose, withdraw
 from rehab.people.consent.tombstones import keep_away
 from rehab.people.models import Clinic, Erasing, Patient, User, new_pseudonym
-from rehab.sessions.corrections import forget_patient as forget_corrections
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.corrections import anonymize_corrections
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import Remark, SessionEvent
 from rehab.sessions.models import TrainingSession
 
 
 def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) -> None:
-    """Erase all that leads to a person, for good and once. Raises StillOpen."""
+    """Erase everything that identifies a person, permanently. Raises SessionStillOpen."""
     with transaction.atomic():
-        hold_closed(patient)
+        lock_without_open_session(patient)
         if patient.erased_at is not None:
-            return  # somebody was quicker
+            return  # somebody else has erased it meanwhile
         withdraw(patient, Purpose.BOARDS, by, now)
         known_as = patient.pseudonym
         if patient.original_id is not None:
@@ -43,13 +43,14 @@ def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) ->
         patient.erased_at, patient.erased_because = now, because
         patient.save()
         sessions = TrainingSession.everywhere.filter(patient=patient)
-        sessions.update(source="", runs=[], original=None)  # names of files, rows of the original
-        # It still says that the session was imported, but no longer from where.
+        # Sources may be files that are named after a person.
+        sessions.update(source="", source_args=[], legacy_row=None)
+        # The session is still marked as imported, but its original cannot be found.
         sessions.filter(original_id__isnull=False).update(original_id=-1 * F("pk"))
         SessionEvent.everywhere.filter(
             session__patient=patient, kind__in=[remark.value for remark in Remark]
         ).update(data={})
-        forget_corrections(patient, known_as)
+        anonymize_corrections(patient, known_as)
         Visit.everywhere.filter(patient=patient).delete()
         forget_values("Patient", patient.pk)
         LogEntry.objects.filter(
@@ -61,32 +62,32 @@ def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) ->
         )
 
 
-def overdue(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
-    """Give the patients whom a clinic has kept for as long as it wants to.
+def patients_past_retention(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
+    """Return the patients whose retention period has passed.
 
-    It counts from the last session, or from the day on which the patient was taken in: sessions
-    that were imported are older than that. Whoever is expected again stays.
+    It begins with the last session, but not before the patient was added, since imported sessions
+    are older. Patients with a planned visit are not among them.
     """
     patients = Patient.everywhere.filter(clinic=clinic, erased_at=None, simulated=False)
     if clinic.keep_months is None:
         return patients.none()
     last = Greatest(Coalesce(Max("sessions__created_at"), "created_at"), "created_at")
     before = months_before(now, clinic.keep_months)
-    today = at_clinic(now, clinic).date()
+    today = clinic_time(now, clinic).date()
     expected = Visit.everywhere.filter(patient=OuterRef("pk"), day__gte=today)
     kept = patients.annotate(last_here=last).filter(last_here__lt=before)
     return kept.exclude(Exists(expected)).order_by("pk")
 
 
-def let_logs_go(clinic: Clinic, now: datetime) -> int:
-    """Delete what is older than a clinic keeps its logs; give how many entries."""
+def delete_old_logs(clinic: Clinic, now: datetime) -> int:
+    """Delete entries that are older than a clinic keeps its logs; return how many."""
     before = months_before(now, clinic.keep_log_months)
     changes, _each = HistoryEntry.everywhere.filter(clinic=clinic, at__lt=before).delete()
     return changes + audit_log.forget_before(clinic.pk, before)
 
 
 def months_before(moment: datetime, months: int) -> datetime:
-    """Give the same day so many months earlier, or that month's last one where it has no such."""
+    """Return the same day some months earlier, or the last day of a shorter month."""
     year, month = divmod(moment.year * 12 + moment.month - 1 - months, 12)
     year, month = max(year, 1), month + 1
     return moment.replace(year=year, month=month, day=min(moment.day, monthrange(year, month)[1]))

@@ -1,4 +1,4 @@
-"""What is filled in about a patient: who it is, the screen, and the end of the program."""
+"""Forms about a patient: details, screen, end of the program, erasure."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rehab.people.models import Boards, Ending, Erasing, Patient, User
 
 
 class PatientForm(PatientRowForm):
-    """A patient of the PT's clinic, new or to be mended."""
+    """A patient of the PT's clinic, new or to be edited."""
 
     class Meta:
         model = Patient
@@ -41,16 +41,16 @@ class PatientForm(PatientRowForm):
             )
 
     def clean_code(self) -> str:
-        """Refuse a code that is taken, and say by whom."""
+        """Return the code. Refuses one that is taken, with the name of its patient."""
         code: str = self.cleaned_data["code"]
         others = Patient.objects.visible_to(self._by).filter(code=code).exclude(pk=self.instance.pk)
         if (other := others.first()) is not None:
-            said = _("Code %(code)s already exists: it is %(nickname)s's.")
-            raise ValidationError(said % {"code": code, "nickname": other.nickname})
+            message = _("Code %(code)s already exists: it is %(nickname)s's.")
+            raise ValidationError(message % {"code": code, "nickname": other.nickname})
         return code
 
     def save(self, commit: bool = True) -> Patient:
-        """Store the patient, and what a new one agrees to."""
+        """Store the patient, and a new one's consents."""
         with transaction.atomic():
             patient = super().save(commit)
             for purpose in map(Purpose, self.cleaned_data.get("agrees", [])):
@@ -79,7 +79,7 @@ class EndingForm(forms.Form):
 
 
 class ErasingForm(forms.Form):
-    """Why a patient is erased; the code, typed once more, says that it is meant."""
+    """Why a patient is erased; the code must be typed as confirmation."""
 
     because = forms.ChoiceField(
         label=_("Why?"),
@@ -98,9 +98,9 @@ class ErasingForm(forms.Form):
         self.patient = patient
 
     def clean_code(self) -> str:
-        """Refuse any other code."""
+        """Return the code. Refuses any other than the patient's."""
         code: str = self.cleaned_data["code"]
         if code != self.patient.code:
-            said = _("That is not %(patient)s's code. Nothing was erased.")
-            raise ValidationError(said % {"patient": self.patient.nickname})
+            message = _("That is not %(patient)s's code. Nothing was erased.")
+            raise ValidationError(message % {"patient": self.patient.nickname})
         return code

@@ -1,24 +1,24 @@
-"""Who is expected on which day, and how far today has come."""
+"""Visits: who is expected on which day, and how far each patient has come today."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from datetime import date, datetime, time, timedelta
+from datetime import date, datetime, time
 from enum import StrEnum
 from typing import ClassVar
 
 from django.db import models
-from django.db.models import Count, QuerySet
+from django.db.models import Count
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.scope import ClinicRow, Scope
-from rehab.sessions.formatting import at_clinic, midnight_of
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.today import IS_OPEN, todays_sessions
 from rehab.training.changes import OPEN_STATES, State
 
-SOON_DAYS = (0, 1, 2, 7)  # from today on: what one tap plans
+SOON_DAYS = (0, 1, 2, 7)  # days from today that one tap plans
 QUARTER_MIN = 15
 
 
@@ -49,7 +49,7 @@ class Visit(ClinicRow):
 
 
 class Progress(StrEnum):
-    """How far somebody has come today, in the order of the list."""
+    """How far a patient has come today, in the order of the list."""
 
     WALKING = "walking"
     PAUSED = "paused"
@@ -59,8 +59,8 @@ class Progress(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Today:
-    """Somebody who is expected today, or was here."""
+class PatientToday:
+    """A patient who is expected today, or was here."""
 
     patient: Patient
     at: time | None
@@ -68,7 +68,7 @@ class Today:
     walked_s: float = 0.0
 
 
-OPEN_NOW = {
+PROGRESS_OF_OPEN = {
     State.RUNNING: Progress.WALKING,
     State.PAUSED: Progress.PAUSED,
     State.READY: Progress.READY,
@@ -76,17 +76,17 @@ OPEN_NOW = {
 
 
 def plan_visit(patient: Patient, day: date, at: time | None) -> Visit:
-    """Expect a patient on a day; a visit of that day gets the new time."""
+    """Store that a patient is expected on a day; a visit of that day gets the new time."""
     visit, _new = Visit.everywhere.update_or_create(
         patient=patient, day=day, defaults={"clinic_id": patient.clinic_id, "at": at}
     )
     return visit
 
 
-def usual_time(user: User, patient: Patient, now: datetime) -> time | None:
-    """Give the time that the next visit may have too: today's, or when the last session began.
+def suggested_time(user: User, patient: Patient, now: datetime) -> time | None:
+    """Return the time to suggest for the next visit: today's, or when the last session began.
 
-    ``now`` is the clinic's clock. Sessions count by the quarter of an hour.
+    ``now`` is in the clinic's time zone. Times of sessions are rounded to a quarter of an hour.
     """
     visits = Visit.objects.visible_to(user).filter(patient=patient)
     planned = visits.filter(day__lte=now.date(), at__isnull=False).order_by("-day").first()
@@ -96,26 +96,29 @@ def usual_time(user: User, patient: Patient, now: datetime) -> time | None:
     began = sessions.order_by("-created_at").values_list("created_at", flat=True).first()
     if began is None:
         return planned.at if planned else None
-    began = at_clinic(began, patient.clinic)
+    began = clinic_time(began, patient.clinic)
     minutes = round((began.hour * 60 + began.minute) / QUARTER_MIN) * QUARTER_MIN
     return time(minutes // 60 % 24, minutes % 60)
 
 
-def read_today(user: User, now: datetime) -> list[Today]:
-    """List who is expected at somebody's clinic today or was here: who walks first, who is done
-    last, the others by time. ``now`` is the clinic's clock.
+def patients_today(user: User, now: datetime) -> list[PatientToday]:
+    """Return who is expected at somebody's clinic today or was here, in the order of `Progress`.
+
+    Within a state patients are ordered by time. ``now`` is in the clinic's time zone. Ended
+    sessions count if a person walked in them.
     """
     patients = Patient.objects.visible_to(user).filter(ended_at=None)
     patients = patients.annotate(count=Count("sessions", distinct=True))
     visits = Visit.objects.visible_to(user).filter(day=now.date())
     expected = dict(visits.values_list("patient_id", "at"))
-    sessions = TrainingSession.objects.visible_to(user).defer("plan")
-    here: dict[int, list[TrainingSession]] = {}
-    for session in _of_today(sessions, midnight_of(now)):
-        here.setdefault(session.patient_id, []).append(session)
+    walked = models.Q(active_s__gt=0, simulated=False)
+    sessions = todays_sessions(TrainingSession.objects.visible_to(user), now)
+    by_patient: dict[int, list[TrainingSession]] = {}
+    for session in sessions.filter(IS_OPEN | walked).order_by("created_at"):
+        by_patient.setdefault(session.patient_id, []).append(session)
     rows = [
-        _tell(patient, expected.get(patient.pk), here.get(patient.pk, ()), now)
-        for patient in patients.filter(pk__in={*expected, *here})
+        _to_row(patient, expected.get(patient.pk), by_patient.get(patient.pk, []), now)
+        for patient in patients.filter(pk__in={*expected, *by_patient})
     ]
     order = list(Progress)
     return sorted(
@@ -123,21 +126,18 @@ def read_today(user: User, now: datetime) -> list[Today]:
     )
 
 
-def _of_today(sessions: QuerySet[TrainingSession], midnight: datetime) -> Iterable[TrainingSession]:
-    """Give what is open, and what people have walked since midnight (and a day, at most)."""
-    open_now = models.Q(state__in=[state.value for state in OPEN_STATES])
-    begun = models.Q(created_at__gte=midnight, created_at__lt=midnight + timedelta(days=1))
-    walked = begun & models.Q(active_s__gt=0, simulated=False)
-    return sessions.filter(open_now | walked).order_by("created_at")
-
-
-def _tell(
-    patient: Patient, at: time | None, sessions: Iterable[TrainingSession], now: datetime
-) -> Today:
-    """Tell how far somebody has come; who was not expected came when the first session began."""
-    sessions = list(sessions)
+def _to_row(
+    patient: Patient, at: time | None, sessions: list[TrainingSession], now: datetime
+) -> PatientToday:
+    """Return a patient's row; without a planned time it has that of the first session."""
     if at is None and sessions:
         at = sessions[0].created_at.astimezone(now.tzinfo).time().replace(second=0, microsecond=0)
-    found = [OPEN_NOW[State(row.state)] for row in sessions if State(row.state) in OPEN_STATES]
-    done = Progress.DONE if sessions else Progress.EXPECTED
-    return Today(patient, at, found[-1] if found else done, sum(row.active_s for row in sessions))
+    states = [State(session.state) for session in sessions]
+    progress = [PROGRESS_OF_OPEN[state] for state in states if state in OPEN_STATES]
+    ended = Progress.DONE if sessions else Progress.EXPECTED
+    return PatientToday(
+        patient,
+        at,
+        progress[-1] if progress else ended,
+        sum(session.active_s for session in sessions),
+    )

@@ -15,18 +15,18 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.access import person
 from rehab.people.roles import Role
 from rehab.people.web.admin_base import ReadOnlyAdmin, ScopedAdmin
-from rehab.sessions.corrections import SessionCorrection, may_correct, tell_corrections
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.corrections import SessionCorrection, can_correct, describe_corrections
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.search import Finder
-from rehab.sessions.reports.trend import with_figures
+from rehab.sessions.reports.search import SessionSearchFilter
+from rehab.sessions.reports.trend import with_metrics
 from rehab.training.changes import OPEN_STATES, State
 
 
 @admin.register(TrainingSession)
 class TrainingSessionAdmin(ScopedAdmin):
-    """Sessions to find and to read. Researchers see pseudonyms. Corrections have their own form."""
+    """Sessions, read-only. Researchers see pseudonyms. Corrections have their own form."""
 
     list_display = (
         "date",
@@ -41,7 +41,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         "state",
         "counts",
     )
-    list_filter = (Finder, "valence", "state", "simulated", "left_out")
+    list_filter = (SessionSearchFilter, "valence", "state", "simulated", "excluded")
     search_fields = ("patient__nickname", "patient__code", "source")
     date_hierarchy = "created_at"
     list_select_related = ("patient", "measure", "station", "clinic")
@@ -68,42 +68,42 @@ class TrainingSessionAdmin(ScopedAdmin):
     readonly_fields = fields
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[TrainingSession]:
-        """Give the visible sessions with their score and hit rate."""
-        return with_figures(request.user, super().get_queryset(request)).defer("plan")
+        """Return the visible sessions with their score and hit rate."""
+        return with_metrics(request.user, super().get_queryset(request)).defer("plan")
 
     def get_object(self, request: HttpRequest, *args: Any, **kwargs: Any) -> Any:
-        """Give a session with its corrections as this person may read them."""
+        """Return a session with its corrections as this person may read them."""
         row = super().get_object(request, *args, **kwargs)
         if row is not None:
-            row.told = tell_corrections(row, person(request))
+            row.described_corrections = describe_corrections(row, person(request))
         return row
 
     def get_list_display(self, request: HttpRequest) -> Any:
-        """Give the columns."""
+        """Return the columns."""
         return self._for(request, self.list_display)
 
     def get_fields(self, request: HttpRequest, obj: Any = None) -> Any:
-        """Give the fields."""
+        """Return the fields."""
         return self._for(request, self.fields)
 
     def get_readonly_fields(self, request: HttpRequest, obj: Any = None) -> Any:
-        """Give the same fields: nothing here is edited."""
+        """Return the same fields: nothing here is edited."""
         return self._for(request, self.fields)
 
     def get_search_fields(self, request: HttpRequest) -> Any:
-        """Give what can be searched: for researchers nothing that leads to a person."""
+        """Return what can be searched: for researchers nothing that identifies a person."""
         if person(request).role == Role.RESEARCHER:
             return ("patient__pseudonym",)
         return self.search_fields
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
-        """Lead to the session's own pages, and to the form that corrects it."""
+        """Return links to the session's own pages, and to the form that corrects it."""
         links = [(reverse("session", args=[row.pk]), _("Every stride"))]
         if person(request).role == Role.RESEARCHER:
             return links
         if State(row.state) in OPEN_STATES:
             links.append((reverse("monitor", args=[row.pk]), _("Monitor")))
-        if may_correct(row):
+        if can_correct(row):
             links.append((reverse("correct", args=[row.pk]), _("Correct")))
         return links
 
@@ -111,60 +111,60 @@ class TrainingSessionAdmin(ScopedAdmin):
         if person(request).role != Role.RESEARCHER:
             return names
         # A source may be a file that is named after a person.
-        seen = (name for name in names if name != "source")
-        return tuple("pseudonym" if name == "patient" else name for name in seen)
+        shown = (name for name in names if name != "source")
+        return tuple("pseudonym" if name == "patient" else name for name in shown)
 
     @admin.display(description=_("patient"), ordering="patient__pseudonym")
     def pseudonym(self, session: TrainingSession) -> str:
-        """Give the patient's pseudonym."""
+        """The patient's pseudonym."""
         return session.patient.pseudonym
 
     @admin.display(description=_("date"), ordering="created_at")
     def date(self, session: TrainingSession) -> Any:
-        """Give the day of the session by the clinic's clock."""
-        return at_clinic(session.started_at or session.created_at, session.clinic).date()
+        """The day of the session in the clinic's time zone."""
+        return clinic_time(session.began_at, session.clinic).date()
 
     @admin.display(description=_("start time"), ordering="started_at")
     def start_time(self, session: TrainingSession) -> str | None:
-        """Give the time of day that it began."""
+        """The time of day when it was started."""
         if session.started_at is None:
             return None
-        return f"{at_clinic(session.started_at, session.clinic):%H:%M:%S}"
+        return f"{clinic_time(session.started_at, session.clinic):%H:%M:%S}"
 
     @admin.display(description=_("duration"), ordering="active_s")
     def duration(self, session: TrainingSession) -> str:
-        """Give the walked time in minutes and seconds."""
+        """The walked time in minutes and seconds."""
         minutes, seconds = divmod(round(session.active_s), 60)
         return f"{minutes}:{seconds:02d}"
 
     @admin.display(description=_("feedback type"), ordering="valence")
     def types(self, session: TrainingSession) -> str:
-        """Give the feedback type, and those it was changed to."""
-        return session.types_words
+        """The feedback type, and those it was changed to."""
+        return session.valences_label
 
     @admin.display(description=_("goal"), ordering="goal")
     def goal_value(self, session: TrainingSession) -> str | None:
-        """Give the goal with its unit."""
+        """The goal with its unit."""
         return None if session.goal is None else f"{session.goal:.2f} {session.measure.unit}"
 
     @admin.display(description=_("score"), ordering="metric_score")
     def score(self, session: Any) -> int | None:
-        """Give the points; none for explicit feedback and sessions that have not ended."""
+        """The points; None for explicit feedback and sessions that have not ended."""
         return None if session.metric_score is None else round(session.metric_score)
 
     @admin.display(description=_("hit rate"), ordering="metric_hit_rate")
     def hit_rate(self, session: Any) -> str | None:
-        """Give the share of hits."""
+        """The share of hits."""
         return None if session.metric_hit_rate is None else f"{session.metric_hit_rate:.0%}"
 
-    @admin.display(description=_("counts"), ordering="left_out", boolean=True)
+    @admin.display(description=_("counts"), ordering="excluded", boolean=True)
     def counts(self, session: TrainingSession) -> bool:
-        """Say whether it is in figures, boards and trends."""
-        return not session.left_out
+        """Whether it is in figures, boards and trends."""
+        return not session.excluded
 
     @admin.display(description=_("log"))
     def log(self, session: TrainingSession) -> str:
-        """Lead to the session's steps, events and metrics."""
+        """Links to the session's steps, events and metrics."""
         return format_html(
             '<a href="{}?session__id__exact={}">{}</a> · '
             '<a href="{}?session__id__exact={}">{}</a> · '
@@ -176,28 +176,28 @@ class TrainingSessionAdmin(ScopedAdmin):
 
     @admin.display(description=_("corrections"))
     def corrections(self, session: Any) -> str:
-        """Tell the corrections, newest first."""
-        if not session.told:
+        """The corrections, newest first."""
+        if not session.described_corrections:
             return gettext("none")
         return format_html_join(
             "",
             "<p><b>{}</b>: {} → {}<br>{} · {}<br>{}</p>",
             (
                 (
-                    told["row"].get_part_display(),
-                    told["old"] or "–",
-                    told["new"] or "–",
-                    told["row"].by or "–",
-                    f"{at_clinic(told['row'].at, session.clinic):%Y-%m-%d %H:%M}",
-                    told["row"].reason,
+                    entry.row.get_field_display(),
+                    entry.old or "–",
+                    entry.new or "–",
+                    entry.row.by or "–",
+                    f"{entry.at:%Y-%m-%d %H:%M}",
+                    entry.row.reason,
                 )
-                for told in session.told
+                for entry in session.described_corrections
             ),
         )
 
 
 class SessionLogAdmin(ReadOnlyAdmin):
-    """Pages of a session's log: its own page leads to those of that session."""
+    """Pages of a session's log, linked from the session's own page."""
 
     linked_by = ("session__id__exact",)
 
@@ -244,12 +244,12 @@ class SessionMetricAdmin(SessionLogAdmin):
 
 @admin.register(SessionCorrection)
 class SessionCorrectionAdmin(ReadOnlyAdmin):
-    """What was corrected of sessions, to read."""
+    """Corrections of sessions, read-only."""
 
-    list_display = ("session", "part", "old", "new", "reason", "by", "at")
-    list_filter = ("part", "at")
+    list_display = ("session", "field", "old", "new", "reason", "by", "at")
+    list_filter = ("field", "at")
     list_select_related = ("session", "by")
 
     def has_add_permission(self, request: HttpRequest, obj: Any = None) -> bool:
-        """Corrections are made in their own form."""
+        """Return False: corrections are made in their own form."""
         return False

@@ -1,4 +1,4 @@
-"""Calls about sessions: create and steer them as the pages do, read what was walked."""
+"""API calls about sessions: create and control them as the pages do, read steps and figures."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from rehab.people.access import for_roles
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.people.web.api_base import Key, Page, Paging, Rejected, answers, caller, cut, say_errors
-from rehab.sessions.forms import SessionForm, like_last_time
+from rehab.sessions.forms.session import SessionForm, initial_choices
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import NotStored
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Protocol
-from rehab.sessions.reports.trend import with_figures
+from rehab.sessions.reports.trend import with_metrics
 from rehab.sessions.schemas import (
-    ChangeGiven,
-    Choice,
+    ChangeRequestBody,
     MetricOut,
+    NamedRow,
     SessionFilter,
-    SessionGiven,
     SessionOut,
+    SessionRequestBody,
     StepFilter,
     StepPage,
 )
 from rehab.sessions.services import change_session
+from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Station
 from rehab.training.changes import NotAllowed
@@ -44,29 +44,29 @@ ORDERS = {
     "oldest": ("created_at", "pk"),
     "best": (F("metric_score").desc(nulls_last=True), "created_at", "pk"),
 }
-# What the set-up form calls otherwise.
+# Fields that have another name in the set-up form.
 FORM_NAMES = {"feedback_type": "valence", "goal": "goal_value"}
 
 
-def sessions_of(user: User) -> QuerySet[TrainingSession]:
-    """Give the sessions that somebody sees, with all that is told of them."""
+def visible_sessions(user: User) -> QuerySet[TrainingSession]:
+    """Return the sessions that somebody may see, with what `SessionOut` needs."""
     rows = TrainingSession.objects.visible_to(user).defer("plan")
-    return with_figures(user, rows).select_related("patient", "measure", "protocol", "station")
+    return with_metrics(user, rows).select_related("patient", "measure", "protocol", "station")
 
 
-def find_session(user: User, session_id: int) -> TrainingSession:
-    """Give a session that somebody sees. Raises Http404 for any other."""
-    return get_object_or_404(sessions_of(user), pk=session_id)
+def get_session(user: User, session_id: int) -> TrainingSession:
+    """Return a session that somebody may see. Raises Http404 for any other."""
+    return get_object_or_404(visible_sessions(user), pk=session_id)
 
 
-@router.get("/protocols", response=answers(Page[Choice]))
+@router.get("/protocols", response=answers(Page[NamedRow]))
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
 def list_protocols(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
     """List the protocols that a session may follow."""
     return cut(Protocol.objects.visible_to(caller(request)).order_by("pk"), wanted)
 
 
-@router.get("/stations", response=answers(Page[Choice]))
+@router.get("/stations", response=answers(Page[NamedRow]))
 @for_roles(Role.LEAD, Role.PT, patients=False)
 def list_stations(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
     """List the stations where a session may be."""
@@ -87,12 +87,12 @@ def list_sessions(request: HttpRequest, wanted: Query[SessionFilter]) -> dict[st
         "created_at__lt": wanted.until,
     }
     given = Q(**{name: value for name, value in asked.items() if value is not None})
-    return cut(sessions_of(user).filter(given).order_by(*ORDERS[wanted.order]), wanted)
+    return cut(visible_sessions(user).filter(given).order_by(*ORDERS[wanted.order]), wanted)
 
 
 @router.post("/sessions", response=answers(SessionOut, 404, 409, code=201))
 @for_roles(Role.LEAD, Role.PT)
-def add_session(request: HttpRequest, given: SessionGiven) -> Status[TrainingSession]:
+def add_session(request: HttpRequest, given: SessionRequestBody) -> Status[TrainingSession]:
     """Create a session that is ready to start: the same as by the set-up page."""
     user = caller(request)
     values = given.model_dump(mode="json", exclude_unset=True)
@@ -102,30 +102,32 @@ def add_session(request: HttpRequest, given: SessionGiven) -> Status[TrainingSes
     if "goal" in values or "goal_percent" in values:
         values["goal_by"] = "value" if "goal" in values else "percent"
     first_station(patient.clinic)
-    data = like_last_time(patient, user)
+    data = initial_choices(patient, user)
     data |= {FORM_NAMES.get(name, name): value for name, value in values.items()}
     form = SessionForm(data, patient=patient, by=user)
     session = form.create()
     if session is None:
-        ours = {theirs: name for name, theirs in FORM_NAMES.items()}
+        api_names = {field: name for name, field in FORM_NAMES.items()}
         objections = say_errors(form.errors)
-        raise Rejected({ours.get(name, name): words for name, words in objections.items()})
-    return Status(201, find_session(user, session.pk))
+        raise Rejected({api_names.get(name, name): message for name, message in objections.items()})
+    return Status(201, get_session(user, session.pk))
 
 
 @router.get("/sessions/{session_id}", response=answers(SessionOut, 404))
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
 def show_session(request: HttpRequest, session_id: Path[Key]) -> TrainingSession:
     """Show a session."""
-    return find_session(caller(request), session_id)
+    return get_session(caller(request), session_id)
 
 
 @router.post("/sessions/{session_id}/changes", response=answers(SessionOut, 404, 409, 503))
 @for_roles(Role.LEAD, Role.PT)
-def change(request: HttpRequest, session_id: Path[Key], given: ChangeGiven) -> TrainingSession:
+def change(
+    request: HttpRequest, session_id: Path[Key], given: ChangeRequestBody
+) -> TrainingSession:
     """Start, pause, resume, finish or steer a session; stored when this answers."""
     user = caller(request)
-    session = find_session(user, session_id)
+    session = get_session(user, session_id)
     try:
         change_session(session, given.kind, given.value, by=user)
     except (NotAllowed, OwnedElsewhere) as problem:
@@ -134,7 +136,7 @@ def change(request: HttpRequest, session_id: Path[Key], given: ChangeGiven) -> T
         raise Rejected({"value": str(problem)}) from problem
     except NotStored as problem:
         raise HttpError(503, str(problem)) from problem
-    return find_session(user, session_id)
+    return get_session(user, session_id)
 
 
 @router.get("/sessions/{session_id}/steps", response=answers(StepPage, 404))
@@ -144,7 +146,7 @@ def list_steps(
 ) -> dict[str, Any]:
     """List a session's steps by their numbers, also while it runs."""
     user = caller(request)
-    session = find_session(user, session_id)
+    session = get_session(user, session_id)
     steps = Step.objects.visible_to(user).filter(session=session, number__gt=wanted.after)
     found = list(steps.order_by("number")[: wanted.limit])
     more = len(found) == wanted.limit
@@ -156,5 +158,5 @@ def list_steps(
 def list_metrics(request: HttpRequest, session_id: Path[Key]) -> QuerySet[SessionMetric]:
     """List the figures of a finished session."""
     user = caller(request)
-    session = find_session(user, session_id)
+    session = get_session(user, session_id)
     return SessionMetric.objects.visible_to(user).filter(session=session).order_by("slug")

@@ -1,7 +1,7 @@
-"""Brings words that a clinic edited to its open sessions, from their next step on.
+"""Edited feedback texts reach the clinic's open sessions, from their next step on.
 
-The same way as a start or a pause by the API: through this process's runtime, into the log first.
-Points and gestures of a session that has been set up stay as they are.
+Like a start or a pause by the API, the change goes through this process's runtime and is logged
+before it takes effect. Points and gestures of a session that has been set up do not change.
 """
 
 from __future__ import annotations
@@ -24,47 +24,47 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.valences import Valence, bands_to_json
 
 
-def listen() -> None:
-    """Listen, from the start of the process on."""
-    words_edited.connect(on_words_edited)
+def connect_signals() -> None:
+    """Connect the signal of edited texts, once, when the process starts."""
+    words_edited.connect(update_open_sessions)
 
 
-def on_words_edited(
+def update_open_sessions(
     row: FeedbackType | None, clinic_id: int, slug: str, by: User, **_signal: Any
 ) -> list[str]:
-    """Reword the clinic's open sessions; give what could not be reached, in words."""
+    """Update the clinic's open sessions; return messages about those that could not be."""
     open_ones = TrainingSession.everywhere.filter(
         clinic=clinic_id, state__in=[state.value for state in OPEN_STATES]
     )
     problems: list[str] = []
     for session in open_ones.select_related("patient").order_by("pk"):
         language = session.to_plan().language
-        worded = row.to_valence(language) if row is not None else usual_valence(slug, language)
+        valence = row.to_valence(language) if row is not None else usual_valence(slug, language)
         try:
-            async_to_sync(_reword)(session.pk, worded, by)
+            async_to_sync(_update_session)(session.pk, valence, by)
         except (InvalidSetting, OwnedElsewhere, NotStored) as problem:
             problems.append(
                 _("The open session of %(patient)s keeps its words: %(problem)s")
-                % {"patient": session.patient.nickname, "problem": _say(problem)}
+                % {"patient": session.patient.nickname, "problem": _describe_problem(problem)}
             )
     return problems
 
 
-def _say(problem: Exception) -> str:
+def _describe_problem(problem: Exception) -> str:
     return in_words(problem) if isinstance(problem, InvalidSetting) else str(problem)
 
 
-async def _reword(session_id: int, worded: Valence, by: User) -> None:
-    """Change the words of one session, unless it has them or cannot come to that type."""
-    serves = runtime.peek() is not None
-    here = runtime.current()
+async def _update_session(session_id: int, valence: Valence, by: User) -> None:
+    """Change the texts of one session, unless it has them or has no such valence."""
+    in_server = runtime.peek() is not None
+    live_runtime = runtime.current()
     try:
-        live = await here.session(session_id)
-        known = live.actor.fold.valences.get(worded.slug)
-        if known is None or known.bands == worded.bands:
+        live = await live_runtime.session(session_id)
+        known = live.actor.fold.valences.get(valence.slug)
+        if known is None or known.bands == valence.bands:
             return
-        value = {"valence": worded.slug, "bands": bands_to_json(worded.bands)}
-        await here.change(session_id, ChangeKind.FEEDBACK_TEXT, value, by)
+        value = {"valence": valence.slug, "bands": bands_to_json(valence.bands)}
+        await live_runtime.change(session_id, ChangeKind.FEEDBACK_TEXT, value, by)
     finally:
-        if not serves:
-            await here.drain()
+        if not in_server:
+            await live_runtime.drain()

@@ -1,4 +1,4 @@
-"""How pages write figures, dates and sources: the same everywhere, in the page's language."""
+"""Figures, dates and sources as text, the same on every page and in its language."""
 
 from __future__ import annotations
 
@@ -12,63 +12,89 @@ from django.utils.translation import gettext, gettext_noop
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
+from rehab.training.changes import State
 
-NOTHING = "–"
-SPACE = "\N{NO-BREAK SPACE}"
-
-
-def say_rate(rate: float | None) -> str:
-    """Write a ratio as whole percent."""
-    return NOTHING if rate is None else f"{say_number(100 * rate, 0)}{SPACE}%"
+MISSING = "–"
+NBSP = "\N{NO-BREAK SPACE}"
 
 
-def say_number(value: float | None, places: int = 2) -> str:
-    """Write a number with a true minus sign."""
+def format_rate(rate: float | None) -> str:
+    """Return a ratio as whole percent."""
+    return MISSING if rate is None else f"{format_number(100 * rate, 0)}{NBSP}%"
+
+
+def format_change(ratio: float | None) -> str:
+    """Return a change as whole percent with its sign."""
+    return ("+" if ratio and ratio > 0 else "") + format_rate(ratio)
+
+
+def format_number(value: float | None, places: int = 2) -> str:
+    """Return a number with a minus sign (not a hyphen) and grouped thousands."""
     if value is None:
-        return NOTHING
+        return MISSING
     written = number_format(round(value, places) + 0.0, places, force_grouping=True)
     return written.replace("-", "−")
 
 
-def say_quantity(value: float | None, unit: str) -> str:
-    """Write a value with its unit."""
-    return NOTHING if value is None else f"{say_number(value)}{SPACE}{unit}"
+def format_quantity(value: float | None, unit: str) -> str:
+    """Return a value with its unit."""
+    return MISSING if value is None else f"{format_number(value)}{NBSP}{unit}"
 
 
-def say_duration(seconds: float) -> str:
-    """Write a time span, to the second below a minute, else to the minute."""
-    return f"{seconds:.0f}{SPACE}s" if seconds < 59.5 else f"{seconds / 60:.0f}{SPACE}min"
+def format_duration(seconds: float) -> str:
+    """Return a time span, in seconds below a minute, else in minutes."""
+    return f"{seconds:.0f}{NBSP}s" if seconds < 59.5 else f"{seconds / 60:.0f}{NBSP}min"
 
 
-def say_day(day: date, today: date) -> str:
-    """Write a day as it is spoken of today."""
+def format_day(day: date, today: date) -> str:
+    """Return a day as text: `today`, without its year in this year, else with it."""
     if day == today:
         return gettext("today")
     return format_date(day, gettext("M j") if day.year == today.year else gettext("M j, Y"))
 
 
-# How lively a robot is (`training.plans.ROBOT_LEVELS`).
-LEVELS: dict[str, Any] = {"normal": _("normal"), "gentle": _("gentle"), "off": _("off"), "": ""}
-# What `list_sources` gives and a session keeps, in English.
-SOURCES = (
+# Of `training.plans.ROBOT_LEVELS`.
+ROBOT_LEVEL_LABELS: dict[str, Any] = {
+    "normal": _("normal"),
+    "gentle": _("gentle"),
+    "off": _("off"),
+    "": "",
+}
+# What `source_choices` returns and a session stores, in English.
+SOURCE_LABELS = (
     gettext_noop("Live sensor"),
     gettext_noop("Simulated patient, good"),
     gettext_noop("Simulated patient, poor"),
     gettext_noop("Simulated patient, fatiguing"),
     gettext_noop("Simulated patient, dropout"),
 )
-SIMULATED, RECORDING = "Simulated patient, ", "Recording "
+SIMULATED_PREFIX, RECORDING_PREFIX = "Simulated patient, ", "Recording "
 
 
-def say_source(source: str) -> str:
-    """Say where steps come from."""
-    if source.startswith(RECORDING):
-        return gettext("Recording %(name)s") % {"name": source.removeprefix(RECORDING)}
+def format_source(source: str) -> str:
+    """Return where steps come from, as text."""
+    if source.startswith(RECORDING_PREFIX):
+        return gettext("Recording %(name)s") % {"name": source.removeprefix(RECORDING_PREFIX)}
     return gettext(source) if source else ""
 
 
-def at_clinic(moment: datetime, clinic: Clinic) -> datetime:
-    """Give a moment by the clinic's own clock."""
+# Shown beside a session's result; a finished session needs none.
+STATE_LABELS: dict[State, Any] = {
+    State.READY: _("not started"),
+    State.RUNNING: _("running"),
+    State.PAUSED: _("paused"),
+    State.FINISHED: "",
+    State.ABORTED: _("ended early"),
+}
+
+
+def format_state(state: str) -> str:
+    """Return a session's state as text, empty for a finished one."""
+    return str(STATE_LABELS[State(state)])
+
+
+def clinic_time(moment: datetime, clinic: Clinic) -> datetime:
+    """Return a moment in the clinic's time zone."""
     return moment.astimezone(ZoneInfo(clinic.time_zone))
 
 

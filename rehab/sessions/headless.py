@@ -1,4 +1,4 @@
-"""A whole session without pages: a recording or a simulated patient, through the one path."""
+"""A whole session without pages: a recording or a simulated patient, through the live path."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rehab.training.scoring import judge
 from rehab.training.steps import Measurement
 from rehab.training.summary import summarize_session
 
-# Steps on their way to the disk at full speed: commits cost little, memory stays flat.
+# Steps that are queued before waiting for the disk: few commits, constant memory.
 BATCH = 500
 
 
@@ -43,16 +43,16 @@ class Pace:
 def simulate_strides(
     walker: SyntheticWalker, fold: SessionFold, count: int
 ) -> Iterator[Measurement]:
-    """Let a simulated patient walk, each stride in the phase that the session has reached."""
+    """Return a simulated patient's strides, each made for the phase that the session is in."""
     return (walker.next_stride(fold.phase) for _ in range(count))
 
 
 async def run_session(
     session_id: int, strides: Callable[[SessionFold], Iterator[Measurement]], pace: Pace
 ) -> SessionFold:
-    """Start a session, send it strides through the live path, finish it; give its fold.
+    """Start a session, send it strides through the live path, finish it; return its fold.
 
-    A failure on the way leaves the session aborted, with the steps that were stored.
+    A failure leaves the session aborted, with the steps that were stored.
     """
     runtime = runtimes.current()
     try:
@@ -60,7 +60,7 @@ async def run_session(
         fold = live.actor.fold
         await runtime.change(session_id, ChangeKind.START, None, None)
         try:
-            await _send(live, strides(fold), pace)
+            await _send_strides(live, strides(fold), pace)
         except BaseException:
             await runtime.change(session_id, ChangeKind.ABORT, None, None)
             raise
@@ -70,7 +70,7 @@ async def run_session(
         await runtime.drain()
 
 
-async def _send(live: LiveSession, strides: Iterator[Measurement], pace: Pace) -> None:
+async def _send_strides(live: LiveSession, strides: Iterator[Measurement], pace: Pace) -> None:
     began: float | None = None
     for count, stride in enumerate(strides, start=1):
         if pace.speed is not None:
@@ -83,7 +83,7 @@ async def _send(live: LiveSession, strides: Iterator[Measurement], pace: Pace) -
 
 
 def robot_steps(session: TrainingSession, fold: SessionFold) -> Iterator[tuple[float, float]]:
-    """Give what a robot would have heard of a stored session: time [s] and performance of steps."""
+    """Yield the steps of a stored session that its robot scores: time [s] and performance."""
     feedback = [index for index, phase in enumerate(fold.plan.phases) if phase.feedback]
     steps = Step.everywhere.filter(session=session, phase__in=feedback).order_by("number")
     for time_s, performance in steps.values_list("time_s", "performance").iterator():
@@ -91,11 +91,13 @@ def robot_steps(session: TrainingSession, fold: SessionFold) -> Iterator[tuple[f
             yield time_s, performance
 
 
-def compare_with_flags(session: TrainingSession, recording: Recording) -> dict[int, dict[str, int]]:
-    """Compare our rule with the recording's own flags; phase → counts.
+def compare_with_recording(
+    session: TrainingSession, recording: Recording
+) -> dict[int, dict[str, int]]:
+    """Compare our hits with the recording's own; return counts by phase.
 
     ``compared`` counts the rows with a recorded value and flag, valid or not; ``agree`` those where
-    shown ≥ goal by our rule is what the file says; ``hits`` the hits by our rule.
+    our rule (shown ≥ goal) gives the recorded flag; ``hits`` the hits by our rule.
     """
     counts: dict[int, dict[str, int]] = defaultdict(lambda: {"compared": 0, "agree": 0, "hits": 0})
     steps = Step.everywhere.filter(session=session).order_by("number").iterator()
@@ -110,17 +112,17 @@ def compare_with_flags(session: TrainingSession, recording: Recording) -> dict[i
     return counts
 
 
-def report(
+def session_report(
     session: TrainingSession,
     fold: SessionFold,
     wall_s: float,
     recording: Recording | None = None,
     robot: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Give the JSON that `runsession` prints; ``robot`` is what a robot did, if one answered."""
+    """Return the JSON that `runsession` prints; ``robot`` is what a simulated robot did, if any."""
     figures = summarize_session(fold)
     if recording is not None:
-        counts = compare_with_flags(session, recording)
+        counts = compare_with_recording(session, recording)
         figures["recorded_success"] = _sum_counts(list(counts.values()))
         for phase in figures["phases"]:
             phase["recorded_success"] = _sum_counts(

@@ -1,4 +1,4 @@
-"""The log of what happened in a session: its steps, its events, and the figures it came to."""
+"""The log of a session: its steps, its events, and its figures."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Step(ScopedModel):
 
 
 class RobotEntry(StrEnum):
-    """What the log keeps of a session's robot. It alters no score: folding passes it over."""
+    """Events of a session's robot. They change no score: folding skips them."""
 
     STOP = "robot_stop"
     ARM = "robot_arm"
@@ -69,7 +69,7 @@ class RobotEntry(StrEnum):
 
 
 class Remark(StrEnum):
-    """What a PT notes with one tap while somebody walks. It alters no score either."""
+    """What a PT notes with one tap while somebody walks. It changes no score either."""
 
     REST = "rest"
     PAIN = "pain"
@@ -99,11 +99,11 @@ EVENTS = {
 
 
 class SessionEvent(ScopedModel):
-    """What was done to a session, noted of it, or done by its robot, ordered against its steps.
+    """A change of a session, a remark, or an act of its robot, ordered against its steps.
     Rows are only added.
 
     ``data``: what the robot reported; which device stopped it where that was no person; as
-    ``value`` (and ``old``) what a change was to that is no number: a name, or words and their type.
+    ``value`` (and ``old``) of a change that is no number: a name, or texts with their valence.
     """
 
     scope = PatientScope(
@@ -117,7 +117,7 @@ class SessionEvent(ScopedModel):
         _("after number"), help_text=_("The last step before it; 0 for none.")
     )
     kind = models.CharField(
-        _("kind"), max_length=32, choices=[(str(kind), words) for kind, words in EVENTS.items()]
+        _("kind"), max_length=32, choices=[(str(kind), label) for kind, label in EVENTS.items()]
     )
     old = models.FloatField(_("old"), null=True)
     value = models.FloatField(_("value"), null=True)
@@ -136,7 +136,7 @@ class SessionEvent(ScopedModel):
         return self.get_kind_display()
 
 
-# Sent with ``sessions``, a set of keys, within the transaction that stores their figures.
+# Sent with ``sessions`` (a set of keys) in the transaction that stores their figures.
 figures_stored = Signal()
 
 

@@ -1,7 +1,8 @@
-"""One sitting of one patient."""
+"""Training sessions."""
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import ClassVar
 
 from django.db import models
@@ -12,7 +13,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.consent.models import PatientScope
 from rehab.people.models import SIDES, Clinic, Patient, User
 from rehab.people.scope import ClinicRow
-from rehab.sessions.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import State
 from rehab.training.plans import SessionPlan
@@ -28,13 +29,13 @@ STATES = {
 
 
 class TrainingSession(ClinicRow):
-    """One sitting of one patient, who is the same from its creation to its end.
+    """One session of one patient.
 
-    ``plan`` is what every step is scored with; the columns beside it are there to be found by.
+    ``plan`` is what every step is scored with; the columns beside it are for queries.
     ``state``, ``goal``, ``started_at``, ``ended_at``, ``changed_to`` and ``active_s`` follow from
     the log and are written together with its changes (``active_s`` of a running session is that of
-    its last one). ``valence`` is the feedback type it began with. Only a correction alters
-    ``patient`` and ``left_out`` (``corrections.py``).
+    its last one). ``valence`` is the valence that it began with. Only a correction changes
+    ``patient`` and ``excluded`` (``corrections.py``).
     """
 
     scope = PatientScope(clinic="clinic", station="station")
@@ -88,15 +89,17 @@ class TrainingSession(ClinicRow):
         _("source"), max_length=200, blank=True, help_text=_("Where its steps come from.")
     )
     simulated = models.BooleanField(_("simulated"), default=False)
-    runs = models.JSONField(
-        default=list, editable=False, help_text=_("Arguments of the source that the server runs.")
+    source_args = models.JSONField(
+        default=list,
+        editable=False,
+        help_text=_("Arguments of the source that the server runs."),
     )
     plan = models.JSONField(_("plan"))
 
     state = models.CharField(
         _("state"),
         max_length=16,
-        choices=[(state.value, words) for state, words in STATES.items()],
+        choices=[(state.value, label) for state, label in STATES.items()],
         default=State.READY.value,
     )
     goal = models.FloatField(
@@ -105,16 +108,16 @@ class TrainingSession(ClinicRow):
     started_at = models.DateTimeField(_("started at"), null=True, blank=True)
     ended_at = models.DateTimeField(_("ended at"), null=True, blank=True)
     active_s = models.FloatField(_("walked (s)"), default=0.0, help_text=_("Time without pauses."))
-    left_out = models.BooleanField(
+    excluded = models.BooleanField(
         _("left out"),
         default=False,
         editable=False,
         help_text=_("Corrected: in no figure, board or trend."),
     )
-    # Its row in the original GARRY's database, where it was imported from there: without steps.
+    # Of an imported session, which has no steps: its key and row in the original GARRY's database.
     original_id = models.BigIntegerField(_("imported session"), null=True, editable=False)
-    original = models.JSONField(null=True, editable=False)
-    # Which process writes the log: each taking over raises the epoch and shuts out the one before.
+    legacy_row = models.JSONField(null=True, editable=False)
+    # The process that writes the log; each change of owner raises the epoch and locks out the last.
     epoch = models.PositiveIntegerField(default=0, editable=False)
     owner = models.CharField(max_length=200, blank=True, editable=False)
 
@@ -136,18 +139,23 @@ class TrainingSession(ClinicRow):
         return gettext("Session %(number)s") % {"number": self.pk}
 
     def to_plan(self) -> SessionPlan:
-        """Give the plan as the rules know it."""
+        """Return the plan in the form that the rules use."""
         return SessionPlan.from_json(self.plan)
 
     @property
-    def later_types(self) -> list[str]:
-        """The feedback types that it was changed to on its way."""
+    def began_at(self) -> datetime:
+        """When it was started, or else set up."""
+        return self.started_at or self.created_at
+
+    @property
+    def later_valences(self) -> list[str]:
+        """The valences that it was changed to while it ran, in order."""
         return self.changed_to.split(",") if self.changed_to else []
 
     @property
-    def types_words(self) -> str:
-        """Its feedback type, and those it was changed to, in words."""
-        names = [gettext(VALENCES[slug].label) for slug in (self.valence, *self.later_types)]
+    def valences_label(self) -> str:
+        """Its feedback type and those that it was changed to, as text."""
+        names = [gettext(VALENCES[slug].label) for slug in (self.valence, *self.later_valences)]
         if len(names) == 1:
             return names[0]
         return gettext("%(first)s, changed to %(others)s") % {

@@ -1,4 +1,4 @@
-"""Replaying a session's log: its committed steps and changes, folded in their order."""
+"""Replay of a session's log: its committed steps and changes, folded in their order."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ log = logging.getLogger(__name__)
 
 
 def fold_log(fold: SessionFold, session: TrainingSession) -> SessionFold:
-    """Fold a session's log; give the fold.
+    """Fold a session's log and return the fold.
 
-    What could not have been (a second pause, say) is passed over, and logged: it altered nothing
-    then, and a log that is refused for it would shut everyone out of all else that it holds.
+    Impossible entries (such as a second pause) are skipped with a warning: they had no effect when
+    they were stored, and refusing the log would make the rest of the session unreadable.
     """
-    passed_over: list[str] = []
-    for entry in read_log(session):
+    skipped: list[str] = []
+    for entry in log_entries(session):
         try:
             if isinstance(entry, Change):
                 fold.change(entry)
             else:
                 fold.step(entry)
         except (InvalidSetting, InvalidMeasurement) as problem:
-            passed_over.append(f"{entry}: {problem}")
-    if passed_over:
+            skipped.append(f"{entry}: {problem}")
+    if skipped:
         log.warning(
-            "The log of session %s holds what could not have been (%d times); the first: %s",
+            "Skipped %d impossible entries in the log of session %s; the first: %s",
+            len(skipped),
             session.pk,
-            len(passed_over),
-            passed_over[0],
+            skipped[0],
         )
     return fold
 
 
-def read_log(session: TrainingSession) -> Iterator[Measurement | Change]:
-    """Give a session's committed steps and changes in the order in which they took effect."""
+def log_entries(session: TrainingSession) -> Iterator[Measurement | Change]:
+    """Return a session's committed steps and changes in the order in which they took effect."""
     changes = SessionEvent.everywhere.filter(session=session, kind__in=list(CONTROLS))
     events = list(changes.order_by("pk"))
     events.reverse()
@@ -61,7 +61,7 @@ def _to_change(event: SessionEvent) -> Change:
 
 
 def to_measurement(step: Step) -> Measurement:
-    """Give back what the source said of a stride; scored again, it gets the verdict it has."""
+    """Return a step as its source sent it; scoring it again gives the stored verdict."""
     return Measurement(
         number=step.number,
         time_s=step.time_s,

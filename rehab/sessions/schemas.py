@@ -1,4 +1,4 @@
-"""What goes in and out of the calls about sessions: the one place that says which fields."""
+"""Request and response schemas of the API's session calls."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ FeedbackType = Annotated[
 ]
 
 
-def read_kind(kind: str) -> str:
-    """Return the kind of change. Raises ValueError for one that nobody may ask for."""
+def parse_change_kind(kind: str) -> str:
+    """Return the kind of change. Raises ValueError for one that a client cannot request."""
     known = requestable_kinds()
     if kind not in known:
         raise ValueError(f"A change is one of: {', '.join(known)}.")
     return kind
 
 
-AskedKind = Annotated[
-    str, AfterValidator(read_kind), Field(json_schema_extra={"enum": requestable_kinds()})
+RequestedChangeKind = Annotated[
+    str, AfterValidator(parse_change_kind), Field(json_schema_extra={"enum": requestable_kinds()})
 ]
 
 
-class Choice(Schema):
+class NamedRow(Schema):
     """Something that a session can be built with."""
 
     id: int
@@ -54,7 +54,7 @@ class SessionOut(Schema):
     state: str
     feedback_type: str = Field(alias="valence", description="The one that it began with.")
     changed_to: list[str] = Field(
-        alias="later_types", description="Types that it was changed to on its way, in order."
+        alias="later_valences", description="Types that it was changed to on its way, in order."
     )
     goal: float | None
     measure: str = Field(alias="measure.name")
@@ -64,7 +64,7 @@ class SessionOut(Schema):
     station: str | None = Field(None, alias="station.name")
     source: str | None = Field(description="Null for researchers: files may be named after people.")
     simulated: bool
-    left_out: bool = Field(description="Corrected: in no figure, board or trend.")
+    excluded: bool = Field(description="Corrected: in no figure, board or trend.")
     imported: bool = Field(description="From the original GARRY, without steps.")
     created_at: datetime
     started_at: datetime | None
@@ -75,17 +75,17 @@ class SessionOut(Schema):
 
     @staticmethod
     def resolve_imported(session: TrainingSession) -> bool:
-        """Say whether it has no steps of its own."""
+        """Return whether it was imported from the original GARRY."""
         return session.original_id is not None
 
     @staticmethod
     def resolve_source(session: TrainingSession, context: Any) -> str | None:
-        """Give where its steps come from, to those who know the patient."""
+        """Return where its steps come from, to those who may see the patient's name."""
         return session.source if sees_names(context) else None
 
     @staticmethod
     def resolve_trained_side(session: TrainingSession) -> str | None:
-        """Give the trained leg; null where the original did not keep it."""
+        """Return the trained leg; null where the original did not store it."""
         return session.trained_side or None
 
 
@@ -101,7 +101,7 @@ class SessionFilter(Paging):
     order: Literal["newest", "oldest", "best"] = "newest"
 
 
-class SessionGiven(Given):
+class SessionRequestBody(Given):
     """A new session. What is left out is like the patient's last time."""
 
     patient: Key
@@ -119,10 +119,10 @@ class SessionGiven(Given):
     robot_below: Words = left_out(description="Gesture after a window below it.")
 
 
-class ChangeGiven(Given):
+class ChangeRequestBody(Given):
     """What is to be changed of a session, as on the therapist's page."""
 
-    kind: AskedKind
+    kind: RequestedChangeKind
     value: float | str | None = Field(
         None,
         description="The new goal, gain, threshold, intensity or phase; 1 or 0 for words shown; "
@@ -175,10 +175,10 @@ class MetricOut(Schema):
 
     @staticmethod
     def resolve_label(metric: SessionMetric) -> str:
-        """Give what the figure is."""
+        """Return the figure's name."""
         return METRICS[metric.slug].label
 
     @staticmethod
     def resolve_unit(metric: SessionMetric) -> str:
-        """Give the figure's unit; none for a ratio or a count."""
+        """Return the figure's unit; empty for a ratio or a count."""
         return METRICS[metric.slug].unit

@@ -2,18 +2,18 @@
 
 from django.urls import path
 
-from rehab.sessions.pages import history, monitor, report, setup, tablet, takehome, walk
+from rehab.sessions.pages import history, monitor, report, session, setup, tablet, takehome, walk
 
 urlpatterns = [
     path("patients/<int:patient_id>/new/", setup.set_up, name="setup"),
     path("patients/<int:patient_id>/sessions/", history.list_sessions, name="history"),
     path("patients/<int:patient_id>/home/", takehome.show_take_home, name="take-home"),
     path("tablet/", tablet.show_tablet, name="tablet"),
-    path("tablet/app.webmanifest", tablet.describe_app, name="tablet-app"),
-    path("tablet/state/", tablet.tell_tablet, name="tablet-state"),
+    path("tablet/app.webmanifest", tablet.web_app_manifest, name="tablet-app"),
+    path("tablet/state/", tablet.tablet_state, name="tablet-state"),
     path("sessions/<int:session_id>/", walk.show_walk, name="walk"),
     path("sessions/<int:session_id>/monitor/", monitor.show_monitor, name="monitor"),
     path("sessions/<int:session_id>/report/", report.show_report, name="report"),
-    path("sessions/<int:session_id>/details/", history.show_session, name="session"),
-    path("sessions/<int:session_id>/correct/", history.correct, name="correct"),
+    path("sessions/<int:session_id>/details/", session.show_session, name="session"),
+    path("sessions/<int:session_id>/correct/", session.correct, name="correct"),
 ]

@@ -31,7 +31,12 @@ from rehab.sources.client import (
 from rehab.sources.reporting import SourceError
 from rehab.sources.source import LiveSource, PlayedSource, Source
 from rehab.training.steps import Side
-from robot.dialing import CannotDial, add_dialing_arguments, find_token, websocket_url
+from robot.connection_args import (
+    BadConnectionArgs,
+    add_connection_arguments,
+    find_token,
+    websocket_url,
+)
 from robot.link import Link, LinkRefused
 
 if TYPE_CHECKING:
@@ -73,7 +78,7 @@ def make_parser(name: str, source: type[Source]) -> ArgumentParser:
     )
     source.add_arguments(parser)
     server = parser.add_argument_group("the server, and how to walk")
-    add_dialing_arguments(server)
+    add_connection_arguments(server)
     server.add_argument(
         "--side",
         choices=[side.value for side in Side],
@@ -247,7 +252,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with ExitStack() as stack:
             return run(name, options, stack)
-    except (CannotDial, UnsendableStride, SourceError) as problem:
+    except (BadConnectionArgs, UnsendableStride, SourceError) as problem:
         print_status(f"{problem}")
         return EXIT_UNUSABLE
     except KeyboardInterrupt:

@@ -6,9 +6,10 @@ from abc import ABC, abstractmethod
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from rehab.sources.client import WINDOW, NextStride
+from rehab.sources.client import NextStride
 from rehab.sources.reporting import Notify
 from rehab.training.steps import Side
+from robot.wire.limits import MAX_STEPS
 
 if TYPE_CHECKING:
     from rehab.sources.intake import Intake, IntakeSettings
@@ -47,7 +48,7 @@ class PlayedSource(Source):
     at full speed.
     """
 
-    max_unacknowledged = WINDOW
+    max_unacknowledged = MAX_STEPS
 
     @abstractmethod
     def open_walk(self, trained_side: Side) -> NextStride:

@@ -1,20 +1,22 @@
-"""What templates draw again and again."""
+"""Tags and filters of all templates."""
 
 from django import template
 from django.templatetags.static import static
-from django.utils.html import format_html
+from django.utils.html import format_html, json_script
 from django.utils.safestring import SafeString
 from django.utils.translation import gettext as _
 
-from rehab.sessions.formatting import LEVELS, say_duration, say_source
+from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_duration, format_source
 from rehab.training.valences import VALENCES
+from robot.wire.close_codes import FINAL_FOR_PAGES
+from robot.wire.limits import PAGE_HEARTBEAT_S
 
 register = template.Library()
 
 
 @register.simple_tag
 def icon(name: str) -> SafeString:
-    """Give an icon of static/img/icons.svg; decoration, so words must stand beside it."""
+    """Return an icon of static/img/icons.svg. It is hidden from readers: put text beside it."""
     return format_html(
         '<svg class="ic" aria-hidden="true"><use href="{}#{}"></use></svg>',
         static("img/icons.svg"),
@@ -22,23 +24,30 @@ def icon(name: str) -> SafeString:
     )
 
 
+@register.simple_tag
+def wire_limits() -> SafeString:
+    """Return what a page's scripts have to know of the wire, as the JSON element ``wire``."""
+    limits = {"final_codes": sorted(FINAL_FOR_PAGES), "heartbeat_ms": 1000 * PAGE_HEARTBEAT_S}
+    return json_script(limits, "wire")
+
+
 @register.filter
 def leg(side: str) -> str:
-    """Name the leg of a side; "" for none."""
+    """Return the label of a leg; "" for none."""
     return {"left": _("left leg"), "right": _("right leg")}.get(side, "")
 
 
-register.filter("duration", say_duration)
-register.filter("source", say_source)
+register.filter("duration", format_duration)
+register.filter("source", format_source)
 
 
 @register.filter
 def type_name(slug: str) -> str:
-    """Name a feedback type."""
+    """Return the label of a valence."""
     return _(VALENCES[slug].label)
 
 
 @register.filter
 def level(name: str) -> str:
-    """Say how lively a robot is."""
-    return str(LEVELS[name])
+    """Return the label of a robot level."""
+    return str(ROBOT_LEVEL_LABELS[name])

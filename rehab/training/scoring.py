@@ -8,12 +8,10 @@ from typing import NamedTuple
 from rehab.training.measures import Measure
 from rehab.training.steps import Measurement, ScoredStep, Side
 from rehab.training.valences import Valence
+from robot.wire.limits import PERFORMANCE_MAX
 
 # Rises with every change that could alter a stored verdict; every step keeps the one it had.
 RULES_VERSION = 1
-
-# A tiny goal must not make numbers that no chart, database or JSON reader can hold.
-PERFORMANCE_MAX = 1000.0
 
 
 class Verdict(NamedTuple):

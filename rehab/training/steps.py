@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from rehab.training.measures import Measure
+from robot.wire.limits import TIME_MAX_S
 
 
 class Side(StrEnum):
@@ -27,10 +28,6 @@ class InvalidReason(StrEnum):
     PAUSED = "paused"
     FLAGGED = "flagged"
     FORCE_LOST = "force_lost"
-
-
-# Seconds since 1970 pass, milliseconds do not.
-TIME_MAX_S = 1e10
 
 
 class InvalidMeasurement(ValueError):

@@ -5,10 +5,10 @@ from robot.bases.base import (
     BadOption,
     BaseLost,
     BaseState,
+    GroundTruth,
+    Indication,
     MobileBase,
-    Mood,
-    Senses,
-    Truth,
+    SensorState,
 )
 from robot.bases.kinematic import KinematicBase
 from robot.bases.kobuki import KobukiBase
@@ -31,8 +31,8 @@ __all__ = [
     "BadOption",
     "BaseLost",
     "BaseState",
+    "GroundTruth",
+    "Indication",
     "MobileBase",
-    "Mood",
-    "Senses",
-    "Truth",
+    "SensorState",
 ]

@@ -1,4 +1,4 @@
-"""What every base can do. Those that drive differ in how; nothing above knows which one it is."""
+"""The interface of all bases. Nothing above knows which base it drives."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from enum import StrEnum
 from types import TracebackType
 from typing import ClassVar, Self
 
-from robot.motion import Pose, Twist
+from robot.motion.pose import Pose
+from robot.motion.twist import Twist
 
 
 class BaseLost(RuntimeError):
@@ -18,27 +19,27 @@ class BaseLost(RuntimeError):
 
 
 class BadOption(ValueError):
-    """An option of a command line that no base could follow; the message says what one could."""
+    """An option of a command line that no base has; the message says which it has."""
 
 
 @dataclass(frozen=True, slots=True)
 class Abilities:
-    """What a base is and can do; what it cannot do safely is refused for that.
+    """What a base is and can do; what it cannot do safely is refused.
 
     Parameters
     ----------
     simulated
-        Nothing in it can touch anyone; only such a base may arm itself.
+        Whether nothing in it can touch anyone; only such a base may arm itself.
     moves
         Whether it can drive and turn, as gestures need.
     announces
         Whether it has lights and sounds, with which it tells that it is about to move.
     real_time
-        Whether it lives by the computer's clock, and so cannot be rehearsed with.
+        Whether it lives by the computer's clock, so it cannot run on a virtual one.
     closed_loop
-        Whether it tells where it is. One that does not is reckoned to be where its orders lead.
+        Whether it reports where it is. Without that its pose is dead reckoning by its orders.
     bumpers
-        Whether it feels what it bumps into.
+        Whether it has bumpers.
     """
 
     simulated: bool
@@ -49,8 +50,8 @@ class Abilities:
     bumpers: bool = False
 
 
-class Mood(StrEnum):
-    """What a base with lights shows."""
+class Indication(StrEnum):
+    """What a base shows by its lights."""
 
     WAITING = "waiting"  # it may not move now
     READY = "ready"
@@ -59,8 +60,8 @@ class Mood(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Senses:
-    """What a base feels beside its motion. By default nothing is wrong, and nothing known.
+class SensorState:
+    """What a base reports beside its motion. By default nothing is wrong, and nothing known.
 
     Parameters
     ----------
@@ -72,11 +73,11 @@ class Senses:
     stop_pressed
         Whether somebody presses its stop button.
     battery_v
-        Voltage of its battery [V]; None where it has none or did not tell.
+        Voltage of its battery [V]; None where unknown.
     is_charging
-        Whether a charger is at it.
+        Whether a charger is connected.
     silent_s
-        How long it has said nothing [s].
+        Time since it last reported anything [s].
     slip_rad
         Heading by its wheels minus heading by its gyro, from home [rad].
     """
@@ -92,16 +93,16 @@ class Senses:
 
 @dataclass(frozen=True, slots=True)
 class BaseState:
-    """Where a base is, by its own odometry from home, how fast it moves, and what it feels."""
+    """Pose of a base by its odometry, from home; its velocity; its other sensors."""
 
     pose: Pose
     twist: Twist
-    senses: Senses = Senses()
+    sensors: SensorState = SensorState()
 
 
 @dataclass(frozen=True, slots=True)
-class Truth:
-    """Where a simulated base really is, seen from home, and how far from it it has been [m]."""
+class GroundTruth:
+    """True pose of a simulated base from home, and the largest distance it has had [m]."""
 
     pose: Pose
     farthest_m: float
@@ -115,7 +116,7 @@ class MobileBase(ABC):
 
     name: ClassVar[str]
     abilities: Abilities  # of the class, or of one that was told what it has
-    port: str = ""  # where it hangs, for bases that hang somewhere; to be set before it is opened
+    port: str = ""  # address of its port or bridge, where it has one; set before it is opened
 
     @abstractmethod
     def __init__(self, monotonic: Callable[[], float]) -> None:
@@ -123,10 +124,10 @@ class MobileBase(ABC):
 
     @classmethod  # noqa: B027 (not every base has options)
     def add_arguments(cls, group: ArgumentParser | _ArgumentGroup) -> None:
-        """Offer options of its own on a command line."""
+        """Add the base's own options to a command line."""
 
     def configure(self, options: Namespace) -> None:
-        """Take the options, before it is opened. Raises BadOption."""
+        """Apply the options, before it is opened. Raises BadOption."""
         self.port = options.port
 
     def __enter__(self) -> Self:
@@ -144,20 +145,34 @@ class MobileBase(ABC):
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """How often something went wrong on the way to it and back, by name."""
+        """How often something went wrong between it and us, by name."""
         return {}
 
     @property
     def problem(self) -> str:
-        """What keeps it from being reached, for whoever looks on; empty where nothing does."""
+        """Why it cannot be reached, for people; empty where it can."""
         return ""
 
     @abstractmethod
     def drive(self, twist: Twist) -> Twist:
-        """Order a velocity, in place of the last one; give what was really ordered.
+        """Order a velocity in place of the last one, and return what was really ordered.
 
-        It holds for ``ORDER_HOLDS_S`` unless it is ordered again. A twist that is not finite is
-        an order to stand still. Raises BaseLost.
+        An order holds for ``ORDER_HOLDS_S``.
+
+        Parameters
+        ----------
+        twist
+            The velocity; one that is not finite is an order to stand still.
+
+        Returns
+        -------
+        Twist
+            The velocity after clipping and rounding.
+
+        Raises
+        ------
+        BaseLost
+            Where the base does not answer any more.
         """
 
     @abstractmethod
@@ -166,15 +181,15 @@ class MobileBase(ABC):
 
     @abstractmethod
     def read(self) -> BaseState:
-        """Give where it is now. Raises BaseLost."""
+        """Return its state now. Raises BaseLost."""
 
     @abstractmethod
     def set_home(self) -> None:
-        """Begin odometry anew: this place is home. A simulation is put back to its own home."""
+        """Make this place home. A simulation is put back to its own home."""
 
-    def truth(self) -> Truth | None:
-        """Give where it really is, where that can be known: in a simulation."""
+    def ground_truth(self) -> GroundTruth | None:
+        """Return its true pose where that is known: in a simulation."""
         return None
 
-    def show(self, mood: Mood, *, aloud: bool) -> None:  # noqa: B027 (not every base can)
-        """Show by lights, and by a sound where it is ``aloud``, what it is about. Never raises."""
+    def show(self, indication: Indication, *, aloud: bool) -> None:  # noqa: B027 (not every base can)
+        """Show its state by lights, and by a sound where ``aloud``. Never raises."""

@@ -1,21 +1,14 @@
-"""A simulated base on a perfect floor: it does what it is told, and its odometry is the truth."""
+"""A simulated base on a perfect floor: it follows every order, and its odometry is exact."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import ClassVar
 
-from robot.bases.base import Abilities, BaseState, MobileBase, Truth
-from robot.motion import (
-    CEILING_M_S,
-    CEILING_RAD_S,
-    HOME,
-    ORDER_HOLDS_S,
-    STILL,
-    Limits,
-    Twist,
-    advance,
-)
+from robot.bases.base import Abilities, BaseState, GroundTruth, MobileBase
+from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, ORDER_HOLDS_S, Limits
+from robot.motion.pose import HOME, advance
+from robot.motion.twist import STILL, Twist
 
 WHEELS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
 
@@ -44,7 +37,7 @@ class KinematicBase(MobileBase):
         self.drive(STILL)
 
     def read(self) -> BaseState:
-        """Give where it is now."""
+        """Return its state now."""
         self._move()
         return BaseState(self._pose, self._twist)
 
@@ -53,9 +46,9 @@ class KinematicBase(MobileBase):
         self.stop()
         self._pose, self._farthest_m = HOME, 0.0
 
-    def truth(self) -> Truth:
-        """Give where it is: its odometry is the truth."""
-        return Truth(self.read().pose, self._farthest_m)
+    def ground_truth(self) -> GroundTruth:
+        """Return its pose, which its odometry knows exactly."""
+        return GroundTruth(self.read().pose, self._farthest_m)
 
     def _move(self) -> None:
         """Bring it to where it is now; no further than its last order held."""

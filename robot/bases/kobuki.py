@@ -1,4 +1,4 @@
-"""A Kobuki on a serial port, driven by way of the process that owns the port."""
+"""A Kobuki on a serial port, driven through the process that owns the port."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import ClassVar, Self
 
-from robot.bases.base import Abilities, BaseLost, BaseState, MobileBase, Mood, Senses
+from robot.bases.base import Abilities, BaseLost, BaseState, Indication, MobileBase, SensorState
 from robot.bases.kobuki_protocol.commands import (
     Extra,
     GpOutput,
@@ -20,13 +20,14 @@ from robot.bases.kobuki_protocol.commands import (
     encode_commands,
 )
 from robot.bases.kobuki_protocol.feedback import Button, decode_feedback
+from robot.bases.kobuki_protocol.frame_filter import Estimate, FrameFilter
 from robot.bases.kobuki_protocol.frames import BAUD, FrameReader
-from robot.bases.kobuki_protocol.trust import Sighting, Trust
 from robot.bases.kobuki_protocol.wheels import STOP, WHEELBASE_M, control_of, twist_of
-from robot.motion import CEILING_M_S, CEILING_RAD_S, STILL, Limits, Twist
-from robot.odometry import Odometry
-from robot.port_client import Heard, PortClient
-from robot.usb import find_port
+from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, Limits
+from robot.motion.odometry import Odometry
+from robot.motion.twist import STILL, Twist
+from robot.port.client import PortClient, ReceivedBytes
+from robot.port.usb import find_port
 
 WHEELS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
 STOP_FRAME = encode_commands(STOP)
@@ -39,16 +40,16 @@ FELT_S = 0.1
 GREETING_S = 1.5  # a base that is switched on has told all by then
 
 LIGHTS = {
-    Mood.WAITING: Output(0),
-    Mood.READY: Output.LED1_GREEN,
-    Mood.MOVING: Output.LED1_ORANGE,
-    Mood.STOPPED: Output.LED1_RED,
+    Indication.WAITING: Output(0),
+    Indication.READY: Output.LED1_GREEN,
+    Indication.MOVING: Output.LED1_ORANGE,
+    Indication.STOPPED: Output.LED1_RED,
 }
-SOUNDS = {Mood.MOVING: Melody.BUTTON, Mood.STOPPED: Melody.ERROR}
+SOUNDS = {Indication.MOVING: Melody.BUTTON, Indication.STOPPED: Melody.ERROR}
 
 
 class KobukiBase(MobileBase):
-    """Orders a Kobuki and adds up where it is. A port that is lost is opened again for ever."""
+    """Drives a Kobuki and integrates its odometry. A lost port is reopened forever."""
 
     name: ClassVar[str] = "kobuki"
     abilities = Abilities(simulated=False, moves=True, announces=True, real_time=True, bumpers=True)
@@ -58,25 +59,25 @@ class KobukiBase(MobileBase):
         self._client: PortClient | None = None
         self._lock = threading.Lock()  # what is heard comes on another thread
         self._reader = FrameReader(decode_feedback)
-        self._trust = Trust()
+        self._filter = FrameFilter()
         self._odometry = Odometry(WHEELBASE_M)
-        self._sighting: Sighting | None = None
+        self._estimate: Estimate | None = None
         self._opened = 0
         self._seen_s = self._begun_s = monotonic()
         self._felt: dict[str, float] = {}
-        self._mood, self._sound = Mood.WAITING, b""
+        self._indication, self._sound = Indication.WAITING, b""
         self._asked_s = self._lit_s = monotonic() - LIGHT_EVERY_S
 
     def __enter__(self) -> Self:
-        """Open the port, stop what hangs on it, and give it a moment to say what it is."""
+        """Open the port, stop the base, and wait a moment for its firmware version."""
         self._client = PortClient(
-            self.port or find_port(), BAUD, STOP_FRAME, self._hear, self._monotonic
+            self.port or find_port(), BAUD, STOP_FRAME, self._receive, self._monotonic
         )
         until_s = self._monotonic() + GREETING_S
         while self._monotonic() < until_s and not self._client.is_dead:
             self.stop()
             with self._lock:
-                if self._sighting is not None and self._trust.firmware is not None:
+                if self._estimate is not None and self._filter.firmware is not None:
                     break
             time.sleep(0.02)
         return self
@@ -88,7 +89,7 @@ class KobukiBase(MobileBase):
         trace: TracebackType | None,
     ) -> None:
         """Leave it standing still, its lights off."""
-        self.show(Mood.WAITING, aloud=False)
+        self.show(Indication.WAITING, aloud=False)
         self.stop()
         if self._client is not None:
             self._client.close()
@@ -102,7 +103,7 @@ class KobukiBase(MobileBase):
                 bad_checksums=reader.bad_checksums,
                 malformed=reader.malformed,
                 skipped_bytes=reader.skipped_bytes,
-                doubted=self._trust.doubted,
+                doubted=self._filter.doubted,
             )
         if self._client is not None:
             counts.update({f"port_{name}": n for name, n in self._client.count().items()})
@@ -116,98 +117,100 @@ class KobukiBase(MobileBase):
     @property
     def firmware(self) -> str:
         """Version of its firmware; empty until it is known."""
-        return "" if self._trust.firmware is None else str(self._trust.firmware)
+        return "" if self._filter.firmware is None else str(self._filter.firmware)
 
     @property
     def problem(self) -> str:
-        """Say why the port is not open; empty where it is."""
+        """Return why the port is not open; empty where it is."""
         return "" if self._client is None else self._client.problem
 
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
         if self._client is None or self._client.is_dead:
-            raise BaseLost("The process that owns the port does not run: see its words above.")
+            raise BaseLost("The process that owns the port does not run: see its messages above.")
         control = control_of(WHEELS.clip(twist))
-        self._client.order(encode_commands(control), self._asides())
+        self._client.order(encode_commands(control), self._extra_commands())
         return twist_of(control)
 
     def stop(self) -> None:
         """Stand still at once."""
         if self._client is not None:
-            self._client.order(STOP_FRAME, self._asides())
+            self._client.order(STOP_FRAME, self._extra_commands())
 
     def read(self) -> BaseState:
-        """Give what is believed of it now."""
+        """Return its state now. Raises BaseLost."""
         if self._client is None or self._client.is_dead:
-            raise BaseLost("The process that owns the port does not run: see its words above.")
+            raise BaseLost("The process that owns the port does not run: see its messages above.")
         now_s = self._monotonic()
         with self._lock:
-            sighting, odometry = self._sighting, self._odometry
+            estimate, odometry = self._estimate, self._odometry
             felt = {name for name, felt_s in self._felt.items() if now_s - felt_s <= FELT_S}
-            silent_s, firmware = now_s - self._seen_s, self._trust.firmware
-            if sighting is None:
-                return BaseState(odometry.pose, STILL, Senses(silent_s=max(silent_s, GREETING_S)))
+            silent_s, firmware = now_s - self._seen_s, self._filter.firmware
+            if estimate is None:
+                return BaseState(
+                    odometry.pose, STILL, SensorState(silent_s=max(silent_s, GREETING_S))
+                )
             refusal = "firmware_unknown" if firmware is None else ""
             if firmware is not None and firmware.major != FIRMWARE_MAJOR:
                 refusal = "firmware_refused"
-            senses = Senses(
+            sensors = SensorState(
                 hazards=frozenset(felt - {"stop_button"}),
                 refusal=refusal,
                 stop_pressed="stop_button" in felt,
-                battery_v=sighting.battery_v if sighting.battery_v > 0 else None,
-                is_charging=sighting.is_charging,
+                battery_v=estimate.battery_v if estimate.battery_v > 0 else None,
+                is_charging=estimate.is_charging,
                 silent_s=silent_s,
                 slip_rad=odometry.slip_rad,
             )
-            twist = Twist((sighting.left_m_s + sighting.right_m_s) / 2, sighting.turn_rad_s)
-            return BaseState(odometry.pose, twist, senses)
+            twist = Twist((estimate.left_m_s + estimate.right_m_s) / 2, estimate.turn_rad_s)
+            return BaseState(odometry.pose, twist, sensors)
 
     def set_home(self) -> None:
-        """Begin odometry anew: this place is home."""
+        """Make this place home."""
         with self._lock:
             self._odometry.set_home()
 
-    def show(self, mood: Mood, *, aloud: bool) -> None:
+    def show(self, indication: Indication, *, aloud: bool) -> None:
         """Show it by the first light, and by a short sound."""
-        self._mood, self._lit_s = mood, self._monotonic() - LIGHT_EVERY_S
-        if aloud and mood in SOUNDS:
-            self._sound = encode_commands(SoundSequence(SOUNDS[mood]))
+        self._indication, self._lit_s = indication, self._monotonic() - LIGHT_EVERY_S
+        if aloud and indication in SOUNDS:
+            self._sound = encode_commands(SoundSequence(SOUNDS[indication]))
 
-    def _asides(self) -> bytes:
-        """Give what is to be sent beside the next setpoint. External power stays on."""
+    def _extra_commands(self) -> bytes:
+        """Return commands to send beside the next setpoint. External power stays on."""
         now_s = self._monotonic()
-        asides, self._sound = self._sound, b""
+        extra, self._sound = self._sound, b""
         if now_s - self._lit_s >= LIGHT_EVERY_S:
             self._lit_s = now_s
-            asides += encode_commands(GpOutput(Output.POWER | LIGHTS[self._mood]))
-        if self._trust.firmware is None and now_s - self._asked_s >= ASK_EVERY_S:
+            extra += encode_commands(GpOutput(Output.POWER | LIGHTS[self._indication]))
+        if self._filter.firmware is None and now_s - self._asked_s >= ASK_EVERY_S:
             self._asked_s = now_s
-            asides += encode_commands(RequestExtra(Extra.HARDWARE | Extra.FIRMWARE | Extra.UDID))
-        return asides
+            extra += encode_commands(RequestExtra(Extra.HARDWARE | Extra.FIRMWARE | Extra.UDID))
+        return extra
 
-    def _hear(self, heard: Heard) -> None:
-        """Take bytes of the base, on the client's thread."""
+    def _receive(self, heard: ReceivedBytes) -> None:
+        """Handle bytes of the base, on the client's thread."""
         with self._lock:
             if heard.opened != self._opened:
                 self._opened = heard.opened
-                self._trust.forget()
+                self._filter.forget()
             for feedback in self._reader.feed(heard.data):
-                sighting = self._trust.take(feedback, heard.at_s)
-                if sighting is not None:
-                    self._see(sighting, heard.at_s)
+                estimate = self._filter.take(feedback, heard.at_s)
+                if estimate is not None:
+                    self._update(estimate, heard.at_s)
 
-    def _see(self, sighting: Sighting, at_s: float) -> None:
-        anew = sighting.began_anew and self._sighting is not None
-        self._sighting, self._seen_s = sighting, at_s
+    def _update(self, estimate: Estimate, at_s: float) -> None:
+        anew = estimate.began_anew and self._estimate is not None
+        self._estimate, self._seen_s = estimate, at_s
         self._odometry.add(
-            sighting.left_m, sighting.right_m, sighting.heading_rad, sighting.turn_rad_s
+            estimate.left_m, estimate.right_m, estimate.heading_rad, estimate.turn_rad_s
         )
         felt = {
-            "bump": sighting.bumper,
-            "cliff": sighting.cliff,
-            "wheel_drop": sighting.wheel_drop,
-            "over_current": sighting.over_current,
-            "restarted": anew,  # switched off, or carried away: where home is nobody knows
-            "stop_button": sighting.buttons & Button.B0,
+            "bump": estimate.bumper,
+            "cliff": estimate.cliff,
+            "wheel_drop": estimate.wheel_drop,
+            "over_current": estimate.over_current,
+            "restarted": anew,  # switched off or carried away: home is unknown
+            "stop_button": estimate.buttons & Button.B0,
         }
         self._felt |= {name: at_s for name, is_felt in felt.items() if is_felt}

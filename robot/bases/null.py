@@ -1,4 +1,4 @@
-"""No base at all: decisions are made and told, nothing moves."""
+"""No base at all: decisions are made and reported, nothing moves."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from robot.bases.base import Abilities, BaseState, MobileBase
-from robot.motion import HOME, STILL, Twist
+from robot.motion.pose import HOME
+from robot.motion.twist import STILL, Twist
 
 
 class NullBase(MobileBase):
-    """Stays at home, whatever it is told."""
+    """Stays at home, whatever is ordered."""
 
     name: ClassVar[str] = "null"
     abilities = Abilities(simulated=True, moves=False)
@@ -26,7 +27,7 @@ class NullBase(MobileBase):
         """Stand still, as ever."""
 
     def read(self) -> BaseState:
-        """Give home."""
+        """Return home, standing still."""
         return BaseState(HOME, STILL)
 
     def set_home(self) -> None:

@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import Any, ClassVar, Self
 
-from robot.bases.base import Abilities, BaseLost, Truth
+from robot.bases.base import Abilities, BaseLost, GroundTruth
 from robot.bases.kobuki import KobukiBase
-from robot.motion import Pose
+from robot.motion.pose import Pose
 
 END_S = 2.0
 
@@ -41,7 +41,7 @@ class TwinBase(KobukiBase):
         self.port = "" if self._twin.stdout is None else self._twin.stdout.readline().strip()
         if not self.port:
             self._end()
-            raise BaseLost("The twin does not start: see its words above.")
+            raise BaseLost("The twin does not start: see its messages above.")
         try:
             super().__enter__()
         except BaseException:
@@ -67,13 +67,13 @@ class TwinBase(KobukiBase):
         self.ask({"do": "carry_home"})
         super().set_home()
 
-    def truth(self) -> Truth:
-        """Give where it really is, and how far from home it has been since the last look."""
+    def ground_truth(self) -> GroundTruth:
+        """Return its true pose, and the largest distance from home since the last call."""
         seen = self.ask({"do": "look"})
-        return Truth(Pose(**seen["pose"]), seen["farthest_m"])
+        return GroundTruth(Pose(**seen["pose"]), seen["farthest_m"])
 
     def ask(self, order: Mapping[str, Any]) -> dict[str, Any]:
-        """Do something to the twin, and give its answer. Raises BaseLost, and ValueError."""
+        """Send an order to the twin, and return its answer. Raises BaseLost and ValueError."""
         twin = self._twin
         if twin is None or twin.stdin is None or twin.stdout is None:
             raise BaseLost("The twin has not been started.")

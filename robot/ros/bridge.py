@@ -21,8 +21,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from robot.link import BackOff
-from robot.motion import TICK_S
-from robot.ros.frames import MAX_FRAME_BYTES, BadFrame, Frame, Heard, read_frame, to_text
+from robot.motion.limits import TICK_S
+from robot.ros.frames import MAX_FRAME_BYTES, BadRosFrame, Frame, Incoming, read_frame, to_text
 
 DEFAULT_URL = "ws://127.0.0.1:9090"
 
@@ -34,38 +34,38 @@ RETRY_FIRST_S, RETRY_LONGEST_S = 0.2, 5.0
 END_S = 2.0
 
 
-class Talk(Protocol):
-    """What is said to a bridge, and what hears it."""
+class TopicClient(Protocol):
+    """What publishes and subscribes at a bridge; every call is told the time."""
 
     def open(self, now_s: float) -> Iterable[Frame]:
-        """Give what is said first on a new connection."""
+        """Return the first frames of a new connection."""
 
     def due(self, now_s: float) -> Iterable[Frame]:
-        """Give what is to be said now."""
+        """Return the frames to send now."""
 
-    def hear(self, heard: Heard, now_s: float) -> None:
-        """Take what came. Raises BadFrame."""
+    def hear(self, heard: Incoming, now_s: float) -> None:
+        """Handle a received frame. Raises BadRosFrame."""
 
     def lose(self, now_s: float) -> None:
-        """Take note that the connection is lost."""
+        """Handle the loss of the connection."""
 
     def end(self, now_s: float) -> Iterable[Frame]:
-        """Give what is said last."""
+        """Return the last frames."""
 
 
 class Bridge:
-    """A connection to a rosbridge that comes back by itself.
+    """A connection to a rosbridge that reconnects by itself.
 
     Parameters
     ----------
     url
         ws://host:9090.
-    talk
-        What is said and heard.
+    client
+        What publishes and subscribes.
     lock
-        Held while the talk is asked and told, which happens on our thread.
+        Held during each call of the client, on the bridge's thread.
     monotonic
-        The clock [s] that the talk is told.
+        The clock [s] of those calls.
     sleep, jitter
         How to pause between attempts, and where chance comes from, in [0, 1).
 
@@ -81,7 +81,7 @@ class Bridge:
     def __init__(
         self,
         url: str,
-        talk: Talk,
+        client: TopicClient,
         lock: threading.Lock,
         monotonic: Callable[[], float] = time.monotonic,
         *,
@@ -89,7 +89,7 @@ class Bridge:
         jitter: Callable[[], float] = random.random,
     ) -> None:
         self.url = url
-        self._talk, self._lock = talk, lock
+        self._client, self._lock = client, lock
         self._monotonic = monotonic
         self._sleep = sleep
         self._back_off = BackOff(RETRY_FIRST_S, RETRY_LONGEST_S, jitter)
@@ -106,12 +106,12 @@ class Bridge:
         return not self._thread.is_alive()
 
     def wake(self) -> None:
-        """Have said at once what is due. Never waits, never raises."""
+        """Send at once what is due. Never waits, never raises."""
         with suppress(RuntimeError):  # it has been closed
             self._loop.call_soon_threadsafe(self._wanted.set)
 
     def close(self) -> None:
-        """Say the last words and hang up. Never raises."""
+        """Send the last frames and close. Never raises."""
         with suppress(RuntimeError):
             self._loop.call_soon_threadsafe(self._closing.set)
         self._thread.join(END_S)
@@ -154,18 +154,18 @@ class Bridge:
                 await self._converse(socket)
             finally:
                 with self._lock:
-                    self._talk.lose(self._monotonic())
+                    self._client.lose(self._monotonic())
                 self.problem = f"The connection to the rosbridge at {self.url} was lost."
         await self._sleep(self._back_off.next_s())
 
     async def _converse(self, socket: ClientConnection) -> None:
-        """Say and hear until the connection is lost, or we are closed."""
+        """Send and receive until the connection is lost or the bridge closed."""
         try:
-            await self._say(socket, self._talk.open)
+            await self._say(socket, self._client.open)
             hearing = asyncio.create_task(self._listen(socket))
             try:
                 while not hearing.done():
-                    await self._say(socket, self._talk.due)
+                    await self._say(socket, self._client.due)
                     with suppress(TimeoutError):
                         async with asyncio.timeout(TICK_S):
                             await self._wanted.wait()
@@ -178,7 +178,7 @@ class Bridge:
             socket.transport.abort()
         except asyncio.CancelledError:
             with suppress(ConnectionClosed, TimeoutError):
-                await self._say(socket, self._talk.end)
+                await self._say(socket, self._client.end)
             raise
         finally:
             await socket.close()
@@ -196,8 +196,8 @@ class Bridge:
                 try:
                     heard = read_frame(text)
                     with self._lock:
-                        self._talk.hear(heard, self._monotonic())
-                except BadFrame:
+                        self._client.hear(heard, self._monotonic())
+                except BadRosFrame:
                     self.counters["bridge_bad"] += 1
                 else:
                     self._back_off.reset()
@@ -205,7 +205,7 @@ class Bridge:
 
 
 def find_bridge() -> str:
-    """Give the address of the environment (GARRY_ROS_URL), or where a bridge would be here."""
+    """Return the address in GARRY_ROS_URL, or the default one on this computer."""
     return os.environ.get("GARRY_ROS_URL", DEFAULT_URL)
 
 

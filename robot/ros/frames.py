@@ -1,4 +1,4 @@
-"""Frames of rosbridge v2: the six operations that are said, and the two that are heard.
+"""Frames of rosbridge v2: the six operations that are sent, and the two that are received.
 
 A bridge complains of nothing that it is told (docs/reference/rosbridge.md#behavior): what matters
 has to come back from it. So nothing is sent here that waits in a queue anywhere: publishers and
@@ -17,8 +17,8 @@ MAX_FRAME_BYTES = 64 * 1024  # an Odometry with its covariances has 2 KiB
 Frame = dict[str, Any]
 
 
-class BadFrame(ValueError):
-    """What came is no frame that would mean something here."""
+class BadRosFrame(ValueError):
+    """A received frame without a meaning here; the message says what one would be."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +45,11 @@ class Answer:
     values: Mapping[str, Any] | None
 
 
-Heard = Publication | Answer
+Incoming = Publication | Answer
 
 
 def advertise(topic: Topic, *, latch: bool = False) -> Frame:
-    """Say that we publish; with ``latch``, whoever comes later gets the last message."""
+    """Return an advertisement; with ``latch``, later subscribers get the last message."""
     return {
         "op": "advertise",
         "topic": topic.name,
@@ -60,17 +60,17 @@ def advertise(topic: Topic, *, latch: bool = False) -> Frame:
 
 
 def unadvertise(topic: Topic) -> Frame:
-    """Say that we do not publish any more."""
+    """Return the end of an advertisement."""
     return {"op": "unadvertise", "topic": topic.name}
 
 
 def publish(topic: Topic, message: Mapping[str, Any]) -> Frame:
-    """Publish a message."""
+    """Return a publication."""
     return {"op": "publish", "topic": topic.name, "msg": dict(message)}
 
 
 def subscribe(topic: Topic, *, newest_every_ms: int = 0) -> Frame:
-    """Ask for a topic's messages: each one, or only the newest of every so often."""
+    """Return a subscription: to each message, or to the newest at an interval [ms]."""
     return {
         "op": "subscribe",
         "topic": topic.name,
@@ -82,26 +82,26 @@ def subscribe(topic: Topic, *, newest_every_ms: int = 0) -> Frame:
 
 
 def unsubscribe(topic: Topic) -> Frame:
-    """Ask for a topic no more."""
+    """Return the end of a subscription."""
     return {"op": "unsubscribe", "topic": topic.name, "id": topic.name}
 
 
 def call_service(service: str, arguments: Mapping[str, Any], question: str) -> Frame:
-    """Ask a service; its answer has the question's name."""
+    """Return a service call; its answer has the question's name."""
     return {"op": "call_service", "service": service, "args": dict(arguments), "id": question}
 
 
 def to_text(frame: Frame) -> str:
-    """Give a frame's text. Raises ValueError for a number that is not finite."""
+    """Return a frame's text. Raises ValueError for a number that is not finite."""
     return json.dumps(frame, separators=(",", ":"), allow_nan=False)
 
 
-def read_frame(text: str | bytes) -> Heard:
-    """Read what a bridge said. Raises BadFrame for anything that is neither of the two."""
+def read_frame(text: str | bytes) -> Incoming:
+    """Return a publication or an answer. Raises BadRosFrame for anything else."""
     try:
         frame = json.loads(text)
     except (ValueError, RecursionError):
-        raise BadFrame("A frame is a JSON object.") from None
+        raise BadRosFrame("A frame is a JSON object.") from None
     match frame:
         case {"op": "publish", "topic": str(topic), "msg": dict(message)}:
             return Publication(topic, message)
@@ -110,4 +110,4 @@ def read_frame(text: str | bytes) -> Heard:
             # (docs/reference/rosbridge.md#messages).
             values = rest.get("values") if rest.get("result") is True else None
             return Answer(question, values if isinstance(values, dict) else None)
-    raise BadFrame('A frame that is heard has the "op" publish or service_response.')
+    raise BadRosFrame('A frame that is heard has the "op" publish or service_response.')

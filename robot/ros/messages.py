@@ -1,4 +1,4 @@
-"""Messages of ROS 1 as JSON: those that are published, and those that are believed.
+"""Messages of ROS 1 as JSON: written and read, with every number checked.
 
 Every number that comes in is checked: a bridge passes on NaN, text and whatever else it is given
 (docs/reference/rosbridge.md#behavior). Axes are those of motion.py, which are those of ROS (REP
@@ -11,21 +11,22 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from robot.motion import Pose, Twist
-from robot.ros.frames import BadFrame
+from robot.motion.pose import Pose
+from robot.motion.twist import Twist
+from robot.ros.frames import BadRosFrame
 
 TWIST = "geometry_msgs/Twist"
 ODOMETRY = "nav_msgs/Odometry"
 BOOL = "std_msgs/Bool"
 STRING = "std_msgs/String"
-# Type of an event: the name of its field that says which feeler it was. Its field ``state`` is 1
+# Type of an event: the name of its field that says which sensor it was. Its field ``state`` is 1
 # while it is pressed, sees an edge, or hangs free (kobuki_msgs).
 EVENTS = {
     "kobuki_msgs/BumperEvent": "bumper",
     "kobuki_msgs/CliffEvent": "sensor",
     "kobuki_msgs/WheelDropEvent": "wheel",
 }
-FEELERS = (*EVENTS, BOOL)
+SENSOR_TYPES = (*EVENTS, BOOL)
 
 # No base of ours is further from anywhere [m], nor faster [m/s, rad/s]: such a number was made up.
 FARTHEST_M = 1e6
@@ -35,7 +36,7 @@ Message = Mapping[str, Any]
 
 
 def write_twist(twist: Twist) -> dict[str, Any]:
-    """Give a geometry_msgs/Twist."""
+    """Return a geometry_msgs/Twist."""
     return {
         "linear": {"x": twist.v_m_s, "y": 0.0, "z": 0.0},
         "angular": {"x": 0.0, "y": 0.0, "z": twist.w_rad_s},
@@ -43,17 +44,17 @@ def write_twist(twist: Twist) -> dict[str, Any]:
 
 
 def read_twist(message: Message) -> Twist:
-    """Read a geometry_msgs/Twist. Raises BadFrame."""
+    """Read a geometry_msgs/Twist. Raises BadRosFrame."""
     return Twist(
         _number(message, FASTEST, "linear", "x"), _number(message, FASTEST, "angular", "z")
     )
 
 
 def read_odometry(message: Message) -> tuple[Pose, Twist]:
-    """Read a nav_msgs/Odometry: pose in its own frame, and velocity. Raises BadFrame."""
+    """Read a nav_msgs/Odometry: pose in its own frame, and velocity. Raises BadRosFrame."""
     x, y, z, w = (_number(message, 2.0, "pose", "pose", "orientation", axis) for axis in "xyzw")
     if abs(math.hypot(x, y, z, w) - 1) > 0.1:
-        raise BadFrame("An orientation is a unit quaternion.")
+        raise BadRosFrame("An orientation is a unit quaternion.")
     heading_rad = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     x_m, y_m = (_number(message, FARTHEST_M, "pose", "pose", "position", axis) for axis in "xy")
     twist = Twist(
@@ -64,15 +65,15 @@ def read_odometry(message: Message) -> tuple[Pose, Twist]:
 
 
 def read_event(kind: str, message: Message) -> tuple[int, bool]:
-    """Read an event: which feeler, and whether it feels something. Raises BadFrame."""
+    """Read an event: which sensor, and whether it feels something. Raises BadRosFrame."""
     if kind == BOOL:
         data = message.get("data")
         if not isinstance(data, bool):
-            raise BadFrame('"data" of a Bool is true or false.')
+            raise BadRosFrame('"data" of a Bool is true or false.')
         return 0, data
     which, state = message.get(EVENTS[kind]), message.get("state")
     if type(which) is not int or type(state) is not int or not 0 <= which <= 255:
-        raise BadFrame("An event says which feeler it was, and its state.")
+        raise BadRosFrame("An event says which sensor it was, and its state.")
     return which, state != 0
 
 
@@ -80,7 +81,7 @@ def _number(message: Any, most: float, *path: str) -> float:
     for name in path:
         message = message.get(name) if isinstance(message, dict) else None
     if isinstance(message, bool) or not isinstance(message, (int, float)):
-        raise BadFrame(f"{'.'.join(path)} is a number.")
+        raise BadRosFrame(f"{'.'.join(path)} is a number.")
     if not abs(message) <= most:
-        raise BadFrame(f"{'.'.join(path)} is no number that could be.")
+        raise BadRosFrame(f"{'.'.join(path)} is no number that could be.")
     return float(message)

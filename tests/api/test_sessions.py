@@ -12,8 +12,8 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Protocol
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
+from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Station
 from rehab.training.goals import GoalRule
 from rehab.training.metrics import METRICS
@@ -40,7 +40,12 @@ def rosa(world: World) -> Patient:
 def walked(patient: Patient, valence: str, score: float | None, day: int) -> TrainingSession:
     """Make a finished session with a score."""
     session = create_session(
-        patient, valence=valence, goal=GoalRule(value=3.0), phases=[make_phase("training")]
+        SessionRequest(
+            patient=patient,
+            valence=valence,
+            goal=GoalRule(value=3.0),
+            phases=[make_phase("training")],
+        )
     )
     session.created_at = session.started_at = datetime(2026, 5, day, 9, 30, tzinfo=HERE.tzinfo)
     session.state, session.active_s = "finished", 61.5
@@ -205,7 +210,7 @@ def test_every_choice_reaches_the_plan(world, pt, rosa):
         "right",
     )
     assert (plan.target.hit_rate, plan.target.duration_s) == (0.65, 720)
-    assert session.runs[:3] == ["synthetic", "--profile", "poor"]
+    assert session.source_args[:3] == ["synthetic", "--profile", "poor"]
 
 
 @pytest.mark.parametrize(

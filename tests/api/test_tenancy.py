@@ -122,10 +122,10 @@ def test_calls_that_ignore_whose_rows_they_read_and_change_are_caught(monkeypatc
 def test_sessions_and_boards_of_anybody_are_caught(monkeypatch):
     def find(user: User, session_id: int) -> TrainingSession:
         them = TrainingSession.everywhere.get(pk=session_id).clinic
-        return find_session(User.everywhere.get(clinic=them, role=Role.LEAD), session_id)
+        return get_session(User.everywhere.get(clinic=them, role=Role.LEAD), session_id)
 
-    find_session = sessions_api.find_session
-    monkeypatch.setattr(sessions_api, "find_session", find)
+    get_session = sessions_api.get_session
+    monkeypatch.setattr(sessions_api, "get_session", find)
     monkeypatch.setattr(
         Leaderboard.objects, "visible_to", lambda actor: Leaderboard.everywhere.all(), raising=False
     )

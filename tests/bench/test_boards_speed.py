@@ -184,7 +184,7 @@ def walk_while_one_is_built(patients: int) -> dict[str, float]:
     from rehab.people.models import Clinic, Patient
     from rehab.sessions.live.actor import SessionActor
     from rehab.sessions.models import TrainingSession
-    from rehab.sessions.services import create_session
+    from rehab.sessions.services import SessionRequest, create_session
     from rehab.training.changes import Change, ChangeKind
     from rehab.training.goals import GoalRule
     from rehab.training.phases import make_phase
@@ -193,7 +193,9 @@ def walk_while_one_is_built(patients: int) -> dict[str, float]:
 
     walker = Patient.everywhere.order_by("pk")[0]
     phases = (make_phase("training"),)
-    session = create_session(walker, valence="binary", goal=GoalRule(value=1.0), phases=phases)
+    session = create_session(
+        SessionRequest(patient=walker, valence="binary", goal=GoalRule(value=1.0), phases=phases)
+    )
     actor, now = SessionActor(session), datetime.now(UTC)
     store(actor, actor.change(Change(ChangeKind.START), None, now))
 

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from tests.robot import damage
+from tests.support import kobuki_damage as damage
 
 pytestmark = pytest.mark.bench
 

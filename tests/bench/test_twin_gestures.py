@@ -7,9 +7,10 @@ import time
 import pytest
 
 from robot.bases.twinned import TwinBase
-from robot.gestures import GESTURES, ORIGINALS, TETHER_M
-from robot.safety import AWAY
-from robot.solo import play
+from robot.behavior.safety import AWAY
+from robot.motion.gesture import TETHER_M
+from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.play_gesture import play_gesture
 
 TIMES = 20
 
@@ -19,7 +20,7 @@ def run(name, seed, times):
     wheels = [f"--{side}-scale={chance.uniform(1.0, 1.02):.4f}" for side in ("left", "right")]
     with TwinBase(time.monotonic, *wheels) as twin:
         for number in range(times):
-            played = play((GESTURES | ORIGINALS)[name], twin, time.monotonic, time.sleep)
+            played = play_gesture((GESTURES | ORIGINALS)[name], twin, time.monotonic, time.sleep)
             pose = played["true_pose"]
             away_m = math.hypot(pose["x_m"], pose["y_m"])
             turned_deg = math.degrees(abs(math.remainder(pose["heading_rad"], math.tau)))

@@ -146,14 +146,14 @@ def test_a_correction_reaches_a_frozen_board(clinic, snapshot):
     assert BoardEntry.everywhere.get(patient=people[0]).figure == 100
     mine = TrainingSession.everywhere.filter(patient=people[0]).order_by("started_at")
     first, second = mine
-    first.left_out = True
+    first.excluded = True
     first.save()
     assert BoardEntry.everywhere.get(patient=people[0]).figure == 75
-    second.left_out = True
+    second.excluded = True
     second.save()
     assert not BoardEntry.everywhere.filter(patient=people[0]).exists()
     assert BoardEntry.everywhere.count() == 5
-    first.left_out = False
+    first.excluded = False
     first.save()
     assert BoardEntry.everywhere.count() == 5
 

@@ -29,7 +29,7 @@ WALKED = """
 from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
-from rehab.sessions.protocols import Protocol
+from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Station
 from tests.support.walks import visit
 rosa = Patient.everywhere.create(

@@ -18,7 +18,7 @@ SEED = """
 from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
-from rehab.sessions.protocols import Protocol
+from rehab.sessions.setup.protocols import Protocol
 from tests.support.walks import strides, walk
 rosa = Patient.everywhere.create(
     clinic=first_clinic(), code="R-1", nickname="Rosa", paretic_side="left"

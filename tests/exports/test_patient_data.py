@@ -28,7 +28,7 @@ from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.consent.models import Purpose, withdraw
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.corrections import Part, correct_session
+from rehab.sessions.corrections import CorrectedField, correct_session
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Station
@@ -190,7 +190,7 @@ def test_each_step_says_under_which_feedback_type_it_was_taken(world):
         phases=phases,
     )
     lead = world.people[Role.LEAD]
-    correct_session(session, {Part.COUNTS: "no"}, "The sensor slipped.", lead, NOW)
+    correct_session(session, {CorrectedField.COUNTS: "no"}, "The sensor slipped.", lead, NOW)
     files = fetch(world)
     steps = [row for row in rows_of(files["steps.csv"]) if row["session"] == str(session.pk)]
     assert [row["feedback_type"] for row in steps] == [
@@ -198,10 +198,10 @@ def test_each_step_says_under_which_feedback_type_it_was_taken(world):
     ]
     assert [row["points"] for row in steps] == ["1", "0", "", "-1", "0"]
     (told,) = (row for row in rows_of(files["sessions.csv"]) if row["session"] == str(session.pk))
-    assert (told["changed_to"], told["left_out"]) == ("negative", "true")
+    assert (told["changed_to"], told["excluded"]) == ("negative", "true")
     rows = rows_of(files["corrections.csv"])
     (corrected,) = (row for row in rows if row["session"] == str(session.pk))
-    assert (corrected["part"], corrected["old"], corrected["new"]) == ("counts", "yes", "no")
+    assert (corrected["field"], corrected["old"], corrected["new"]) == ("counts", "yes", "no")
     assert (corrected["reason"], corrected["by"]) == ("The sensor slipped.", lead.username)
 
 

@@ -9,7 +9,7 @@ import pytest
 from django.test import Client
 
 from rehab.gestures.models import Gesture
-from robot.trial import admit_gesture
+from robot.motion.dry_run import validate_gesture
 from tests.support.forms import gesture_form
 from tests.support.world import World, build_world, client_of
 
@@ -37,7 +37,7 @@ def test_a_pt_composes_a_gesture_for_the_clinic(pt, world):
     assert wave.clinic == world.clinic
     rows = list(wave.steps.values_list("position", "turn_deg", "hold_s"))
     assert rows == [(1, 30, 0), (2, -60, 0.5), (3, 30, 0)]
-    assert admit_gesture(wave.to_data()).name == "wave"
+    assert validate_gesture(wave.to_data()).name == "wave"
 
 
 def test_numbers_say_the_order(pt):

@@ -20,16 +20,16 @@ STRIDES = 24
 SEED = """
 from rehab.people.sign_in.first_start import first_clinic
 from rehab.people.models import Patient
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
 from rehab.stations.builtin import first_station
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
 clinic = first_clinic()
 patient = Patient.everywhere.create(clinic=clinic, code="R", nickname="R", paretic_side="left")
-create_session(
-    patient, valence="positive", goal=GoalRule(value=3.0), phases=[make_phase("training")],
-    station=first_station(clinic), runs={runs!r},
-)
+create_session(SessionRequest(
+    patient=patient, valence="positive", goal=GoalRule(value=3.0), phases=[make_phase("training")],
+    station=first_station(clinic), source_args={runs!r},
+))
 """
 CHANGE = """
 import asyncio, json, os, sys

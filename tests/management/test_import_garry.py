@@ -139,8 +139,8 @@ def test_ids_dates_scores_types_and_goals_are_those_of_the_original(file, clinic
         assert (session.valence, session.goal, session.state) == (kind.lower(), goal, "finished")
         assert session.to_plan().goal.value == goal
         assert scores.get(pk) == (None if kind == "Explicit" else score)
-        assert session.original["score"] == score
-        assert session.original["threshold"] == goal
+        assert session.legacy_row["score"] == score
+        assert session.legacy_row["threshold"] == goal
     assert not Step.everywhere.exists()
 
 
@@ -309,7 +309,7 @@ def test_another_file_with_the_same_ids_is_not_mixed_in(file, clinic):
 def test_several_clinics_have_to_be_told_apart(file, clinic):
     birch = Clinic.everywhere.create(name="Birch")
     _, problem = refused(file)
-    assert "Say --clinic with one of: Birch, Oak" in problem
+    assert "Give --clinic with one of: Birch, Oak" in problem
     assert "no clinic 'Elm'" in refused(file, "--clinic", "Elm")[1]
     run(file, "--clinic", "Birch")
     assert TrainingSession.everywhere.filter(clinic=birch).count() == 67

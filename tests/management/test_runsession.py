@@ -15,7 +15,7 @@ from django.core.management import CommandError, call_command
 from rehab.sessions.headless import Pace, run_session
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
 from rehab.sources.recording import read_recording
 from rehab.training.goals import GoalRule
 from tests.support.data import recording
@@ -164,7 +164,12 @@ def test_true_cadence_waits_for_each_stride_on_the_given_clock(tmp_path):
 
     world = build_world("amber")
     session = create_session(
-        world.patient, valence="positive", goal=GoalRule(value=3.0), phases=walk.phases
+        SessionRequest(
+            patient=world.patient,
+            valence="positive",
+            goal=GoalRule(value=3.0),
+            phases=walk.phases,
+        )
     )
     pace = Pace(2.0, lambda: now[0], sleep)
     asyncio.run(run_session(session.pk, lambda _: iter(walk), pace))
@@ -174,10 +179,12 @@ def test_true_cadence_waits_for_each_stride_on_the_given_clock(tmp_path):
 def test_a_run_that_breaks_leaves_an_aborted_session_with_its_steps(tmp_path):
     world = build_world("amber")
     session = create_session(
-        world.patient,
-        valence="positive",
-        goal=GoalRule(value=3.0),
-        phases=world.session.to_plan().phases,
+        SessionRequest(
+            patient=world.patient,
+            valence="positive",
+            goal=GoalRule(value=3.0),
+            phases=world.session.to_plan().phases,
+        )
     )
 
     def strides(_):

@@ -29,7 +29,7 @@ browser = Client()
 browser.force_login(User.everywhere.get())
 print(browser.cookies["sessionid"].value)
 from rehab.people.models import Patient
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Device
 from rehab.training.goals import GoalRule
@@ -42,8 +42,8 @@ for kind in KINDS:
     device.save()
     print(token)
 patient = Patient.everywhere.create(clinic=clinic, code="1", nickname="A", paretic_side="left")
-create_session(patient, valence="positive", goal=GoalRule(value=3.0),
-               phases=[make_phase("training")], station=station)
+create_session(SessionRequest(patient=patient, valence="positive", goal=GoalRule(value=3.0),
+               phases=[make_phase("training")], station=station))
 """
 READ_LOG = """
 import django, json; django.setup()

@@ -19,7 +19,7 @@ from rehab.people.sign_in.factors import Authenticator
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.models import Device
 from tests.support.archives import body_of
 from tests.support.tenancy import all_routes, walk_patterns

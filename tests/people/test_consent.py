@@ -27,7 +27,7 @@ from rehab.people.models import Boards, Clinic, Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from tests.support.world import NOW, World, client_of
@@ -220,11 +220,13 @@ def test_leaving_boards_on_the_tablet_withdraws_the_consent(world, pt):
 def set_up(world: World) -> TrainingSession:
     walked = world.session
     return create_session(
-        world.patient,
-        valence="positive",
-        goal=GoalRule(value=1.0),
-        protocol=walked.protocol,
-        measure=walked.measure,
+        SessionRequest(
+            patient=world.patient,
+            valence="positive",
+            goal=GoalRule(value=1.0),
+            protocol=walked.protocol,
+            measure=walked.measure,
+        )
     )
 
 

@@ -7,7 +7,7 @@ from django.urls import reverse
 
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.sessions.protocols import Protocol
+from rehab.sessions.setup.protocols import Protocol
 from tests.support.form_noise import run_noise
 from tests.support.world import build_world, client_of
 

@@ -13,7 +13,7 @@ from django.urls import reverse
 
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocol_admin import PresetAdmin
+from rehab.sessions.setup_admin import PresetAdmin
 from tests.support.world import client_of, scoped_models
 
 pytestmark = pytest.mark.django_db
@@ -34,7 +34,7 @@ def is_refused(client: Client, url: str, **asked: str) -> bool:
 
 def test_a_researcher_cannot_ask_letter_by_letter_what_is_hidden(world):
     TrainingSession.everywhere.filter(pk=world.session.pk).update(
-        source="Recording: maria_lopez.csv", original={"participant_id": 7}
+        source="Recording: maria_lopez.csv", legacy_row={"participant_id": 7}
     )
     client, url = client_of(world, Role.RESEARCHER), reverse(SESSIONS)
     assert client.get(url).context["cl"].result_count == 1

@@ -138,7 +138,7 @@ def test_a_host_makes_clinics_and_their_leads(world):
 
 
 def test_shared_rows_are_the_hosts_to_change(world):
-    from rehab.sessions.protocols import Measure, Protocol
+    from rehab.sessions.setup.protocols import Measure, Protocol
 
     client = client_of(world, Role.LEAD)
     for model in (Measure, Protocol):

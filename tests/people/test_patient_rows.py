@@ -26,8 +26,8 @@ from rehab.people.consent.models import (
 from rehab.people.models import Boards, Erasing, Patient
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
-from rehab.sessions.defaults import install_defaults
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
+from rehab.sessions.setup.defaults import install_defaults
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from tests.support.world import NOW, World, build_world, client_of
@@ -115,11 +115,13 @@ def test_nobody_agrees_joins_or_walks_for_a_person_who_was_just_erased(world):
     walked = world.session
     with pytest.raises(InvalidSetting, match="has ended"):
         create_session(
-            stale[2],
-            valence="positive",
-            goal=GoalRule(value=1.0),
-            protocol=walked.protocol,
-            measure=walked.measure,
+            SessionRequest(
+                patient=stale[2],
+                valence="positive",
+                goal=GoalRule(value=1.0),
+                protocol=walked.protocol,
+                measure=walked.measure,
+            )
         )
 
 

@@ -17,7 +17,7 @@ from django.utils.translation import override
 from rehab.people.models import Clinic, Patient
 from rehab.people.roles import Role
 from rehab.people.web.refusals import in_words
-from rehab.sessions.protocols import Protocol
+from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind, NotAllowed, State
 from rehab.training.controls import CONTROLS
@@ -25,8 +25,8 @@ from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
 from rehab.training.valences import VALENCES, CueGestures, edit_valence
-from robot.composed import Move, compose
-from robot.gestures import BadGesture
+from robot.motion.gesture_errors import BadGesture
+from robot.motion.gesture_spec import Move, build_gesture
 from tests.support.forms import feedback_form, gesture_form, session_form
 from tests.support.programs import program_of
 from tests.support.world import World, client_of
@@ -70,10 +70,13 @@ def said(act: Callable[[], object], language: str = "es") -> str:
             "Negativa: esta retroalimentación no da nada por un acierto y quita puntos",
         ),
         (
-            lambda: compose("wave", [Move(turn_rad=0.5)]),
+            lambda: build_gesture("wave", [Move(turn_rad=0.5)]),
             "Termina con un giro de 29° a la izquierda. Añada pasos que vuelvan al origen.",
         ),
-        (lambda: compose("wave", [Move(forward_m=0.4)]), "Paso 1: se aleja 0,40 m del origen"),
+        (
+            lambda: build_gesture("wave", [Move(forward_m=0.4)]),
+            "Paso 1: se aleja 0,40 m del origen",
+        ),
     ],
 )
 def test_a_refusal_is_said_in_spanish_with_its_values(act, words):

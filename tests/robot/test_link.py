@@ -9,9 +9,8 @@ from dataclasses import replace
 import pytest
 from websockets.asyncio.server import serve
 
-from robot.dialing import CannotDial, check_token, websocket_url
+from robot.connection_args import BadConnectionArgs, check_token, websocket_url
 from robot.link import (
-    MAX_FRAME_BYTES,
     REFUSALS,
     BackOff,
     FrameTooLarge,
@@ -19,8 +18,7 @@ from robot.link import (
     LinkRefused,
     Timing,
 )
-
-pytestmark = pytest.mark.realtime
+from robot.wire.limits import MAX_FRAME_BYTES
 
 QUICK = Timing(retry_first_s=0.01, retry_longest_s=0.05, close_within_s=0.1)
 HELLO = {"type": "hello", "version": 1}
@@ -97,7 +95,7 @@ def test_a_server_address_becomes_a_websocket_address(server, url):
     ],
 )
 def test_what_is_no_address_is_refused_with_an_example(server):
-    with pytest.raises(CannotDial, match="http://127.0.0.1:8000"):
+    with pytest.raises(BadConnectionArgs, match="http://127.0.0.1:8000"):
         websocket_url(server, "/ws/source/")
 
 
@@ -107,7 +105,7 @@ def test_a_token_loses_its_blanks():
 
 @pytest.mark.parametrize("token", ["", "  ", "a b", "a\nb", "ä", "a\r\nX: y"])
 def test_what_is_no_token_is_refused(token):
-    with pytest.raises(CannotDial, match="Copy it"):
+    with pytest.raises(BadConnectionArgs, match="Copy it"):
         check_token(token)
 
 
@@ -258,6 +256,8 @@ async def test_pauses_stay_bounded_while_there_is_no_server():
     waiting = asyncio.create_task(anext(link))
     await until(lambda: len(losses.pauses_s) >= 9)
     waiting.cancel()
+    await asyncio.gather(waiting, return_exceptions=True)
+    await link.close()
 
     assert losses.pauses_s[:3] == pytest.approx([0.15, 0.3, 0.6])
     assert max(losses.pauses_s) == 3.75
@@ -299,11 +299,14 @@ async def test_a_server_that_hangs_up_before_a_word_is_not_hammered():
         waiting = asyncio.create_task(anext(link))
         await until(lambda: len(losses.pauses_s) >= 4)
         waiting.cancel()
+        await asyncio.gather(waiting, return_exceptions=True)
+        await link.close()
         serving_over.set()
 
     assert losses.pauses_s[:4] == pytest.approx([0.2, 0.4, 0.8, 1.6])
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("talks", [False, True], ids=["listening", "sending"])
 async def test_a_half_open_link_is_noticed(talks):
     greetings = []

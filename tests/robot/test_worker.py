@@ -9,15 +9,14 @@ import pytest
 
 from robot.bases import BASES, Abilities, BaseLost
 from robot.bases.kinematic import KinematicBase
-from robot.link import NOT_PROTOCOL, REFUSALS, Link, LinkRefused, Timing
-from robot.motion import STILL
+from robot.link import REFUSALS, Link, LinkRefused, Timing
+from robot.motion.twist import STILL
+from robot.wire.close_codes import CloseCode
 from robot.worker import Worker
-from tests.robot.fake_garry import TOKEN, FakeGarry, serve_garry
-
-pytestmark = pytest.mark.realtime
+from tests.support.fake_robot_server import TOKEN, FakeGarry, serve_garry
 
 FAST = Timing(retry_first_s=0.02, retry_longest_s=0.1)
-ENDING = REFUSALS.keys() - {NOT_PROTOCOL}  # of the close codes, those that end the work
+ENDING = REFUSALS.keys() - {CloseCode.NOT_PROTOCOL}  # of the close codes, those that end the work
 
 
 class RealBase(KinematicBase):
@@ -57,6 +56,7 @@ def is_kind(kind, **parts):
     return lambda report: report["kind"] == kind and parts.items() <= report.items()
 
 
+@pytest.mark.realtime
 async def test_it_says_hello_decides_performs_and_reports(garry):
     async with working(garry):
         await garry.until_hello(1)
@@ -70,6 +70,7 @@ async def test_it_says_hello_decides_performs_and_reports(garry):
         await garry.until(is_kind("gesture", phase="ended", outcome="done"))
 
 
+@pytest.mark.realtime
 async def test_a_stop_is_at_the_base_within_a_tenth_of_a_second(garry):
     base = BASES["kinematic"](time.monotonic)
     async with working(garry, base):
@@ -83,6 +84,7 @@ async def test_a_stop_is_at_the_base_within_a_tenth_of_a_second(garry):
         await garry.until(is_kind("gesture", phase="ended", outcome="stopped"))
 
 
+@pytest.mark.realtime
 async def test_silence_stops_it_and_what_was_on_its_way_counts_no_more(garry):
     base = BASES["kinematic"](time.monotonic)
     said: list[str] = []
@@ -101,6 +103,7 @@ async def test_silence_stops_it_and_what_was_on_its_way_counts_no_more(garry):
     assert any("silent" in line for line in said)
 
 
+@pytest.mark.realtime
 async def test_a_server_that_goes_stops_it_and_is_found_again():
     garry, base = FakeGarry(), BASES["kinematic"](time.monotonic)
     async with serve_garry(garry) as server:
@@ -122,6 +125,7 @@ STANDARD = [1000, 1001, 1002, 1003, 1007, 1008, 1009, 1010, 1011, 1012, 1013, 10
 OURS = [4000, 4001, 4004, 4008, 4009, 4011, 4012, 4029, 4400, 4409, 4410, 4999]
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("code", [None, *STANDARD, *OURS])
 async def test_however_the_server_hangs_up_it_stands_still_until_somebody_orders(garry, code):
     garry.welcome |= {"watched": True}

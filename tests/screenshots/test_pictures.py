@@ -72,11 +72,11 @@ from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
 from rehab.gestures.models import Gesture
 from rehab.people.models import Patient, User
-from rehab.sessions.corrections import Part, correct_session
+from rehab.sessions.corrections import CorrectedField, correct_session
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Protocol
-from rehab.sessions.presets import Preset
+from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.presets import Preset
 from rehab.patients.visits import plan_visit
 from rehab.stations.models import Device, Station
 from tests.support.walks import visit
@@ -91,9 +91,12 @@ for index, valence in enumerate(types):
     days_ago = 3 * (len(types) - 1 - index)
     last = visit(rosa, valence, index + 1, days_ago, 360 + 70 * (index % 3), timezone.now())
 lead = User.everywhere.get(username="pt")
-left_out = TrainingSession.everywhere.get(pk=11)
-changes = {Part.COUNTS: "no", Part.NOTE: "Walked with a cane from minute four on."}
-correct_session(left_out, changes, "The sensor slipped.", lead, timezone.now())
+excluded = TrainingSession.everywhere.get(pk=11)
+changes = {
+    CorrectedField.COUNTS: "no",
+    CorrectedField.NOTE: "Walked with a cane from minute four on.",
+}
+correct_session(excluded, changes, "The sensor slipped.", lead, timezone.now())
 blocks = Protocol.everywhere.create(
     clinic=first_clinic(), name="Short blocks", description="Four blocks, each a little harder."
 )

@@ -20,8 +20,8 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.presets import Preset
-from rehab.sessions.protocols import Protocol, ProtocolPhase
+from rehab.sessions.setup.presets import Preset
+from rehab.sessions.setup.protocols import Protocol, ProtocolPhase
 from rehab.stations.models import Device, Station, find_device
 from tests.support.walks import strides, walk
 from tests.support.world import NOW, World, build_world, client_of
@@ -147,7 +147,7 @@ def multiply(world: World) -> None:
         patient = patient_of(world, f"More {number}")
         session = walk(patient, "positive", strides(3, 1), days_ago=number)
         SessionCorrection.everywhere.create(
-            session=session, part="note", reason="why", by=world.people[Role.PT], at=NOW
+            session=session, field="note", reason="why", by=world.people[Role.PT], at=NOW
         )
         Leaderboard.everywhere.create(clinic=world.clinic, name=f"More {number}")
         station = Station.everywhere.create(clinic=world.clinic, name=f"More {number}")

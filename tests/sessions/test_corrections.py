@@ -17,12 +17,12 @@ from rehab.people.consent.models import Purpose, give
 from rehab.people.models import Erasing, Patient
 from rehab.people.roles import Role
 from rehab.sessions import corrections
-from rehab.sessions.corrections import Part, SessionCorrection, correct_session
+from rehab.sessions.corrections import CorrectedField, SessionCorrection, correct_session
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.dashboard import read_week
-from rehab.sessions.reports.takehome import sum_up_for_home
-from rehab.sessions.reports.trend import read_trend
+from rehab.sessions.reports.takehome import summarize_for_patient
+from rehab.sessions.reports.trend import load_trend
+from rehab.sessions.reports.week import week_summary
 from tests.support.walks import strides, walk
 from tests.support.world import NOW, World, agreeing, build_world, client_of
 
@@ -124,7 +124,7 @@ def test_a_session_goes_to_whoever_walked_it(world, rosa, omar):
     agrees_with_a_rebuild(board)
     assert log_of(session) == log
     row = SessionCorrection.everywhere.get(session=session)
-    assert (row.part, row.old, row.new) == (Part.PATIENT, rosa.pseudonym, omar.pseudonym)
+    assert (row.field, row.old, row.new) == (CorrectedField.PATIENT, rosa.pseudonym, omar.pseudonym)
     assert (row.by, row.reason) == (world.people[Role.PT], "Read off the sheet.")
 
 
@@ -147,9 +147,9 @@ def test_what_is_left_out_is_in_no_board_trend_week_or_paper_and_comes_back(worl
     def figures() -> tuple[Any, ...]:
         return (
             rows_of(board).get(rosa.pk),
-            [point.session.pk for point in read_trend(pt, mine)],
-            read_week(pt, world.clinic, now).total.sessions,
-            sum_up_for_home(pt, mine, now)["count"],
+            [point.session.pk for point in load_trend(pt, mine)],
+            week_summary(pt, world.clinic, now).total.sessions,
+            summarize_for_patient(pt, mine, now)["count"],
         )
 
     before = figures()
@@ -181,7 +181,7 @@ def test_the_board_follows_in_the_same_transaction(world, rosa, omar, monkeypatc
         raise Broken
 
     monkeypatch.setattr(corrections.SessionCorrection, "save", fail)
-    changes = {Part.PATIENT: omar.pseudonym}
+    changes = {CorrectedField.PATIENT: omar.pseudonym}
     with pytest.raises(Broken):
         correct_session(session, changes, "why", world.people[Role.PT], NOW)
     session.refresh_from_db()
@@ -228,16 +228,16 @@ def test_an_older_form_undoes_nothing_and_shows_what_was_altered_meanwhile(world
     lead = world.people[Role.LEAD]
     assert f"Who walked: Omar ({lead}) · Counts: left out ({lead})" in said
     session.refresh_from_db()
-    assert (session.patient, session.left_out) == (omar, True)
+    assert (session.patient, session.excluded) == (omar, True)
     assert SessionCorrection.everywhere.filter(session=session).count() == 2
     again = sent_by(page.content.decode())
     assert (again["patient"], again["counts"]) == (str(omar.pk), "no")
     assert again["note"] == "Walked with\r\na cane."
     assert client.post(url, again).status_code == 302
     session.refresh_from_db()
-    assert (session.patient, session.left_out) == (omar, True)
+    assert (session.patient, session.excluded) == (omar, True)
     newest = SessionCorrection.everywhere.filter(session=session).order_by("-pk")[0]
-    assert (newest.part, newest.new) == (Part.NOTE, "Walked with\na cane.")
+    assert (newest.field, newest.new) == (CorrectedField.NOTE, "Walked with\na cane.")
     assert newest.reason == "Told later."
     still = client.post(url, opened(world, session) | {"reason": "Nothing."})
     assert "Nothing is altered" in still.content.decode()
@@ -249,7 +249,7 @@ def test_a_form_that_does_not_say_what_it_showed_alters_nothing(world, rosa):
     page = client_of(world).post(reverse("correct", args=[session.pk]), sent)
     assert "meanwhile" in page.content.decode()
     session.refresh_from_db()
-    assert not session.left_out
+    assert not session.excluded
 
 
 def test_another_clinics_patient_cannot_have_walked_here(world, rosa):
@@ -266,7 +266,7 @@ def test_a_session_that_still_runs_is_ended_first(world, rosa):
     answer = correct(world, session, counts="no")
     assert answer.headers["Location"] == reverse("session", args=[session.pk])
     session.refresh_from_db()
-    assert not session.left_out
+    assert not session.excluded
 
 
 def test_a_researcher_reads_corrections_by_pseudonym_and_makes_none(world, rosa, omar):
@@ -315,7 +315,7 @@ def test_the_api_says_what_is_left_out(world, rosa):
     session = walk(rosa, "positive", strides(3, 1))
     correct(world, session, counts="no")
     told = client_of(world).get(f"/api/v1/sessions/{session.pk}").json()
-    assert told["left_out"] is True
+    assert told["excluded"] is True
 
 
 def test_nobody_who_is_erased_is_offered_or_taken_as_who_walked(world, rosa, omar):
@@ -326,7 +326,11 @@ def test_nobody_who_is_erased_is_offered_or_taken_as_who_walked(world, rosa, oma
     assert f'value="{rosa.pk}"' not in page
     with pytest.raises(ValidationError, match="no such patient"):
         correct_session(
-            world.session, {Part.PATIENT: rosa.pseudonym}, "Why.", world.people[Role.PT], NOW
+            world.session,
+            {CorrectedField.PATIENT: rosa.pseudonym},
+            "Why.",
+            world.people[Role.PT],
+            NOW,
         )
     erase(world.patient, Erasing.ASKED, None, NOW)  # who did walk stays chosen
     assert f'value="{world.patient.pk}" selected' in pt.get(url).content.decode()

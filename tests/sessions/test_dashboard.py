@@ -18,7 +18,8 @@ from rehab.people.roles import Role
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports import dashboard
-from rehab.sessions.reports.dashboard import find_matters, look, read_today, read_week
+from rehab.sessions.reports.dashboard import dashboard_context, find_alerts, sessions_today
+from rehab.sessions.reports.week import week_summary
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import say_seen
 from rehab.training.changes import ChangeKind, State
@@ -71,18 +72,18 @@ def test_the_weeks_figures_are_those_of_what_was_walked(world, rosa):
     ago(rosa, "positive", strides(9, 0), datetime(2026, 9, 13, 23, 59, tzinfo=HERE))
     ago(rosa, "negative", strides(9, 0), monday, simulated=True)
     out = ago(rosa, "negative", strides(9, 0), monday)
-    TrainingSession.everywhere.filter(pk=out.pk).update(left_out=True)
-    week = read_week(world.people[Role.PT], world.clinic, NOW)
-    assert (week.total.sessions, week.total.strides, week.left_out) == (3, 50, 2)
+    TrainingSession.everywhere.filter(pk=out.pk).update(excluded=True)
+    week = week_summary(world.people[Role.PT], world.clinic, NOW)
+    assert (week.total.sessions, week.total.strides, week.excluded) == (3, 50, 2)
     assert week.total.hit_rate == pytest.approx((8 + 10 + 5) / 50)
-    assert week.total.wanted == pytest.approx((0.6 * 10 + 0.8 * 10) / 20)
+    assert week.total.target_hit_rate == pytest.approx((0.6 * 10 + 0.8 * 10) / 20)
     positive, binary = week.types
     assert (positive.label, positive.sessions, positive.strides) == ("Positive", 2, 40)
     assert positive.hit_rate == pytest.approx(18 / 40)
-    assert positive.wanted == pytest.approx(0.6)
+    assert positive.target_hit_rate == pytest.approx(0.6)
     assert binary.hit_rate == pytest.approx(0.5)
-    assert binary.wanted == pytest.approx(0.8)
-    rows = TrainingSession.everywhere.filter(started_at__gte=monday, left_out=False)
+    assert binary.target_hit_rate == pytest.approx(0.8)
+    rows = TrainingSession.everywhere.filter(started_at__gte=monday, excluded=False)
     walked = sum(row.active_s for row in rows if not row.simulated)
     assert week.total.minutes == pytest.approx(walked / 60)
     assert sum(week.minutes) == pytest.approx(walked / 60)
@@ -93,19 +94,19 @@ def test_the_weeks_figures_are_those_of_what_was_walked(world, rosa):
 def test_the_week_begins_on_monday_by_the_clinics_clock(world, rosa):
     # Sunday 22:30 in UTC is Monday in Madrid.
     ago(rosa, "positive", strides(3, 1), datetime(2026, 9, 13, 22, 30, tzinfo=ZoneInfo("UTC")))
-    week = read_week(world.people[Role.PT], world.clinic, NOW)
+    week = week_summary(world.people[Role.PT], world.clinic, NOW)
     assert week.total.sessions == 1
     assert week.minutes[0] > 0
 
 
 def test_where_nobody_walked_the_simulated_ones_are_told_as_such(world, rosa):
     ago(rosa, "positive", strides(3, 1), NOW - timedelta(hours=1), simulated=True)
-    week = read_week(world.people[Role.PT], world.clinic, NOW)
+    week = week_summary(world.people[Role.PT], world.clinic, NOW)
     assert (week.simulated, week.total.sessions) == (True, 1)
 
 
 def test_a_week_without_a_session_has_no_rate(world):
-    week = read_week(world.people[Role.PT], world.clinic, NOW)
+    week = week_summary(world.people[Role.PT], world.clinic, NOW)
     assert (week.total.sessions, week.total.hit_rate, week.types) == (0, None, [])
 
 
@@ -119,7 +120,7 @@ def test_today_lists_open_sessions_first_and_yesterdays_not_at_all(world, rosa):
     TrainingSession.everywhere.filter(pk=left.pk).update(state=State.PAUSED.value)
     ago(rosa, "explicit", strides(3, 1), NOW - timedelta(days=1))
     ago(rosa, "positive", strides(1, 1), NOW - timedelta(hours=3), end=ChangeKind.ABORT)
-    lines = read_today(world.people[Role.PT], world.clinic, NOW)
+    lines = sessions_today(world.people[Role.PT], world.clinic, NOW)
     told = [(line.session.pk, line.state, line.hit_rate) for line in lines]
     assert [state for _, state, _ in told] == ["Running", "Paused", "Finished", "Aborted"]
     assert [key for key, _, _ in told[:3]] == [runs.pk, left.pk, done.pk]
@@ -128,22 +129,22 @@ def test_today_lists_open_sessions_first_and_yesterdays_not_at_all(world, rosa):
 
 
 def test_what_was_left_open_is_told_however_many_walked_since(world, rosa, monkeypatch):
-    monkeypatch.setattr(dashboard, "SHOWN", 3)
+    monkeypatch.setattr(dashboard, "MAX_ENDED", 3)
     pt = world.people[Role.PT]
     left = ago(rosa, "positive", strides(3, 1), NOW - timedelta(days=1), end=None)
     for hours in range(5):
         ago(rosa, "binary", strides(1, 1), NOW - timedelta(hours=hours))
-    told = look(pt, NOW)
+    told = dashboard_context(pt, NOW)
     assert [line.state for line in told["today"]] == ["Running", *["Finished"] * 3]
     assert told["today"][0].session == left
     assert told["walking"] == 1
-    assert "The session of Rosa is open since Sep 15" in told["matters"][0].words
+    assert "The session of Rosa is open since Sep 15" in told["alerts"][0].message
 
 
 def test_the_hit_rate_of_who_walks_is_told_as_it_stands(world, rosa, monkeypatch):
     session = ago(rosa, "positive", strides(3, 1), NOW, end=None)
     pt = world.people[Role.PT]
-    assert read_today(pt, world.clinic, NOW)[0].hit_rate == ""  # another process runs it
+    assert sessions_today(pt, world.clinic, NOW)[0].hit_rate == ""  # another process runs it
     fold = SimpleNamespace(feedback=Tally(judged=4, hits=3))
     running = SimpleNamespace(
         actor=SimpleNamespace(fold=fold),
@@ -151,7 +152,7 @@ def test_the_hit_rate_of_who_walks_is_told_as_it_stands(world, rosa, monkeypatch
     )
     live = SimpleNamespace(sessions={session.pk: running})
     monkeypatch.setattr(runtime, "peek", lambda: live)
-    assert read_today(pt, world.clinic, NOW)[0].hit_rate == "75\N{NO-BREAK SPACE}%"
+    assert sessions_today(pt, world.clinic, NOW)[0].hit_rate == "75\N{NO-BREAK SPACE}%"
     page = front(pt)
     assert (
         "75\N{NO-BREAK SPACE}%"
@@ -173,8 +174,8 @@ def test_a_session_left_open_and_devices_shut_out_want_attention(world, rosa):
         Device.everywhere.filter(pk=device.pk).update(created_at=made)
     Device.everywhere.filter(name="long revoked").update(revoked_at=NOW - timedelta(days=30))
     Device.everywhere.filter(pk=world.device.pk).update(last_seen_at=NOW)
-    told = look(pt, NOW)
-    words = [matter.words for matter in find_matters(pt, told["today"], told["places"], NOW)]
+    told = dashboard_context(pt, NOW)
+    words = [alert.message for alert in find_alerts(pt, told["today"], told["stations"], NOW)]
     assert len(words) == 3
     assert words[0] == "The session of Rosa is open since 06:00. End it."
     assert words[1].startswith("never at ")

@@ -14,18 +14,18 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.boards.models import BoardEntry
-from rehab.patients.closure import StillOpen, end_program, reopen_program
-from rehab.patients.erasure import erase, months_before, overdue
+from rehab.patients.closure import SessionStillOpen, end_program, reopen_program
+from rehab.patients.erasure import erase, months_before, patients_past_retention
 from rehab.patients.visits import Visit
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.models import Ending, Erasing, Patient
 from rehab.people.roles import Role
-from rehab.sessions.corrections import Part, SessionCorrection, correct_session
+from rehab.sessions.corrections import CorrectedField, SessionCorrection, correct_session
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from tests.support.world import NOW, World, build_world, client_of, mark, scoped_models
@@ -40,11 +40,13 @@ def page_of(world: World, client: Client) -> str:
 
 def start(world: World) -> TrainingSession:
     return create_session(
-        world.patient,
-        valence="positive",
-        goal=GoalRule(value=1.0),
-        protocol=world.session.protocol,
-        measure=world.session.measure,
+        SessionRequest(
+            patient=world.patient,
+            valence="positive",
+            goal=GoalRule(value=1.0),
+            protocol=world.session.protocol,
+            measure=world.session.measure,
+        )
     )
 
 
@@ -86,7 +88,7 @@ def test_who_has_an_open_session_is_neither_ended_nor_erased(world):
         lambda: end_program(world.patient, Ending.DONE, NOW),
         lambda: erase(world.patient, Erasing.ASKED, None, NOW),
     ):
-        with pytest.raises(StillOpen, match="End it first"):
+        with pytest.raises(SessionStillOpen, match="End it first"):
             act()
     url = reverse("end-program", kwargs={"patient_id": world.patient.pk})
     assert b"open session" in client_of(world).post(url, {"because": "done"}).content
@@ -120,8 +122,8 @@ def test_erasing_leaves_nothing_that_leads_to_the_person(world):
     assert lead.post(change, given).status_code == 302
     TrainingSession.everywhere.filter(pk=world.session.pk).update(
         source="Recording rosamunde.csv",
-        runs=["recording", "/data/rosamunde.csv"],
-        original={"name": "Rosamunde"},
+        source_args=["recording", "/data/rosamunde.csv"],
+        legacy_row={"name": "Rosamunde"},
         original_id=990_017,
     )
     Patient.everywhere.filter(pk=patient.pk).update(original_id=880_018)
@@ -131,7 +133,10 @@ def test_erasing_leaves_nothing_that_leads_to_the_person(world):
     other = Patient.everywhere.create(clinic=world.clinic, code="other", nickname="Other")
     lead_user = world.people[Role.LEAD]
     for walker in (other, patient):  # given to somebody else, and back
-        changes = {Part.PATIENT: walker.pseudonym, Part.NOTE: f"A note of osamunde {walker.code}"}
+        changes = {
+            CorrectedField.PATIENT: walker.pseudonym,
+            CorrectedField.NOTE: f"A note of osamunde {walker.code}",
+        }
         correct_session(world.session, changes, "because CASE-47", lead_user, NOW)
     patient.refresh_from_db()
     known = [patient.pseudonym, patient.alias, "990017", "880018", "87.125", "osamunde", "CASE-47"]
@@ -147,7 +152,7 @@ def test_erasing_leaves_nothing_that_leads_to_the_person(world):
     assert not AuditEntry.everywhere.filter(patient=patient).exists()
     assert not BoardEntry.everywhere.filter(patient=patient).exists()
     assert not Visit.everywhere.filter(patient=patient).exists()
-    walked = SessionCorrection.everywhere.filter(part=Part.PATIENT).order_by("pk")
+    walked = SessionCorrection.everywhere.filter(field=CorrectedField.PATIENT).order_by("pk")
     assert [row.new for row in walked][-2:] == [other.pseudonym, patient.pseudonym]
 
 
@@ -248,8 +253,11 @@ def test_who_was_imported_a_moment_ago_stays_however_old_the_sessions_are(world)
     last_walked(world, 400)
     taken_in = datetime.now(UTC) - timedelta(days=58)
     Patient.everywhere.filter(pk=world.patient.pk).update(created_at=taken_in)
-    assert not overdue(world.clinic, datetime.now(UTC)).exists()
-    assert overdue(world.clinic, datetime.now(UTC) + timedelta(days=5)).get() == world.patient
+    assert not patients_past_retention(world.clinic, datetime.now(UTC)).exists()
+    assert (
+        patients_past_retention(world.clinic, datetime.now(UTC) + timedelta(days=5)).get()
+        == world.patient
+    )
 
 
 @pytest.mark.parametrize(
@@ -261,7 +269,7 @@ def test_who_is_expected_again_stays_by_the_clinics_day(zone, day, stays, world)
     world.clinic.keep_months, world.clinic.time_zone = 2, zone
     last_walked(world, 400)
     Visit.everywhere.filter(patient=world.patient).update(day=now.date().replace(day=day))
-    assert overdue(world.clinic, now).exists() == (not stays)
+    assert patients_past_retention(world.clinic, now).exists() == (not stays)
 
 
 def test_without_a_wish_nobody_goes_and_each_clinic_has_its_own(world):
@@ -299,7 +307,7 @@ def test_an_open_session_holds_up_one_patient_and_no_other(world):
 def test_simulated_patients_stay(world):
     world.clinic.keep_months = 1
     Patient.everywhere.filter(pk=world.patient.pk).update(simulated=True)
-    assert not overdue(world.clinic, NOW + timedelta(days=5000)).exists()
+    assert not patients_past_retention(world.clinic, NOW + timedelta(days=5000)).exists()
 
 
 def test_both_logs_go_when_the_clinic_has_kept_them_long_enough(world):

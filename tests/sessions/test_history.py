@@ -16,9 +16,15 @@ from django.utils import timezone
 from rehab.people.consent.models import Purpose, give
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.formatting import at_clinic, say_day, say_duration, say_number, say_rate
+from rehab.sessions.formatting import (
+    clinic_time,
+    format_day,
+    format_duration,
+    format_number,
+    format_rate,
+)
 from rehab.sessions.log import RobotEntry, SessionEvent, Step
-from rehab.sessions.reports.trend import SESSIONS, read_trend
+from rehab.sessions.reports.trend import SESSIONS, load_trend
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.clock import HERE
@@ -145,15 +151,15 @@ def test_the_trend_equals_the_stored_strides(world, client, patient):
         2.2,
     ]
     session = walk(patient, "positive", walked, phases=phases, wanted=0.6)
-    (point,) = read_trend(world.people[Role.PT], type(session).everywhere.filter(pk=session.pk))
+    (point,) = load_trend(world.people[Role.PT], type(session).everywhere.filter(pk=session.pk))
     steps = Step.everywhere.filter(session=session, side="left", valid=True)
     trained = [step.value for step in steps if step.phase in {1, 3}]
     before = [step.value for step in steps if step.phase == 0]
-    assert point.walked.count == len(trained) == 6
-    assert point.walked.mean == pytest.approx(statistics.mean(trained))
-    assert point.walked.deviation == pytest.approx(statistics.pstdev(trained))
+    assert point.with_feedback.count == len(trained) == 6
+    assert point.with_feedback.mean == pytest.approx(statistics.mean(trained))
+    assert point.with_feedback.deviation == pytest.approx(statistics.pstdev(trained))
     assert point.baseline.mean == pytest.approx(statistics.mean(before)) == 1.5
-    assert point.gain == pytest.approx(statistics.mean(trained) / 1.5 - 1)
+    assert point.change == pytest.approx(statistics.mean(trained) / 1.5 - 1)
     chart = read_json(history(client, patient), "trend")
     assert chart["hits"]["wanted"] == [60.0]
     judged = [step.hit for step in steps if step.phase in {1, 3}]
@@ -167,7 +173,7 @@ def test_the_trend_has_the_newest_sessions_oldest_first(world, patient):
     for index in range(SESSIONS + 3):
         walk(patient, "positive", strides(index % 5 + 1, 2), days_ago=index)
     walk(patient, "positive", strides(9, 0), end=ChangeKind.ABORT)
-    trend = read_trend(world.people[Role.PT], patient.sessions.all())
+    trend = load_trend(world.people[Role.PT], patient.sessions.all())
     dates = [point.session.created_at for point in trend]
     assert len(trend) == SESSIONS
     assert dates == sorted(dates)
@@ -226,16 +232,18 @@ def test_the_chart_holds_every_stride_of_the_trained_leg(client, patient):
 
 def test_strides_before_the_goal_is_known_are_drawn_unjudged(client, world, patient):
     from rehab.sessions.live.actor import SessionActor
-    from rehab.sessions.services import create_session
+    from rehab.sessions.services import SessionRequest, create_session
     from rehab.training.goals import GoalRule
     from rehab.training.steps import Measurement, Side
     from tests.support.world import store
 
     session = create_session(
-        patient,
-        valence="binary",
-        goal=GoalRule(percent_of_baseline=100),
-        phases=(make_phase("baseline", strides=60), make_phase("training")),
+        SessionRequest(
+            patient=patient,
+            valence="binary",
+            goal=GoalRule(percent_of_baseline=100),
+            phases=(make_phase("baseline", strides=60), make_phase("training")),
+        )
     )
     actor = SessionActor(session)
     rows = [*actor.change(Change(ChangeKind.START), None, NOW)]
@@ -370,15 +378,15 @@ def test_who_may_look(world, patient):
 
 
 def test_figures_are_written_the_same_everywhere():
-    assert [plain(say_rate(rate)) for rate in (0.712, 0, 1, -0.02, None)] == [
+    assert [plain(format_rate(rate)) for rate in (0.712, 0, 1, -0.02, None)] == [
         "71 %",
         "0 %",
         "100 %",
         "−2 %",
         "–",
     ]
-    assert [say_number(value, 0) for value in (1234.4, -5, -0.2)] == ["1,234", "−5", "0"]
-    assert [plain(say_duration(s)) for s in (0, 59.4, 59.6, 1234)] == [
+    assert [format_number(value, 0) for value in (1234.4, -5, -0.2)] == ["1,234", "−5", "0"]
+    assert [plain(format_duration(s)) for s in (0, 59.4, 59.6, 1234)] == [
         "0 s",
         "59 s",
         "1 min",
@@ -389,11 +397,11 @@ def test_figures_are_written_the_same_everywhere():
 def test_days_follow_the_clinics_own_clock(world):
     late = datetime(2026, 11, 20, 23, 30, tzinfo=UTC)
     world.clinic.time_zone = "Europe/Madrid"
-    there = at_clinic(late, world.clinic).date()
+    there = clinic_time(late, world.clinic).date()
     assert there == date(2026, 11, 21)
-    assert say_day(there, date(2026, 11, 21)) == "today"
-    assert say_day(there, date(2026, 11, 25)) == "Nov 21"
-    assert say_day(there, date(2027, 1, 2)) == "Nov 21, 2026"
+    assert format_day(there, date(2026, 11, 21)) == "today"
+    assert format_day(there, date(2026, 11, 25)) == "Nov 21"
+    assert format_day(there, date(2027, 1, 2)) == "Nov 21, 2026"
 
 
 def test_a_change_of_type_and_gain_is_told_wherever_the_session_is(client, patient):

@@ -17,7 +17,7 @@ from rehab.sessions.live.actor import SessionActor, StepRow
 from rehab.sessions.live.writer import STEP_COLUMNS
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
 from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind, NotAllowed
 from rehab.training.goals import GoalRule
@@ -40,7 +40,9 @@ def patient() -> Patient:
 
 def begin(patient: Patient, valence: str = "binary", **settings: Any) -> SessionActor:
     defaults: dict[str, Any] = {"goal": GoalRule(value=3.0), "phases": TRAINING}
-    actor = SessionActor(create_session(patient, valence=valence, **defaults | settings))
+    actor = SessionActor(
+        create_session(SessionRequest(patient=patient, valence=valence, **defaults | settings))
+    )
     change(actor, ChangeKind.START)
     return actor
 
@@ -231,7 +233,7 @@ def test_what_could_not_have_been_is_passed_over_and_nothing_else_is_lost(patien
     rebuilt = SessionActor.load(reread(actor))
     assert fold_state(rebuilt) == fold_state(actor)
     (warning,) = caplog.messages
-    assert "could not have been (3 times)" in warning
+    assert "Skipped 3 impossible entries" in warning
     assert "a session that is paused" in warning.lower()
     walk(rebuilt, 4.0)
     assert SessionActor.load(reread(actor)).fold.last_number == 5
@@ -245,7 +247,7 @@ def test_strides_after_the_end_hide_no_session(patient, caplog):
     walk(other, 4.0)
     loaded = SessionActor.load(reread(actor))
     assert (loaded.fold.state, loaded.fold.score) == ("finished", 2)
-    assert "could not have been (1 times)" in caplog.text
+    assert "Skipped 1 impossible entries" in caplog.text
 
 
 @pytest.mark.parametrize(

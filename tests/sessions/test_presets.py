@@ -12,8 +12,8 @@ from rehab.gestures.models import Gesture
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.presets import Preset
-from rehab.sessions.protocols import Protocol
+from rehab.sessions.setup.presets import Preset
+from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Station
 from tests.support.world import World, build_world, client_of, mark
 

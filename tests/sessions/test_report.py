@@ -14,7 +14,8 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.report import draw_chart, write_report
+from rehab.sessions.reports.report import report_context
+from rehab.sessions.reports.report_chart import draw_chart
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.clock import HERE
@@ -135,7 +136,7 @@ def test_the_chart_shows_every_stride_once(world, patient):
         0.0,
     ]
     session = walk(patient, "positive", strides, phases=phases)
-    chart = write_report(world.people[Role.PT], session)["chart"]
+    chart = report_context(world.people[Role.PT], session)["chart"]
     assert chart["hit"].count("M") == 2
     assert chart["miss"].count("M") == 6
     assert chart["lost"].count("M") == 1

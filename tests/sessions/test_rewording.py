@@ -13,7 +13,7 @@ from rehab.people.roles import Role
 from rehab.sessions.live import owners
 from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.log import SessionEvent
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
 from tests.support.world import build_world, client_of
@@ -30,7 +30,11 @@ def begin(world, valence="positive", language="en"):
     world.patient.language = language
     world.patient.save()
     phases = [make_phase("training")]
-    return create_session(world.patient, valence=valence, goal=GoalRule(value=4.0), phases=phases)
+    return create_session(
+        SessionRequest(
+            patient=world.patient, valence=valence, goal=GoalRule(value=4.0), phases=phases
+        )
+    )
 
 
 def form(slug="positive", **changes):

@@ -9,15 +9,15 @@ from rehab.gestures.models import Gesture
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.protocols import Protocol
-from rehab.sessions.services import change_session, create_session
+from rehab.sessions.services import SessionRequest, change_session, create_session
+from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import CueGestures
-from robot.composed import read_gesture
-from robot.motion import HOME
+from robot.motion.gesture_spec import parse_gesture
+from robot.motion.pose import HOME
 from tests.support.world import World, build_world, client_of
 
 pytestmark = pytest.mark.django_db
@@ -82,7 +82,7 @@ def test_every_choice_reaches_the_plan(pt, patient, station, world):
         CueGestures(None, "droop"),
         (),
     )
-    assert (session.runs, session.simulated) == ([], False)
+    assert (session.source_args, session.simulated) == ([], False)
 
 
 def test_the_therapist_may_go_on_at_the_own_page(pt, patient, station):
@@ -152,7 +152,7 @@ def test_nobody_begins_where_somebody_else_may_be_walking(pt, patient, station, 
 def test_like_last_time_offers_what_the_last_session_was(pt, patient, station):
     pt.post(f"/patients/{patient.pk}/new/", choices(station, source="synthetic poor"))
     session = newest()
-    assert session.runs[:3] == ["synthetic", "--profile", "poor"]
+    assert session.source_args[:3] == ["synthetic", "--profile", "poor"]
     assert session.simulated
     change_session(session, ChangeKind.START)
     change_session(session, ChangeKind.GOAL, 4.2)
@@ -191,7 +191,7 @@ def test_a_composed_gesture_goes_along_with_the_plan(pt, patient, station, world
     plan = newest().to_plan()
     assert plan.valence.cue == CueGestures("wave", None)
     assert [data["name"] for data in plan.gestures] == ["wave"]
-    assert read_gesture(plan.gestures[0]).goals[-1].pose == HOME
+    assert parse_gesture(plan.gestures[0]).waypoints[-1].pose == HOME
     TrainingSession.everywhere.filter(pk=newest().pk).update(state="finished")
     form = pt.get(url).context["form"]
     assert (form["robot_above"].value(), form["robot_below"].value()) == ("wave", "(nothing)")
@@ -213,11 +213,13 @@ def test_a_gesture_of_another_clinic_cannot_be_chosen(pt, patient, station, worl
     assert "Select a valid choice" in page.content.decode()
     with pytest.raises(InvalidSetting, match="no gesture wave"):
         create_session(
-            patient,
-            valence="positive",
-            goal=GoalRule(value=4.0),
-            protocol=Protocol.everywhere.get(name="Training only"),
-            cue=CueGestures(above="wave"),
+            SessionRequest(
+                patient=patient,
+                valence="positive",
+                goal=GoalRule(value=4.0),
+                protocol=Protocol.everywhere.get(name="Training only"),
+                cue=CueGestures(above="wave"),
+            )
         )
 
 
@@ -234,7 +236,7 @@ def test_recordings_of_this_machine_can_be_chosen_and_are_looked_at(
     assert "layouts" in page.lower()
     (folder / "walk.csv").write_text("time_s,side,value\n1.0,left,4.0\n2.1,left,3.9\n")
     pt.post(url, choices(station, source="recording walk.csv"))
-    assert newest().runs == ["recording", str(folder / "walk.csv")]
+    assert newest().source_args == ["recording", str(folder / "walk.csv")]
     settings.HOSTED = True  # there a folder would belong to no clinic
     assert "walk.csv" not in pt.get(url).content.decode()
 
@@ -254,7 +256,7 @@ def test_recorded_signals_can_be_chosen_once_the_body_mass_is_known(
     answer = pt.post(f"/patients/{patient.pk}/details/", details)
     assert answer.url == f"/patients/{patient.pk}/"
     pt.post(url, signals)
-    assert newest().runs == ["recording", str(file), "--mass", "71.5"]
+    assert newest().source_args == ["recording", str(file), "--mass", "71.5"]
 
 
 def test_a_patients_details_can_be_mended_but_not_into_somebody_elses(pt, patient, world):

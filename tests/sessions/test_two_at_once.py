@@ -14,10 +14,10 @@ from django.urls import reverse
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection
-from rehab.sessions.defaults import install_defaults
-from rehab.sessions.forms import SessionForm
+from rehab.sessions.forms.session import SessionForm
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import StationTaken
+from rehab.sessions.setup.defaults import install_defaults
 from rehab.stations.models import Station
 from tests.support.forms import session_form
 from tests.support.programs import program_of

@@ -8,10 +8,10 @@ import pytest
 from django.test import Client
 from django.utils import timezone
 
-from rehab.patients.visits import Progress, Visit, plan_visit, read_today, usual_time
+from rehab.patients.visits import Progress, Visit, patients_today, plan_visit, suggested_time
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports import dashboard
 from tests.support.clock import HERE
@@ -24,7 +24,9 @@ pytestmark = pytest.mark.django_db
 @pytest.fixture
 def world(world: World) -> World:
     Visit.everywhere.all().delete()
-    TrainingSession.everywhere.filter(pk=world.session.pk).update(created_at=NOW - timedelta(9))
+    then = NOW - timedelta(9)
+    sessions = TrainingSession.everywhere.filter(pk=world.session.pk)
+    sessions.update(created_at=then, started_at=then)
     return world
 
 
@@ -50,7 +52,7 @@ def test_today_lists_who_walks_who_is_expected_and_who_is_done(world):
     walk(dora, "positive", [HIT] * 3, end=None)  # came without a plan, and walks
     walk(emil, "positive", [HIT], days_ago=1)
     walk(emil, "positive", [HIT], simulated=True)  # nobody was here
-    listed = read_today(world.people[Role.PT], HERE)
+    listed = patients_today(world.people[Role.PT], HERE)
     assert [(row.patient.nickname, row.at, row.progress) for row in listed] == [
         ("Dora", HERE.time().replace(second=0), Progress.WALKING),
         ("Ana", time(11, 0), Progress.EXPECTED),
@@ -64,7 +66,7 @@ def test_a_day_is_the_clinics_own(world):
     rosa = patient(world, "Rosa")
     plan_visit(rosa, NOW.date(), None)
     late = NOW.replace(hour=23, minute=30)
-    assert read_today(world.people[Role.PT], late)
+    assert patients_today(world.people[Role.PT], late)
     world.clinic.time_zone = "Asia/Tokyo"
     world.clinic.save()
     Visit.everywhere.all().delete()
@@ -73,15 +75,27 @@ def test_a_day_is_the_clinics_own(world):
     assert visit.day == (timezone.now() + timedelta(hours=9)).date()
 
 
+def test_who_was_set_up_yesterday_and_walked_today_is_on_both_lists_of_today(world):
+    rosa, pt = patient(world, "Rosa"), world.people[Role.PT]
+    session = walk(rosa, "positive", [HIT] * 9)
+    sessions = TrainingSession.everywhere.filter(pk=session.pk)
+    sessions.update(created_at=NOW - timedelta(1))
+    assert [row.progress for row in patients_today(pt, HERE)] == [Progress.DONE]
+    assert [row.session for row in dashboard.sessions_today(pt, world.clinic, HERE)] == [session]
+    sessions.update(started_at=NOW - timedelta(1))
+    assert patients_today(pt, HERE) == []
+    assert dashboard.sessions_today(pt, world.clinic, HERE) == []
+
+
 def test_the_first_of_two_midnights_begins_the_day(world):
     """In Havana the hour after midnight comes twice on November 1, 2026: at 4 and at 5 UTC."""
     world.clinic.time_zone = "America/Havana"
     world.clinic.save()
     pt, first = world.people[Role.PT], datetime(2026, 11, 1, 4, 30, tzinfo=UTC)
     walked = walk(patient(world, "Rosa"), "positive", [HIT] * 9, now=first)
-    now = at_clinic(first + timedelta(hours=1), world.clinic)  # it is half past twelve again
-    assert [row.patient for row in read_today(pt, now)] == [walked.patient]
-    listed = dashboard.read_today(pt, world.clinic, now)
+    now = clinic_time(first + timedelta(hours=1), world.clinic)  # it is half past twelve again
+    assert [row.patient for row in patients_today(pt, now)] == [walked.patient]
+    listed = dashboard.sessions_today(pt, world.clinic, now)
     assert walked in [line.session for line in listed]
 
 
@@ -90,7 +104,7 @@ def test_the_next_visit_is_one_tap_at_the_usual_time(world):
     session = walk(rosa, "positive", [HIT])
     began = datetime(2026, 10, 20, 10, 8, tzinfo=HERE.tzinfo)
     TrainingSession.everywhere.filter(pk=session.pk).update(created_at=began)
-    assert usual_time(world.people[Role.PT], rosa, HERE) == time(10, 15)
+    assert suggested_time(world.people[Role.PT], rosa, HERE) == time(10, 15)
     client, today = pt_of(world), timezone.now().astimezone(HERE.tzinfo).date()
     page = client.get(f"/patients/{rosa.pk}/").content.decode()
     assert "In a week" in page

@@ -15,7 +15,7 @@ from rehab.people.roles import Role
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
 from rehab.stations.models import Device, Station
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
@@ -328,13 +328,15 @@ def open_session(
     ``beside`` puts it there though another one is open, as databases of before may have it.
     """
     session = create_session(
-        place.patient,
-        valence=valence,
-        goal=goal or GoalRule(value=3.0),
-        phases=phases or (make_phase("training"),),
-        cue=cue,
-        station=place.station if at_station and not beside else None,
-        created_by=place.pt,
+        SessionRequest(
+            patient=place.patient,
+            valence=valence,
+            goal=goal or GoalRule(value=3.0),
+            phases=phases or (make_phase("training"),),
+            cue=cue,
+            station=place.station if at_station and not beside else None,
+            created_by=place.pt,
+        )
     )
     if beside:
         session.station = place.station

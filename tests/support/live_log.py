@@ -13,7 +13,7 @@ def read(session_id: int) -> dict[str, Any]:
     """Give a session's step numbers, and whether folding its log again gives the same verdicts."""
     from rehab.sessions.log import Step
     from rehab.sessions.models import TrainingSession
-    from rehab.sessions.replay import read_log
+    from rehab.sessions.replay import log_entries
     from rehab.training.changes import Change
     from rehab.training.fold import SessionFold
 
@@ -21,7 +21,7 @@ def read(session_id: int) -> dict[str, Any]:
     steps = list(Step.everywhere.filter(session=session).order_by("number"))
     fold = SessionFold(session.to_plan())
     scored = []
-    for entry in read_log(session):
+    for entry in log_entries(session):
         if isinstance(entry, Change):
             fold.change(entry)
         else:

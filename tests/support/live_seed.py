@@ -24,7 +24,7 @@ def seed(count: int) -> list[dict[str, Any]]:
     from rehab.people.sign_in.first_start import first_clinic, prepare_database
     from rehab.people.sign_in.flow import BACKEND
     from rehab.sessions.live.actor import SessionActor
-    from rehab.sessions.services import create_session
+    from rehab.sessions.services import SessionRequest, create_session
     from rehab.stations.models import Device, Station
     from rehab.training.changes import Change, ChangeKind
     from rehab.training.goals import GoalRule
@@ -53,11 +53,13 @@ def seed(count: int) -> list[dict[str, Any]]:
                 tokens[kind] = device.new_token()
                 device.save()
             session = create_session(
-                patient,
-                valence="binary",
-                goal=GoalRule(value=3.0),
-                phases=(make_phase("training"),),
-                station=station,
+                SessionRequest(
+                    patient=patient,
+                    valence="binary",
+                    goal=GoalRule(value=3.0),
+                    phases=(make_phase("training"),),
+                    station=station,
+                )
             )
             actor = SessionActor(session)
             store(actor, actor.change(Change(ChangeKind.START), None, timezone.now()))

@@ -24,7 +24,7 @@ from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.replay import read_log
+from rehab.sessions.replay import log_entries
 from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.fold import SessionFold
 from rehab.training.phases import make_phase
@@ -361,7 +361,7 @@ class Sources(RuleBasedStateMachine):
         numbers = Step.everywhere.filter(session=session).order_by("number")
         assert list(numbers.values_list("number", flat=True)) == list(range(1, self.sent + 1))
         # The log in its order, but for what the server found wrong with a step.
-        assert [plain(entry) for entry in read_log(session)] == [plain(e) for e in self.log]
+        assert [plain(entry) for entry in log_entries(session)] == [plain(e) for e in self.log]
         oracle = SessionFold.replay(session.to_plan(), self.log)
         rebuilt = SessionActor.load(session).fold
         for fold in (rebuilt, actor.fold):

@@ -104,7 +104,7 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
     from rehab.people.roles import Role
     from rehab.people.sign_in.first_start import first_clinic
     from rehab.people.sign_in.flow import BACKEND
-    from rehab.sessions.services import create_session
+    from rehab.sessions.services import SessionRequest, create_session
     from rehab.stations.models import Device, Station
     from rehab.stations.pins import set_pin
     from rehab.training.goals import GoalRule, Target
@@ -138,13 +138,15 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
             device.save()
         phases = wish.get("phases", [{"kind": "training"}])
         session = create_session(
-            patient,
-            valence=wish.get("valence", "positive"),
-            goal=GoalRule(value=wish.get("goal", GOAL)),
-            phases=[make_phase(**phase) for phase in phases],
-            target=Target(duration_s=60 * wish.get("minutes", 10)),
-            station=station,
-            created_by=person,
+            SessionRequest(
+                patient=patient,
+                valence=wish.get("valence", "positive"),
+                goal=GoalRule(value=wish.get("goal", GOAL)),
+                phases=[make_phase(**phase) for phase in phases],
+                target=Target(duration_s=60 * wish.get("minutes", 10)),
+                station=station,
+                created_by=person,
+            )
         )
         made.append({"session": session.pk, "cookie": cookies.session_key, **tokens})
     return made

@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 from rehab.people.models import Patient
 from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
 from rehab.sources.synthetic import PROFILES, SyntheticWalker
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule, Target
@@ -39,13 +39,15 @@ def walk(
     """Create a session, walk it and end it. Strides follow each other by a second."""
     began = now - timedelta(days=days_ago)
     session = create_session(
-        patient,
-        valence=valence,
-        goal=GoalRule(value=GOAL),
-        phases=phases or (make_phase("training"),),
-        trained_side=LEFT,
-        target=Target(hit_rate=wanted),
-        simulated=simulated,
+        SessionRequest(
+            patient=patient,
+            valence=valence,
+            goal=GoalRule(value=GOAL),
+            phases=phases or (make_phase("training"),),
+            trained_side=LEFT,
+            target=Target(hit_rate=wanted),
+            simulated=simulated,
+        )
     )
     TrainingSession.everywhere.filter(pk=session.pk).update(created_at=began)
     session.created_at = began
@@ -73,18 +75,20 @@ def visit(
     began = now - timedelta(days=days_ago, seconds=1.2 * count)
     half = (count - 54 - 12 - 40) // 2
     session = create_session(
-        patient,
-        valence=valence,
-        goal=GoalRule(percent_of_baseline=97),
-        phases=(
-            make_phase("baseline", strides=54),
-            make_phase("training", strides=half),
-            make_phase("catch", strides=12),
-            make_phase("training", "Training 85 %", gain=0.85, strides=half),
-            make_phase("washout"),
-        ),
-        trained_side=LEFT,
-        target=Target(hit_rate=0.6, duration_s=600),
+        SessionRequest(
+            patient=patient,
+            valence=valence,
+            goal=GoalRule(percent_of_baseline=97),
+            phases=(
+                make_phase("baseline", strides=54),
+                make_phase("training", strides=half),
+                make_phase("catch", strides=12),
+                make_phase("training", "Training 85 %", gain=0.85, strides=half),
+                make_phase("washout"),
+            ),
+            trained_side=LEFT,
+            target=Target(hit_rate=0.6, duration_s=600),
+        )
     )
     TrainingSession.everywhere.filter(pk=session.pk).update(created_at=began)
     session.created_at = began

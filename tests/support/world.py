@@ -27,9 +27,9 @@ from rehab.sessions.live.actor import Row, SessionActor
 from rehab.sessions.live.writer import Job, commit
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.presets import Preset
-from rehab.sessions.protocols import Measure, Protocol, ProtocolPhase
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
+from rehab.sessions.setup.presets import Preset
+from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
 from rehab.stations.models import Device, LeaveTries, Pairing, Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule
@@ -146,14 +146,16 @@ def build_world(name: str) -> World:
         level = patient.boards if purpose == Purpose.BOARDS else ""
         give(patient, purpose, people[Role.PT], NOW, level)
     session = create_session(
-        patient,
-        valence="positive",
-        goal=GoalRule(value=1.0),
-        protocol=protocol,
-        measure=measure,
-        station=station,
-        created_by=people[Role.PT],
-        source=mark(name, TrainingSession),
+        SessionRequest(
+            patient=patient,
+            valence="positive",
+            goal=GoalRule(value=1.0),
+            protocol=protocol,
+            measure=measure,
+            station=station,
+            created_by=people[Role.PT],
+            source=mark(name, TrainingSession),
+        )
     )
     actor = SessionActor(session)
     store(actor, actor.change(Change(ChangeKind.START), people[Role.PT], NOW))
@@ -190,7 +192,7 @@ def build_world(name: str) -> World:
         session,
         SessionCorrection.everywhere.create(
             session=session,
-            part="note",
+            field="note",
             new=mark(name, SessionCorrection),
             reason=mark(name, SessionCorrection),
             by=people[Role.PT],

@@ -18,10 +18,10 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.metrics import compute_metrics
 from rehab.training.phases import PHASE_KINDS, make_phase
 from rehab.training.plans import ChartStyle, SessionPlan
-from rehab.training.scoring import PERFORMANCE_MAX
 from rehab.training.steps import InvalidMeasurement, InvalidReason, Measurement, ScoredStep, Side
 from rehab.training.tallies import Tally
 from rehab.training.valences import VALENCES, Band, Confetti, Valence, bands_to_json
+from robot.wire.limits import PERFORMANCE_MAX
 from tests.training.sessions import make_plan, others_than, start
 
 Log = list[Measurement | Change]

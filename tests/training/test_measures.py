@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from rehab.training.measures import A2, GAIN_MAX, GAIN_MIN, MEASURES, InvalidSetting, check_gain
 from rehab.training.plans import check_activation_threshold
-from rehab.training.scoring import PERFORMANCE_MAX, judge
+from rehab.training.scoring import judge
+from robot.wire.limits import PERFORMANCE_MAX
 from tests.training.sessions import SWAY
 
 SIGNED = dataclasses.replace(A2, slug="signed", value_min=-20)

@@ -1,4 +1,4 @@
-"""`manage.py export`: the files that the pages give out, for scripts and very large ones."""
+"""`manage.py export`: the same files as the pages' exports, for scripts and very large ones."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from rehab.people.models import Patient, User
 
 
 class Command(BaseCommand):
-    """Writes all sessions that an account may see, or all that is kept of one patient."""
+    """Writes all sessions that an account may see, or all data of one patient."""
 
     help = "Write FILE (a ZIP): all sessions that an account may see, or one patient's data."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Ask where to, and for whose eyes."""
+        """Add the options."""
         parser.add_argument("file", type=Path, metavar="FILE")
         parser.add_argument("--as", dest="username", required=True, metavar="ACCOUNT")
         parser.add_argument("--patient", metavar="CODE", help="all of this patient, with the name")
@@ -31,7 +31,7 @@ class Command(BaseCommand):
     def handle(
         self, *args: Any, file: Path, username: str, patient: str | None, **options: Any
     ) -> None:
-        """Write it, for the account's owner only to read on this machine."""
+        """Write the file, readable only by the owner of this process."""
         user = User.everywhere.select_related("clinic").filter(username=username).first()
         if user is None or user.clinic is None:
             raise CommandError(f"No clinic's account is called {username!r}. Look in the admin.")

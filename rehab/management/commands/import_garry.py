@@ -1,4 +1,4 @@
-"""`manage.py import_garry`: take participants and sessions over from the original GARRY."""
+"""`manage.py import_garry`: import participants and sessions from the original GARRY."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from typing import Any
 from django.core.management import BaseCommand, CommandError
 from django.db import transaction
 
-from rehab.legacy.database import Damaged, read_original
-from rehab.legacy.importing import TakeOver
+from rehab.legacy.database import InvalidDatabase, read_database
+from rehab.legacy.importing import Importer
 from rehab.people.models import Clinic
 from rehab.people.sign_in.first_start import first_clinic, prepare_database
 
 
 class Command(BaseCommand):
-    """Takes over what can be, or, where something cannot, nothing at all; always says why."""
+    """Imports everything, or else nothing (``--partial``: what it can); always says why."""
 
     help = "Import participants and sessions of an original GARRY (data.db). Again, only new ones."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Offer the file and how far to go."""
+        """Add the options."""
         parser.add_argument("file", type=Path, metavar="FILE")
         parser.add_argument("--dry-run", action="store_true", help="report, and change nothing")
         parser.add_argument(
@@ -30,20 +30,20 @@ class Command(BaseCommand):
         parser.add_argument("--clinic", metavar="NAME", help="whose they are, if there are several")
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Import. Raises CommandError where nothing was changed because of what could not be."""
+        """Import. Raises CommandError, with the cure, where nothing was changed."""
         try:
-            original = read_original(options["file"])
-        except Damaged as problem:
+            database = read_database(options["file"])
+        except InvalidDatabase as problem:
             raise CommandError(f"{problem} Nothing was changed.") from problem
         prepare_database()
         with transaction.atomic():
-            work = TakeOver(find_clinic(options["clinic"]), original)
-            work.run()
-            goes_on = work.is_whole or options["partial"]
-            if options["dry_run"] or not goes_on:
+            importer = Importer(find_clinic(options["clinic"]), database)
+            importer.run()
+            keep = importer.is_complete or options["partial"]
+            if options["dry_run"] or not keep:
                 transaction.set_rollback(True)
-        self.stdout.write("\n".join(work.report()))
-        if not goes_on:
+        self.stdout.write("\n".join(importer.report()))
+        if not keep:
             raise CommandError(
                 "Nothing was changed, since not all could be taken over. Mend that, or take over "
                 "the rest with --partial."
@@ -52,11 +52,11 @@ class Command(BaseCommand):
 
 
 def find_clinic(name: str | None) -> Clinic:
-    """Give the clinic of this name, or the only one. Raises CommandError."""
+    """Return the clinic of this name, or the only one. Raises CommandError."""
     names = list(Clinic.everywhere.values_list("name", flat=True))
     if name is None and len(names) <= 1:
         return first_clinic()
     if name not in names:
-        wanted = "Which clinic?" if name is None else f"There is no clinic {name!r}."
-        raise CommandError(f"{wanted} Say --clinic with one of: {', '.join(names) or '(none)'}.")
+        problem = "Which clinic?" if name is None else f"There is no clinic {name!r}."
+        raise CommandError(f"{problem} Give --clinic with one of: {', '.join(names) or '(none)'}.")
     return Clinic.everywhere.get(name=name)

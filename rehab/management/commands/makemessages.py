@@ -14,7 +14,7 @@ REFUSALS = [
         ("InvalidSetting", 1),
         ("NotAllowed", 1),
         ("BadGesture", 1),
-        ("BadGoal", 2),
+        ("BadWaypoint", 2),
         ("Marked", 1),
     )
 ]

@@ -1,4 +1,4 @@
-"""`manage.py retention`: erase whom clinics have kept long enough. Meant to run every night."""
+"""`manage.py retention`: erase patients and logs past their retention period, every night."""
 
 from __future__ import annotations
 
@@ -9,38 +9,40 @@ from django.core.management.base import BaseCommand
 from django.db import transaction
 from django.utils import timezone
 
-from rehab.patients.closure import StillOpen
-from rehab.patients.erasure import erase, let_logs_go, overdue
+from rehab.patients.closure import SessionStillOpen
+from rehab.patients.erasure import delete_old_logs, erase, patients_past_retention
 from rehab.people.models import Clinic, Erasing
 
 
 class Command(BaseCommand):
-    """Erases patients and old log entries, clinic by clinic, as their leads have set it."""
+    """Erases patients and deletes old log entries by each clinic's own periods."""
 
     help = "Erase whom clinics have kept long enough (Clinic: keep patients, keep the logs)."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Offer to look first."""
+        """Add the options."""
         parser.add_argument("--dry-run", action="store_true", help="say whom, and change nothing")
 
     def handle(self, *args: Any, dry_run: bool, **options: Any) -> None:
-        """Erase, and say how many. Who still has an open session is named and left."""
+        """Erase, and print how many. Patients with an open session are named and skipped."""
         now = timezone.now()
         for clinic in Clinic.everywhere.order_by("pk"):
             erased = 0
-            for patient in overdue(clinic, now):
+            for patient in patients_past_retention(clinic, now):
                 if dry_run:
                     self.stdout.write(f"{clinic}: would erase {patient.code}")
                     continue
                 try:
                     erase(patient, Erasing.RETENTION, None, now)
                     erased += 1
-                except StillOpen as problem:
+                except SessionStillOpen as problem:
                     self.stderr.write(f"{clinic}, {patient.code}: {problem}")
             with transaction.atomic():
-                gone = let_logs_go(clinic, now)
+                deleted = delete_old_logs(clinic, now)
                 transaction.set_rollback(dry_run)
             would = "would let go" if dry_run else "let go"
-            self.stdout.write(f"{clinic}: {erased} patient(s) erased, {would} {gone} log entries.")
+            self.stdout.write(
+                f"{clinic}: {erased} patient(s) erased, {would} {deleted} log entries."
+            )
         if dry_run:
             self.stdout.write("Nothing was changed (--dry-run).")

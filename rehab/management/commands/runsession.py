@@ -15,10 +15,16 @@ from django.core.management import BaseCommand, CommandError
 
 from rehab.people.models import Clinic, Patient
 from rehab.people.sign_in.first_start import first_clinic, prepare_database
-from rehab.sessions.headless import Pace, report, robot_steps, run_session, simulate_strides
+from rehab.sessions.headless import (
+    Pace,
+    robot_steps,
+    run_session,
+    session_report,
+    simulate_strides,
+)
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.payloads import describe_cue
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
 from rehab.sources.recording import Recording, RecordingError, read_recording
 from rehab.sources.synthetic import PROFILES, SyntheticWalker
 from rehab.training.fold import SessionFold
@@ -27,14 +33,14 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.phases import Phase, make_phase
 from rehab.training.steps import Measurement, Side
 from rehab.training.valences import VALENCES
-from robot.rehearsal import REHEARSED, Rehearsal
+from robot.simulation import SIMULATED_BASES, Simulation
 
 BASELINE_STRIDES = 54
 MIN_SYNTHETIC_STRIDES = 100
 
 
 def finite_number(text: str) -> float:
-    """Read a finite number from the command line."""
+    """Return a finite number from the command line. Raises ArgumentTypeError."""
     try:
         value = float(text)
     except ValueError:
@@ -45,7 +51,7 @@ def finite_number(text: str) -> float:
 
 
 def parse_speed(text: str) -> float | None:
-    """Read `max` as None and a number above 0 as itself."""
+    """Return None for `max`, else a number above 0. Raises ArgumentTypeError."""
     if text == "max":
         return None
     value = finite_number(text)
@@ -55,12 +61,12 @@ def parse_speed(text: str) -> float | None:
 
 
 class Command(BaseCommand):
-    """Runs a whole session, stores it like any other, prints what it added up to."""
+    """Runs a whole session, stores it like any other, and prints its figures."""
 
     help = "Score a recording or a simulated patient: a whole session without pages."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Offer the choices of a session."""
+        """Add the options."""
         source = parser.add_mutually_exclusive_group(required=True)
         source.add_argument("--recording", type=Path, metavar="FILE")
         source.add_argument("--synthetic", type=int, metavar="SEED")
@@ -87,7 +93,7 @@ class Command(BaseCommand):
         )
         parser.add_argument(
             "--base",
-            choices=sorted(REHEARSED),
+            choices=sorted(SIMULATED_BASES),
             default="null",
             help="robot base that answers, on a clock that runs with the strides",
         )
@@ -119,13 +125,15 @@ class Command(BaseCommand):
         phases, goal = recorded_plan(recording, options) if recording else synthetic_plan(options)
         began = time.perf_counter()
         session = create_session(
-            find_patient(options, side),
-            valence=options["valence"],
-            goal=goal,
-            phases=phases,
-            trained_side=side,
-            source=name_source(recording, options),
-            simulated=recording is None,
+            SessionRequest(
+                patient=find_patient(options, side),
+                valence=options["valence"],
+                goal=goal,
+                phases=phases,
+                trained_side=side,
+                source=name_source(recording, options),
+                simulated=recording is None,
+            )
         )
 
         def strides(fold: SessionFold) -> Iterator[Measurement]:
@@ -136,22 +144,24 @@ class Command(BaseCommand):
 
         fold = asyncio.run(run_session(session.pk, strides, Pace(options["speed"])))
         wall_s = time.perf_counter() - began
-        return report(session, fold, wall_s, recording, rehearse(session, fold, options["base"]))
+        return session_report(
+            session, fold, wall_s, recording, simulate_robot(session, fold, options["base"])
+        )
 
 
-def rehearse(session: TrainingSession, fold: SessionFold, base: str) -> dict[str, Any]:
-    """Let a simulated robot answer a stored session; give what it did."""
-    rehearsal = Rehearsal(base, describe_cue(fold))
-    rehearsal.walk(robot_steps(session, fold))
-    windows = len(rehearsal.decisions)
+def simulate_robot(session: TrainingSession, fold: SessionFold, base: str) -> dict[str, Any]:
+    """Let a simulated robot answer a stored session; return what it did."""
+    simulation = Simulation(base, describe_cue(fold))
+    simulation.walk(robot_steps(session, fold))
+    windows = len(simulation.decisions)
     return {
-        "robot": {"base": base, "windows": windows, "activated_share": rehearsal.share},
-        "gestures": rehearsal.gestures,
+        "robot": {"base": base, "windows": windows, "activated_share": simulation.share},
+        "gestures": simulation.gestures,
     }
 
 
 def name_source(recording: Recording | None, options: dict[str, Any]) -> str:
-    """Say where the steps come from."""
+    """Return the text that the session stores about its source."""
     if recording is not None:
         return f"recording {recording.name}"[:200]
     return f"simulated {options['profile']} {options['synthetic']}"
@@ -160,7 +170,7 @@ def name_source(recording: Recording | None, options: dict[str, Any]) -> str:
 def recorded_plan(
     recording: Recording, options: dict[str, Any]
 ) -> tuple[tuple[Phase, ...], GoalRule]:
-    """Give phases and goal of a recording."""
+    """Return phases and goal of a recording. Raises InvalidSetting without any goal."""
     phases = recording.phases if options["gain_from_recording"] else recording.phases_at_gain_one()
     goal = options["goal"] if options["goal"] is not None else recording.goal
     if goal is None:
@@ -171,7 +181,7 @@ def recorded_plan(
 
 
 def synthetic_plan(options: dict[str, Any]) -> tuple[tuple[Phase, ...], GoalRule]:
-    """Give phases and goal of a simulated patient: a tenth of the strides is washout."""
+    """Return phases and goal of a simulated patient: a tenth of the strides is washout."""
     count = options["strides"]
     if count < MIN_SYNTHETIC_STRIDES:
         raise InvalidSetting("Give --strides {least} or more.", least=MIN_SYNTHETIC_STRIDES)
@@ -186,7 +196,7 @@ def synthetic_plan(options: dict[str, Any]) -> tuple[tuple[Phase, ...], GoalRule
 
 
 def find_patient(options: dict[str, Any], side: Side) -> Patient:
-    """Give the patient that the session belongs to; made on first use where none is named."""
+    """Return the session's patient; unless one is named, the command line's own."""
     clinic = first_clinic()
     if options["clinic"]:
         named = Clinic.everywhere.filter(name=options["clinic"]).first()
@@ -210,7 +220,7 @@ def find_patient(options: dict[str, Any], side: Side) -> Patient:
 
 
 def describe(figures: dict[str, Any]) -> str:
-    """Put the figures in words."""
+    """Return the figures as text."""
     rate = "–" if figures["hit_rate"] is None else f"{figures['hit_rate']:.1%}"
     lines = [
         f"Session {figures['session']}, {figures['valence']}: {figures['strides']} strides "

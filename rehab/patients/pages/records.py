@@ -1,4 +1,4 @@
-"""A patient's records: what is kept, how the program ends, and how a person is erased."""
+"""A patient's records: stored data, end of the program, erasure."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST, require_safe
 
-from rehab.patients.closure import StillOpen, end_program, reopen_program
+from rehab.patients.closure import SessionStillOpen, end_program, reopen_program
 from rehab.patients.erasure import erase
 from rehab.patients.forms import EndingForm, ErasingForm
 from rehab.people.access import for_roles, person
@@ -21,8 +21,8 @@ from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 
 
-def find_patient(user: User, patient_id: int) -> Patient:
-    """Give a patient that somebody sees. Raises Http404 for any other."""
+def get_patient(user: User, patient_id: int) -> Patient:
+    """Return a patient that somebody may see. Raises Http404 for any other."""
     patients = Patient.objects.visible_to(user).select_related("clinic")
     return get_object_or_404(patients, pk=patient_id)
 
@@ -30,13 +30,13 @@ def find_patient(user: User, patient_id: int) -> Patient:
 @for_roles(Role.LEAD, Role.PT)
 @require_safe
 def show_records(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Show what can be done with all that is kept of a patient."""
-    patient = find_patient(person(request), patient_id)
+    """Show the page on consent, data and the end of the program."""
+    patient = get_patient(person(request), patient_id)
     return render_records(request, patient)
 
 
 def render_records(request: HttpRequest, patient: Patient, **forms: Any) -> HttpResponse:
-    """Give the page, with the forms as they were sent."""
+    """Return the page, with the forms as they were sent."""
     user = person(request)
     sessions = TrainingSession.objects.visible_to(user).filter(patient=patient)
     context = {
@@ -55,17 +55,17 @@ def render_records(request: HttpRequest, patient: Patient, **forms: Any) -> Http
 @require_POST
 def end(request: HttpRequest, patient_id: int) -> HttpResponse:
     """End a patient's program: off the lists, with the summary to take home."""
-    patient = find_patient(person(request), patient_id)
+    patient = get_patient(person(request), patient_id)
     form = EndingForm(request.POST)
     if not form.is_valid():
         return render_records(request, patient, ending=form)
     try:
         end_program(patient, Ending(form.cleaned_data["because"]), timezone.now())
-    except StillOpen as problem:
+    except SessionStillOpen as problem:
         form.add_error(None, str(problem))
         return render_records(request, patient, ending=form)
-    said = _("%(patient)s's program has ended. Give the summary along.")
-    messages.success(request, said % {"patient": patient.nickname})
+    message = _("%(patient)s's program has ended. Give the summary along.")
+    messages.success(request, message % {"patient": patient.nickname})
     return redirect("patient", patient_id=patient.pk)
 
 
@@ -73,23 +73,23 @@ def end(request: HttpRequest, patient_id: int) -> HttpResponse:
 @require_POST
 def reopen(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Take a patient back in."""
-    patient = find_patient(person(request), patient_id)
+    patient = get_patient(person(request), patient_id)
     reopen_program(patient)
     return redirect("patient", patient_id=patient.pk)
 
 
-@for_roles(Role.LEAD, patients=False)  # what is noted must not name whom it erases
+@for_roles(Role.LEAD, patients=False)  # the audit entry must not name the erased patient
 @require_POST
 def erase_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Erase all that leads to a person, once the code has been typed."""
+    """Erase everything that identifies a person, after the code was typed as confirmation."""
     user = person(request)
-    patient = find_patient(user, patient_id)
+    patient = get_patient(user, patient_id)
     form = ErasingForm(request.POST, patient=patient)
     if patient.erased_at is not None or not form.is_valid():
         return render_records(request, patient, erasing=form)
     try:
         erase(patient, Erasing(form.cleaned_data["because"]), user, timezone.now())
-    except StillOpen as problem:
+    except SessionStillOpen as problem:
         form.add_error(None, str(problem))
         return render_records(request, patient, erasing=form)
     messages.success(request, _("All that led to this person is erased, for good."))

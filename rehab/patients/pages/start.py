@@ -1,4 +1,4 @@
-"""Where a session begins: who walks today, and what is open or past."""
+"""The start list and a patient's own pages."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from rehab.patients.forms import PatientForm, ScreenForm
-from rehab.patients.visits import SOON_DAYS, Visit, read_today, usual_time
+from rehab.patients.visits import SOON_DAYS, Visit, patients_today, suggested_time
 from rehab.people.access import clinic_of, for_roles, person
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.formatting import at_clinic
-from rehab.sessions.forms import SessionForm, like_last_time
+from rehab.sessions.formatting import clinic_time
+from rehab.sessions.forms.session import SessionForm, initial_choices
 from rehab.sessions.models import TrainingSession
 from rehab.stations.builtin import first_station
 from rehab.training.changes import OPEN_STATES
 
-SHOWN = 60  # patients on one page, those who were here last first
+MAX_PATIENTS = 60  # patients on one page
 DEMO_CODE = "demo"
 
 
-def patients_of(user: User) -> QuerySet[Patient]:
-    """Give the patients of somebody's clinic, those who were here last first."""
+def patients_by_last_visit(user: User) -> QuerySet[Patient]:
+    """Return the patients of somebody's clinic, the most recent session first."""
     return (
         Patient.objects.visible_to(user)
         .annotate(last_here=Max("sessions__created_at"), count=Count("sessions"))
@@ -39,7 +39,7 @@ def patients_of(user: User) -> QuerySet[Patient]:
 
 
 def open_sessions(user: User) -> QuerySet[TrainingSession]:
-    """Give the sessions that have begun, or could, and have not ended."""
+    """Return the sessions that are ready, running or paused."""
     states = [state.value for state in OPEN_STATES]
     return (
         TrainingSession.objects.visible_to(user)
@@ -48,31 +48,31 @@ def open_sessions(user: User) -> QuerySet[TrainingSession]:
     )
 
 
-def list_everybody(user: User, words: str = "") -> dict[str, Any]:
-    """Give both lists of the start page: who is expected today, and all patients."""
-    now = at_clinic(timezone.now(), clinic_of(user))
-    patients = patients_of(user)
-    if words:
-        patients = patients.filter(Q(nickname__icontains=words) | Q(code__icontains=words))
-    else:  # whose program has ended is found by name or code
+def start_lists(user: User, query: str = "") -> dict[str, Any]:
+    """Return the context of the start page: who is expected today, and all patients."""
+    now = clinic_time(timezone.now(), clinic_of(user))
+    patients = patients_by_last_visit(user)
+    if query:
+        patients = patients.filter(Q(nickname__icontains=query) | Q(code__icontains=query))
+    else:  # patients whose program has ended are found by name or code only
         patients = patients.filter(ended_at=None)
-    shown = list(patients[: SHOWN + 1])
+    shown = list(patients[: MAX_PATIENTS + 1])
     return {
         "now": now,
-        "today": read_today(user, now),
-        "patients": shown[:SHOWN],
-        "more": len(shown) > SHOWN,
+        "today": patients_today(user, now),
+        "patients": shown[:MAX_PATIENTS],
+        "more": len(shown) > MAX_PATIENTS,
         "open": open_sessions(user),
     }
 
 
 @for_roles(Role.LEAD, Role.PT)
-@never_cache  # going back shows what is true now
+@never_cache  # so that going back shows the present state
 @require_safe
 def choose_patient(request: HttpRequest) -> HttpResponse:
     """List who is expected today, then all patients."""
-    words = request.GET.get("q", "").strip()
-    context = list_everybody(person(request), words) | {"q": words}
+    query = request.GET.get("q", "").strip()
+    context = start_lists(person(request), query) | {"q": query}
     return render(request, "patients/start.html", context)
 
 
@@ -82,10 +82,10 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
 def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Offer a patient the session like last time, another one, the past ones, the next visit."""
     user = person(request)
-    patient = get_object_or_404(patients_of(user), pk=patient_id)
+    patient = get_object_or_404(patients_by_last_visit(user), pk=patient_id)
     first_station(patient.clinic)
-    initial = like_last_time(patient, user)
-    lists = list_everybody(user)
+    initial = initial_choices(patient, user)
+    lists = start_lists(user)
     today = lists["now"].date()
     visits = Visit.objects.visible_to(user).filter(patient=patient, day__gte=today)
     context = lists | {
@@ -99,7 +99,7 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
             for days in SOON_DAYS
             if days or all(row.patient != patient for row in lists["today"])
         ],
-        "at": usual_time(user, patient, lists["now"]),
+        "at": suggested_time(user, patient, lists["now"]),
     }
     return render(request, "patients/start.html", context)
 
@@ -107,7 +107,7 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
 def add_patient(request: HttpRequest) -> HttpResponse:
-    """Take a new patient in."""
+    """Add a new patient."""
     user = person(request)
     form = PatientForm(request.POST or None, by=user, now=timezone.now())
     if request.method == "POST" and form.keep():
@@ -118,9 +118,9 @@ def add_patient(request: HttpRequest) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
 def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Mend what was written of a patient."""
+    """Edit a patient's details."""
     user = person(request)
-    patient = get_object_or_404(patients_of(user), pk=patient_id)
+    patient = get_object_or_404(patients_by_last_visit(user), pk=patient_id)
     form = PatientForm(request.POST or None, by=user, now=timezone.now(), instance=patient)
     if request.method == "POST" and form.keep():
         return redirect("patient", patient_id=patient.pk)
@@ -131,8 +131,8 @@ def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
 def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Fit the patient's page to this patient's eyes and ears."""
-    patient = get_object_or_404(patients_of(person(request)), pk=patient_id)
+    """Set how the patient's page looks and sounds."""
+    patient = get_object_or_404(patients_by_last_visit(person(request)), pk=patient_id)
     form = ScreenForm(request.POST or None, instance=patient)
     if request.method == "POST" and form.keep():
         return redirect("patient", patient_id=patient.pk)
@@ -142,7 +142,7 @@ def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
 @for_roles(Role.LEAD, Role.PT)
 @require_POST
 def add_demo(request: HttpRequest) -> HttpResponse:
-    """Let somebody who only looks around begin with a simulated patient."""
+    """Add a simulated patient, for people who want to try GARRY."""
     user = person(request)
     patient, _made = Patient.objects.visible_to(user).get_or_create(
         clinic=clinic_of(user),
@@ -150,6 +150,6 @@ def add_demo(request: HttpRequest) -> HttpResponse:
         defaults={"nickname": "Demo", "paretic_side": "left", "simulated": True},
     )
     if not patient.simulated:
-        said = _("%(nickname)s has the code %(code)s. Give that patient another code first.")
-        messages.error(request, said % {"nickname": patient.nickname, "code": patient.code})
+        message = _("%(nickname)s has the code %(code)s. Give that patient another code first.")
+        messages.error(request, message % {"nickname": patient.nickname, "code": patient.code})
     return redirect("patient", patient_id=patient.pk)

@@ -1,4 +1,4 @@
-"""Planning when a patient comes again."""
+"""Planning and removing visits."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from django.utils.dateparse import parse_date, parse_time
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST
 
-from rehab.patients.visits import SOON_DAYS, Visit, plan_visit, usual_time
+from rehab.patients.visits import SOON_DAYS, Visit, plan_visit, suggested_time
 from rehab.people.access import for_roles, person
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 
-FARTHEST = timedelta(days=366)
+MAX_AHEAD = timedelta(days=366)
 
 
-class WrongDay(ValueError):
-    """A day on which nobody can be expected; the message says what to do."""
+class InvalidVisitDay(ValueError):
+    """A day or time that is no valid visit; the message says what to do."""
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -39,31 +39,33 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
     if (removed := given.get("remove", "")).isdecimal():
         visits.filter(pk=int(removed)).delete()
         return redirect("patient", patient_id=patient.pk)
-    now = at_clinic(timezone.now(), patient.clinic)
+    now = clinic_time(timezone.now(), patient.clinic)
     try:
         if (days := given.get("in", "")) in map(str, SOON_DAYS):
             day = now.date() + timedelta(days=int(days))
-            at = usual_time(user, patient, now) if int(days) else None
+            at = suggested_time(user, patient, now) if int(days) else None
         else:
-            day, at = _read(given.get("day", ""), given.get("at", ""), now.date())
-    except WrongDay as problem:
+            day, at = _parse_day(given.get("day", ""), given.get("at", ""), now.date())
+    except InvalidVisitDay as problem:
         messages.error(request, str(problem))
     else:
         visit = plan_visit(patient, day, at)
-        words = format_date(visit.day, "l j F") + (f", {visit.at:%H:%M}" if visit.at else "")
-        said = {"name": patient.nickname, "when": words}
-        messages.success(request, _("%(name)s is expected on %(when)s.") % said)
+        when = format_date(visit.day, "l j F") + (f", {visit.at:%H:%M}" if visit.at else "")
+        names = {"name": patient.nickname, "when": when}
+        messages.success(request, _("%(name)s is expected on %(when)s.") % names)
     return redirect("patient", patient_id=patient.pk)
 
 
-def _read(day: str, at: str, today: date) -> tuple[date, time | None]:
-    """Read a day and a time, which may be left out. Raises WrongDay."""
+def _parse_day(day: str, at: str, today: date) -> tuple[date, time | None]:
+    """Return a day and an optional time. Raises InvalidVisitDay."""
     try:
         chosen, hour = parse_date(day), parse_time(at) if at else None
     except ValueError:
         chosen = hour = None
     if chosen is None or (at and hour is None):
-        raise WrongDay(_("Choose the day of the visit, and a time such as 10:30 if there is one."))
-    if not today <= chosen <= today + FARTHEST:
-        raise WrongDay(_("Choose a day between today and a year from now."))
+        raise InvalidVisitDay(
+            _("Choose the day of the visit, and a time such as 10:30 if there is one.")
+        )
+    if not today <= chosen <= today + MAX_AHEAD:
+        raise InvalidVisitDay(_("Choose a day between today and a year from now."))
     return chosen, hour

@@ -10,7 +10,7 @@ from django.utils.translation import gettext
 
 from rehab.training import marking
 from rehab.training.measures import InvalidSetting
-from robot import gestures
+from robot.motion import gesture_errors
 
 
 class _Number(float):
@@ -20,7 +20,7 @@ class _Number(float):
         return number_format(super().__format__(spec))
 
 
-def in_words(problem: InvalidSetting | gestures.BadGesture) -> str:
+def in_words(problem: InvalidSetting | gesture_errors.BadGesture) -> str:
     """Say a refusal in the language in force; what was said in a language before stays as it is."""
     said = gettext(problem.template)
     if not problem.values:
@@ -30,7 +30,7 @@ def in_words(problem: InvalidSetting | gestures.BadGesture) -> str:
 
 def _say(value: object) -> object:
     match value:
-        case marking.Marked() | gestures.Marked():
+        case marking.Marked() | gesture_errors.Marked():
             return gettext(value)
         case marking.AnyOf():
             return f" {gettext(marking.OR)} ".join(map(gettext, value))

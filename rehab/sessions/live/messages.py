@@ -2,31 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import Any
 
 from rehab.sessions.log import Remark
 from rehab.training.controls import CONTROLS, ValueKind, requestable_kinds
 from rehab.training.steps import InvalidMeasurement, Measurement, Side
+from robot.wire.frames import BadFrame, check_values, read_name, read_number, read_whole
+from robot.wire.limits import MAX_EXTRA, MAX_REASONS, MAX_STEPS, PROTOCOL_VERSION
 
-MAX_FRAME = 64 * 1024
-MAX_STEPS = 256  # in one frame
-MAX_EXTRA = 32
 ROBOT_STATES = ("idle", "performing", "stopped", "disarmed")
 GESTURE_PHASES = ("started", "ended")
-NAME = re.compile(r"[A-Za-z0-9_.:-]{1,64}")
 PLAIN = re.compile(r"\s*([^,\s]{1,40})\s*,\s*([^,\s]{1,40})\s*")
-
-
-class BadFrame(ValueError):
-    """A frame that is not the protocol; the message says what would be."""
-
-    def __init__(self, message: str, code: str = "bad_frame") -> None:
-        super().__init__(message)
-        self.code = code
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,34 +30,13 @@ class Hello:
     token: str | None
 
 
-def _refuse_constant(name: str) -> NoReturn:
-    raise BadFrame(f"{name} is not JSON. Send null for a value that could not be had.")
-
-
-_decode = json.JSONDecoder(parse_constant=_refuse_constant).decode
-
-
-def read_object(text: str | None) -> dict[str, Any]:
-    """Read a frame as a JSON object with a type. Raises BadFrame."""
-    if text is None:
-        raise BadFrame("Send text frames, not binary ones.")
-    if len(text) > MAX_FRAME:
-        raise BadFrame(f"A frame has at most {MAX_FRAME} characters; send smaller ones.")
-    try:
-        message = _decode(text)
-    except BadFrame:
-        raise
-    except (ValueError, RecursionError):
-        raise BadFrame("A frame is one JSON object, as docs/protocol.md shows.") from None
-    if not isinstance(message, dict) or not isinstance(message.get("type", ""), str):
-        raise BadFrame('A frame is a JSON object with a "type".')
-    return message
-
-
 def read_hello(message: dict[str, Any]) -> Hello:
     """Read a source's hello. Raises BadFrame."""
-    if message.get("version") != 1:
-        raise BadFrame('This server speaks version 1: send "version": 1.', "version")
+    if message.get("version") != PROTOCOL_VERSION:
+        raise BadFrame(
+            f'This server speaks version {PROTOCOL_VERSION}: send "version": {PROTOCOL_VERSION}.',
+            "version",
+        )
     return Hello(
         run=read_name(message, "run"),
         last=read_whole(message, "last", low=0),
@@ -134,46 +102,6 @@ def read_change(message: dict[str, Any]) -> tuple[str, float | str | None]:
     return kind, _optional_number(message, "value")
 
 
-def read_name(message: dict[str, Any], name: str) -> str:
-    """Read a short name. Raises BadFrame."""
-    value = message.get(name)
-    if not isinstance(value, str) or not NAME.fullmatch(value):
-        raise BadFrame(f'"{name}" is a text of 1 to 64 letters, digits or _ . : -')
-    return value
-
-
-def read_whole(message: dict[str, Any], name: str, *, low: int) -> int:
-    """Read a whole number. Raises BadFrame."""
-    value = message.get(name)
-    if not isinstance(value, int) or isinstance(value, bool) or not low <= value < 2**31:
-        raise BadFrame(f'"{name}" is a whole number of {low} or more.')
-    return value
-
-
-def read_number(message: dict[str, Any], name: str) -> float:
-    """Read a finite number. Raises BadFrame."""
-    value = message.get(name)
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        try:
-            number = float(value)
-        except OverflowError:
-            number = math.inf
-        if math.isfinite(number):
-            return number
-    raise BadFrame(f'"{name}" is a finite number.')
-
-
-def check_plain(value: Any, depth: int = 8) -> None:
-    """Refuse what could not be passed on: numbers that are not finite, nesting without end."""
-    if isinstance(value, float) and not math.isfinite(value):
-        raise BadFrame("Numbers are finite. Send null for a value that could not be had.")
-    if isinstance(value, (dict, list)):
-        if not depth:
-            raise BadFrame("Objects and lists nest at most 8 deep here.")
-        for item in value.values() if isinstance(value, dict) else value:
-            check_plain(item, depth - 1)
-
-
 BORG_MAX = 10  # CR10
 
 
@@ -204,7 +132,7 @@ def read_report(message: dict[str, Any]) -> dict[str, Any]:
     report = message.get("report")
     if not isinstance(report, dict):
         raise BadFrame('"report" is an object.')
-    check_plain(report)
+    check_values(report)
     if not isinstance(report.get("kind", ""), str):
         raise BadFrame('"kind" of a report is a name.')
     match report.get("kind"):
@@ -271,8 +199,8 @@ def _optional_number(message: dict[str, Any], name: str) -> float | None:
 
 
 def _read_reasons(reasons: Any) -> tuple[str, ...]:
-    if not isinstance(reasons, list) or len(reasons) > 8:
-        raise BadFrame('"reasons" is a list of up to 8 codes.')
+    if not isinstance(reasons, list) or len(reasons) > MAX_REASONS:
+        raise BadFrame(f'"reasons" is a list of up to {MAX_REASONS} codes.')
     return tuple(read_name({"reasons": reason}, "reasons") for reason in reasons)
 
 

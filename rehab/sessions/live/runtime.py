@@ -39,11 +39,13 @@ from rehab.training.changes import (
     State,
 )
 from rehab.training.controls import CONTROLS, Audience
+from robot.wire.close_codes import CloseCode
+from robot.wire.limits import PAGE_HEARTBEAT_S, ROBOT_HEARTBEAT_S
 
 log = logging.getLogger(__name__)
 
-HEARTBEAT_S = 0.25  # to robots, which stand still after 0.65 s of silence
-SWEEP = 20  # heartbeats; then pages hear one too, idle sessions go, sign-ins are looked at
+# Robot heartbeats between those of pages; then idle sessions go, and sign-ins are looked at.
+SWEEP = round(PAGE_HEARTBEAT_S / ROBOT_HEARTBEAT_S)
 CHECKPOINT = 8  # heartbeats
 HEARTBEAT = to_text({"type": "heartbeat"})
 # Python's full collections take 200 ms with 2,000 sockets (docs/reference/stack.md#live-path): make
@@ -172,10 +174,12 @@ class Runtime:
             del self.sessions[live.id]
         for peer in (live.source, live.robot):
             if peer is not None:
-                peer.send_away(4011, "not_stored", "A step could not be stored. Connect again.")
+                peer.send_away(
+                    CloseCode.NOT_STORED, "not_stored", "A step could not be stored. Connect again."
+                )
         for socket in list(self.sockets):
             if getattr(socket, "live", None) is live:
-                socket.close_soon(4012)
+                socket.close_soon(CloseCode.RESTARTING)
 
     async def change(self, session_id: int, kind: str, value: ChangeValue, by: User | None) -> None:
         """Start, pause, steer or end a session; committed when this returns.
@@ -229,11 +233,11 @@ class Runtime:
     async def _repeat(self, beats: int, work: Callable[[], Awaitable[None]]) -> None:
         """Do something again and again. Where it fails that is logged, and it is tried again."""
         while True:
-            await asyncio.sleep(beats * HEARTBEAT_S)
+            await asyncio.sleep(beats * ROBOT_HEARTBEAT_S)
             try:
                 await work()
             except Exception:
-                log.exception("What is done every %.2f s failed", beats * HEARTBEAT_S)
+                log.exception("What is done every %.2f s failed", beats * ROBOT_HEARTBEAT_S)
 
     async def _beat_for_robots(self) -> None:
         for live in self.sessions.values():
@@ -284,7 +288,7 @@ class Runtime:
         for routine in self.routines:
             routine.cancel()
         await asyncio.gather(*self.routines, return_exceptions=True)
-        closing = [socket.shut(4012) for socket in list(self.sockets)]
+        closing = [socket.shut(CloseCode.RESTARTING) for socket in list(self.sockets)]
         await asyncio.gather(*closing, self.notes.settled(), return_exceptions=True)
         await asyncio.gather(*self.asked, return_exceptions=True)
         await self.loop.run_in_executor(None, self.writer.close)

@@ -19,7 +19,7 @@ from django.conf import settings
 from twisted.internet import defer, reactor
 
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.messages import MAX_FRAME
+from robot.wire.limits import MAX_FRAME_BYTES
 
 log = logging.getLogger(__name__)
 
@@ -91,8 +91,8 @@ class LiveServer(Server):  # type: ignore[misc]
 
     def __init__(self, *args: Any, on_ready: Callable[[], None] | None = None, **options: Any):
         options |= {
-            "websocket_max_message_size": MAX_FRAME + 1024,
-            "websocket_max_frame_size": MAX_FRAME + 1024,
+            "websocket_max_message_size": MAX_FRAME_BYTES + 1024,
+            "websocket_max_frame_size": MAX_FRAME_BYTES + 1024,
             # A half-open socket is noticed within 20 s.
             "ping_interval": 10,
             "ping_timeout": 10,

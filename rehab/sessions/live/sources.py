@@ -25,14 +25,14 @@ def child_name(session_id: int) -> str:
 
 
 async def run_source(children: Children, session: TrainingSession, server: str) -> None:
-    """Start what ``session.runs`` says, if anything and if it does not run yet.
+    """Start what ``session.source_args`` says, if anything and if it does not run yet.
 
     ``server`` is where this process answers.
     """
     name = child_name(session.pk)
-    if not session.runs or session.station is None or name in children.all:
+    if not session.source_args or session.station is None or name in children.all:
         return
     token = await sync_to_async(builtin_token)(session.station, Device.Kind.SOURCE)
-    command = [sys.executable, "-m", "rehab.sources", *session.runs, "--child", "--resume"]
+    command = [sys.executable, "-m", "rehab.sources", *session.source_args, "--child", "--resume"]
     place = ["--server", server, "--session", str(session.pk)]
     children.start(name, [*command, *place], {"GARRY_TOKEN": token}, once=True)

@@ -14,13 +14,14 @@ from rehab.people.consent.models import may_be_watched
 from rehab.people.models import Patient
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
-from rehab.sessions.formatting import LEVELS
+from rehab.sessions.control_text import chart_marks
+from rehab.sessions.formatting import ROBOT_LEVEL_LABELS
 from rehab.sessions.live.messages import BORG_MAX
 from rehab.sessions.log import EVENTS, Remark
 from rehab.sessions.models import TrainingSession
 from rehab.training.plans import ROBOT_LEVELS
 
-# What is noted with one tap, with its icon.
+# The icon of each remark, in the order of the buttons.
 ICONS = {
     Remark.REST: "rest",
     Remark.PAIN: "pain",
@@ -33,33 +34,36 @@ ICONS = {
 }
 
 
-def ask_for_consent(request: HttpRequest, patient: Patient) -> HttpResponse:
-    """Lead whoever would watch from elsewhere to the page where it can be agreed to."""
-    said = _(
+def redirect_to_consent(request: HttpRequest, patient: Patient) -> HttpResponse:
+    """Redirect somebody outside the clinic to the page where remote view is consented to."""
+    message = _(
         "You are not in the clinic, and %(patient)s has not agreed to remote view. Ask first, and "
         "note it here."
     )
-    messages.error(request, said % {"patient": patient.nickname})
+    messages.error(request, message % {"patient": patient.nickname})
     return redirect("consent", patient_id=patient.pk)
 
 
 @for_roles(Role.LEAD, Role.PT)
 @require_safe
 def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
-    """Show and steer a session; everything on it comes by its socket."""
+    """Show the page that controls a session; its contents come by the session's socket."""
     sessions = TrainingSession.objects.visible_to(person(request))
     session = get_object_or_404(
         sessions.select_related("patient__clinic", "station", "measure"), pk=session_id
     )
     if not may_be_watched(session.patient, client_address(request)):
-        return ask_for_consent(request, session.patient)
+        return redirect_to_consent(request, session.patient)
     context = {
+        "chart_marks": chart_marks(),
         "session": session,
         "remarks": [
             {"slug": what.value, "label": capfirst(EVENTS[what]), "icon": icon}
             for what, icon in ICONS.items()
         ],
         "borg": range(BORG_MAX + 1),
-        "levels": [(capfirst(LEVELS[name]), share) for name, share in ROBOT_LEVELS.items()],
+        "levels": [
+            (capfirst(ROBOT_LEVEL_LABELS[name]), share) for name, share in ROBOT_LEVELS.items()
+        ],
     }
     return render(request, "sessions/monitor.html", context)

@@ -1,4 +1,4 @@
-"""A session on one page of paper."""
+"""The page with a session's report on paper."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from django.views.decorators.http import require_safe
 
 from rehab.people.access import for_roles, person
 from rehab.people.roles import Role
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.report import moment_of, write_report
+from rehab.sessions.reports.report import report_context
 
 
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
 @require_safe
 def show_report(request: HttpRequest, session_id: int) -> HttpResponse:
-    """Write one session's page for the records; researchers see a pseudonym."""
+    """Show one session's report for the records; researchers see a pseudonym."""
     user = person(request)
     sessions = TrainingSession.objects.visible_to(user).select_related(
         "patient", "clinic", "measure", "station", "created_by"
@@ -26,8 +26,8 @@ def show_report(request: HttpRequest, session_id: int) -> HttpResponse:
     context = {
         "session": session,
         "by_name": user.role != Role.RESEARCHER,
-        "began": moment_of(session),
-        "now": at_clinic(timezone.now(), session.clinic),
-        "report": write_report(user, session),
+        "began": clinic_time(session.began_at, session.clinic),
+        "now": clinic_time(timezone.now(), session.clinic),
+        "report": report_context(user, session),
     }
     return render(request, "sessions/report.html", context)

@@ -1,4 +1,4 @@
-"""How a session is set up."""
+"""The page that sets a session up."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from rehab.feedback.valences import valences_of
 from rehab.people.access import for_roles, person
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.forms import SessionForm, like_last_time, minutes_of
-from rehab.sessions.preset_form import keep_preset
-from rehab.sessions.presets import Preset
-from rehab.sessions.protocols import Protocol
+from rehab.sessions.forms.preset import save_preset
+from rehab.sessions.forms.session import SessionForm, initial_choices, protocol_minutes
+from rehab.sessions.setup.presets import Preset
+from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.builtin import first_station
 
-# Where the person who set the session up goes on.
-PLACES = ("walk", "monitor")
+# Where the person who set the session up may go next.
+NEXT_PAGES = ("walk", "monitor")
 
 
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
 def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Show the set-up, beginning like last time or with a preset; create the session.
+    """Show the set-up, filled in like last time or from a preset; create the session.
 
-    What stands in it may also be kept as a preset.
+    The form may also be stored as a preset.
     """
     user = person(request)
     patient = get_object_or_404(Patient.objects.visible_to(user), pk=patient_id)
@@ -42,21 +42,23 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
         form = SessionForm(request.POST, patient=patient, by=user)
         if wanted == "preset":
             try:
-                kept = keep_preset(request.POST, patient, user, name)
+                preset = save_preset(request.POST, patient, user, name)
             except ValidationError as problem:
                 form.errors.clear()
                 form.add_error(None, problem.messages)
             else:
-                words = gettext("Saved as preset “%(name)s”. It is renamed or deleted in Admin.")
-                messages.success(request, words % {"name": kept.name})
-                return redirect(f"{reverse('setup', args=[patient.pk])}?preset={kept.pk}")
+                message = gettext("Saved as preset “%(name)s”. It is renamed or deleted in Admin.")
+                messages.success(request, message % {"name": preset.name})
+                return redirect(f"{reverse('setup', args=[patient.pk])}?preset={preset.pk}")
         elif (session := form.create()) is not None:
-            return redirect(wanted if wanted in PLACES else PLACES[0], session_id=session.pk)
+            return redirect(
+                wanted if wanted in NEXT_PAGES else NEXT_PAGES[0], session_id=session.pk
+            )
     else:
-        initial = like_last_time(patient, user) | (chosen.to_choices(user) if chosen else {})
+        initial = initial_choices(patient, user) | (chosen.to_initial(user) if chosen else {})
         form = SessionForm(initial=initial, patient=patient, by=user)
     protocols = Protocol.objects.visible_to(user).prefetch_related("phases")
-    lengths = {row.pk: minutes_of(row) for row in protocols}
+    lengths = {row.pk: protocol_minutes(row) for row in protocols}
     context = {
         "patient": patient,
         "form": form,

@@ -1,4 +1,4 @@
-"""The tablet at a treadmill: shows a code until it is paired, then whatever its station does."""
+"""The tablet at a treadmill: it shows a code until it is paired, then its station's sessions."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from rehab.stations import pairing, tablets
 from rehab.stations.models import Device
 from rehab.training.changes import OPEN_STATES
 
-SECRET = "garry_pairing"  # noqa: S105 (the cookie's name)
+PAIRING_COOKIE = "garry_pairing"
 
 
-def open_session(tablet: Device) -> TrainingSession | None:
-    """Give the newest open session at the tablet's station."""
+def current_session(tablet: Device) -> TrainingSession | None:
+    """Return the newest open session at the tablet's station."""
     sessions = TrainingSession.objects.visible_to(tablet)
     return sessions.filter(state__in=[state.value for state in OPEN_STATES]).first()
 
@@ -35,12 +35,12 @@ def show_tablet(request: HttpRequest) -> HttpResponse:
     """Show the code of a new tablet; a paired one waits for its station's next session."""
     tablet = tablet_of(request)
     if tablet is not None:
-        session = open_session(tablet)
+        session = current_session(tablet)
         if session is not None:
             return redirect("walk", session_id=session.pk)
         return render(request, "sessions/tablet.html", {"station": tablet.station})
     now = timezone.now()
-    begun = pairing.find(request.COOKIES.get(SECRET, ""), now)
+    begun = pairing.find(request.COOKIES.get(PAIRING_COOKIE, ""), now)
     if begun is not None and begun.device is None:
         return _show_code(request, begun.code)
     try:
@@ -49,7 +49,7 @@ def show_tablet(request: HttpRequest) -> HttpResponse:
         status = 429 if isinstance(refused, pairing.PairingFlooded) else 503
         return render(request, "sessions/tablet.html", {"problem": refused}, status=status)
     response = _show_code(request, begun.code)
-    tablets.remember(response, SECRET, secret, pairing.LIFETIME.total_seconds())
+    tablets.remember(response, PAIRING_COOKIE, secret, pairing.LIFETIME.total_seconds())
     return response
 
 
@@ -62,8 +62,8 @@ def _show_code(request: HttpRequest, code: str) -> HttpResponse:
 
 @public
 @require_safe
-def describe_app(request: HttpRequest) -> JsonResponse:
-    """Let the tablet's browser install its page as an app that fills the screen."""
+def web_app_manifest(request: HttpRequest) -> JsonResponse:
+    """Return the manifest with which a browser installs the page as a full-screen app."""
     mark = {"src": static("img/mark.svg"), "type": "image/svg+xml", "sizes": "any"}
     app = {
         "name": _("GARRY tablet"),
@@ -82,22 +82,22 @@ def describe_app(request: HttpRequest) -> JsonResponse:
 @public
 @never_cache
 @require_safe
-def tell_tablet(request: HttpRequest) -> HttpResponse:
-    """Tell a tablet where to go: nowhere yet, to its code's successor, or to a session."""
+def tablet_state(request: HttpRequest) -> HttpResponse:
+    """Return where a tablet goes next: nowhere yet, to a new code, or to a session."""
     tablet = tablet_of(request)
     if tablet is not None:
-        session = open_session(tablet)
+        session = current_session(tablet)
         there = reverse("walk", kwargs={"session_id": session.pk}) if session else ""
         response = JsonResponse({"paired": True, "go": there})
         if token := request.COOKIES.get(tablets.COOKIE):
             tablets.remember(response, tablets.COOKIE, token, tablets.COOKIE_AGE_S)
         return response
-    begun = pairing.find(request.COOKIES.get(SECRET, ""), timezone.now())
+    begun = pairing.find(request.COOKIES.get(PAIRING_COOKIE, ""), timezone.now())
     if begun is None:
         return JsonResponse({"paired": False, "go": reverse("tablet")})  # for a new code
     token = pairing.collect(begun)
     response = JsonResponse({"paired": token is not None, "go": reverse("tablet") if token else ""})
     if token is not None:
         tablets.remember(response, tablets.COOKIE, token, tablets.COOKIE_AGE_S)
-        response.delete_cookie(SECRET)
+        response.delete_cookie(PAIRING_COOKIE)
     return response

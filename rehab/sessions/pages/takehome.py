@@ -1,4 +1,4 @@
-"""A page on paper for the patient to take home."""
+"""The page on paper that a patient takes home."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from rehab.people.access import for_roles, person
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.people.web.language import speak_to
-from rehab.sessions.formatting import at_clinic
+from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.takehome import sum_up_for_home
+from rehab.sessions.reports.takehome import summarize_for_patient
 
 
 @for_roles(Role.LEAD, Role.PT)
 @require_safe
 def show_take_home(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Tell in plain words what a patient has walked; a person's figures hold no simulated ones."""
+    """Show in plain words what a patient has walked, without a person's simulated sessions."""
     user = person(request)
     patient = get_object_or_404(
         Patient.objects.visible_to(user).select_related("clinic"), pk=patient_id
@@ -28,7 +28,7 @@ def show_take_home(request: HttpRequest, patient_id: int) -> HttpResponse:
     sessions = TrainingSession.objects.visible_to(user).filter(
         patient=patient, simulated=patient.simulated
     )
-    now = at_clinic(timezone.now(), patient.clinic)
-    told = sum_up_for_home(user, sessions, now)
-    context = {"patient": patient, "told": told, "today": now.date()}
+    now = clinic_time(timezone.now(), patient.clinic)
+    summary = summarize_for_patient(user, sessions, now)
+    context = {"patient": patient, "summary": summary, "today": now.date()}
     return render(request, "sessions/takehome.html", context)

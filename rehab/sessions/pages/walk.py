@@ -15,7 +15,7 @@ from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.web.language import speak_to
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.pages.monitor import ask_for_consent
+from rehab.sessions.pages.monitor import redirect_to_consent
 from rehab.training.changes import ENDED_STATES, State
 
 
@@ -30,7 +30,7 @@ def show_walk(request: HttpRequest, session_id: int) -> HttpResponse:
     session = get_object_or_404(sessions, pk=session_id)
     alone = not request.user.is_authenticated
     if not alone and not may_be_watched(session.patient, client_address(request)):
-        return ask_for_consent(request, session.patient)
+        return redirect_to_consent(request, session.patient)
     mirror = "mirror" in request.GET
     speak_to(session.patient)
     if State(session.state) in ENDED_STATES and not mirror:

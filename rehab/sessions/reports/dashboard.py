@@ -1,311 +1,141 @@
-"""What a clinic sees first in the admin: today, this week, its stations, what wants attention."""
+"""A clinic's dashboard in the admin: today, this week, its stations and alerts."""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
-from django.db.models import Count, F, OuterRef, Q, QuerySet, Subquery
 from django.utils.dateformat import format as format_date
 from django.utils.translation import gettext
 
 from rehab.people.access import clinic_of
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Right, Role, rights_of
-from rehab.sessions.formatting import at_clinic, midnight_of, say_duration, say_number, say_rate
-from rehab.sessions.live import runtime
-from rehab.sessions.live.session import LiveSession
-from rehab.sessions.log import SessionMetric, Step
+from rehab.sessions.formatting import clinic_time, format_duration, format_rate, midnight_of
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.trend import with_figures
+from rehab.sessions.reports.stations import StationStatus, find_live_session, station_statuses
+from rehab.sessions.reports.today import IS_OPEN, todays_sessions
+from rehab.sessions.reports.trend import with_metrics
+from rehab.sessions.reports.week import week_summary
 from rehab.stations.models import Device, Station
-from rehab.stations.presence import is_overdue, say_state
+from rehab.stations.presence import is_overdue
 from rehab.training.changes import OPEN_STATES, State
-from rehab.training.valences import VALENCES
 
-SHOWN = 40  # sessions of today that are over; open ones are shown all
-LONG_OPEN = timedelta(hours=3)  # no visit takes as long
-REVOKED_FOR = timedelta(days=7)  # so long it is told that a device is shut out
-# Who walks stands on top, then what could go on, then what is over.
-ORDER = [State.RUNNING, State.PAUSED, State.READY, State.FINISHED, State.ABORTED]
+MAX_ENDED = 40  # ended sessions of today that are listed; open ones are all listed
+OPEN_TOO_LONG = timedelta(hours=3)  # no visit takes as long
+REVOKED_ALERT_FOR = timedelta(days=7)  # how long an alert tells of a revoked device
+# Who walks comes first, then what could go on, then what is over.
+STATE_ORDER = [State.RUNNING, State.PAUSED, State.READY, State.FINISHED, State.ABORTED]
 
 
 @dataclass(frozen=True, slots=True)
-class Today:
-    """A session of today, or one that is still open."""
+class SessionRow:
+    """A session of today, or one that is still open, as text."""
 
     session: TrainingSession
-    who: str
+    patient: str
     time: str
     state: str
-    open: bool
-    walked: str
+    is_open: bool
+    duration: str
     hit_rate: str
 
 
 @dataclass(frozen=True, slots=True)
-class Walked:
-    """What was walked with one feedback type, or with all: wanted and hits by judged steps."""
+class Alert:
+    """A problem that somebody should solve, and the page where it is solved."""
 
-    slug: str
-    label: str
-    sessions: int
-    minutes: float
-    strides: int
-    hit_rate: float | None
-    wanted: float | None
-
-    @property
-    def words(self) -> dict[str, str]:
-        """Give the figures as they are written."""
-        return {
-            "minutes": say_duration(60 * self.minutes),
-            "strides": say_number(self.strides, 0),
-            "hit_rate": say_rate(self.hit_rate),
-            "wanted": say_rate(self.wanted),
-        }
-
-
-@dataclass(frozen=True, slots=True)
-class Week:
-    """Monday to now. ``simulated``: nobody walked, so these are simulated sessions."""
-
-    total: Walked
-    types: list[Walked]
-    days: list[str]
-    minutes: list[float]
-    simulated: bool
-    left_out: int
-
-    @property
-    def chart(self) -> dict[str, Any]:
-        """Give the data of both charts."""
-        return {
-            "days": self.days,
-            "minutes": [round(minutes, 1) for minutes in self.minutes],
-            "types": [
-                {
-                    "slug": own.slug,
-                    "label": own.label,
-                    "hit": own.hit_rate and round(100 * own.hit_rate, 1),
-                    "wanted": own.wanted and round(100 * own.wanted, 1),
-                }
-                for own in self.types
-                if own.hit_rate is not None
-            ],
-        }
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """A station with its devices, each with its state, and who is there."""
-
-    station: Station
-    devices: list[tuple[Device, str]]
-    session: TrainingSession | None
-    here: dict[str, bool]  # what is connected to the open session
-
-
-@dataclass(frozen=True, slots=True)
-class Matter:
-    """Something that wants attention, and where to mend it."""
-
-    words: str
-    name: str
+    message: str
+    url_name: str
     key: int
 
 
-def look(user: User, now: datetime) -> dict[str, Any]:
-    """Give what somebody of a clinic sees; each part as far as the role sees its rows."""
+def dashboard_context(user: User, now: datetime) -> dict[str, Any]:
+    """Return the template's context; each part as far as the user's role sees its rows."""
     clinic = clinic_of(user)
-    today = read_today(user, clinic, now)
-    open_now = [line.session for line in today if line.open]
-    places = list(read_places(user, open_now, now)) if _sees(user, Station) else []
+    today = sessions_today(user, clinic, now)
+    open_sessions = [row.session for row in today if row.is_open]
+    may_see_stations = Right.VIEW in rights_of(user.role, Station.__name__)
+    stations = list(station_statuses(user, open_sessions, now)) if may_see_stations else []
     return {
         "clinic": clinic,
-        "now": at_clinic(now, clinic),
+        "now": clinic_time(now, clinic),
         "today": today,
-        "walking": sum(line.session.state == State.RUNNING for line in today),
-        "week": read_week(user, clinic, now),
-        "places": places,
-        "matters": list(find_matters(user, today, places, now)),
-        "steers": user.role in (Role.LEAD, Role.PT),
+        "walking": sum(row.session.state == State.RUNNING for row in today),
+        "week": week_summary(user, clinic, now),
+        "stations": stations,
+        "alerts": list(find_alerts(user, today, stations, now)),
+        "can_steer": user.role in (Role.LEAD, Role.PT),
     }
 
 
-def _sees(user: User, model: type) -> bool:
-    return Right.VIEW in rights_of(user.role, model.__name__)
-
-
-def read_today(user: User, clinic: Clinic, now: datetime) -> list[Today]:
-    """Give today's sessions by the clinic's clock, and every open one, those that run on top."""
-    midnight = midnight_of(at_clinic(now, clinic))
-    is_open = Q(state__in=[state.value for state in OPEN_STATES])
-    begun = Q(created_at__gte=midnight) | Q(started_at__gte=midnight)
-    sessions = TrainingSession.objects.visible_to(user).filter(is_open | begun).defer("plan")
-    lines = (
-        with_figures(user, sessions)
+def sessions_today(user: User, clinic: Clinic, now: datetime) -> list[SessionRow]:
+    """Return today's sessions by the clinic's clock and every open one, running ones first."""
+    local = clinic_time(now, clinic)
+    sessions = todays_sessions(TrainingSession.objects.visible_to(user), local)
+    rows = (
+        with_metrics(user, sessions)
         .select_related("patient", "station", "measure")
         .order_by("-created_at", "-pk")
     )
-    rows = [*lines.filter(is_open), *lines.exclude(is_open)[:SHOWN]]
-    rows.sort(key=lambda row: ORDER.index(State(row.state)))
+    listed = [*rows.filter(IS_OPEN), *rows.exclude(IS_OPEN)[:MAX_ENDED]]
+    listed.sort(key=lambda row: STATE_ORDER.index(State(row.state)))
     by_name = user.role != Role.RESEARCHER
     return [
-        Today(
+        SessionRow(
             session=row,
-            who=row.patient.nickname if by_name else row.patient.pseudonym,
-            time=_say_time(at_clinic(row.started_at or row.created_at, clinic), midnight),
+            patient=row.patient.nickname if by_name else row.patient.pseudonym,
+            time=_format_time(clinic_time(row.began_at, clinic), midnight_of(local)),
             state=row.get_state_display(),
-            open=State(row.state) in OPEN_STATES,
-            walked=say_duration(row.active_s),
-            hit_rate=_say_hits(row),
+            is_open=State(row.state) in OPEN_STATES,
+            duration=format_duration(row.active_s),
+            hit_rate=_format_hit_rate(row),
         )
-        for row in rows
+        for row in listed
     ]
 
 
-def _say_hits(row: Any) -> str:
-    """Give the hit rate; of an open session as it stands by now, where this process runs it."""
+def _format_hit_rate(row: Any) -> str:
+    """Return the hit rate; of an open session the current one, where this process runs it."""
     if State(row.state) not in OPEN_STATES:
-        return say_rate(row.metric_hit_rate)
-    running = _find_running(row)
-    rate = running.actor.fold.feedback.hit_rate if running else None
-    return "" if rate is None else say_rate(rate)
+        return format_rate(row.metric_hit_rate)
+    live = find_live_session(row)
+    rate = live.actor.fold.feedback.hit_rate if live else None
+    return "" if rate is None else format_rate(rate)
 
 
-def _find_running(session: TrainingSession) -> LiveSession | None:
-    live = runtime.peek()
-    return live.sessions.get(session.pk) if live else None
-
-
-def _say_time(moment: datetime, midnight: datetime) -> str:
+def _format_time(moment: datetime, midnight: datetime) -> str:
     day = "" if moment >= midnight else format_date(moment, "M j") + ", "
     return f"{day}{moment:%H:%M}"
 
 
-def read_week(user: User, clinic: Clinic, now: datetime) -> Week:
-    """Give the figures of the clinic's week so far: of what people walked, corrections heeded."""
-    here = at_clinic(now, clinic)
-    monday = midnight_of(here - timedelta(days=here.weekday()))
-    begun = TrainingSession.objects.visible_to(user).filter(
-        started_at__gte=monday, started_at__lte=now
-    )
-    steps = SessionMetric.objects.visible_to(user).filter(session=OuterRef("pk"), slug="steps")
-    rows = list(
-        with_figures(user, begun)
-        .annotate(judged=Subquery(steps.values("value")))
-        .order_by()
-        .values(
-            *("pk", "valence", "simulated", "left_out", "active_s", "started_at"),
-            *("metric_hit_rate", "judged", "plan__target__hit_rate"),
+def find_alerts(
+    user: User, today: Iterable[SessionRow], stations: Iterable[StationStatus], now: datetime
+) -> Iterator[Alert]:
+    """Yield what somebody should look after: sessions left open, devices that cannot dial in."""
+    for row in today:
+        too_long = row.is_open and now - row.session.began_at > OPEN_TOO_LONG
+        if too_long and user.role != Role.RESEARCHER:
+            message = gettext("The session of %(name)s is open since %(time)s. End it.")
+            names = {"name": row.patient, "time": row.time}
+            yield Alert(message % names, "monitor", row.session.pk)
+    for status in stations:
+        for device, _state in status.devices:
+            if (problem := _device_problem(device, now)) is not None:
+                names = {"name": device.name, "station": status.station.name}
+                yield Alert(problem % names, "admin:rehab_device_change", device.pk)
+
+
+def _device_problem(device: Device, now: datetime) -> str | None:
+    if is_overdue(device, now):
+        return gettext(
+            "%(name)s at %(station)s has never dialed in. Give it its token, or revoke it."
         )
-    )
-    counted = [row for row in rows if not row["left_out"]]
-    simulated = bool(counted) and all(row["simulated"] for row in counted)
-    counted = [row for row in counted if row["simulated"] == simulated]
-    strides = _count_strides(user, begun.filter(left_out=False, simulated=simulated))
-    minutes = [0.0] * 7
-    for row in counted:
-        minutes[at_clinic(row["started_at"], clinic).weekday()] += row["active_s"] / 60
-    return Week(
-        total=_sum_up("", "", counted, sum(strides.values())),
-        types=[
-            _sum_up(kind.slug, kind.label, own, strides[kind.slug])
-            for kind in VALENCES.values()
-            if (own := [row for row in counted if row["valence"] == kind.slug])
-        ],
-        days=[format_date(monday + timedelta(days=day), "D") for day in range(7)],
-        minutes=minutes,
-        simulated=simulated,
-        left_out=len(rows) - len(counted),
-    )
-
-
-def _count_strides(user: User, sessions: QuerySet[TrainingSession]) -> defaultdict[str, int]:
-    """Give the valid strides of the trained leg, by feedback type."""
-    found: defaultdict[str, int] = defaultdict(int)
-    rows = (
-        Step.objects.visible_to(user)
-        .filter(session__in=sessions.values("pk"), valid=True)
-        .filter(side=F("session__trained_side"))
-        .values_list("session__valence")
-        .annotate(Count("pk"))
-        .order_by()
-    )
-    found.update(rows)
-    return found
-
-
-def _sum_up(slug: str, label: str, rows: list[dict[str, Any]], strides: int) -> Walked:
-    judged = [row for row in rows if row["metric_hit_rate"] is not None and row["judged"]]
-    wished = [row for row in judged if row["plan__target__hit_rate"] is not None]
-    return Walked(
-        slug=slug,
-        label=gettext(label) if label else "",
-        sessions=len(rows),
-        minutes=sum(row["active_s"] for row in rows) / 60,
-        strides=strides,
-        hit_rate=_mean(judged, "metric_hit_rate"),
-        wanted=_mean(wished, "plan__target__hit_rate"),
-    )
-
-
-def _mean(rows: list[dict[str, Any]], name: str) -> float | None:
-    """Give a mean in which each judged step weighs the same."""
-    weight = sum(row["judged"] for row in rows)
-    return sum(row[name] * row["judged"] for row in rows) / weight if weight else None
-
-
-def read_places(user: User, open_now: list[TrainingSession], now: datetime) -> Iterator[Place]:
-    """Give the stations with their devices, and what is connected to their open sessions."""
-    devices: defaultdict[int, list[Device]] = defaultdict(list)
-    for device in Device.objects.visible_to(user).order_by("kind", "name"):
-        devices[device.station_id].append(device)
-    at_station = {session.station_id: session for session in reversed(open_now)}
-    for station in Station.objects.visible_to(user):
-        session = at_station.get(station.pk)
-        yield Place(
-            station,
-            [(device, say_state(device, now)) for device in devices[station.pk]],
-            session,
-            find_here(session, now) if session else {},
+    if device.revoked_at is not None and now - device.revoked_at < REVOKED_ALERT_FOR:
+        return gettext(
+            "%(name)s at %(station)s is revoked and shut out. Give it a new token to let "
+            "it in again."
         )
-
-
-def find_here(session: TrainingSession, now: datetime) -> dict[str, bool]:
-    """Give what is connected to a session of this process; nothing where another one runs it."""
-    running = _find_running(session)
-    if running is None:
-        return {}
-    told = running.presence(now)
-    return {"source": told["source"], "tablet": bool(told["tablets"]), "robot": told["robot"]}
-
-
-def find_matters(
-    user: User, today: list[Today], places: list[Place], now: datetime
-) -> Iterator[Matter]:
-    """Give what wants attention, each with its cure."""
-    for line in today:
-        began = line.session.started_at or line.session.created_at
-        if line.open and now - began > LONG_OPEN and user.role != Role.RESEARCHER:
-            words = gettext("The session of %(name)s is open since %(time)s. End it.")
-            yield Matter(words % {"name": line.who, "time": line.time}, "monitor", line.session.pk)
-    for place in places:
-        for device, _state in place.devices:
-            names = {"name": device.name, "station": place.station.name}
-            link = "admin:rehab_device_change"
-            if is_overdue(device, now):
-                words = gettext(
-                    "%(name)s at %(station)s has never dialed in. Give it its token, or revoke it."
-                )
-                yield Matter(words % names, link, device.pk)
-            elif device.revoked_at is not None and now - device.revoked_at < REVOKED_FOR:
-                words = gettext(
-                    "%(name)s at %(station)s is revoked and shut out. Give it a new token to let "
-                    "it in again."
-                )
-                yield Matter(words % names, link, device.pk)
+    return None

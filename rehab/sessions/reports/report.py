@@ -2,248 +2,151 @@
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
-from datetime import datetime
-from itertools import groupby
+from dataclasses import replace
 from typing import Any
 
 from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
 
 from rehab.people.models import User
-from rehab.sessions.formatting import at_clinic, say_duration, say_number, say_quantity, say_rate
+from rehab.sessions.formatting import (
+    clinic_time,
+    format_change,
+    format_number,
+    format_quantity,
+)
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.review import Review, review_session
-from rehab.sessions.reports.trend import Point, read_trend
+from rehab.sessions.reports.report_chart import draw_chart
+from rehab.sessions.reports.review import SessionReview, review_session
+from rehab.sessions.reports.summary import Figure, format_phases, format_summary
+from rehab.sessions.reports.trend import TrendPoint, load_trend
 from rehab.training.changes import ChangeKind
 from rehab.training.plans import SessionPlan
 
-# What one page has room for; what is left out is counted, and stands in the session's details.
-PHASES, GOALS, TIMES = 9, 6, 6
+# What one page has room for; what is omitted is counted, and is on the session's own page.
+MAX_PHASES, MAX_GOALS, MAX_TIMES = 9, 6, 6
 ADVERSE = (Remark.FALL, Remark.NEAR_FALL, Remark.PAIN, Remark.DIZZINESS)
 REMARKS = {kind.value for kind in Remark}
-# The chart, in units of its view box.
-WIDE, HIGH, SPACE = 1000.0, 250.0, 18.0
-DOT, RING = 3.2, 2.6
 
 
-def write_report(user: User, session: TrainingSession) -> dict[str, Any]:
-    """Give everything that the page says of a session."""
+def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
+    """Return everything that the report shows of a session."""
     plan = session.to_plan()
     review = review_session(user, session)
-    ended = read_trend(user, TrainingSession.objects.visible_to(user).filter(pk=session.pk))
-    point = ended[0] if ended else None
-    events = list(SessionEvent.objects.visible_to(user).filter(session=session).order_by("pk"))
-    phases = review.figures["phases"]
+    ended = load_trend(user, TrainingSession.objects.visible_to(user).filter(pk=session.pk))
+    phases = format_phases(review)
     return {
-        "figures": _sum_up(plan, review, point),
-        "goals": _tell_goals(plan, review, session),
-        "phases": [_tell_phase(phase) for phase in phases[:PHASES]],
-        "more_phases": max(0, len(phases) - PHASES),
-        "remarks": _tell_remarks(events, session),
-        "robot": _tell_robot(events),
+        "figures": _list_figures(plan, review, ended[0] if ended else None),
+        "goals": _describe_goals(plan, review),
+        "phases": phases[:MAX_PHASES],
+        "more_phases": max(0, len(phases) - MAX_PHASES),
+        "remarks": _summarize_remarks(review.rows, session),
+        "robot": _describe_robot(review.rows),
         "chart": draw_chart(review.chart),
         "unit": plan.measure.unit,
     }
 
 
-def _sum_up(plan: SessionPlan, review: Review, point: Point | None) -> list[tuple[str, str, str]]:
-    """Give the main figures: label, value, and what stands beside it."""
-    figures, target = review.figures, plan.target
-    walked, baseline = (point.walked, point.baseline) if point else (None, None)
-    unit, lost = plan.measure.unit, figures["missing"] + figures["invalid"]
-    scored = plan.valence.has_points or figures["score"] is not None
-    wanted = _("wanted %(rate)s") % {"rate": say_rate(target.hit_rate)} if target.hit_rate else ""
-    planned = ""
-    if target.duration_s:
-        planned = _("planned %(time)s") % {"time": say_duration(target.duration_s)}
-    against = _("no baseline")
-    if baseline and point:
-        gain = point.gain
-        change = say_rate(gain) if gain is None or gain <= 0 else f"+{say_rate(gain)}"
-        said = {"mean": say_quantity(baseline.mean, unit), "change": change}
-        against = _("baseline %(mean)s, %(change)s") % said
-    left_out = ngettext("%(count)s does not count", "%(count)s do not count", lost)
+def _list_figures(
+    plan: SessionPlan, review: SessionReview, point: TrendPoint | None
+) -> list[Figure]:
+    """Return the main figures in the order of the page, with the mean beside its baseline."""
+    summary = format_summary(plan, review)
+    with_feedback, baseline = (point.with_feedback, point.baseline) if point else (None, None)
+    unit = plan.measure.unit
+    note = _("no baseline")
+    if point and baseline:
+        values = {
+            "mean": format_quantity(baseline.mean, unit),
+            "change": format_change(point.change),
+        }
+        note = _("baseline %(mean)s, %(change)s") % values
+    mean = format_quantity(with_feedback.mean if with_feedback else None, unit)
     return [
-        (_("Hit rate"), say_rate(figures["hit_rate"]), wanted),
-        (
-            _("Mean with feedback"),
-            say_quantity(walked.mean if walked else None, unit),
-            against,
-        ),
-        (
-            _("Strides, trained leg"),
-            say_number(figures["strides"], 0),
-            left_out % {"count": say_number(lost, 0)} if lost else "",
-        ),
-        (_("Walked"), say_duration(figures["active_s"]), planned),
-        (
-            _("Score"),
-            say_number(figures["score"], 0) if scored else "–",
-            _("points") if scored else _("this type has no points"),
-        ),
+        summary.hit_rate,
+        Figure(_("Mean with feedback"), mean, note),
+        replace(summary.strides, label=_("Strides, trained leg")),
+        summary.duration,
+        summary.score,
     ]
 
 
-def _tell_goals(plan: SessionPlan, review: Review, session: TrainingSession) -> list[str]:
-    """Tell the goal as it began and each change of it."""
-    changes = [moment for moment in review.moments if moment.event.kind == ChangeKind.GOAL]
+def _describe_goals(plan: SessionPlan, review: SessionReview) -> list[str]:
+    """Return the first goal and each change of it."""
+    changes = [entry for entry in review.events if entry.event.kind == ChangeKind.GOAL]
     first = plan.goal.value
     if changes and changes[0].event.old is not None:
         first = changes[0].event.old
     unit = plan.measure.unit
     if first is not None:
-        told = [say_quantity(first, unit)]
+        goals = [format_quantity(first, unit)]
     elif plan.goal.percent_of_baseline:
-        percent = {"percent": say_number(plan.goal.percent_of_baseline, 0)}
-        told = [_("%(percent)s %% of baseline") % percent]
+        percent = {"percent": format_number(plan.goal.percent_of_baseline, 0)}
+        goals = [_("%(percent)s %% of baseline") % percent]
     else:
-        told = []
-    for moment in changes[:GOALS]:
-        at = at_clinic(moment.event.at, session.clinic)
-        told.append(f"{say_quantity(moment.event.value, unit)} ({at:%H:%M})")
-    left = len(changes) - GOALS
-    if left > 0:
-        more = ngettext("%(count)s change more", "%(count)s changes more", left)
-        told += [f"… {more % {'count': left}} …", say_quantity(review.figures["goal"], unit)]
-    return told
+        goals = []
+    for entry in changes[:MAX_GOALS]:
+        goals.append(f"{format_quantity(entry.event.value, unit)} ({entry.at:%H:%M})")
+    omitted = len(changes) - MAX_GOALS
+    if omitted > 0:
+        more = ngettext("%(count)s change more", "%(count)s changes more", omitted)
+        goals += [f"… {more % {'count': omitted}} …", format_quantity(review.figures["goal"], unit)]
+    return goals
 
 
-def _tell_phase(phase: dict[str, Any]) -> dict[str, Any]:
-    return phase | {
-        "hit_rate_words": say_rate(phase["hit_rate"]),
-        "mean_words": say_number(phase["mean"]),
-        "performance_words": say_rate(phase["mean_performance"]),
-    }
-
-
-def _tell_remarks(events: list[SessionEvent], session: TrainingSession) -> list[dict[str, Any]]:
-    """Tell each kind of remark with its times, adverse ones first; Borg with its values."""
+def _summarize_remarks(
+    events: list[SessionEvent], session: TrainingSession
+) -> list[dict[str, Any]]:
+    """Return each kind of remark with its times, adverse ones first; Borg with its values."""
     times: defaultdict[Remark, list[str]] = defaultdict(list)
     for event in events:
         if event.kind in REMARKS:
-            words = f"{at_clinic(event.at, session.clinic):%H:%M}"
+            text = f"{clinic_time(event.at, session.clinic):%H:%M}"
             if event.kind == Remark.BORG:
-                words = f"{say_number(event.value, 0)} ({words})"
-            times[Remark(event.kind)].append(words)
+                text = f"{format_number(event.value, 0)} ({text})"
+            times[Remark(event.kind)].append(text)
     order = sorted(times, key=lambda kind: (kind not in ADVERSE, list(Remark).index(kind)))
     return [
         {
-            "name": _("Exertion (Borg)") if kind == Remark.BORG else _(say_kind(kind)),
+            "name": _("Exertion (Borg)") if kind == Remark.BORG else _(remark_label(kind)),
             "count": 0 if kind == Remark.BORG else len(times[kind]),
-            "times": _shorten(times[kind]),
+            "times": _join(times[kind]),
             "adverse": kind in ADVERSE,
         }
         for kind in order
     ]
 
 
-def say_kind(kind: Remark) -> str:
-    """Name a remark as its button does."""
+def remark_label(kind: Remark) -> str:
+    """Return the label of a remark, the same as on its button."""
     return kind.value.replace("_", " ").capitalize()
 
 
-def _shorten(entries: list[str]) -> str:
-    """Join entries; of many the first ones, how many are left out, and the last."""
-    if len(entries) <= TIMES:
+def _join(entries: list[str]) -> str:
+    """Join entries; of many, the first ones, how many are omitted, and the last."""
+    if len(entries) <= MAX_TIMES:
         return ", ".join(entries)
-    more = _("%(count)s more") % {"count": len(entries) - TIMES}
-    return ", ".join([*entries[: TIMES - 1], f"… {more} …", entries[-1]])
+    more = _("%(count)s more") % {"count": len(entries) - MAX_TIMES}
+    return ", ".join([*entries[: MAX_TIMES - 1], f"… {more} …", entries[-1]])
 
 
-def _tell_robot(events: list[SessionEvent]) -> str:
-    """Tell what the robot did: gestures, how many windows it answered, its stops."""
+def _describe_robot(events: list[SessionEvent]) -> str:
+    """Return what the robot did: gestures, windows that it answered, stops."""
     kinds: defaultdict[str, list[SessionEvent]] = defaultdict(list)
     for event in events:
         kinds[event.kind].append(event)
-    begun = [row for row in kinds[RobotEntry.GESTURE] if row.data.get("phase") == "started"]
+    started = [row for row in kinds[RobotEntry.GESTURE] if row.data.get("phase") == "started"]
     windows, stops = len(kinds[RobotEntry.DECISION]), len(kinds[RobotEntry.STOP])
-    if not (begun or windows or stops):
+    if not (started or windows or stops):
         return _("No robot.")
-    told = [ngettext("%(count)s gesture", "%(count)s gestures", len(begun)) % {"count": len(begun)}]
+    count = len(started)
+    parts = [ngettext("%(count)s gesture", "%(count)s gestures", count) % {"count": count}]
     if windows:
         above = sum(bool(row.data.get("above")) for row in kinds[RobotEntry.DECISION])
-        words = _("%(above)s of %(count)s windows of five seconds at or above its threshold")
-        told.append(words % {"above": above, "count": windows})
+        text = _("%(above)s of %(count)s windows of five seconds at or above its threshold")
+        parts.append(text % {"above": above, "count": windows})
     if stops:
-        told.append(ngettext("stopped once", "stopped %(count)s times", stops) % {"count": stops})
-    return ", ".join(told) + "."
-
-
-def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
-    """Draw all strides of the trained leg against the goal, as paths that print in gray.
-
-    At or above the goal is a disc, below a ring, without a goal a cross; what does not count is a
-    mark at the foot. The goal is a line, phases without feedback are shaded.
-    """
-    strides = chart["strides"]
-    numbers, shown, goals = strides["number"], strides["shown"], strides["goal"]
-    if not numbers:
-        return {}
-    known = [value for value in (*shown, *goals) if value is not None]
-    highest: float = max(known, default=1.0)
-    top = 1.08 * highest if highest > 0 else 1.0
-    first: int = numbers[0]
-    span: int = max(1, numbers[-1] - first)
-
-    def x(number: float) -> float:
-        return SPACE + (WIDE - 2 * SPACE) * (number - first) / span
-
-    def y(value: float) -> float:
-        return HIGH - HIGH * max(value, 0.0) / top
-
-    paths: defaultdict[str, list[str]] = defaultdict(list)
-    for number, value, hit in zip(numbers, shown, strides["hit"], strict=True):
-        at = x(number)
-        if value is None:
-            paths["lost"].append(f"M{at:.1f} {HIGH:.0f}v6")
-        elif hit is None:
-            paths["free"].append(f"M{at - 2.4:.1f} {y(value):.1f}h4.8m-2.4 -2.4v4.8")
-        elif hit:
-            paths["hit"].append(f"M{at:.1f} {y(value):.1f}h0")
-        else:
-            up = y(value)
-            paths["miss"].append(
-                f"M{at - RING:.1f} {up:.1f}a{RING} {RING} 0 1 0 {2 * RING} 0"
-                f"a{RING} {RING} 0 1 0 {-2 * RING} 0"
-            )
-    runs = [
-        (goal, [number for number, _same in run])
-        for goal, run in groupby(zip(numbers, goals, strict=True), lambda pair: pair[1])
-    ]
-    line = ""
-    for before, (goal, run) in zip([(None, [0]), *runs], runs, strict=False):
-        if goal is not None:
-            line += f"V{y(goal):.1f}" if before[0] else f"M{x(run[0]):.1f} {y(goal):.1f}"
-            line += f"H{x(run[-1] + 1 if run[-1] != numbers[-1] else run[-1]):.1f}"
-    return {
-        **{name: "".join(parts) for name, parts in paths.items()},
-        "goal": line,
-        "phases": [
-            {
-                "name": phase["name"],
-                "x": round(x(phase["from"]), 1),
-                "width": round(max(1.0, x(phase["to"]) - x(phase["from"])), 1),
-                "quiet": not phase["feedback"],
-            }
-            for phase in chart["phases"]
-        ],
-        "levels": [{"y": round(y(value), 1), "words": f"{value:g}"} for value in _even_values(top)],
-        "first": numbers[0],
-        "last": numbers[-1],
-        "strides": len(numbers),
-    }
-
-
-def _even_values(top: float) -> list[float]:
-    """Give values that are easy to say, three to seven of them below the top."""
-    size = 10.0 ** math.floor(math.log10(top))
-    step = next(step for step in (size / 5, size / 2, size, 2 * size) if top / step < 8)
-    return [round(step * count, 10) for count in range(1, math.ceil(top / step))]
-
-
-def moment_of(session: TrainingSession) -> datetime:
-    """Give when a session began, by the clinic's clock."""
-    return at_clinic(session.started_at or session.created_at, session.clinic)
+        parts.append(ngettext("stopped once", "stopped %(count)s times", stops) % {"count": stops})
+    return ", ".join(parts) + "."

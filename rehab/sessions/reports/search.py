@@ -1,4 +1,4 @@
-"""How sessions are found in the admin: by day, person, place and figures, in one form."""
+"""The search form of sessions in the admin: by day, patient, station and figures."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.access import person
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.forms import NumberField
+from rehab.sessions.forms.session import NumberField
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Station
 
-# Name in the form → what it narrows, and how many of the form's units make one of the column's.
+# Name in the form → the column, and how many units of the form are one unit of the column.
 RANGES = {"score": ("metric_score", 1), "hits": ("metric_hit_rate", 100), "goal": ("goal", 1)}
 
-# No session lies beyond; the days around them are still days in every time zone.
+# The days before and after are still valid dates in every time zone.
 FIRST_DAY, LAST_DAY = date(1900, 1, 1), date(2999, 12, 31)
 NO_DAY = _("Give a day of the years 1900 to 2999.")
 DAYS = [MinValueValidator(FIRST_DAY, NO_DAY), MaxValueValidator(LAST_DAY, NO_DAY)]
 
 
-class FindForm(forms.Form):
-    """What sessions are looked for by. Everything may be left empty."""
+class SessionSearchForm(forms.Form):
+    """What sessions are searched by. Everything may be left empty."""
 
     first = forms.DateField(required=False, validators=DAYS, label=_("From"))
     last = forms.DateField(required=False, validators=DAYS, label=_("To"))
@@ -73,7 +73,7 @@ class FindForm(forms.Form):
             )
 
     def clean(self) -> dict[str, Any]:
-        """Refuse ranges that begin after their end."""
+        """Return the cleaned data. Refuses ranges that begin after their end."""
         data: dict[str, Any] = super().clean() or {}
         for low, high in (("first", "last"), *((f"{n}_min", f"{n}_max") for n in RANGES)):
             start, end = data.get(low), data.get(high)
@@ -81,8 +81,8 @@ class FindForm(forms.Form):
                 self.add_error(high, ValidationError(gettext("It ends before it begins.")))
         return data
 
-    def narrow(self, sessions: QuerySet[Any], zone: str) -> QuerySet[Any]:
-        """Give those of some sessions that fit; days by the clock of a time zone."""
+    def filter_sessions(self, sessions: QuerySet[Any], zone: str) -> QuerySet[Any]:
+        """Return the sessions that match; ``zone`` is the time zone of the days."""
         data = self.cleaned_data
         begun: QuerySet[Any] = sessions.annotate(begun=Coalesce("started_at", "created_at"))
         if data["first"]:
@@ -106,8 +106,8 @@ def _midnight(day: Any, zone: str) -> datetime:
     return datetime.combine(day, time(), ZoneInfo(zone))
 
 
-class Finder(ListFilter):
-    """The form as the admin's filter. What it cannot read it says, and then gives nothing."""
+class SessionSearchFilter(ListFilter):
+    """The form as a filter of the admin. An invalid form shows its errors and finds nothing."""
 
     title = _("what was walked")
     template = "admin/search_filter.html"
@@ -122,35 +122,39 @@ class Finder(ListFilter):
         super().__init__(request, params, model, model_admin)
         user = person(request)
         self.zone = user.clinic.time_zone if user.clinic else settings.TIME_ZONE
-        names = [name for name in FindForm(by=user).fields if name in params]
+        names = [name for name in SessionSearchForm(by=user).fields if name in params]
         given = {name: params.pop(name)[-1].strip() for name in names}
-        self.used_parameters = {name: words for name, words in given.items() if words}
-        self.form = FindForm(given or None, by=user)
+        self.used_parameters = {name: value for name, value in given.items() if value}
+        self.form = SessionSearchForm(given or None, by=user)
         self.others: list[tuple[str, str]] = []
 
     def has_output(self) -> bool:
-        """Give the form at all times."""
+        """Return True: the form is always shown."""
         return True
 
     def expected_parameters(self) -> list[str | None]:
-        """Give the names of the form's fields."""
+        """Return the names of the form's fields."""
         return list(self.form.fields)
 
     def choices(self, changelist: Any) -> Iterator[Any]:
-        """Give no links; keep what else the page is narrowed by."""
+        """Return no links; store the other filters, which the form sends along."""
         mine = {*self.expected_parameters(), "p", "e"}
         self.others = [(name, v) for name, v in changelist.params.items() if name not in mine]
         return iter(())
 
     def queryset(self, request: HttpRequest, queryset: QuerySet[Any]) -> QuerySet[Any]:
-        """Give the sessions that fit."""
+        """Return the sessions that match; none for an invalid form."""
         if not self.used_parameters:
             return queryset
-        return self.form.narrow(queryset, self.zone) if self.form.is_valid() else queryset.none()
+        return (
+            self.form.filter_sessions(queryset, self.zone)
+            if self.form.is_valid()
+            else queryset.none()
+        )
 
     @property
     def groups(self) -> list[tuple[Any, list[Any]]]:
-        """Give the fields as they stand: alone, or two of a range under one heading."""
+        """The fields as they are laid out: single, or two of a range under one heading."""
         form = self.form
         alone = [(None, [form[name]]) for name in ("who", "place") if name in form.fields]
         return [

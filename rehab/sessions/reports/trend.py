@@ -1,4 +1,4 @@
-"""How a patient's sessions develop: hits, mean value, baseline and goal of each."""
+"""The trend over a patient's sessions: hit rate, mean value, baseline and goal of each."""
 
 from __future__ import annotations
 
@@ -12,12 +12,19 @@ from typing import Any
 from django.db.models import Avg, Count, F, OuterRef, QuerySet, Subquery
 
 from rehab.people.models import User
-from rehab.sessions.formatting import say_day, say_duration, say_number, say_quantity, say_rate
+from rehab.sessions.formatting import (
+    format_change,
+    format_day,
+    format_duration,
+    format_number,
+    format_quantity,
+    format_rate,
+)
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.training.phases import Phase
 
-SESSIONS = 30  # as many as a chart can tell apart
+SESSIONS = 30  # as many as can be told apart in a chart
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +36,8 @@ class Spread:
     deviation: float
 
     @classmethod
-    def join(cls, parts: Sequence[tuple[int, float, float]]) -> Spread | None:
-        """Join (count, mean, mean of squares) of several sets; None without a value."""
+    def pool(cls, parts: Sequence[tuple[int, float, float]]) -> Spread | None:
+        """Pool (count, mean, mean of squares) of several samples; None without a value."""
         count = sum(part[0] for part in parts)
         if not count:
             return None
@@ -40,26 +47,28 @@ class Spread:
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
-    """A session of the trend. ``walked`` covers its feedback phases, ``baseline`` its baseline."""
+class TrendPoint:
+    """A session of the trend, with the values of its feedback phases and of its baseline."""
 
     session: TrainingSession
     hit_rate: float
-    wanted: float | None
-    walked: Spread | None
+    target_hit_rate: float | None
+    with_feedback: Spread | None
     baseline: Spread | None
 
     @property
-    def gain(self) -> float | None:
-        """Change of the mean over the baseline (ratio), positive for the better direction."""
-        if self.walked is None or self.baseline is None or self.baseline.mean <= 0:
+    def change(self) -> float | None:
+        """Change of the mean from the baseline (ratio), positive for the better direction."""
+        if self.with_feedback is None or self.baseline is None or self.baseline.mean <= 0:
             return None
-        change = self.walked.mean / self.baseline.mean - 1
-        return change if self.session.measure.higher_is_better else -change
+        ratio = self.with_feedback.mean / self.baseline.mean - 1
+        return ratio if self.session.measure.higher_is_better else -ratio
 
 
-def figures_of(user: User, sessions: Sequence[TrainingSession]) -> dict[int, dict[str, float]]:
-    """Give score and hit rate of sessions, by their keys."""
+def metrics_by_session(
+    user: User, sessions: Sequence[TrainingSession]
+) -> dict[int, dict[str, float]]:
+    """Return score and hit rate of sessions by their keys."""
     found: dict[int, dict[str, float]] = defaultdict(dict)
     rows = SessionMetric.objects.visible_to(user).filter(
         session__in=[session.pk for session in sessions], slug__in=("score", "hit_rate")
@@ -69,8 +78,8 @@ def figures_of(user: User, sessions: Sequence[TrainingSession]) -> dict[int, dic
     return found
 
 
-def with_figures(user: Any, sessions: QuerySet[TrainingSession]) -> QuerySet[TrainingSession]:
-    """Give sessions with ``metric_score`` and ``metric_hit_rate``, to be read and ordered by."""
+def with_metrics(user: Any, sessions: QuerySet[TrainingSession]) -> QuerySet[TrainingSession]:
+    """Annotate sessions with ``metric_score`` and ``metric_hit_rate``."""
     figure = SessionMetric.objects.visible_to(user).filter(session=OuterRef("pk")).values("value")
     return sessions.annotate(
         metric_score=Subquery(figure.filter(slug="score")),
@@ -78,22 +87,22 @@ def with_figures(user: Any, sessions: QuerySet[TrainingSession]) -> QuerySet[Tra
     )
 
 
-def read_trend(user: User, sessions: QuerySet[TrainingSession]) -> list[Point]:
-    """Give the newest of these sessions that have a hit rate, oldest first."""
-    counted = sessions.filter(metrics__slug="hit_rate", left_out=False)
+def load_trend(user: User, sessions: QuerySet[TrainingSession]) -> list[TrendPoint]:
+    """Return the newest of these sessions that have a hit rate, oldest first."""
+    counted = sessions.filter(metrics__slug="hit_rate", excluded=False)
     ended = counted.select_related("measure")
     newest = list(ended.order_by("-created_at", "-pk")[:SESSIONS])[::-1]
-    figures, values = figures_of(user, newest), _values_by_phase(user, newest)
-    points: list[Point] = []
+    figures, values = metrics_by_session(user, newest), _values_by_phase(user, newest)
+    points: list[TrendPoint] = []
     for session in newest:
         plan, parts = session.to_plan(), values[session.pk]
         points.append(
-            Point(
+            TrendPoint(
                 session=session,
                 hit_rate=figures[session.pk]["hit_rate"],
-                wanted=plan.target.hit_rate,
-                walked=_join(parts, plan.phases, lambda phase: phase.feedback),
-                baseline=_join(parts, plan.phases, lambda phase: phase.kind == "baseline"),
+                target_hit_rate=plan.target.hit_rate,
+                with_feedback=_pool(parts, plan.phases, lambda phase: phase.feedback),
+                baseline=_pool(parts, plan.phases, lambda phase: phase.kind == "baseline"),
             )
         )
     return points
@@ -103,7 +112,7 @@ Parts = dict[int, tuple[int, float, float]]
 
 
 def _values_by_phase(user: User, sessions: Sequence[TrainingSession]) -> defaultdict[int, Parts]:
-    """Give count, mean and mean square of the trained leg's valid values, session and phase."""
+    """Return count, mean and mean square of the trained leg's valid values by session and phase."""
     found: defaultdict[int, Parts] = defaultdict(dict)
     steps = (
         Step.objects.visible_to(user)
@@ -118,70 +127,75 @@ def _values_by_phase(user: User, sessions: Sequence[TrainingSession]) -> default
     return found
 
 
-def _join(parts: Parts, phases: Sequence[Phase], wanted: Callable[[Phase], bool]) -> Spread | None:
-    return Spread.join(
+def _pool(parts: Parts, phases: Sequence[Phase], wanted: Callable[[Phase], bool]) -> Spread | None:
+    return Spread.pool(
         [part for index, part in parts.items() if index < len(phases) and wanted(phases[index])]
     )
 
 
-def sum_up_all(
-    groups: list[dict[str, Any]], trend: list[Point], *, simulated: bool
+def summarize_trend(
+    groups: list[dict[str, Any]], trend: list[TrendPoint], *, simulated: bool
 ) -> dict[str, Any]:
-    """Give the figures above the charts."""
+    """Return the figures above the charts."""
     last = trend[-1] if trend else None
     counted = [group for group in groups if group["simulated"] == simulated]
-    gain = last.gain if last else None
+    change = last.change if last else None
     means = ""
-    if last and last.walked and last.baseline:
+    if last and last.with_feedback and last.baseline:
         unit = last.session.measure.unit
-        means = f"{say_number(last.baseline.mean)} → {say_quantity(last.walked.mean, unit)}"
+        after = format_quantity(last.with_feedback.mean, unit)
+        means = f"{format_number(last.baseline.mean)} → {after}"
     return {
-        "hit_rate": say_rate(last.hit_rate if last else None),
-        "wanted": say_rate(last.wanted) if last and last.wanted else "",
-        "gain": ("+" if gain and gain > 0 else "") + say_rate(gain),
+        "hit_rate": format_rate(last.hit_rate if last else None),
+        "target_hit_rate": format_rate(last.target_hit_rate)
+        if last and last.target_hit_rate
+        else "",
+        "change": format_change(change),
         "means": means,
         "measure": last.session.measure.name if last else "",
-        "walked": say_duration(sum(group["walked"] for group in counted)),
+        "duration": format_duration(sum(group["active_s"] for group in counted)),
         "count": sum(group["pk__count"] for group in counted),
-        "left_out": 0
+        "excluded": 0
         if simulated
         else sum(group["pk__count"] for group in groups if group["simulated"]),
     }
 
 
-def draw_trend(trend: list[Point], now: datetime) -> dict[str, Any]:
-    """Give the data of both charts, its days by the clock of ``now``.
+def trend_chart_data(trend: list[TrendPoint], now: datetime) -> dict[str, Any]:
+    """Return the data of both charts, with days in the time zone of ``now``.
 
     Values are those of the newest session's measure alone.
     """
     measure = trend[-1].session.measure if trend else None
 
-    begun = {
-        point.session.pk: (point.session.started_at or point.session.created_at).astimezone(
-            now.tzinfo
-        )
-        for point in trend
-    }
-    a_day = Counter(start.date() for start in begun.values())
+    starts = {point.session.pk: point.session.began_at.astimezone(now.tzinfo) for point in trend}
+    per_day = Counter(start.date() for start in starts.values())
 
-    def day(point: Point) -> str:
-        start = begun[point.session.pk]
-        words = say_day(start.date(), now.date()).capitalize()
-        return f"{words} {start:%H:%M}" if a_day[start.date()] > 1 else words
+    def day(point: TrendPoint) -> str:
+        start = starts[point.session.pk]
+        label = format_day(start.date(), now.date()).capitalize()
+        return f"{label} {start:%H:%M}" if per_day[start.date()] > 1 else label
 
-    alike = [point for point in trend if point.session.measure == measure]
+    comparable = [point for point in trend if point.session.measure == measure]
     return {
         "hits": {
             "days": [day(point) for point in trend],
             "hit": [round(100 * point.hit_rate, 1) for point in trend],
-            "wanted": [point.wanted and round(100 * point.wanted, 1) for point in trend],
+            "wanted": [
+                point.target_hit_rate and round(100 * point.target_hit_rate, 1) for point in trend
+            ],
         },
         "values": {
-            "days": [day(point) for point in alike],
-            "mean": [point.walked and round(point.walked.mean, 3) for point in alike],
-            "deviation": [point.walked and round(point.walked.deviation, 3) for point in alike],
-            "baseline": [point.baseline and round(point.baseline.mean, 3) for point in alike],
-            "goal": [point.session.goal and round(point.session.goal, 3) for point in alike],
+            "days": [day(point) for point in comparable],
+            "mean": [
+                point.with_feedback and round(point.with_feedback.mean, 3) for point in comparable
+            ],
+            "deviation": [
+                point.with_feedback and round(point.with_feedback.deviation, 3)
+                for point in comparable
+            ],
+            "baseline": [point.baseline and round(point.baseline.mean, 3) for point in comparable],
+            "goal": [point.session.goal and round(point.session.goal, 3) for point in comparable],
             "unit": measure.unit if measure else "",
         },
     }

@@ -10,7 +10,6 @@ from rehab.sources.client.clock import PlaybackClock
 from rehab.sources.client.live import LiveFeed
 from rehab.sources.client.playback import NextStride, StridePlayback
 from rehab.sources.client.step_queue import (
-    WINDOW,
     StepQueue,
     StepsLost,
     UnsendableStride,
@@ -18,7 +17,6 @@ from rehab.sources.client.step_queue import (
 )
 
 __all__ = [
-    "WINDOW",
     "LiveFeed",
     "NextStride",
     "PlaybackClock",

@@ -13,7 +13,8 @@ from rehab.sources.client.live import LiveFeed
 from rehab.sources.client.playback import StridePlayback
 from rehab.sources.client.step_queue import StepQueue
 from rehab.training.steps import Measurement
-from robot.link import ENDED, Link, LinkRefused, Message
+from robot.link import Link, LinkRefused, Message
+from robot.wire.close_codes import CloseCode
 
 # Before asking for the station's next session, where the last one's end closed the connection.
 RETURN_S = 1.0
@@ -150,7 +151,7 @@ class SourceClient:
                     self._follower.handle(message)
                     self._wake_waiters()
             except LinkRefused as refusal:
-                if refusal.code != ENDED or self._queue.session is None:
+                if refusal.code != CloseCode.ENDED or self._queue.session is None:
                     raise
                 # Somebody finished the session while steps were on their way.
                 self._follower.is_welcome = False

@@ -12,7 +12,8 @@ from rehab.training.changes import ENDED_STATES, State
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import Phase, make_phase
 from rehab.training.steps import Side
-from robot.link import NOT_PROTOCOL, LinkRefused, Message
+from robot.link import LinkRefused, Message
+from robot.wire.close_codes import CloseCode
 
 
 class SessionFollower:
@@ -189,7 +190,7 @@ def _read_goal(message: Message) -> float | None:
 
 def _misunderstood(message: Message) -> LinkRefused:
     return LinkRefused(
-        NOT_PROTOCOL,
+        CloseCode.NOT_PROTOCOL,
         f"The server sent a {str(message['type'])[:40]!r} that this client does not understand. "
         "Use the version that fits the server.",
     )

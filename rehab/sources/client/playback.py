@@ -7,9 +7,9 @@ import time
 from collections.abc import Callable
 
 from rehab.sources.client.clock import PlaybackClock
-from rehab.sources.client.step_queue import WINDOW
 from rehab.training.phases import Phase, make_phase
 from rehab.training.steps import Measurement, Side
+from robot.wire.limits import MAX_STEPS
 
 # Gives the next stride, walked in that phase; None at the end.
 NextStride = Callable[[Phase], Measurement | None]
@@ -47,7 +47,7 @@ class StridePlayback:
         self,
         open_walk: Callable[[Side], NextStride],
         speed: float | None = 1.0,
-        max_unacknowledged: int = WINDOW,
+        max_unacknowledged: int = MAX_STEPS,
         monotonic: Callable[[], float] = time.monotonic,
         *,
         resumes: bool = False,

@@ -4,23 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections import deque
 from typing import Any, NamedTuple
 
 from rehab.training.steps import InvalidReason, Measurement
+from robot.wire.frames import NAME
+from robot.wire.limits import MAX_EXTRA, MAX_FRAME_BYTES, MAX_REASONS, MAX_STEPS
 
 Message = dict[str, Any]
 
-# docs/protocol.md: as many may be on their way, and in one frame.
-WINDOW = 256
-# Leaves room in a frame of 64 KiB for what stands around the steps.
-FRAME_BYTES = 60 * 1024
-
-MAX_REASONS = 8
-MAX_EXTRA = 32
+FRAME_BYTES = MAX_FRAME_BYTES - 4 * 1024  # room for what stands around the steps
 OWN_REASONS = (InvalidReason.PAUSED, InvalidReason.NOT_FINITE)  # reasons that are added here
-_NAME = re.compile(r"[A-Za-z0-9_.:-]{1,64}")
 
 
 class UnsendableStride(ValueError):
@@ -73,7 +67,7 @@ def _check_names(measurement: Measurement, reasons: tuple[str, ...]) -> None:
             f"{len(reasons)} reasons; {MAX_EXTRA} and {MAX_REASONS} can be sent. Leave columns out."
         )
     for name in (*reasons, *measurement.extra):
-        if not _NAME.fullmatch(name):
+        if not NAME.fullmatch(name):
             raise UnsendableStride(
                 f"Stride {measurement.number}: the name {name[:80]!r} cannot be sent. Rename that "
                 "column or reason to at most 64 letters, digits or _ . : -"
@@ -84,7 +78,7 @@ class StepQueue:
     """Keeps a source's steps in order until the server has stored them.
 
     It numbers strides as the current session needs it, decides which steps to send next and never
-    lets more than ``WINDOW`` be in flight. It sends nothing itself.
+    lets more than ``MAX_STEPS`` be in flight. It sends nothing itself.
     """
 
     def __init__(self) -> None:
@@ -107,7 +101,7 @@ class StepQueue:
     @property
     def can_send(self) -> bool:
         """Whether a step can be sent now."""
-        return self._sent < min(len(self._kept), WINDOW)
+        return self._sent < min(len(self._kept), MAX_STEPS)
 
     @property
     def next_is_paused(self) -> bool:

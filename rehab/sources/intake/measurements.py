@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from rehab.gait import Stride
-from rehab.sources.client.step_queue import MAX_REASONS
 from rehab.training.steps import Measurement, Side
+from robot.wire.limits import MAX_REASONS
 
 # What travels with a step beside its A2, under the names that rehab.gait gives.
 EXTRA = (

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 
-from rehab.sources.client.step_queue import MAX_EXTRA, MAX_REASONS
-from rehab.training.steps import TIME_MAX_S, InvalidReason, Measurement, Side
+from rehab.training.steps import InvalidReason, Measurement, Side
+from robot.wire.frames import NAME
+from robot.wire.limits import MAX_EXTRA, MAX_REASONS, TIME_MAX_S
 
 Cell = float | str | None
 
-NAME = re.compile(r"[A-Za-z0-9_.:-]{1,64}")
 VALUE = "value"
 TIMES = ("time_s", "time", "t")
 # Cells of a stride that are no further named values.

@@ -1,7 +1,7 @@
 """The protocol of a Kobuki, pure: commands and feedback, both ways, for driver and twin alike.
 
 ``frames`` finds and makes frames, ``commands`` and ``feedback`` are what they say, ``wheels`` turns
-twists into orders and back, ``trust`` says what can be believed of a damaged stream.
+twists into commands and back, ``frame_filter`` makes estimates of a damaged stream.
 """
 
 from robot.bases.kobuki_protocol.commands import (
@@ -41,6 +41,7 @@ from robot.bases.kobuki_protocol.feedback import (
     decode_feedback,
     encode_feedback,
 )
+from robot.bases.kobuki_protocol.frame_filter import Estimate, FrameFilter
 from robot.bases.kobuki_protocol.frames import (
     BAUD,
     FRAME_S,
@@ -48,7 +49,6 @@ from robot.bases.kobuki_protocol.frames import (
     Malformed,
     frame,
 )
-from robot.bases.kobuki_protocol.trust import Sighting, Trust
 from robot.bases.kobuki_protocol.wheels import (
     STOP,
     TICK_M,
@@ -76,8 +76,10 @@ __all__ = [
     "CoreSensors",
     "DockIr",
     "Eeprom",
+    "Estimate",
     "Extra",
     "Feedback",
+    "FrameFilter",
     "FrameReader",
     "GetGain",
     "GpInput",
@@ -93,10 +95,8 @@ __all__ = [
     "RequestExtra",
     "SetGain",
     "Side",
-    "Sighting",
     "Sound",
     "SoundSequence",
-    "Trust",
     "Udid",
     "Version",
     "Wheel",

@@ -46,7 +46,7 @@ class Melody(IntEnum):
 
 
 class BaseControl(NamedTuple):
-    """The setpoint, until the next one: ``robot.bases.kobuki_wheels`` makes it from a twist."""
+    """The setpoint, until the next one: ``wheels.control_of`` makes it from a twist."""
 
     speed_mm_s: int  # of the outer wheel
     radius_mm: int  # above 0: around a point on the left; 1: on the spot; 0: straight
@@ -60,7 +60,7 @@ class Sound(NamedTuple):
 
     @classmethod
     def at(cls, frequency_hz: float, duration_s: float) -> Self:
-        """Give the note of a frequency [Hz], for up to 0.255 s."""
+        """Return the note of a frequency [Hz] and a duration of up to 0.255 s."""
         return cls(round(1 / (frequency_hz * 2.75e-6)), round(duration_s * 1000))
 
 
@@ -136,7 +136,7 @@ _COMMAND_IDS = {kind: number for number, (kind, _) in COMMANDS.items()}
 
 
 def encode_commands(*commands: Command) -> bytes:
-    """Give one frame with these commands. Raises struct.error for numbers that do not fit."""
+    """Return one frame with these commands. Raises struct.error for numbers that do not fit."""
     payload = b""
     for command in commands:
         number = _COMMAND_IDS[type(command)]
@@ -145,7 +145,14 @@ def encode_commands(*commands: Command) -> bytes:
 
 
 def decode_commands(payload: bytes) -> list[Command]:
-    """Give the commands of a payload, in their order; unknown ones left out. Raises Malformed."""
+    """Return the commands of a payload in their order, without unknown ones.
+
+    Raises
+    ------
+    Malformed
+        For sub-payloads that do not fill the payload, or of another length than
+        docs/reference/kobuki.md#commands.
+    """
     commands: list[Command] = []
     for number, data in split(payload):
         if number in COMMANDS:

@@ -187,9 +187,14 @@ _NUMBERS = (1, 3, 4, 5, 6, _HARDWARE, _FIRMWARE, _GYRO, 15, 16, 19, 21)  # of Fe
 
 
 def encode_feedback(feedback: Feedback, *, short_versions: bool = False) -> bytes:
-    """Give the frame that says this, in the order of the ids.
+    """Return the frame of a feedback, its sub-payloads in the order of their ids.
 
-    ``short_versions``: in two bytes, as firmware before 1.1.2 has them.
+    Parameters
+    ----------
+    feedback
+        What to encode; parts that are None are left out.
+    short_versions
+        Encode versions in two bytes, as firmware before 1.1.2 does.
     """
     payload = b""
     part: Any
@@ -210,7 +215,14 @@ def encode_feedback(feedback: Feedback, *, short_versions: bool = False) -> byte
 
 
 def decode_feedback(payload: bytes) -> Feedback:
-    """Give what a payload says; unknown sub-payloads are left out. Raises Malformed."""
+    """Return the feedback of a payload, without unknown sub-payloads.
+
+    Raises
+    ------
+    Malformed
+        For sub-payloads that do not fill the payload, or of another length than
+        docs/reference/kobuki.md#feedback.
+    """
     parts: dict[str, Any] = {}
     for number, data in split(payload):
         if number in _LAYOUTS:

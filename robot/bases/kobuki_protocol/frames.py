@@ -31,7 +31,7 @@ class Malformed(ValueError):
 
 
 def frame(payload: bytes) -> bytes:
-    """Give the frame around a payload. Raises ValueError for one that is too short or too long."""
+    """Return the frame around a payload. Raises ValueError for one too short or too long."""
     if not SHORTEST <= len(payload) <= LONGEST:
         raise ValueError(f"A payload has {SHORTEST} to {LONGEST} bytes, not {len(payload)}.")
     body = bytes((len(payload),)) + payload
@@ -47,7 +47,7 @@ class FrameReader(Generic[T]):
     Parameters
     ----------
     decode
-        Gives what a payload says, or raises Malformed: ``decode_feedback``, ``decode_commands``.
+        Returns what a payload holds, or raises Malformed: ``decode_feedback``, ``decode_commands``.
 
     Attributes
     ----------
@@ -65,7 +65,13 @@ class FrameReader(Generic[T]):
         self._buffer = bytearray()
 
     def feed(self, data: bytes) -> list[T]:
-        """Take the next bytes; give what the frames say that are whole now."""
+        """Add the next bytes, and return what the frames hold that are complete now.
+
+        Parameters
+        ----------
+        data
+            Any number of bytes, cut anywhere.
+        """
         buffer, found, at = self._buffer, [], 0
         buffer += data
         while True:
@@ -93,7 +99,7 @@ class FrameReader(Generic[T]):
         return found
 
     def _open(self, body: bytes) -> T:
-        """Give what a frame says, from its length to its checksum. Raises Malformed."""
+        """Return what a frame holds, given from its length to its checksum. Raises Malformed."""
         if reduce(xor, body):
             self.bad_checksums += 1
             raise Malformed("The checksum is wrong.")
@@ -111,7 +117,7 @@ def sub_payload(number: int, data: bytes) -> bytes:
 
 
 def split(payload: bytes) -> Iterator[tuple[int, bytes]]:
-    """Give id and data of each sub-payload. Raises Malformed where they do not fill it exactly."""
+    """Yield id and data of each sub-payload. Raises Malformed where they do not fill it exactly."""
     at, end = 0, len(payload)
     while at < end:
         if at + 2 > end or at + 2 + payload[at + 1] > end:

@@ -1,11 +1,11 @@
-"""Wheels of a Kobuki: what a twist is in its orders, and what its orders are in wheel speeds."""
+"""Wheels of a Kobuki: twists as commands, and commands as wheel speeds."""
 
 from __future__ import annotations
 
 import math
 
 from robot.bases.kobuki_protocol.commands import BaseControl
-from robot.motion import STILL, Twist
+from robot.motion.twist import STILL, Twist
 
 # Between the wheels [m], and one tick of an encoder [m]
 # (docs/reference/kobuki.md#odometry-and-gyro).
@@ -22,7 +22,9 @@ STOP = BaseControl(0, 0)
 
 
 def slow_to_wheels(twist: Twist) -> Twist:
-    """Give a twist on the same curve of which no wheel is too fast; what is not finite is still.
+    """Return a twist on the same curve with no wheel above ``WHEEL_MAX_M_S``.
+
+    ``STILL`` for one that is not finite.
 
     Clipping one of the two speeds would make it another curve
     (docs/reference/kobuki.md#speed-and-radius).
@@ -35,7 +37,17 @@ def slow_to_wheels(twist: Twist) -> Twist:
 
 
 def control_of(twist: Twist) -> BaseControl:
-    """Give the order that comes nearest to a twist; one that is not finite is an order to stand.
+    """Return the command that comes nearest to a twist.
+
+    Parameters
+    ----------
+    twist
+        The velocity; one that is not finite gives the stop.
+
+    Returns
+    -------
+    BaseControl
+        Speed of the outer wheel [mm/s] and radius of the curve [mm].
 
     Notes
     -----
@@ -58,7 +70,7 @@ def control_of(twist: Twist) -> BaseControl:
 
 
 def twist_of(control: BaseControl) -> Twist:
-    """Give the twist that an order means, as the firmware reads it.
+    """Return the twist that a command means, as the firmware reads it.
 
     Source: docs/reference/kobuki.md#speed-and-radius.
     """
@@ -72,6 +84,6 @@ def twist_of(control: BaseControl) -> Twist:
 
 
 def wheel_speeds(twist: Twist) -> tuple[float, float]:
-    """Give the speeds of the left and the right wheel [m/s]."""
+    """Return the speeds of the left and the right wheel [m/s]."""
     turning_m_s = twist.w_rad_s * WHEELBASE_M / 2
     return twist.v_m_s - turning_m_s, twist.v_m_s + turning_m_s

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Self
 
 from robot.bases.base import BaseLost, BaseState, MobileBase
-from robot.bases.rosbridge.conversation import Conversation
+from robot.bases.rosbridge.client import BaseClient
 from robot.bases.rosbridge.topics import (
     DEFAULT_PROFILE,
     PROFILES,
@@ -20,14 +20,14 @@ from robot.bases.rosbridge.topics import (
     add_topic_arguments,
     read_topics,
 )
-from robot.motion import STILL, Twist
+from robot.motion.twist import STILL, Twist
 from robot.ros.bridge import Bridge, find_bridge
 
 GREETING_S = 3.0  # a bridge that is there has said by then where the base is
 
 
 class RosbridgeBase(MobileBase):
-    """Orders a base by way of a rosbridge. A connection that is lost is made again for ever.
+    """Orders a base by way of a rosbridge. A connection that is lost is made again forever.
 
     It cannot stop the base once the connection is gone: the base's own driver has to, by a timeout
     of its own (docs/robot.md). Every connection begins with an order to stand still.
@@ -46,21 +46,19 @@ class RosbridgeBase(MobileBase):
 
     @classmethod
     def add_arguments(cls, group: ArgumentParser | _ArgumentGroup) -> None:
-        """Offer the base's topics."""
+        """Add options for the base's topics."""
         add_topic_arguments(group)
 
     def configure(self, options: Namespace) -> None:
-        """Take the bridge's address and the base's topics. Raises BadOption."""
+        """Apply the bridge's address and the base's topics. Raises BadOption."""
         self.port = options.ros_url
         self._choose(read_topics(options))
 
     def __enter__(self) -> Self:
-        """Connect, and give the bridge a moment to say where the base is."""
-        self._bridge = Bridge(
-            self.port or find_bridge(), self._conversation, self._lock, self._monotonic
-        )
+        """Connect, and wait a moment for the base's odometry."""
+        self._bridge = Bridge(self.port or find_bridge(), self._client, self._lock, self._monotonic)
         until_s = self._monotonic() + GREETING_S
-        while self._monotonic() < until_s and self.read().senses.silent_s == math.inf:
+        while self._monotonic() < until_s and self.read().sensors.silent_s == math.inf:
             time.sleep(0.02)
         return self
 
@@ -79,23 +77,25 @@ class RosbridgeBase(MobileBase):
     def counters(self) -> Mapping[str, int]:
         """Count what went wrong with the connection, with orders, and with odometry."""
         with self._lock:
-            counts = dict(self._conversation.counters)
+            counts = dict(self._client.counters)
         return counts if self._bridge is None else counts | self._bridge.counters
 
     @property
     def problem(self) -> str:
-        """Say why the base is not reached; empty where it is."""
+        """Return why the base cannot be reached; empty where it can."""
         if self._bridge is None:
             return ""
         with self._lock:
-            return self._bridge.problem or self._conversation.problem(self._monotonic())
+            return self._bridge.problem or self._client.problem(self._monotonic())
 
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
         if self._bridge is not None and self._bridge.is_dead:
-            raise BaseLost("The thread that talks to the rosbridge has ended: see its words above.")
+            raise BaseLost(
+                "The thread that talks to the rosbridge has ended: see its messages above."
+            )
         with self._lock:
-            ordered = self._conversation.orders.order(twist, self._monotonic())
+            ordered = self._client.orders.order(twist, self._monotonic())
         if self._bridge is not None:
             self._bridge.wake()
         return ordered
@@ -106,15 +106,15 @@ class RosbridgeBase(MobileBase):
             self.drive(STILL)
 
     def read(self) -> BaseState:
-        """Give what is believed of it now."""
+        """Return its state now."""
         with self._lock:
-            return self._conversation.state(self._monotonic())
+            return self._client.state(self._monotonic())
 
     def set_home(self) -> None:
-        """Begin odometry anew: this place is home."""
+        """Make this place home."""
         with self._lock:
-            self._conversation.sight.set_home()
+            self._client.odometry.set_home()
 
     def _choose(self, topics: Topics) -> None:
         self.abilities = topics.abilities
-        self._conversation = Conversation(topics, self._monotonic())
+        self._client = BaseClient(topics, self._monotonic())

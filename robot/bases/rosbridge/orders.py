@@ -1,11 +1,12 @@
-"""What is ordered of a base by ROS: the newest twist and no other, one on its way at a time."""
+"""Orders to a base by ROS: the newest twist and no other, one on its way at a time."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter, deque
 
-from robot.motion import CEILING_M_S, CEILING_RAD_S, ORDER_HOLDS_S, STILL, Limits, Twist
+from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, ORDER_HOLDS_S, Limits
+from robot.motion.twist import STILL, Twist
 
 WHEELS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
 
@@ -50,7 +51,7 @@ class Orders:
         self.is_answered = False
 
     def order(self, twist: Twist, now_s: float) -> Twist:
-        """Take an order in place of the last one; give what will be sent."""
+        """Store an order in place of the last one, and return what will be sent."""
         clipped = WHEELS.clip(twist)
         twist = Twist(round(clipped.v_m_s, DIGITS), round(clipped.w_rad_s, DIGITS))
         if twist.is_still and self._is_still_back:
@@ -63,7 +64,7 @@ class Orders:
         return twist
 
     def forget(self) -> None:
-        """Forget everything: the connection is lost, or there is a new one."""
+        """Reset everything: the connection is lost, or there is a new one."""
         self.sent, self._sent_s = STILL, -math.inf
         self._wanted, self._is_new = STILL, False
         self._out.clear()
@@ -71,9 +72,9 @@ class Orders:
         self.is_answered = False
 
     def due(self, now_s: float) -> Twist | None:
-        """Give the twist to send now; None for none. What is given counts as sent."""
-        # Whoever orders hangs, or what was sent does not come back: it may arrive late, and what
-        # follows it has to be standing still.
+        """Return the twist to send now, which counts as sent; None for none."""
+        # The program that orders hangs, or what was sent does not come back: it may arrive late,
+        # and what follows it has to be standing still.
         waits_s = max(now_s - self._wanted_s, self.unanswered_s(now_s))
         if not self._wanted.is_still and waits_s > ORDER_HOLDS_S:
             self.counters["lapsed"] += 1
@@ -90,7 +91,7 @@ class Orders:
         return self.sent
 
     def come_back(self, twist: Twist) -> bool:
-        """Take a twist from the topic; give whether it is somebody else's, and moves."""
+        """Handle a twist from the topic, and return whether it moves and is of another program."""
         for place in reversed(range(len(self._out))):
             if _are_same(self._out[place][1], twist):
                 for _ in range(place + 1):
@@ -103,7 +104,7 @@ class Orders:
         return is_foreign
 
     def unanswered_s(self, now_s: float) -> float:
-        """Give for how long something has not come back [s]; 0 where all has."""
+        """Return how long something has not come back [s]; 0 where all has."""
         return now_s - self._out[0][0] if self._out else 0.0
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from robot.bases.base import Abilities, BadOption
 from robot.ros.frames import Topic
-from robot.ros.messages import BOOL, FEELERS, ODOMETRY, TWIST
+from robot.ros.messages import BOOL, ODOMETRY, SENSOR_TYPES, TWIST
 
 NAME = re.compile(r"/?[A-Za-z]\w*(/\w+)*", re.ASCII)
 NONE = "none"
@@ -25,13 +25,13 @@ class Topics:
         Takes geometry_msgs/Twist.
     odometry
         Gives nav_msgs/Odometry; None for an open loop.
-    feelers
+    sensors
         What stops it, as a hazard's code, and the topic that tells so.
     """
 
     order: Topic
     odometry: Topic | None = None
-    feelers: dict[str, Topic] = field(default_factory=dict)
+    sensors: dict[str, Topic] = field(default_factory=dict)
 
     @property
     def abilities(self) -> Abilities:
@@ -41,11 +41,11 @@ class Topics:
             moves=True,
             real_time=True,
             closed_loop=self.odometry is not None,
-            bumpers=BUMP in self.feelers,
+            bumpers=BUMP in self.sensors,
         )
 
     def chosen(self, options: Namespace) -> Topics:
-        """Give these with those of a command line in their place. Raises BadOption."""
+        """Return these with the topics of a command line in their place. Raises BadOption."""
         order = replace(self.order, name=options.cmd_topic or self.order.name)
         _check_name("--cmd-topic", order.name)
         odometry = self.odometry
@@ -53,18 +53,18 @@ class Topics:
             odometry = Topic(options.odom_topic, ODOMETRY) if options.odom_topic != NONE else None
         if odometry is not None:
             _check_name("--odom-topic", odometry.name)
-        feelers = dict(self.feelers)
-        for hazard, option in FEELER_OPTIONS.items():
+        sensors = dict(self.sensors)
+        for hazard, option in SENSOR_OPTIONS.items():
             text: str = getattr(options, f"{option}_topic")
             if text == NONE:
-                feelers.pop(hazard, None)
+                sensors.pop(hazard, None)
             elif text:
-                kind = feelers[hazard].kind if hazard in feelers else BOOL
-                feelers[hazard] = _read_feeler(f"--{option.replace('_', '-')}-topic", text, kind)
-        return Topics(order, odometry, feelers)
+                kind = sensors[hazard].kind if hazard in sensors else BOOL
+                sensors[hazard] = _read_sensor(f"--{option.replace('_', '-')}-topic", text, kind)
+        return Topics(order, odometry, sensors)
 
 
-FEELER_OPTIONS = {BUMP: "bumper", "cliff": "cliff", "wheel_drop": "wheel_drop"}
+SENSOR_OPTIONS = {BUMP: "bumper", "cliff": "cliff", "wheel_drop": "wheel_drop"}
 
 PROFILES = {
     # What kobuki_node has without remappings, and the original's nodes publish on
@@ -84,19 +84,19 @@ DEFAULT_PROFILE = "kobuki"
 
 
 def add_topic_arguments(group: ArgumentParser | _ArgumentGroup) -> None:
-    """Let a command line name the topics of a base."""
+    """Add options for the topics of a base to a command line."""
     group.add_argument(
         "--ros-robot",
         choices=sorted(PROFILES),
         default=DEFAULT_PROFILE,
-        help="which topics it has: a Kobuki's with its feelers, or /cmd_vel and /odom alone "
+        help="which topics it has: a Kobuki's with its sensors, or /cmd_vel and /odom alone "
         f"(default: {DEFAULT_PROFILE})",
     )
     group.add_argument("--cmd-topic", metavar="TOPIC", help="that takes Twists")
     group.add_argument(
         "--odom-topic", metavar="TOPIC", help=f"that gives Odometry; {NONE}: an open loop"
     )
-    for hazard, option in FEELER_OPTIONS.items():
+    for hazard, option in SENSOR_OPTIONS.items():
         group.add_argument(
             f"--{option.replace('_', '-')}-topic",
             metavar="TOPIC[:TYPE]",
@@ -105,15 +105,17 @@ def add_topic_arguments(group: ArgumentParser | _ArgumentGroup) -> None:
 
 
 def read_topics(options: Namespace) -> Topics:
-    """Give the topics of a command line. Raises BadOption."""
+    """Return the topics of a command line. Raises BadOption."""
     return PROFILES[options.ros_robot].chosen(options)
 
 
-def _read_feeler(option: str, text: str, kind: str) -> Topic:
+def _read_sensor(option: str, text: str, kind: str) -> Topic:
     name, _, named = text.partition(":")
     _check_name(option, name)
-    if named and named not in FEELERS:
-        raise BadOption(f"{option}: no {named} is read here. Known types: {', '.join(FEELERS)}.")
+    if named and named not in SENSOR_TYPES:
+        raise BadOption(
+            f"{option}: no {named} is read here. Known types: {', '.join(SENSOR_TYPES)}."
+        )
     return Topic(name, named or kind)
 
 

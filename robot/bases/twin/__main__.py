@@ -37,12 +37,12 @@ from robot.bases.twin.camera import Camera
 from robot.bases.twin.faults import BadFault, Faults
 from robot.bases.twin.firmware import FIRMWARE, Firmware
 from robot.bases.twin.lines import Line, PtyLine, SocketLine
+from robot.bases.twin.output import redirect_output
 from robot.bases.twin.process import Twin
-from robot.bases.twin.quiet import keep_to_ourselves
 
 
 def make_body(name: str, notice: Callable[[str], None]) -> Body:
-    """Give a body by its name, ``bullet`` or ``kinematic``; ``auto`` takes physics if it can.
+    """Return a body by its name, ``bullet`` or ``kinematic``; ``auto`` prefers physics.
 
     Raises ImportError where physics was asked for by name and is not there.
     """
@@ -61,8 +61,8 @@ def make_body(name: str, notice: Callable[[str], None]) -> Body:
     return KinematicBody(FRAME_S)
 
 
-def say(text: str) -> None:
-    """Print a line for whoever looks on."""
+def print_notice(text: str) -> None:
+    """Print a line to standard error."""
     print(text, file=sys.stderr, flush=True)
 
 
@@ -75,7 +75,7 @@ def read_version(text: str) -> Version:
 
 
 def make_parser() -> ArgumentParser:
-    """Give the command line."""
+    """Return the command line's parser."""
     parser = ArgumentParser(
         prog="python -m robot twin",
         description=__doc__,
@@ -114,7 +114,7 @@ def make_parser() -> ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the twin of the command line until told to end, and give the exit status."""
+    """Run the twin of the command line until told to end, and return the exit status."""
     parser = make_parser()
     options = parser.parse_args(arguments)
     if options.camera and not find_spec("pybullet"):
@@ -127,13 +127,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             faults.change(fault.name, getattr(options, fault.name))
     except BadFault as problem:
         parser.error(str(problem))
-    answers = keep_to_ourselves()
+    answers = redirect_output()
 
     def answer(text: str) -> None:
         os.write(answers, text.encode() + b"\n")
 
     try:
-        body = make_body(options.body, say)
+        body = make_body(options.body, print_notice)
     except ImportError as problem:
         parser.error(f"{problem}. Cure: --body kinematic, or pip install 'garry[twin]'.")
     chance = random.Random(options.seed)  # noqa: S311 (nothing here is a secret)
@@ -164,7 +164,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with camera:
             Twin(firmware, port).run(orders, answer, over.is_set)
     except BrokenPipeError:
-        pass  # whoever listened to the answers is gone
+        pass  # the reader of the answers is gone
     finally:
         port.close()
     return 0

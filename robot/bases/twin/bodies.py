@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 from robot.bases.kobuki_protocol import WHEELBASE_M
-from robot.motion import HOME, Pose, Twist, advance
+from robot.motion.pose import HOME, Pose, advance
+from robot.motion.twist import Twist
 
 # Where the floor sensors see the floor they stand on [m]: 10.2 mm and 21.4 mm up
 # (docs/reference/kobuki.md#twin).
@@ -52,7 +53,7 @@ class Body(Protocol):
         """Turn its wheels for one frame's time at these speeds [m/s]."""
 
     def touch(self) -> Touch:
-        """Give what it touches now."""
+        """Return what it touches now."""
 
     def carry_home(self) -> None:
         """Put it where it began."""
@@ -82,7 +83,7 @@ class KinematicBody:
         self.rolled_m = (left_m + left_m_s * self._frame_s, right_m + right_m_s * self._frame_s)
 
     def touch(self) -> Touch:
-        """Give that it touches the floor, and nothing else."""
+        """Return that it touches the floor alone."""
         return Touch()
 
     def carry_home(self) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from robot.bases.kobuki_protocol import Side, Wheel
 from robot.bases.twin.bodies import Touch
-from robot.motion import HOME, Pose, wrap
+from robot.motion.pose import HOME, Pose, wrap
 
 # Of 2.5 ms each in a frame: 400 Hz, finer than the 240 Hz of docs/reference/kobuki.md#twin.
 STEPS = 8
@@ -106,7 +106,7 @@ class BulletBody:
         self.turn_rad_s = (self.pose.heading_rad - was_rad) / self._frame_s
 
     def touch(self) -> Touch:
-        """Give what it touches now."""
+        """Return what it touches now."""
         right_m, center_m, left_m = self._measure_down(FLOOR_SENSORS_M)
         return Touch(
             self._press() if self._walls else 0,
@@ -159,7 +159,7 @@ class BulletBody:
         return self._axes[8] > LEVEL and abs(self._at_m[2]) < LEVEL_M
 
     def _press(self) -> int:
-        """Give the bits of the bumper that walls press."""
+        """Return the bits of the bumper that walls press."""
         bumper, a, (x_m, y_m, _) = 0, self._axes, self._at_m
         for contact in self._find_contacts(self._robot, linkIndexA=-1):
             if contact[2] in self._walls and contact[8] <= TOUCH_M:
@@ -170,13 +170,13 @@ class BulletBody:
         return bumper
 
     def _drop(self) -> int:
-        """Give the bits of the wheels that hang."""
+        """Return the bits of the wheels that hang."""
         right_m, left_m = self._measure_down(AXLES_M)
         right = Wheel.RIGHT if right_m > WHEEL_M + DROP_M else 0
         return right | (Wheel.LEFT if left_m > WHEEL_M + DROP_M else 0)
 
     def _measure_down(self, points_m: Sequence[tuple[float, float, float]]) -> list[float]:
-        """Give how far down from each of these points something is [m]."""
+        """Return the distance down from each of these points to anything [m]."""
         a, (x_m, y_m, z_m) = self._axes, self._at_m
         down_x, down_y, down_z = SEEN_M * a[2], SEEN_M * a[5], SEEN_M * a[8]
         starts, ends = [], []
@@ -200,7 +200,7 @@ class BulletBody:
     def _put_box(
         self, size_m: tuple[float, float, float], middle_m: tuple[float, ...], heading_rad: float
     ) -> int:
-        """Put a box that stays where it is; give its number."""
+        """Put a fixed box, and return its number."""
         world = self._world
         half = [side / 2 for side in size_m]
         box: int = world.createMultiBody(
@@ -216,7 +216,7 @@ class BulletBody:
 
 
 def _third(angle_rad: float) -> int:
-    """Give the part of the bumper at an angle, counter-clockwise from ahead; none at the back."""
+    """Return the bumper's part at an angle, counter-clockwise from ahead; 0 at the back."""
     if abs(angle_rad) > math.pi / 2:
         return 0
     if abs(angle_rad) <= THIRD_RAD:

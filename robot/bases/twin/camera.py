@@ -20,8 +20,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from robot.bases.twin.quiet import keep_to_ourselves
-from robot.motion import Pose
+from robot.bases.twin.output import redirect_output
+from robot.motion.pose import Pose
 
 INTERVAL_S = 0.2
 WIDTH, HEIGHT = 320, 240  # 33 ms a picture on a core of 2026; 480 × 360 takes 78
@@ -38,7 +38,7 @@ class Camera:
     file
         A PNG; always whole, since each picture takes the place of the last at once.
     look
-        Gives the twin's pose.
+        Returns the twin's pose.
     """
 
     def __init__(self, file: Path, look: Callable[[], Pose]) -> None:
@@ -84,7 +84,7 @@ class Camera:
                 pipe.close()
 
 
-class Studio:
+class Renderer:
     """The twin's looks in a world without physics. Raises ImportError without pybullet."""
 
     def __init__(self) -> None:
@@ -108,7 +108,7 @@ class Studio:
         self._lens = self._world.computeProjectionMatrixFOV(SEES_DEG, WIDTH / HEIGHT, 0.1, 10)
 
     def draw(self, pose: Pose) -> bytes:
-        """Give a picture of it at a pose, as PNG."""
+        """Return a picture of the twin at a pose, as PNG."""
         turned = self._world.getQuaternionFromEuler((0, 0, pose.heading_rad))
         self._world.resetBasePositionAndOrientation(self._robot, (pose.x_m, pose.y_m, 0.0), turned)
         picture = self._world.getCameraImage(
@@ -123,7 +123,7 @@ class Studio:
 
 
 def write_png(width: int, height: int, rgba: bytes) -> bytes:
-    """Give a picture of rows of red, green, blue and opacity, a byte each, as PNG (RFC 2083)."""
+    """Return a picture of RGBA rows, a byte each, as PNG (RFC 2083)."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
         return (
@@ -148,8 +148,8 @@ def main(file: Path) -> None:
     """Draw wherever standard input says the twin is, until it closes."""
     if hasattr(os, "nice"):
         os.nice(10)  # the twin and the server come first
-    keep_to_ourselves()
-    studio, rest = Studio(), b""
+    redirect_output()
+    studio, rest = Renderer(), b""
     new = file.with_name(f".{file.name}.new")
     while data := os.read(0, 65536):
         *lines, rest = (rest + data).split(b"\n")

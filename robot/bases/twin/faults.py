@@ -9,7 +9,7 @@ from typing import Any
 
 
 class BadFault(ValueError):
-    """A fault that there is not, or that cannot be so large."""
+    """A fault that does not exist, or a value outside its limits."""
 
 
 @dataclass
@@ -50,7 +50,7 @@ class Faults:
     false_header: float = 0.0
 
     def change(self, name: str, value: Any) -> Any:
-        """Set a fault and give what it was. Raises BadFault."""
+        """Set a fault, and return its value before. Raises BadFault."""
         if name not in LIMITS:
             raise BadFault(f"{name} is no fault. There are: {', '.join(LIMITS)}.")
         least, most = LIMITS[name]
@@ -64,7 +64,7 @@ class Faults:
         return was
 
     def damage(self, data: bytes, chance: random.Random) -> bytes:
-        """Give what arrives of bytes that were sent."""
+        """Return what arrives of bytes that were sent."""
         if self.false_header and chance.random() < self.false_header:
             data = b"\xaa\x55" + data
         if not self.drop and not self.flip and not self.duplicate:

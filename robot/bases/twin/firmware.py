@@ -1,4 +1,4 @@
-"""The firmware of the twin: takes a Kobuki's commands and says what a Kobuki would."""
+"""The firmware of the twin: takes a Kobuki's commands, and sends a Kobuki's feedback."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ class Firmware:
         self.switch_on()
 
     def switch_on(self) -> None:
-        """Begin as after its power was off: all counters at 0, standing still."""
+        """Start as after its power was off: all counters at 0, standing still."""
         self.reader = FrameReader(decode_commands)
         self.control, self._ordered_s = STOP, -math.inf
         self.output, self.sounds = int(Output.POWER), 0
@@ -127,13 +127,13 @@ class Firmware:
         self._drifted_deg = 0.0
 
     def take(self, data: bytes, now_s: float) -> None:
-        """Take bytes of the driver, as they arrive through the line."""
+        """Handle bytes of the driver, damaged as the line's faults say."""
         for commands in self.reader.feed(self.faults.damage(data, self._chance)):
             for command in commands:
                 self._obey(command, now_s)
 
     def step(self, now_s: float) -> bytes:
-        """Live for one frame's time; give the frame, as it arrives at the driver."""
+        """Simulate one frame's time, and return the frame as it arrives at the driver."""
         if self.watchdog_s is not None and now_s - self._ordered_s > self.watchdog_s:
             self.control = STOP
         faults, (left_m_s, right_m_s) = self.faults, self.wheels_m_s
@@ -232,7 +232,7 @@ def _cliff(floor_m: tuple[float, float, float]) -> int:
 
 
 def _voltage(away_m: float) -> int:
-    """Give a floor sensor's reading: falling with distance, as its kind does; the curve is ours."""
+    """Return a floor sensor's reading, which falls with distance; the curve is ours."""
     return min(4095, round(0.056 / (away_m + 0.005) / 3.3 * 4095))
 
 

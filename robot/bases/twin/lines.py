@@ -30,22 +30,22 @@ class Line(Protocol):
     name: str
 
     def plug_in(self) -> None:
-        """Let the port be there."""
+        """Make the port appear."""
 
     def pull_out(self) -> None:
-        """Let it vanish."""
+        """Make the port vanish."""
 
     def write(self, data: bytes) -> None:
         """Send bytes; what does not fit is lost."""
 
     def read(self) -> bytes:
-        """Give what came in."""
+        """Return what came in."""
 
     def wait(self, for_s: float) -> None:
         """Wait for bytes, or at most so long [s]."""
 
     def close(self) -> None:
-        """Let it vanish for good."""
+        """Remove the port for good."""
 
 
 class PtyLine:
@@ -59,7 +59,7 @@ class PtyLine:
         self.plug_in()
 
     def plug_in(self) -> None:
-        """Let the port be there."""
+        """Make the port appear."""
         if self._master >= 0:
             return
         import tty
@@ -72,7 +72,7 @@ class PtyLine:
         Path(self.name).symlink_to(os.ttyname(self._slave))
 
     def pull_out(self) -> None:
-        """Let it vanish."""
+        """Make the port vanish."""
         if self._master >= 0:
             Path(self.name).unlink(missing_ok=True)
             os.close(self._slave)
@@ -91,7 +91,7 @@ class PtyLine:
             os.write(self._master, data)
 
     def read(self) -> bytes:
-        """Give what came in."""
+        """Return what came in."""
         with contextlib.suppress(OSError):
             return os.read(self._master, READ_SIZE)
         return b""
@@ -101,7 +101,7 @@ class PtyLine:
         _wait_for([self._master] if self._master >= 0 else [], for_s)
 
     def close(self) -> None:
-        """Let it vanish for good."""
+        """Remove the port for good."""
         self.pull_out()
         self._folder.cleanup()
 
@@ -117,7 +117,7 @@ class SocketLine:
         self.name = f"socket://127.0.0.1:{self._address[1]}"
 
     def plug_in(self) -> None:
-        """Let the port be there, with the same number as before."""
+        """Make the port appear, with the same number as before."""
         if self._door is not None:
             return
         self._door = socket.create_server(self._address, backlog=1)
@@ -125,7 +125,7 @@ class SocketLine:
         self._address = self._door.getsockname()
 
     def pull_out(self) -> None:
-        """Let it vanish."""
+        """Make the port vanish."""
         for end in (self._door, self._driver):
             if end is not None:
                 end.close()
@@ -142,7 +142,7 @@ class SocketLine:
                 self._leave()
 
     def read(self) -> bytes:
-        """Give what came in, and let the next driver in where there is none."""
+        """Return what came in, and accept the next driver where there is none."""
         data = b""
         if self._driver is not None:
             try:
@@ -162,7 +162,7 @@ class SocketLine:
         _wait_for([end for end in (self._door, self._driver) if end is not None], for_s)
 
     def close(self) -> None:
-        """Let it vanish for good."""
+        """Remove the port for good."""
         self.pull_out()
 
     def _let_in(self) -> None:

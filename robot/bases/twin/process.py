@@ -14,7 +14,7 @@ from robot.bases.kobuki_protocol import FRAME_S
 from robot.bases.twin.faults import BadFault
 from robot.bases.twin.firmware import Firmware
 from robot.bases.twin.lines import Line
-from robot.motion import HOME
+from robot.motion.pose import HOME
 
 HELD_BYTES = 4096  # of a stalled line, as many as a pty keeps; the oldest are lost
 LATE_S = 0.1  # behind its time by more than this it lets the time go, instead of catching up
@@ -44,7 +44,7 @@ class Twin:
         self._looked_s = -math.inf
 
     def listen(self, now_s: float) -> None:
-        """Take what the driver has sent, at a time [s]."""
+        """Read what the driver has sent, at a time [s]."""
         if now_s < self._stalled_until_s:
             return
         data = self.line.read()
@@ -68,7 +68,7 @@ class Twin:
         self._held = self._held[-HELD_BYTES:]
 
     def do(self, order: Mapping[str, Any], now_s: float) -> dict[str, Any]:
-        """Do something to it, at a time [s], and give the answer. Raises BadFault."""
+        """Carry out an order to the twin at a time [s], and return the answer. Raises BadFault."""
         match order:
             case {"do": "set", "name": str(name), "value": value}:
                 for_s = _seconds(order) if "for_s" in order else None

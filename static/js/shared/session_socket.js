@@ -12,13 +12,14 @@
 import { _ } from "garry/shared/language";
 import { refusal } from "garry/shared/labels";
 
-const SILENCE_MS = 12_000; // the server sends something every 5 s
-const DOUBT_MS = 6_000; // after which an old socket is not trusted when the tablet wakes up
+const wire = JSON.parse(document.getElementById("wire").textContent); // robot/wire/
+const SILENCE_MS = 2.4 * wire.heartbeat_ms;
+const DOUBT_MS = 1.2 * wire.heartbeat_ms; // after which an old socket is not trusted when the tablet wakes up
 const CONFIRM_MS = 50;
 const ANSWER_MS = 8_000;
 const FIRST_PAUSE_MS = 200;
 const LONGEST_PAUSE_MS = 5_000;
-const FINAL = new Set([4001, 4004, 4009, 4400, 4410]); // docs/protocol.md: do not retry as it is
+const FINAL = new Set(wire.final_codes); // do not retry as it is
 const STEPS = new Set(["step", "missing", "calm"]);
 
 export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {

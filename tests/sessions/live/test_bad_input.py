@@ -9,9 +9,9 @@ from django.db import OperationalError
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers import base
-from rehab.sessions.live.messages import MAX_FRAME
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
+from robot.wire.limits import MAX_FRAME_BYTES
 from tests.support.callers import (
     Caller,
     Message,
@@ -30,7 +30,7 @@ from tests.support.callers import (
 # --- frames that are not the protocol -------------------------------------------------------------
 
 BAD_FRAMES: dict[str, Any] = {
-    "too_large": '{"type": "step", "x": "' + "x" * MAX_FRAME + '"}',
+    "too_large": '{"type": "step", "x": "' + "x" * MAX_FRAME_BYTES + '"}',
     "binary": b'{"type": "step"}',
     "empty": "",
     "no_json": "hello?",
@@ -45,7 +45,7 @@ BAD_FRAMES: dict[str, Any] = {
     "unknown_type": {"type": "stride"},
     "seen": {"type": "seen", "frame": 1},
     "second_hello": {"type": "hello", "version": 1, "run": "r", "last": 0},
-    "deep_array": "[" * (MAX_FRAME // 2) + "]" * (MAX_FRAME // 2),
+    "deep_array": "[" * (MAX_FRAME_BYTES // 2) + "]" * (MAX_FRAME_BYTES // 2),
     "deep_extra": '{"type":"step","extra":' + '{"a":' * 9000 + "1" + "}" * 9001,
     "surrogates": '{"type": "\\ud800"}',
     "long_int": '{"type": "step", "number": ' + "9" * 5000 + "}",

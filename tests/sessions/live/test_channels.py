@@ -90,7 +90,7 @@ async def test_a_step_carries_the_feedback_of_its_valence(place, begun, valence)
 
 
 async def test_a_robot_hears_its_cue_states_and_steps(place, begun, ready, monkeypatch):
-    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.005)
+    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.005)
     session = await begun(place)
     robot = await place.robot().dial()
     welcome = await robot.hello()
@@ -123,7 +123,7 @@ async def test_a_robot_waits_for_a_session_at_its_station(place, ready):
 
 
 async def test_pages_hear_a_heartbeat(place, begun, monkeypatch):
-    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.002)
     session = await begun(place)
     tablet = place.tablet(session)
     await tablet.watch()
@@ -131,7 +131,7 @@ async def test_pages_hear_a_heartbeat(place, begun, monkeypatch):
 
 
 async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch):
-    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.002)
     disk, database = threading.Event(), asyncio.Event()
     waiting: set[str] = set()
 
@@ -169,7 +169,7 @@ async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch)
 
 
 async def test_heartbeats_and_housekeeping_go_on_whatever_fails(place, begun, monkeypatch, caplog):
-    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.002)
     failed: Counter[str] = Counter()
 
     def fail(what: str) -> Callable[..., None]:

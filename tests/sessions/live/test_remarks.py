@@ -7,7 +7,7 @@ from asgiref.sync import ThreadSensitiveContext, sync_to_async
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.log import Remark, SessionEvent
-from rehab.sessions.services import change_session, create_session
+from rehab.sessions.services import SessionRequest, change_session, create_session
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
@@ -31,11 +31,13 @@ async def test_a_page_of_the_site_may_create_and_change_sessions(place, elsewher
 
     def view():
         session = create_session(
-            place.patient,
-            valence="positive",
-            goal=GoalRule(value=3.0),
-            phases=PHASES,
-            station=place.station,
+            SessionRequest(
+                patient=place.patient,
+                valence="positive",
+                goal=GoalRule(value=3.0),
+                phases=PHASES,
+                station=place.station,
+            )
         )
         change_session(session, ChangeKind.START, by=place.pt)
         change_session(session, ChangeKind.GOAL, 4.0, by=place.pt)

@@ -16,7 +16,7 @@ from rehab.sessions.live.actor import SessionActor
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.valences import CueGestures
-from robot.trial import admit_gesture
+from robot.motion.dry_run import validate_gesture
 from tests.support.callers import Message, restart
 
 STATUS = {
@@ -268,7 +268,7 @@ async def test_composed_gestures_travel_in_the_cue(place, ready):
     cue = (await (await place.robot().dial()).hello())["cue"]
     assert (cue["above"], cue["below"]) == ("wave", None)
     assert cue["gestures"] == [wave]
-    assert admit_gesture(cue["gestures"][0]).name == "wave"
+    assert validate_gesture(cue["gestures"][0]).name == "wave"
 
 
 def compose(clinic: Clinic) -> Message:

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.django_db(transaction=True)
 
 @pytest.fixture(autouse=True)
 def _hasty(monkeypatch):
-    monkeypatch.setattr(runtimes, "HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.002)
 
 
 async def end_in(key: str, minutes: float) -> None:

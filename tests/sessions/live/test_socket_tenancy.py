@@ -19,7 +19,7 @@ from rehab.sessions.live.consumers.robot import RobotConsumer
 from rehab.sessions.live.consumers.screens import MonitorConsumer, PatientConsumer
 from rehab.sessions.live.consumers.source import SourceConsumer
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.services import create_session
+from rehab.sessions.services import SessionRequest, create_session
 from rehab.stations.models import Device, Station
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
@@ -61,12 +61,14 @@ class Everyone:
     @staticmethod
     def _open(world: World) -> TrainingSession:
         return create_session(
-            world.patient,
-            valence="positive",
-            goal=GoalRule(value=1.0),
-            phases=(make_phase("training"),),
-            station=world.rows[Station],
-            created_by=world.people[Role.PT],
+            SessionRequest(
+                patient=world.patient,
+                valence="positive",
+                goal=GoalRule(value=1.0),
+                phases=(make_phase("training"),),
+                station=world.rows[Station],
+                created_by=world.people[Role.PT],
+            )
         )
 
     def headers(self, actor: Actor) -> list[tuple[bytes, bytes]]:

@@ -17,7 +17,7 @@ from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
 from robot.bases.kinematic import KinematicBase
-from robot.performer import Performer
+from robot.behavior.performer import Performer
 from tests.support.callers import SourceCaller, a_step, change, turns
 from tests.support.world import NOW
 
@@ -334,8 +334,8 @@ async def test_a_robot_answers_plain_text(place, begun):
     await source.say("4.02, 3.0")
     step = await robot.hear("step")
     performer = Performer(KinematicBase(lambda: 0.0))
-    performer.hear(robot.heard[0], 0.0)
-    performer.hear(step, 0.0)
+    performer.handle(robot.heard[0], 0.0)
+    performer.handle(step, 0.0)
     assert (performer.is_linked, performer.bad_messages) == (True, 0)
 
 

@@ -65,7 +65,7 @@ async def test_the_next_phase_has_the_other_feedback_type_for_everyone(place, be
     )
     row = await TrainingSession.everywhere.aget(pk=session.pk)
     assert (row.valence, row.changed_to) == ("positive", "negative")
-    assert row.types_words == "Positive, changed to Negative"
+    assert row.valences_label == "Positive, changed to Negative"
 
     await restart()
     again = await place.monitor(session).watch()

@@ -14,9 +14,10 @@ from channels.generic.websocket import AsyncWebsocketConsumer
 from rehab.sessions.events import to_text
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.auth import Actor
-from rehab.sessions.live.messages import BadFrame, read_object
 from rehab.sessions.live.session import LiveSession, NotStored
 from rehab.sessions.payloads import Message
+from robot.wire.close_codes import CloseCode
+from robot.wire.frames import BadFrame, read_object
 
 log = logging.getLogger(__name__)
 
@@ -108,7 +109,7 @@ class Socket(AsyncWebsocketConsumer):
                 case "websocket.connect":
                     await self.accept()
                     if self.runtime.draining:
-                        await self.shut(4012)
+                        await self.shut(CloseCode.RESTARTING)
                     else:
                         self.start(self.outbox.run())
                         await self._guard(self.opened())
@@ -128,21 +129,25 @@ class Socket(AsyncWebsocketConsumer):
         elapsed, self._budget_at = now - self._budget_at, now
         self._budget = min(FRAME_BURST, self._budget + elapsed * FRAMES_PER_S) - 1
         if self._budget < 0:
-            raise Closing(4029, "flood", f"Send at most {FRAMES_PER_S:g} frames a second.")
+            raise Closing(
+                CloseCode.TOO_MANY, "flood", f"Send at most {FRAMES_PER_S:g} frames a second."
+            )
 
     async def _guard(self, work: Awaitable[None]) -> None:
         """Do the work; whatever is wrong with it is told to the sender and harms nobody else."""
         try:
             await work
         except BadFrame as problem:
-            await self.end(4400, problem.code, str(problem))
+            await self.end(CloseCode.NOT_PROTOCOL, problem.code, str(problem))
         except Closing as problem:
             await self.end(problem.code, problem.error, str(problem))
         except NotStored as problem:
-            await self.end(4011, "not_stored", str(problem))
+            await self.end(CloseCode.NOT_STORED, "not_stored", str(problem))
         except Exception:
             log.exception("A socket failed")
-            await self.end(4011, "server_error", "The server failed. Connect again.")
+            await self.end(
+                CloseCode.NOT_STORED, "server_error", "The server failed. Connect again."
+            )
 
     def start(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run a task that lives as long as the socket."""
@@ -180,12 +185,15 @@ class Socket(AsyncWebsocketConsumer):
 
     def send_off(self) -> None:
         """End a socket that would no longer be let in."""
-        self.start(self.end(4001, "revoked", "The token or sign-in is no longer valid."))
+        self.start(
+            self.end(CloseCode.UNAUTHORIZED, "revoked", "The token or sign-in is no longer valid.")
+        )
 
     async def shut(self, code: int) -> None:
         """Close with a code."""
         if not self.is_closed:
-            await self._pass_on({"type": "websocket.close", "code": code})
+            # autobahn, below daphne, takes no subclass of int
+            await self._pass_on({"type": "websocket.close", "code": int(code)})
             self.is_closed = True
 
     async def _pass_on(self, message: dict[str, Any]) -> None:
@@ -202,7 +210,9 @@ class Socket(AsyncWebsocketConsumer):
     async def refuse_silence(self) -> None:
         """Close a socket that says nothing. Cancelled by the first good frame."""
         await asyncio.sleep(self.first_frame_s)
-        raise Closing(4400, "silent", f"Send hello within {self.first_frame_s:g} s.")
+        raise Closing(
+            CloseCode.NOT_PROTOCOL, "silent", f"Send hello within {self.first_frame_s:g} s."
+        )
 
     async def opened(self) -> None:
         """Deal with a new connection."""
@@ -220,4 +230,6 @@ class NowhereConsumer(Socket):
 
     async def opened(self) -> None:
         """Say so."""
-        raise Closing(4004, "no_address", "No socket has this address; see docs/protocol.md.")
+        raise Closing(
+            CloseCode.NO_SESSION, "no_address", "No socket has this address; see docs/protocol.md."
+        )

@@ -9,12 +9,13 @@ from django.utils import timezone
 
 from rehab.sessions.live.auth import find_actor, find_device_by, may_open, open_session_of, token_of
 from rehab.sessions.live.consumers.base import Closing, Socket
-from rehab.sessions.live.messages import BadFrame, read_object
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import LiveSession, Peer
 from rehab.sessions.payloads import Message
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED_STATES
+from robot.wire.close_codes import CloseCode
+from robot.wire.frames import BadFrame, read_object
 
 
 class DeviceSocket(Socket):
@@ -51,7 +52,7 @@ class DeviceSocket(Socket):
     def _admit(self, actor: object) -> Device:
         if not isinstance(actor, Device) or actor.kind != self.kind:
             raise Closing(
-                4001,
+                CloseCode.UNAUTHORIZED,
                 "token",
                 f"This opens no {self.kind.value}. Take the {self.kind.value}'s token from the "
                 'admin, and send it in the header "Authorization: Bearer …" or as "token" in the '
@@ -81,11 +82,15 @@ class DeviceSocket(Socket):
             await self._attach(found)
         elif session_id is not None and await may_open(device, session_id):
             raise Closing(
-                4410, "ended", f"Session {session_id} has ended. Create a new one for this station."
+                CloseCode.ENDED,
+                "ended",
+                f"Session {session_id} has ended. Create a new one for this station.",
             )
         elif session_id is not None:
             raise Closing(
-                4004, "no_session", f"This station has no open session {session_id}. Create it."
+                CloseCode.NO_SESSION,
+                "no_session",
+                f"This station has no open session {session_id}. Create it.",
             )
         else:
             await self.say({"type": "welcome", "session": None})
@@ -100,17 +105,17 @@ class DeviceSocket(Socket):
             # Admitted, too: from its place on until its welcome nothing may come between.
             live = await self.runtime.admitted(session_id)
         except OwnedElsewhere as problem:
-            raise Closing(4409, "busy", str(problem)) from None
+            raise Closing(CloseCode.BUSY, "busy", str(problem)) from None
         other: Peer | None = getattr(live, self.slot)
         if other is not None and other is not self:
             if other.device_id != self.device_id:
                 raise Closing(
-                    4409,
+                    CloseCode.BUSY,
                     "busy",
                     f"This session has another {self.kind.value}. Stop that one first, or use "
                     "another station.",
                 )
-            other.send_away(4009, "replaced", "The same device connected again.")
+            other.send_away(CloseCode.REPLACED, "replaced", "The same device connected again.")
         self._leave_session()
         self.live = live
         setattr(live, self.slot, self)

@@ -8,13 +8,13 @@ from django.utils import timezone
 
 from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.hub import Lagged, Viewer
-from rehab.sessions.live.messages import BadFrame, read_name, read_report
+from rehab.sessions.live.messages import read_report
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.payloads import Message, describe_cue
 from rehab.stations.models import Device
 from rehab.training.controls import Audience
-
-MAX_REPORT = 8 * 1024
+from robot.wire.frames import BadFrame, read_name
+from robot.wire.limits import MAX_REPORT_CHARS
 
 
 class RobotConsumer(DeviceSocket):
@@ -61,8 +61,8 @@ class RobotConsumer(DeviceSocket):
                 live.channel.viewers.discard(viewer)
 
     def _heard_report(self, message: Message, text: str) -> None:
-        if len(text) > MAX_REPORT:
-            raise BadFrame(f'"report" is an object of at most {MAX_REPORT} characters.')
+        if len(text) > MAX_REPORT_CHARS:
+            raise BadFrame(f'"report" is an object of at most {MAX_REPORT_CHARS} characters.')
         report = read_report(message)
         if self.live is None:
             return

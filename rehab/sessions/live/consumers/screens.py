@@ -24,13 +24,9 @@ from rehab.sessions.live.backlog import read_steps
 from rehab.sessions.live.consumers.base import Closing, Socket
 from rehab.sessions.live.hub import Lagged, Unseen, Viewer
 from rehab.sessions.live.messages import (
-    BadFrame,
     read_change,
-    read_name,
-    read_object,
     read_order,
     read_remark,
-    read_whole,
 )
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import LiveSession, NotStored
@@ -39,6 +35,8 @@ from rehab.stations.models import Device
 from rehab.training.changes import ChangeKind, PauseReason
 from rehab.training.controls import CONTROLS, Audience, Requester
 from rehab.training.measures import InvalidSetting
+from robot.wire.close_codes import CloseCode
+from robot.wire.frames import BadFrame, read_name, read_object, read_whole
 
 
 class ScreenConsumer(Socket):
@@ -58,15 +56,19 @@ class ScreenConsumer(Socket):
         session_id = int(self.scope["url_route"]["kwargs"]["session_id"])
         self.actor = await find_actor(self.scope)
         if self.actor is None:
-            raise Closing(4001, "sign_in", "Sign in again, or pair the tablet again.")
+            raise Closing(
+                CloseCode.UNAUTHORIZED, "sign_in", "Sign in again, or pair the tablet again."
+            )
         if not self.is_welcome(self.actor) or not await may_open(self.actor, session_id):
-            raise Closing(4004, "no_session", "There is no such session for you.")
+            raise Closing(CloseCode.NO_SESSION, "no_session", "There is no such session for you.")
         if not await may_watch(self.actor, session_id, self.scope):
-            raise Closing(4004, "elsewhere", "The patient has not agreed to remote view.")
+            raise Closing(
+                CloseCode.NO_SESSION, "elsewhere", "The patient has not agreed to remote view."
+            )
         try:
             self.live = live = await self.runtime.session(session_id)
         except OwnedElsewhere as problem:
-            raise Closing(4409, "busy", str(problem)) from None
+            raise Closing(CloseCode.BUSY, "busy", str(problem)) from None
         if isinstance(self.actor, Device):
             live.tablets += 1
             live.tablet_heard_at = timezone.now()
@@ -99,7 +101,9 @@ class ScreenConsumer(Socket):
                 await viewer.pump()
             except Unseen:
                 raise Closing(
-                    4008, "unseen", "The page confirms nothing. Connect again with ?after=."
+                    CloseCode.UNCONFIRMED,
+                    "unseen",
+                    "The page confirms nothing. Connect again with ?after=.",
                 ) from None
             except Lagged:
                 after = None
@@ -147,7 +151,9 @@ class ScreenConsumer(Socket):
             value = self.pauses_as.value
         live, by = self.live, self.actor if isinstance(self.actor, User) else None
         if live is None:
-            raise Closing(4004, "not_open", "The session is not open. Connect again.")
+            raise Closing(
+                CloseCode.NO_SESSION, "not_open", "The session is not open. Connect again."
+            )
         if (self.requester if by else Requester.TABLET) not in CONTROLS[kind].requesters:
             await self._refuse(mark, "refused", "That is changed on the therapist's page.")
             return
@@ -158,7 +164,9 @@ class ScreenConsumer(Socket):
         what, value = read_remark(message)
         live, by = self.live, self.actor
         if live is None:
-            raise Closing(4004, "not_open", "The session is not open. Connect again.")
+            raise Closing(
+                CloseCode.NO_SESSION, "not_open", "The session is not open. Connect again."
+            )
         if self.audience is not Audience.MONITOR or not isinstance(by, User):
             await self._refuse(mark, "refused", "That is noted on the therapist's page.")
             return
@@ -188,7 +196,9 @@ class ScreenConsumer(Socket):
         order = read_order(message, *self.robot_orders)
         live, by = self.live, self.actor if isinstance(self.actor, User) else None
         if live is None:
-            raise Closing(4004, "not_open", "The session is not open. Connect again.")
+            raise Closing(
+                CloseCode.NO_SESSION, "not_open", "The session is not open. Connect again."
+            )
         sessions = self.runtime.at_station_of(live)
         if order == "stop":
             device = {"device": self.actor.pk} if isinstance(self.actor, Device) else {}

@@ -12,7 +12,6 @@ from rehab.sessions.live.consumers.base import Closing
 from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.lateness import Lateness
 from rehab.sessions.live.messages import (
-    BadFrame,
     Hello,
     read_hello,
     read_plain,
@@ -23,8 +22,10 @@ from rehab.sessions.payloads import Message, describe_source_phase
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED_STATES, State
 from rehab.training.steps import Measurement, Side
+from robot.wire.close_codes import CloseCode
+from robot.wire.frames import BadFrame
+from robot.wire.limits import MAX_STEPS
 
-MAX_UNACKNOWLEDGED = 256
 PLAIN_HELLO = Hello(run="text", last=0, session=None, clock_s=None, speed=1.0, token=None)
 
 
@@ -99,13 +100,17 @@ class SourceConsumer(DeviceSocket):
                     f"Step {measurement.number} leaves a gap: send {live.next_number} next.", "gap"
                 )
             elif live.actor.fold.state in ENDED_STATES:
-                raise Closing(4410, "ended", "The session has ended; it takes no more steps.")
+                raise Closing(
+                    CloseCode.ENDED, "ended", "The session has ended; it takes no more steps."
+                )
             elif live.actor.fold.state is State.READY:
                 await self._complain("not_running", "The session has not started. Wait for start.")
                 return
-            elif live.next_number - live.committed > MAX_UNACKNOWLEDGED:
+            elif live.next_number - live.committed > MAX_STEPS:
                 raise Closing(
-                    4029, "flood", f"Wait for acks: at most {MAX_UNACKNOWLEDGED} steps may be open."
+                    CloseCode.TOO_MANY,
+                    "flood",
+                    f"Wait for acks: at most {MAX_STEPS} steps may be open.",
                 )
             else:
                 late = self.lateness.is_late(measurement.time_s, now)

@@ -1,0 +1,78 @@
+"""The page of one session, and the form that corrects it."""
+
+from __future__ import annotations
+
+from django.contrib import messages
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.utils import timezone
+from django.utils.translation import gettext
+from django.views.decorators.http import require_http_methods, require_safe
+
+from rehab.people.access import for_roles, person
+from rehab.people.roles import Role
+from rehab.sessions.corrections import CorrectedField, can_correct, describe_corrections
+from rehab.sessions.formatting import clinic_time, format_day, format_state
+from rehab.sessions.forms.correction import CorrectionForm
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.review import review_session
+from rehab.sessions.reports.summary import format_phases, format_summary
+from rehab.training.changes import OPEN_STATES, State
+
+
+@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
+@require_safe
+def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
+    """Show one session with every stride, phase and event; researchers see a pseudonym."""
+    user = person(request)
+    session = get_object_or_404(
+        TrainingSession.objects.visible_to(user).select_related("patient", "clinic", "measure"),
+        pk=session_id,
+    )
+    review = review_session(user, session)
+    summary = format_summary(session.to_plan(), review)
+    corrections = describe_corrections(session, user)
+    notes = (entry.new for entry in corrections if entry.row.field == CorrectedField.NOTE)
+    by_name = user.role != Role.RESEARCHER
+    start = clinic_time(session.began_at, session.clinic)
+    now = clinic_time(timezone.now(), session.clinic)
+    context = {
+        "session": session,
+        "by_name": by_name,
+        "who": session.patient.nickname if by_name else session.patient.pseudonym,
+        "day": format_day(start.date(), now.date()).capitalize(),
+        "time": f"{start:%H:%M}",
+        "state": format_state(session.state),
+        "open": State(session.state) in OPEN_STATES,
+        "can_correct": by_name and can_correct(session),
+        "corrections": corrections,
+        "note": next(notes, ""),
+        "review": review,
+        "figures": [
+            summary.hit_rate,
+            summary.score,
+            summary.goal,
+            summary.duration,
+            summary.strides,
+        ],
+        "phases": format_phases(review),
+    }
+    return render(request, "sessions/session.html", context)
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_http_methods(["GET", "HEAD", "POST"])
+def correct(request: HttpRequest, session_id: int) -> HttpResponse:
+    """Correct an ended session: who walked, whether it counts, a note. The log stays as it is."""
+    user = person(request)
+    session = get_object_or_404(
+        TrainingSession.objects.visible_to(user).select_related("patient", "clinic"), pk=session_id
+    )
+    if not can_correct(session):
+        messages.error(request, gettext("This session still runs. End it before you correct it."))
+        return redirect("session", session_id=session.pk)
+    form = CorrectionForm(request.POST or None, session=session, by=user)
+    if request.method == "POST" and form.create(timezone.now()):
+        messages.success(request, gettext("Corrected. Figures, boards and trends follow it."))
+        return redirect("session", session_id=session.pk)
+    return render(request, "sessions/correct.html", {"session": session, "form": form})

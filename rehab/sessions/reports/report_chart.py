@@ -1,0 +1,85 @@
+"""The chart of a session's report: every stride, as SVG paths."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from itertools import groupby
+from typing import Any
+
+# In units of the view box.
+WIDTH, HEIGHT, MARGIN = 1000.0, 250.0, 18.0
+RING = 2.6
+
+
+def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
+    """Return all strides of the trained leg against the goal, as paths that print in gray.
+
+    At or above the goal is a disc, below a ring, without a goal a cross; an invalid stride is a
+    mark below the axis. The goal is a line, phases without feedback are shaded.
+    ``chart``: of `review.stride_chart`. Returns {} without strides.
+    """
+    strides = chart["strides"]
+    numbers, shown, goals = strides["number"], strides["shown"], strides["goal"]
+    if not numbers:
+        return {}
+    known = [value for value in (*shown, *goals) if value is not None]
+    highest: float = max(known, default=1.0)
+    top = 1.08 * highest if highest > 0 else 1.0
+    first: int = numbers[0]
+    span: int = max(1, numbers[-1] - first)
+
+    def x(number: float) -> float:
+        return MARGIN + (WIDTH - 2 * MARGIN) * (number - first) / span
+
+    def y(value: float) -> float:
+        return HEIGHT - HEIGHT * max(value, 0.0) / top
+
+    paths: defaultdict[str, list[str]] = defaultdict(list)
+    for number, value, hit in zip(numbers, shown, strides["hit"], strict=True):
+        at = x(number)
+        if value is None:
+            paths["lost"].append(f"M{at:.1f} {HEIGHT:.0f}v6")
+        elif hit is None:
+            paths["free"].append(f"M{at - 2.4:.1f} {y(value):.1f}h4.8m-2.4 -2.4v4.8")
+        elif hit:
+            paths["hit"].append(f"M{at:.1f} {y(value):.1f}h0")
+        else:
+            up = y(value)
+            paths["miss"].append(
+                f"M{at - RING:.1f} {up:.1f}a{RING} {RING} 0 1 0 {2 * RING} 0"
+                f"a{RING} {RING} 0 1 0 {-2 * RING} 0"
+            )
+    runs = [
+        (goal, [number for number, _same in run])
+        for goal, run in groupby(zip(numbers, goals, strict=True), lambda pair: pair[1])
+    ]
+    line = ""
+    for before, (goal, run) in zip([(None, [0]), *runs], runs, strict=False):
+        if goal is not None:
+            line += f"V{y(goal):.1f}" if before[0] else f"M{x(run[0]):.1f} {y(goal):.1f}"
+            line += f"H{x(run[-1] + 1 if run[-1] != numbers[-1] else run[-1]):.1f}"
+    return {
+        **{name: "".join(parts) for name, parts in paths.items()},
+        "goal": line,
+        "phases": [
+            {
+                "name": phase["name"],
+                "x": round(x(phase["from"]), 1),
+                "width": round(max(1.0, x(phase["to"]) - x(phase["from"])), 1),
+                "quiet": not phase["feedback"],
+            }
+            for phase in chart["phases"]
+        ],
+        "levels": [{"y": round(y(value), 1), "words": f"{value:g}"} for value in _axis_ticks(top)],
+        "first": numbers[0],
+        "last": numbers[-1],
+        "strides": len(numbers),
+    }
+
+
+def _axis_ticks(top: float) -> list[float]:
+    """Return round values for the axis, three to seven of them below the top."""
+    size = 10.0 ** math.floor(math.log10(top))
+    step = next(step for step in (size / 5, size / 2, size, 2 * size) if top / step < 8)
+    return [round(step * count, 10) for count in range(1, math.ceil(top / step))]

@@ -1,0 +1,92 @@
+"""The main figures of one session as text: for its page and for its report on paper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from django.utils.translation import gettext as _
+from django.utils.translation import ngettext
+
+from rehab.sessions.formatting import MISSING, format_duration, format_number, format_rate
+from rehab.sessions.reports.review import SessionReview
+from rehab.training.changes import ChangeKind
+from rehab.training.plans import SessionPlan
+from rehab.training.valences import VALENCES
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure as text, with a note beside it."""
+
+    label: str
+    value: str
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class SessionSummary:
+    """The figures that a session's page and its report share."""
+
+    hit_rate: Figure
+    score: Figure
+    goal: Figure
+    duration: Figure
+    strides: Figure
+
+
+def format_summary(plan: SessionPlan, review: SessionReview) -> SessionSummary:
+    """Return the main figures of a session."""
+    figures, target = review.figures, plan.target
+    has_score = plan.valence.has_points or figures["score"] is not None
+    goal_changes = sum(entry.event.kind == ChangeKind.GOAL for entry in review.events)
+    not_counted = figures["missing"] + figures["invalid"]
+    return SessionSummary(
+        hit_rate=Figure(
+            _("Hit rate"),
+            format_rate(figures["hit_rate"]),
+            _("wanted %(rate)s") % {"rate": format_rate(target.hit_rate)}
+            if target.hit_rate
+            else "",
+        ),
+        score=Figure(
+            _("Score"),
+            format_number(figures["score"], 0) if has_score else MISSING,
+            _("points") if has_score else _("this type has no points"),
+        ),
+        goal=Figure(
+            _("Goal"),
+            format_number(figures["goal"]),
+            plan.measure.unit
+            + (_(", changed %(count)s ×") % {"count": goal_changes} if goal_changes else ""),
+        ),
+        duration=Figure(
+            _("Walked"),
+            format_duration(figures["active_s"]),
+            _("planned %(time)s") % {"time": format_duration(target.duration_s)}
+            if target.duration_s
+            else "",
+        ),
+        strides=Figure(
+            _("Strides"),
+            format_number(figures["strides"], 0),
+            ngettext("%(count)s does not count", "%(count)s do not count", not_counted)
+            % {"count": format_number(not_counted, 0)}
+            if not_counted
+            else "",
+        ),
+    )
+
+
+def format_phases(review: SessionReview) -> list[dict[str, Any]]:
+    """Return the figures of each phase with their texts beside them."""
+    return [
+        phase
+        | {
+            "hit_rate_text": format_rate(phase["hit_rate"]),
+            "mean_text": format_number(phase["mean"]),
+            "performance_text": format_rate(phase["mean_performance"]),
+            "valence_label": _(VALENCES[phase["valence"]].label) if phase["valence"] else "",
+        }
+        for phase in review.figures["phases"]
+    ]

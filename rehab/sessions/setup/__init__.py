@@ -1,0 +1,1 @@
+"""What sessions are set up from: protocols, presets, gestures and sources."""

@@ -1,0 +1,181 @@
+"""What sessions are built from: measures, and protocols with their phases."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from django.core.exceptions import ValidationError
+from django.db import models
+from django.db.models import F, Q
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.models import Clinic
+from rehab.people.scope import ClinicRow, Scope, ScopedModel
+from rehab.people.web.refusals import in_words
+from rehab.training import measures as rules
+from rehab.training.phases import PHASE_KINDS, Phase
+
+
+def display_name(row: Measure | Protocol) -> str:
+    """Return the name of a row; that of a shared one is translated."""
+    return row.name if row.clinic_id else gettext(row.name)
+
+
+class Measure(ClinicRow):
+    """A quantity of a stride that can be trained. Without a clinic it is shared by all."""
+
+    scope = Scope(clinic="clinic", shared=True, host=Q(clinic__isnull=True))
+
+    clinic = models.ForeignKey(
+        Clinic,
+        on_delete=models.CASCADE,
+        related_name="measures",
+        null=True,
+        blank=True,
+        verbose_name=_("clinic"),
+    )
+    slug = models.SlugField(_("slug"), max_length=32)
+    name = models.CharField(_("name"), max_length=64)
+    unit = models.CharField(_("unit"), max_length=16)
+    higher_is_better = models.BooleanField(_("higher is better"), default=True)
+    value_min = models.FloatField(_("value min"), help_text=_("Smallest value that can be real."))
+    value_max = models.FloatField(_("value max"), help_text=_("Largest value that can be real."))
+    goal_min = models.FloatField(_("goal min"), help_text=_("A goal lies above this."))
+    goal_max = models.FloatField(_("goal max"), help_text=_("A goal lies at or below this."))
+
+    class Meta(ClinicRow.Meta):
+        verbose_name = _("measure")
+        verbose_name_plural = _("measures")
+        ordering: ClassVar = ["name"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(fields=["clinic", "slug"], name="measure_slug_once_per_clinic"),
+            models.UniqueConstraint(
+                fields=["slug"], condition=Q(clinic__isnull=True), name="measure_slug_once_shared"
+            ),
+            models.CheckConstraint(
+                condition=Q(value_min__lt=F("value_max"))
+                & Q(goal_min__gte=0)
+                & Q(goal_min__lt=F("goal_max")),
+                name="measure_bounds_in_order",
+                violation_error_message=_(
+                    "Each smallest value must lie below the largest; goals lie above 0."
+                ),
+            ),
+        ]
+
+    def __str__(self) -> str:
+        return f"{display_name(self)} [{self.unit}]"
+
+    def to_rule(self) -> rules.Measure:
+        """Return the measure in the form that the rules use."""
+        return rules.Measure(
+            slug=self.slug,
+            name=self.name,
+            unit=self.unit,
+            value_min=self.value_min,
+            value_max=self.value_max,
+            goal_min=self.goal_min,
+            goal_max=self.goal_max,
+            higher_is_better=self.higher_is_better,
+        )
+
+
+class Protocol(ClinicRow):
+    """A list of phases that sessions are built from. Without a clinic it is shared by all."""
+
+    scope = Scope(clinic="clinic", shared=True, host=Q(clinic__isnull=True))
+
+    clinic = models.ForeignKey(
+        Clinic,
+        on_delete=models.CASCADE,
+        related_name="protocols",
+        null=True,
+        blank=True,
+        verbose_name=_("clinic"),
+    )
+    name = models.CharField(_("name"), max_length=64)
+    description = models.TextField(_("description"), blank=True)
+
+    class Meta(ClinicRow.Meta):
+        verbose_name = _("protocol")
+        verbose_name_plural = _("protocols")
+        ordering: ClassVar = ["name"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(
+                fields=["clinic", "name"], name="protocol_name_once_per_clinic"
+            ),
+            models.UniqueConstraint(
+                fields=["name"], condition=Q(clinic__isnull=True), name="protocol_name_once_shared"
+            ),
+        ]
+
+    def __str__(self) -> str:
+        return display_name(self)
+
+    def to_rules(self) -> tuple[Phase, ...]:
+        """Return the phases in the form that the rules use."""
+        phases = sorted(self.phases.all(), key=lambda phase: phase.position)  # also if prefetched
+        return tuple(phase.to_rule() for phase in phases)
+
+
+class ProtocolPhase(ScopedModel):
+    """One phase of a protocol."""
+
+    scope = Scope(clinic="protocol__clinic", shared=True, host=Q(protocol__clinic__isnull=True))
+
+    protocol = models.ForeignKey(
+        Protocol, on_delete=models.CASCADE, related_name="phases", verbose_name=_("protocol")
+    )
+    position = models.PositiveSmallIntegerField(_("position"))
+    kind = models.CharField(
+        _("kind"),
+        max_length=16,
+        choices=[(kind.slug, _(kind.label)) for kind in PHASE_KINDS.values()],
+    )
+    name = models.CharField(_("name"), max_length=64)
+    feedback = models.BooleanField(
+        _("feedback"), help_text=_("Whether the patient gets feedback in this phase.")
+    )
+    gain = models.FloatField(
+        _("gain"),
+        default=1.0,
+        help_text=_("What is shown is this share of the measured value (0.5 to 1.5)."),
+    )
+    strides = models.PositiveIntegerField(
+        _("strides"), null=True, blank=True, help_text=_("Ends after so many.")
+    )
+    seconds = models.FloatField(
+        _("seconds"), null=True, blank=True, help_text=_("Ends after so many seconds.")
+    )
+
+    class Meta(ScopedModel.Meta):
+        verbose_name = _("protocol phase")
+        verbose_name_plural = _("protocol phases")
+        ordering: ClassVar = ["protocol", "position"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(
+                fields=["protocol", "position"], name="protocol_phase_position_once"
+            )
+        ]
+
+    def __str__(self) -> str:
+        return gettext(self.name)
+
+    def to_rule(self) -> Phase:
+        """Return the phase in the form that the rules use. Raises InvalidSetting."""
+        return Phase(
+            kind=self.kind,
+            name=self.name,
+            feedback=self.feedback,
+            gain=self.gain,
+            strides=self.strides,
+            seconds=self.seconds,
+        )
+
+    def clean(self) -> None:
+        """Refuse what the rules refuse, with their message."""
+        try:
+            self.to_rule()
+        except rules.InvalidSetting as problem:
+            raise ValidationError(in_words(problem)) from problem

@@ -1,0 +1,184 @@
+"""What a base's driver publishes and subscribes to at a rosbridge. Time is a parameter."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+
+from robot.bases.base import BaseState, SensorState
+from robot.bases.rosbridge.orders import Orders
+from robot.bases.rosbridge.perception import DeadReckoning, HazardSensors, ReportedOdometry
+from robot.bases.rosbridge.topics import Topics
+from robot.motion.twist import STILL
+from robot.ros.frames import (
+    Answer,
+    BadRosFrame,
+    Frame,
+    Incoming,
+    Publication,
+    advertise,
+    call_service,
+    publish,
+    subscribe,
+    unadvertise,
+    unsubscribe,
+)
+from robot.ros.messages import (
+    ODOMETRY,
+    TWIST,
+    read_event,
+    read_odometry,
+    read_twist,
+    write_twist,
+)
+
+ODOMETRY_EVERY_MS = 20  # as often as orders go out
+LAST_STOPS = 3  # one may be lost (docs/reference/kobuki.md#orders)
+
+# rosapi tells whether anybody is there, where it runs; asked so often [s], while the base stands.
+SUBSCRIBERS, PUBLISHERS = "/rosapi/subscribers", "/rosapi/publishers"
+ASK_EVERY_S = 2.0
+LATE_S = 1.0  # then somebody who looks on should know
+
+# Why it must not move; bases/base.py, SensorState.
+NOBODY_LISTENS = "nobody_listens"
+SENSOR_MISSING = "feeler_missing"
+# Hazards of its own.
+RESTARTED = "restarted"
+OTHER_DRIVER = "other_driver"
+
+
+class BaseClient:
+    """One base at one rosbridge."""
+
+    def __init__(self, topics: Topics, now_s: float) -> None:
+        self.topics = topics
+        self.orders = Orders()
+        self.odometry: ReportedOdometry | DeadReckoning = (
+            DeadReckoning() if topics.odometry is None else ReportedOdometry()
+        )
+        self.sensors = HazardSensors()
+        self._is_open = False
+        self._opened_s = now_s
+        self._asked_s = -math.inf
+        self._missing: dict[str, str] = {}  # topic: why it must not move
+
+    @property
+    def counters(self) -> Counter[str]:
+        """How often something went wrong."""
+        return self.orders.counters + self.sensors.counters
+
+    def open(self, now_s: float) -> Iterator[Frame]:
+        """Yield the first frames of a new connection. Its first order is to stand still."""
+        self.lose(now_s)
+        self._is_open, self._opened_s, self._asked_s = True, now_s, -math.inf
+        topics = self.topics
+        yield advertise(topics.order)
+        yield subscribe(topics.order)
+        if topics.odometry is not None:
+            yield subscribe(topics.odometry, newest_every_ms=ODOMETRY_EVERY_MS)
+        for topic in topics.sensors.values():
+            yield subscribe(topic)
+
+    def due(self, now_s: float) -> Iterator[Frame]:
+        """Yield the frames to send now."""
+        twist = self.orders.due(now_s)
+        if twist is not None:
+            self.odometry.order(twist, now_s)
+            yield publish(self.topics.order, write_twist(twist))
+        if self.orders.sent.is_still and now_s - self._asked_s >= ASK_EVERY_S:
+            self._asked_s = now_s
+            name = self.topics.order.name
+            yield call_service(SUBSCRIBERS, {"topic": name}, name)
+            for topic in self.topics.sensors.values():
+                yield call_service(PUBLISHERS, {"topic": topic.name}, topic.name)
+
+    def hear(self, heard: Incoming, now_s: float) -> None:
+        """Handle a frame of the bridge. Raises BadRosFrame for impossible values."""
+        if isinstance(heard, Answer):
+            self._take_answer(heard)
+            return
+        odometry = self.topics.odometry
+        if heard.topic == self.topics.order.name:
+            if self.orders.come_back(read_twist(heard.message)):
+                self.sensors.note(OTHER_DRIVER, now_s)
+        elif odometry is not None and heard.topic == odometry.name:
+            pose, twist = read_odometry(heard.message)
+            if isinstance(self.odometry, ReportedOdometry) and self.odometry.take(
+                pose, twist, now_s
+            ):
+                self.sensors.counters["jumped"] += 1
+                self.sensors.note(RESTARTED, now_s)
+        else:
+            self._feel(heard, now_s)
+
+    def lose(self, now_s: float) -> None:
+        """Reset orders and hazards: the connection is lost."""
+        self._is_open = False
+        self.orders.forget()
+        self.odometry.order(STILL, now_s)
+        self.sensors.forget()
+        self._missing.clear()
+
+    def end(self, now_s: float) -> Iterator[Frame]:
+        """Yield the last frames: stand still, unsubscribe, unadvertise."""
+        self.lose(now_s)
+        topics = self.topics
+        for _ in range(LAST_STOPS):
+            yield publish(topics.order, write_twist(STILL))
+        for topic in (topics.order, topics.odometry, *topics.sensors.values()):
+            if topic is not None:
+                yield unsubscribe(topic)
+        yield unadvertise(topics.order)
+
+    def state(self, now_s: float) -> BaseState:
+        """Return the state of the base now."""
+        self.odometry.move(now_s)
+        sensors = SensorState(
+            hazards=self.sensors.hazards(now_s),
+            refusal=min(self._missing.values(), default=""),
+            silent_s=self.silent_s(now_s),
+        )
+        return BaseState(self.odometry.pose, self.odometry.twist, sensors)
+
+    def silent_s(self, now_s: float) -> float:
+        """Return how long it has been unknown whether orders arrive, or where it is [s]."""
+        if not self._is_open or not self.orders.is_answered:
+            return math.inf
+        return max(0.0, self.orders.unanswered_s(now_s), now_s - self.odometry.seen_s)
+
+    def problem(self, now_s: float) -> str:
+        """Return what is wrong at a bridge that answers; empty where nothing is."""
+        order, odometry = self.topics.order.name, self.topics.odometry
+        if not self._is_open or now_s - self._opened_s < LATE_S:
+            return ""
+        if not self.orders.is_answered or self.orders.unanswered_s(now_s) > LATE_S:
+            return f"Nothing that is sent on {order} comes back: is it of the type {TWIST}?"
+        if odometry is not None and now_s - self.odometry.seen_s > LATE_S:
+            return f"No {ODOMETRY} comes on {odometry.name}: does its driver run?"
+        for topic, reason in self._missing.items():
+            if reason == NOBODY_LISTENS:
+                return f"No driver listens on {topic}: start it, or choose another --cmd-topic."
+            return f"Nobody tells on {topic}: start what does, or say that there is none."
+        return ""
+
+    def _feel(self, heard: Publication, now_s: float) -> None:
+        for hazard, topic in self.topics.sensors.items():
+            if topic.name == heard.topic:
+                which, is_felt = read_event(topic.kind, heard.message)
+                self.sensors.take(hazard, which, is_felt, now_s)
+                return
+        raise BadRosFrame("Nobody asked for that topic.")
+
+    def _take_answer(self, answer: Answer) -> None:
+        """Store who uses a topic. Without rosapi that is unknown, and nothing is refused."""
+        is_order = answer.question == self.topics.order.name
+        there = (answer.values or {}).get("subscribers" if is_order else "publishers")
+        if not isinstance(there, list):
+            return
+        # The bridge itself listens to what we order.
+        if len(there) >= (2 if is_order else 1):
+            self._missing.pop(answer.question, None)
+        else:
+            self._missing[answer.question] = NOBODY_LISTENS if is_order else SENSOR_MISSING

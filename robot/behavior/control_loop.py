@@ -1,0 +1,42 @@
+"""The one loop that runs a robot: live, for a gesture alone, and in a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from robot.behavior.performer import Performer
+from robot.motion.limits import TICK_S
+
+
+def control_loop(
+    performer: Performer,
+    monotonic: Callable[[], float],
+    is_over: Callable[[], bool] = lambda: False,
+) -> Iterator[float]:
+    """Tick a performer 50 times a second.
+
+    The caller lets the time pass, by sleeping, by awaiting, or by moving a virtual clock, and may
+    look at the performer meanwhile.
+
+    Parameters
+    ----------
+    performer
+        The robot.
+    monotonic
+        The clock [s] that the performer is ticked by.
+    is_over
+        Asked before each wait; the loop ends once it is true.
+
+    Yields
+    ------
+    float
+        How long to wait until the next tick [s].
+
+    Raises
+    ------
+    BaseLost
+        Where the base does not answer any more.
+    """
+    while not is_over():
+        yield TICK_S
+        performer.tick(monotonic())

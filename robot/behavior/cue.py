@@ -1,0 +1,83 @@
+"""A session's order to its robot, read from what the server sends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from robot.wire.frames import BadFrame, read_number
+from robot.wire.limits import MAX_CUE_GESTURES, MAX_NAME_CHARS
+
+LEAST_INTENSITY = 0.1
+# A cue of this intensity or less is performed quietly: without sounds, and at this share of every
+# speed and acceleration, so that half as far takes as long (our choice).
+QUIET = 0.5
+QUIET_PACE = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Cue:
+    """A session's order to its robot.
+
+    Parameters
+    ----------
+    above, below
+        The gesture after a window above or below the threshold; None for none.
+    threshold
+        Mean performance that a window has to reach; 1 is the goal.
+    window_s, rest_s
+        Length of a window, and time from the start of one gesture to the start of the next, both
+        on the source's clock [s]: so what a robot does follows from the log, without chance.
+    intensity
+        Share of a gesture's size, 0.1 to 1; 0 for no gesture at all.
+    gestures
+        Composed gestures as JSON data, not parsed yet.
+    """
+
+    above: str | None = None
+    below: str | None = None
+    threshold: float = 0.9
+    window_s: float = 5.0
+    rest_s: float = 5.0
+    intensity: float = 1.0
+    gestures: tuple[Any, ...] = ()
+
+    @classmethod
+    def read(cls, cue: Any) -> Cue:
+        """Return the cue that the server sends. Raises BadFrame."""
+        if not isinstance(cue, dict):
+            raise BadFrame('"cue" is an object.')
+        intensity = read_number(cue, "intensity", 0.0, 1.0)
+        if 0 < intensity < LEAST_INTENSITY:
+            raise BadFrame(f'"intensity" is 0, or a number from {LEAST_INTENSITY:g} to 1.')
+        gestures = cue.get("gestures", [])
+        if not isinstance(gestures, list) or len(gestures) > MAX_CUE_GESTURES:
+            raise BadFrame(f'"gestures" is a list of up to {MAX_CUE_GESTURES}.')
+        return cls(
+            above=_read_gesture(cue, "above"),
+            below=_read_gesture(cue, "below"),
+            threshold=read_number(cue, "threshold", 0.0, 10.0),
+            window_s=read_number(cue, "window_s", 1.0, 600.0),
+            rest_s=read_number(cue, "rest_s", 0.0, 3600.0),
+            intensity=intensity,
+            gestures=tuple(gestures),
+        )
+
+    @property
+    def is_quiet(self) -> bool:
+        """Whether it is to be performed without sounds, and slowly."""
+        return self.intensity <= QUIET
+
+    def gesture(self, above: bool) -> str | None:
+        """Return the gesture after a window above or below the threshold."""
+        return self.above if above else self.below
+
+
+def _read_gesture(cue: Mapping[str, Any], name: str) -> str | None:
+    gesture = cue.get(name)
+    if gesture is not None and not (
+        isinstance(gesture, str) and 0 < len(gesture) <= MAX_NAME_CHARS
+    ):
+        raise BadFrame(f'"{name}" is the name of a gesture, or null.')
+    return gesture

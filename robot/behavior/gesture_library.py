@@ -1,0 +1,64 @@
+"""The gestures that a robot can perform: built-in ones, and those received with the cue."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from robot.motion.dry_run import validate_gesture
+from robot.motion.gesture import Gesture
+from robot.motion.gesture_errors import BadGesture
+from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.limits import Limits
+
+# Why a name cannot be performed.
+UNKNOWN_GESTURE = "unknown_gesture"
+BAD_GESTURE = "bad_gesture"  # it came along, and no base may perform it
+
+
+class GestureLibrary:
+    """Gestures by name.
+
+    Parameters
+    ----------
+    own
+        Those that no cue may replace.
+    limits
+        Speeds and accelerations that a gesture has to do with.
+    """
+
+    def __init__(self, builtin: Mapping[str, Gesture], limits: Limits) -> None:
+        self.builtin = builtin
+        self._limits = limits
+        self._received: dict[str, Gesture | None] = {}  # None: refused
+
+    def replace_received(self, gestures: Iterable[Any]) -> list[str]:
+        """Replace the received gestures, and return what is wrong with the refused ones.
+
+        Each is parsed, checked and dry-run here, whatever the server has checked.
+        """
+        self._received, problems = {}, []
+        for data in gestures:
+            try:
+                gesture = validate_gesture(data, self._limits)
+                if gesture.name in self.builtin:
+                    raise BadGesture(
+                        "This robot has a gesture {name} of its own.", name=gesture.name
+                    )
+            except BadGesture as problem:
+                name = data.get("name") if isinstance(data, dict) else None
+                # A name that every robot knows means that gesture, whatever else comes under it.
+                if isinstance(name, str) and name not in GESTURES and name not in ORIGINALS:
+                    self._received[name] = None
+                problems.append(f"gesture {name}: {problem}")
+            else:
+                self._received[gesture.name] = gesture
+        return problems
+
+    def find(self, name: str) -> tuple[Gesture | None, str]:
+        """Return the gesture of that name and no reason, or None and why there is none."""
+        if name in self._received:
+            gesture = self._received[name]
+            return gesture, "" if gesture else BAD_GESTURE
+        gesture = self.builtin.get(name)
+        return gesture, "" if gesture else UNKNOWN_GESTURE

@@ -1,0 +1,88 @@
+"""What a robot makes known: reports to the server, lights and sounds to people."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+
+from robot.bases import BaseState, Indication, MobileBase
+from robot.behavior.reports import Report, gesture_report, status_report
+from robot.behavior.safety import BATTERY_WARN_V, battery_share
+from robot.motion.gesture import Gesture
+
+STATUS_MOVING_S = 0.25
+STATUS_IDLE_S = 1.0
+REPORTS_KEPT = 64  # while nobody fetches them the oldest are dropped: what is past is past
+
+State = tuple[str, str]  # the robot's state, and why it would not perform now
+
+
+class StatusReporter:
+    """Collects reports until they are sent, and shows the state by lights and sounds.
+
+    Parameters
+    ----------
+    base
+        The base with the lights and sounds.
+
+    Attributes
+    ----------
+    reports
+        Reports to send, oldest first; the sender pops them from the left.
+    """
+
+    def __init__(self, base: MobileBase) -> None:
+        self.reports: deque[Report] = deque(maxlen=REPORTS_KEPT)
+        self._base = base
+        self._told_s: float | None = None  # the last status
+        self._told: State | None = None
+        self._indication: Indication | None = None
+
+    def reset(self) -> None:
+        """Make the next status due at once, for a server that knows nothing yet."""
+        self._told_s = None
+
+    def report_gesture(self, gesture: Gesture, phase: str, outcome: str) -> None:
+        """Report that a gesture has started or ended."""
+        is_open = not self._base.abilities.closed_loop
+        self.reports.append(gesture_report(gesture.name, phase, outcome, open_loop=is_open))
+
+    def report_status(
+        self,
+        now_s: float,
+        state: State,
+        there: BaseState,
+        gesture: Gesture | None,
+        bad_messages: int,
+        counters: Mapping[str, int],
+    ) -> None:
+        """Report the status where it has changed, and every so often."""
+        every_s = STATUS_IDLE_S if gesture is None else STATUS_MOVING_S
+        due = self._told_s is None or not 0 <= now_s - self._told_s < every_s
+        if not due and state == self._told:
+            return
+        self._told_s, self._told = now_s, state
+        name = None if gesture is None else gesture.name
+        volts = there.sensors.battery_v
+        battery = (None, False) if volts is None else (battery_share(volts), volts < BATTERY_WARN_V)
+        self.reports.append(
+            status_report(self._base, *state, name, there, battery, bad_messages, counters)
+        )
+
+    def show(self, state: State, *, is_quiet: bool) -> None:
+        """Show a state by the base's lights, and by a sound unless it is quiet."""
+        match state:
+            case "stopped", _:
+                indication = Indication.STOPPED
+            case "performing", _:
+                indication = Indication.MOVING
+            case "idle", "":
+                indication = Indication.READY
+            case _:
+                indication = Indication.WAITING
+        if indication is not self._indication:
+            self._indication = indication
+            self._base.show(
+                indication,
+                aloud=not is_quiet and indication in (Indication.MOVING, Indication.STOPPED),
+            )

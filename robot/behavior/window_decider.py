@@ -1,0 +1,160 @@
+"""When a robot answers: the mean performance of five seconds of walking against a threshold.
+
+The paper's rule (P 3.4.1), on the source's clock: windows of 5 s follow each other without a gap
+from the first step on; a window's mean is *above* where it reaches the threshold. Here are the
+session's order to its robot, the windows, and when a gesture may start.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from robot.behavior.cue import Cue
+
+MIN_STEPS = 2  # fewer valid steps in a window say nothing
+# A window above is answered in full from this mean performance on, where the strong words for the
+# patient begin; at the threshold with this share of it (our choice).
+FULL_PERFORMANCE = 1.1
+FAINT = 0.5
+
+# Why no gesture followed a decision.
+NO_GESTURE = "no_gesture"  # the order names none for it
+LATE = "late"  # the step that ended the window came more than a window after it
+PERFORMING = "performing"
+RESTING = "resting"
+OFF = "off"  # the order's intensity is 0
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What a window came to; ``at_s`` is the time of the step that ended it."""
+
+    from_s: float
+    until_s: float
+    at_s: float
+    steps: int
+    mean: float
+    threshold: float
+    above: bool
+
+    @property
+    def is_late(self) -> bool:
+        """Whether it is of so long ago that nobody may answer it any more."""
+        return self.at_s - self.until_s > self.until_s - self.from_s
+
+    @property
+    def strength(self) -> float:
+        """The share of the cue's intensity that answers it, ``FAINT`` to 1.
+
+        Above the threshold it grows with the mean performance; a window below never makes it grow.
+        """
+        if not self.above or self.mean >= FULL_PERFORMANCE:
+            return 1.0
+        grown = (self.mean - self.threshold) / (FULL_PERFORMANCE - self.threshold)
+        return FAINT + (1 - FAINT) * grown
+
+
+class WindowDecider:
+    """Sorts steps into windows, and decides when a gesture may start.
+
+    Windows are counted from the first step: the one with the number k has the steps of which
+    ``(time - first) / window_s`` lies in [k, k + 1). A window ends with the first step of a later
+    one, for the source's clock is told by steps alone.
+    """
+
+    def __init__(self, cue: Cue) -> None:
+        self.cue = cue
+        self.windows = 0  # those with a decision
+        self.activated = 0  # those above
+        self._started_s: float | None = None  # when the last gesture started
+        self.drop_window()
+
+    @property
+    def share(self) -> float | None:
+        """The share of windows that were above; None before there was one."""
+        return self.activated / self.windows if self.windows else None
+
+    def drop_window(self) -> None:
+        """Discard the open window, since some of its steps are missing."""
+        self._first_s: float | None = None
+        self._window = 0
+        self._steps, self._sum = 0, 0.0
+
+    def set_cue(self, cue: Cue) -> None:
+        """Use another cue, from the open window on."""
+        if cue.window_s != self.cue.window_s:
+            self.drop_window()
+        self.cue = cue
+
+    def add(self, time_s: float, performance: float) -> Decision | None:
+        """Add a step, and return the decision about the window that it ended, or None.
+
+        Parameters
+        ----------
+        time_s
+            The source's clock [s]. One that is earlier than the open window starts over.
+        performance
+            Shown value over goal, finite.
+        """
+        if self._first_s is None:
+            self._first_s = time_s
+            if self._started_s is not None and self._started_s > time_s:
+                self._started_s = time_s  # set back meanwhile: nobody knows how long ago it was
+        window = math.floor((time_s - self._first_s) / self.cue.window_s)
+        if window < self._window:
+            self.drop_window()
+            self._first_s, window = time_s, 0
+            if self._started_s is not None:
+                self._started_s = time_s
+        decision = self._decide(time_s) if window > self._window else None
+        if window > self._window:
+            self._window, self._steps, self._sum = window, 0, 0.0
+        self._steps += 1
+        self._sum += performance
+        return decision
+
+    def _decide(self, time_s: float) -> Decision | None:
+        if self._first_s is None or self._steps < MIN_STEPS:
+            return None
+        from_s = self._first_s + self._window * self.cue.window_s
+        until_s = from_s + self.cue.window_s
+        mean = self._sum / self._steps
+        above = mean >= self.cue.threshold
+        self.windows += 1
+        self.activated += above
+        return Decision(
+            from_s=from_s,
+            until_s=until_s,
+            at_s=time_s,
+            steps=self._steps,
+            mean=mean,
+            threshold=self.cue.threshold,
+            above=above,
+        )
+
+    def blocking_reason(self, decision: Decision, *, performing: bool) -> str:
+        """Return why no gesture may follow a decision now; empty where one may.
+
+        Parameters
+        ----------
+        decision
+            What the window came to.
+        performing
+            Whether a gesture is running.
+        """
+        if self.cue.gesture(decision.above) is None:
+            return NO_GESTURE
+        if not self.cue.intensity:
+            return OFF
+        if decision.is_late:
+            return LATE
+        if performing:
+            return PERFORMING
+        if self._started_s is not None and decision.at_s - self._started_s < self.cue.rest_s:
+            return RESTING
+        return ""
+
+    def mark_started(self, decision: Decision) -> None:
+        """Store that a gesture answers this decision."""
+        self._started_s = decision.at_s

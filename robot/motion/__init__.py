@@ -1,0 +1,1 @@
+"""Motion of a base: twists, poses, limits, paths, gestures and the player. Pure."""

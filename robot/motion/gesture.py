@@ -1,0 +1,235 @@
+"""Gestures: places to go to, one after the other, and home again.
+
+A gesture says where, never for how long: timed ones end rotated and displaced as soon as a base
+speeds up gently (docs/reference/kobuki.md#timed-gestures).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadWaypoint
+from robot.motion.limits import DEFAULT_LIMITS, Limits
+from robot.motion.path import Drive, Segment, is_on_path, plan_path
+from robot.motion.pose import HOME, Pose
+
+# A base never leaves this circle around its home [m]; gestures keep 5 cm away from its edge
+# (docs/reference/kobuki.md#beside-a-person).
+TETHER_M = 0.30
+REACH_M = 0.25
+
+# How near to its waypoint a base has to come [m, rad] (docs/reference/kobuki.md#beside-a-person
+# asks for 1 cm and 2°).
+NEAR_M = 0.004
+NEAR_RAD = 0.02
+
+GESTURE_MAX_S = 16.0  # the paper's longest, with slack
+WAYPOINTS_MAX = 32
+TURN_MAX_RAD = math.tau  # a longer cable than this winds up
+# Slower turns stick and shake (docs/reference/kobuki.md#what-users-report: below 0.33 rad/s).
+LEAST_PACE = 0.2
+SLACK = 1.5  # a waypoint's time over its shortest possible: odometry, grip and latency cost some
+
+
+@dataclass(frozen=True, slots=True)
+class Waypoint:
+    """A pose to come to, seen from home.
+
+    Parameters
+    ----------
+    x_m, y_m, heading_rad
+        The pose [m, m, rad]. A heading of ±2π is home again after a full turn.
+    within_s
+        Time that it may take [s]; a base that is not there by then stops.
+    pace
+        Share of the limits to go at, above 0 and up to 1.
+    hold_s
+        How long to stay there [s].
+    """
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    within_s: float
+    pace: float = 1.0
+    hold_s: float = 0.0
+
+    @property
+    def pose(self) -> Pose:
+        """Where it is."""
+        return Pose(self.x_m, self.y_m, self.heading_rad)
+
+
+@dataclass(frozen=True, slots=True)
+class Gesture:
+    """What a base performs: waypoints in their order, of which the last is home.
+
+    Raises BadGesture for what no base with the default limits should or could perform.
+    """
+
+    name: str
+    label: str
+    waypoints: tuple[Waypoint, ...]
+
+    def __post_init__(self) -> None:
+        check_gesture(self)
+
+    def scaled(self, intensity: float) -> Gesture:
+        """Return the gesture at a share of its size, which never takes longer.
+
+        Ways shrink, and turns with them as long as it drives on the line ahead of home only. Where
+        it drives aside its turns set the direction, and stay as they are.
+
+        Parameters
+        ----------
+        intensity
+            The share, above 0 and up to 1.
+
+        Raises
+        ------
+        BadGesture
+            For any other share.
+        """
+        if not 0 < intensity <= 1:
+            raise BadGesture("An intensity lies above 0 and up to 1.")
+        turns = intensity if self._drives_ahead else 1.0
+        waypoints = tuple(
+            replace(
+                waypoint,
+                x_m=waypoint.x_m * intensity,
+                y_m=waypoint.y_m * intensity,
+                heading_rad=waypoint.heading_rad * turns,
+            )
+            for waypoint in self.waypoints
+        )
+        return replace(self, waypoints=waypoints)
+
+    @property
+    def _drives_ahead(self) -> bool:
+        """Whether it drives with the heading of home only."""
+        segments = (
+            segment
+            for segments, _, _ in stages(self.waypoints, DEFAULT_LIMITS)
+            for segment in segments
+        )
+        drives = [segment for segment in segments if isinstance(segment, Drive)]
+        return all(abs(drive.heading_rad) < 1e-9 for drive in drives)
+
+    @property
+    def least_s(self) -> float:
+        """The shortest time that it can take within the default limits [s]."""
+        return sum(
+            hold_s + sum(segment.least_s(limits) for segment in segments)
+            for segments, limits, hold_s in stages(self.waypoints, DEFAULT_LIMITS)
+        )
+
+
+def check_gesture(gesture: Gesture) -> None:
+    """Check that a gesture is safe and possible within ``DEFAULT_LIMITS``.
+
+    Raises
+    ------
+    BadGesture
+        For too many waypoints, one out of reach, too little or too much time, an end that is not
+        home, and a way that is driven backwards and was not driven forwards before (a Kobuki has no
+        rear bumper). The message names the waypoint and the cure.
+    """
+    if not 1 <= len(gesture.waypoints) <= WAYPOINTS_MAX:
+        raise BadGesture("A gesture has 1 to {most} goals.", most=WAYPOINTS_MAX)
+    for number, waypoint in enumerate(gesture.waypoints, start=1):
+        check_waypoint(number, waypoint)
+    last = gesture.waypoints[-1].pose
+    if last.distance_m(HOME) or abs(last.turn_rad(HOME)) > 1e-9:
+        raise BadGesture("A gesture's last goal is home: x 0, y 0, heading 0.")
+    needed_s = [needed_time_s(*stage) for stage in stages(gesture.waypoints, DEFAULT_LIMITS)]
+    if sum(needed_s) > GESTURE_MAX_S:
+        raise BadGesture(
+            "This takes up to {took:.1f} s; a gesture takes at most {most:g} s. Make it smaller, "
+            "or leave something out.",
+            took=sum(needed_s),
+            most=GESTURE_MAX_S,
+        )
+    for number, (waypoint, least_s) in enumerate(
+        zip(gesture.waypoints, needed_s, strict=True), start=1
+    ):
+        if waypoint.within_s < least_s:
+            raise BadWaypoint(
+                number,
+                "{part} {number} needs {needed:.1f} s; give it as long.",
+                needed=math.ceil(10 * least_s) / 10,
+            )
+    _check_ways_back(gesture.waypoints)
+
+
+def needed_time_s(segments: Sequence[Segment], limits: Limits, hold_s: float) -> float:
+    """Return the time that a waypoint needs at least [s]: its segments with slack, and its hold."""
+    return SLACK * sum(segment.least_s(limits) for segment in segments) + hold_s
+
+
+def check_waypoint(number: int, waypoint: Waypoint) -> None:
+    """Check what holds for a waypoint whatever comes before it. Raises BadWaypoint."""
+    numbers = (
+        waypoint.x_m,
+        waypoint.y_m,
+        waypoint.heading_rad,
+        waypoint.within_s,
+        waypoint.pace,
+        waypoint.hold_s,
+    )
+    if not all(map(math.isfinite, numbers)):
+        raise BadWaypoint(number, NOT_FINITE)
+    away_m = waypoint.pose.distance_m(HOME)
+    if away_m > REACH_M:
+        raise BadWaypoint(
+            number,
+            "{part} {number} goes {away:.2f} m away from home, further than {most:g} m. Make it "
+            "shorter.",
+            away=away_m,
+            most=REACH_M,
+        )
+    if abs(waypoint.heading_rad) > TURN_MAX_RAD:
+        raise BadWaypoint(
+            number, "{part} {number} turns more than once around. Turn back first, or less."
+        )
+    if not LEAST_PACE <= waypoint.pace <= 1:
+        raise BadWaypoint(
+            number, "{part} {number} has a pace outside {least:g} to 1.", least=LEAST_PACE
+        )
+    if not (0 < waypoint.within_s <= GESTURE_MAX_S and 0 <= waypoint.hold_s <= waypoint.within_s):
+        raise BadWaypoint(
+            number,
+            "{part} {number} may take up to {most:g} s, its hold included.",
+            most=GESTURE_MAX_S,
+        )
+
+
+def _check_ways_back(waypoints: Sequence[Waypoint]) -> None:
+    """Refuse a way that is backed over and was not come over before."""
+    seen: list[tuple[Pose, Pose]] = []
+    start = HOME
+    for number, waypoint in enumerate(waypoints, start=1):
+        for segment in plan_path(start, waypoint.pose):
+            if not isinstance(segment, Drive):
+                continue
+            if segment.by_m > 0:
+                seen.append((start, waypoint.pose))
+            elif not is_on_path(start, waypoint.pose, seen):
+                raise BadWaypoint(
+                    number,
+                    "{part} {number} backs where it did not come from; there is no bumper behind. "
+                    "Let it face the way, or go ahead first.",
+                )
+        start = waypoint.pose
+
+
+def stages(
+    waypoints: Sequence[Waypoint], limits: Limits
+) -> list[tuple[tuple[Segment, ...], Limits, float]]:
+    """Return each waypoint's segments from the one before, their limits, and its hold [s]."""
+    starts = (HOME, *(waypoint.pose for waypoint in waypoints[:-1]))
+    return [
+        (plan_path(start, waypoint.pose), limits.scaled(waypoint.pace), waypoint.hold_s)
+        for start, waypoint in zip(starts, waypoints, strict=True)
+    ]

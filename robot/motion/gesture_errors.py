@@ -1,0 +1,40 @@
+"""Why a gesture is refused, in words that pages translate."""
+
+from __future__ import annotations
+
+
+def gettext_noop(text: str) -> str:
+    """Return a text that is marked for translation; the robot's computer has no translations."""
+    return text
+
+
+NOT_FINITE = gettext_noop("{part} {number} has a number that is not finite.")
+
+
+class Marked(str):
+    """A word within a message that is translated by itself."""
+
+    __slots__ = ()
+
+
+class BadGesture(ValueError):
+    """A gesture that no base may perform; the message names the cure.
+
+    The message is ``template`` with ``values`` filled in, so that pages can translate it.
+    """
+
+    def __init__(self, template: str, /, **values: object) -> None:
+        super().__init__(template.format(**values) if values else template)
+        self.template, self.values = template, values
+
+
+class BadWaypoint(BadGesture):
+    """A gesture of which one waypoint is at fault: ``number`` says which."""
+
+    def __init__(self, number: int, template: str, /, **values: object) -> None:
+        super().__init__(template, part=Marked("Goal"), number=number, **values)
+        self.number = number
+
+    def of_step(self, number: int) -> BadGesture:
+        """Return the error for the step that the waypoint belongs to."""
+        return BadGesture(self.template, **self.values | {"part": Marked("Step"), "number": number})

@@ -1,0 +1,209 @@
+"""Plays a gesture: what to order now, given the time and where the base is."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import replace
+
+from robot.motion.gesture import LEAST_PACE, NEAR_M, NEAR_RAD, Gesture, Waypoint
+from robot.motion.gesture_errors import gettext_noop
+from robot.motion.limits import Limits
+from robot.motion.path import Drive, Segment, Turn, plan_path
+from robot.motion.pose import HOME, Pose, wrap
+from robot.motion.twist import STILL, Twist
+
+DONE = "done"
+OUT_OF_TIME = gettext_noop("out_of_time")
+BAD_ODOMETRY = "bad_odometry"
+
+# Slowing down is begun for this share of what the limits allow, so that an order that comes a
+# little late is still in time.
+BRAKING = 0.8
+# Speed for each meter or radian that is left [1/s]: the last centimeter without overshoot, at
+# orders that are 20 ms apart and a base that follows within 100 ms.
+CLOSING_PER_S = 8.0
+# At home it waits so long [s] for orders that are still on their way, and turns once more if they
+# have carried it past.
+SETTLE_S = 0.1
+# While driving: heading offset for each meter beside the line [rad/m], at most so much [rad].
+STEER_RAD_M = 2.5
+STEER_MAX_RAD = 0.3
+
+
+class Player:
+    """Plays one gesture at a time, closed on odometry.
+
+    ``step`` is to be called some 50 times a second, whether a gesture is played or not; it never
+    gives more than the limits allow, and eases off by itself after the last waypoint.
+
+    Parameters
+    ----------
+    limits
+        Speeds and accelerations that every order keeps to.
+    """
+
+    def __init__(self, limits: Limits) -> None:
+        self.limits = limits
+        self.gesture: Gesture | None = None
+        self.outcome = ""  # of the gesture that was played last
+        self.twist = STILL  # what was ordered last
+        self._time_s: float | None = None
+        self._waypoints: deque[Waypoint] = deque()
+        self._segments: deque[Segment] = deque()
+        self._waypoint: Waypoint | None = None
+        self._until_s = 0.0  # the waypoint's time is over
+        self._there_s: float | None = None  # when its segments were done
+        self._begins_s = 0.0  # before that it stands still, announced
+        self._verdict = ""  # the outcome-to-be, while the base comes to rest
+        self._turns_rad = 0.0  # full turns that were made before the gesture
+        self._pace = 1.0
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a gesture is played, its coming to rest included."""
+        return self.gesture is not None
+
+    def start(
+        self,
+        gesture: Gesture,
+        time_s: float,
+        pose: Pose,
+        after_s: float = 0.0,
+        pace: float = 1.0,
+    ) -> None:
+        """Begin a gesture around home, which is odometry's zero. Raises RuntimeError while busy.
+
+        Parameters
+        ----------
+        gesture
+            What to play.
+        time_s
+            The player's clock [s].
+        pose
+            Where the base is now: full turns that it has made do not count.
+        after_s
+            How long it stands still first [s].
+        pace
+            Share of each waypoint's own pace to go at, above 0 and up to 1; its time grows with it.
+        """
+        if self.gesture is not None:
+            raise RuntimeError(f"{self.gesture.name} is being played.")
+        self.gesture, self._verdict, self._pace = gesture, "", pace
+        self._turns_rad = pose.heading_rad - wrap(pose.heading_rad)
+        self._waypoints = deque(gesture.waypoints)
+        self._begins_s = time_s + after_s
+        self._next_waypoint(HOME, self._begins_s)
+
+    def stop(self, reason: str) -> None:
+        """End the gesture: from now on the base slows down as its limits allow."""
+        if self.is_busy and not self._verdict:
+            self._verdict = reason
+
+    def halt(self, reason: str) -> None:
+        """End the gesture and order stillness at once, without slowing down first."""
+        if self.is_busy:
+            self._end(self._verdict or reason)
+        self.twist = STILL
+
+    def step(self, time_s: float, pose: Pose) -> Twist:
+        """Return the twist to order now.
+
+        Parameters
+        ----------
+        time_s
+            The player's clock [s]; where it goes backwards, nothing speeds up.
+        pose
+            Where the base is, by its odometry. One that is not finite halts it.
+        """
+        elapsed_s = 0.0 if self._time_s is None else time_s - self._time_s
+        self._time_s = time_s
+        if not pose.is_finite:
+            self.halt(BAD_ODOMETRY)
+            return STILL
+        limits, wanted = self._wanted_twist(time_s, pose)
+        self.twist = limits.approach(self.twist, wanted, elapsed_s)
+        if self._verdict and self.twist.is_still:
+            self._end(self._verdict)
+        return self.twist
+
+    def _wanted_twist(self, time_s: float, pose: Pose) -> tuple[Limits, Twist]:
+        """Return the limits and the twist that the present waypoint asks for."""
+        here = replace(pose, heading_rad=pose.heading_rad - self._turns_rad)
+        while self._waypoint is not None and not self._verdict:
+            limits = self.limits.scaled(self._share(self._waypoint))
+            if time_s < self._begins_s:
+                return limits, STILL
+            if self._there_s is None and time_s > self._until_s:
+                self._verdict = OUT_OF_TIME
+            elif self._segments:
+                wanted = _follow(self._segments[0], here, limits)
+                if wanted is not None:
+                    return limits, wanted
+                self._segments.popleft()
+            elif self._there_s is None:
+                self._there_s = time_s
+            elif time_s - self._there_s < max(
+                self._waypoint.hold_s, 0 if self._waypoints else SETTLE_S
+            ):
+                return limits, STILL
+            elif (
+                not self._waypoints
+                and abs(self._waypoint.heading_rad - here.heading_rad) > NEAR_RAD
+            ):
+                self._segments.append(Turn(self._waypoint.heading_rad, 0.0))
+                self._there_s = None
+            else:
+                self._next_waypoint(self._waypoint.pose, time_s)
+        return self.limits, STILL
+
+    def _next_waypoint(self, start: Pose, time_s: float) -> None:
+        self._there_s = None
+        if not self._waypoints:
+            self._waypoint, self._verdict = None, DONE
+            return
+        self._waypoint = self._waypoints.popleft()
+        self._segments = deque(plan_path(start, self._waypoint.pose))
+        self._until_s = time_s + self._waypoint.within_s * self._waypoint.pace / self._share(
+            self._waypoint
+        )
+
+    def _share(self, waypoint: Waypoint) -> float:
+        """Return the share of the limits for a waypoint."""
+        return max(LEAST_PACE, waypoint.pace * self._pace)
+
+    def _end(self, outcome: str) -> None:
+        self.gesture, self._waypoint = None, None
+        self.outcome, self._verdict = outcome, ""
+        self._waypoints.clear()
+        self._segments.clear()
+
+
+def _follow(segment: Segment, pose: Pose, limits: Limits) -> Twist | None:
+    """Return the twist that follows a segment; None at its end."""
+    match segment:
+        case Turn():
+            left_rad = segment.heading_rad - pose.heading_rad
+            if abs(left_rad) <= NEAR_RAD:
+                return None
+            return Twist(w_rad_s=_approach_speed(left_rad, limits.w_rad_s, limits.slow_down_rad_s2))
+        case Drive():
+            cos, sin = math.cos(segment.heading_rad), math.sin(segment.heading_rad)
+            x_m, y_m = segment.x_m - pose.x_m, segment.y_m - pose.y_m
+            left_m, beside_m = x_m * cos + y_m * sin, x_m * sin - y_m * cos
+            ahead = math.copysign(1.0, segment.by_m)
+            if left_m * ahead <= NEAR_M:
+                return None
+            # Towards the line; backwards that is by turning the other way.
+            steer_rad = max(-STEER_MAX_RAD, min(STEER_MAX_RAD, STEER_RAD_M * beside_m)) * ahead
+            turn_rad = wrap(segment.heading_rad - steer_rad - pose.heading_rad)
+            return Twist(
+                _approach_speed(left_m, limits.v_m_s, limits.slow_down_m_s2),
+                turn_rad * CLOSING_PER_S / 2,
+            )
+
+
+def _approach_speed(left: float, speed: float, slow_down: float) -> float:
+    """Return a speed from which the rest of the way is long enough to brake."""
+    braking = math.sqrt(2 * BRAKING * slow_down * abs(left))
+    return math.copysign(min(speed, braking, CLOSING_PER_S * abs(left)), left)

@@ -1,0 +1,1 @@
+"""The process that owns a serial port, and its client."""

@@ -1,0 +1,107 @@
+"""`python -m robot.port`: owns a serial port, and stops the base on it when orders stop coming.
+
+A base may go on with its last setpoint forever (docs/reference/kobuki.md#watchdogs). So a small
+process of its own sends it, 50 times a second, what was ordered last, and the stop frame as soon as
+that is older than 0.25 s, the pipe of the orders closes, or anything at all goes wrong here. It
+knows no base, only bytes. Orders come on standard input, what was received goes to standard output,
+a JSON line each:
+
+    {"number": 7, "sent_s": 12.34, "frame": "aa55…", "once": "aa55…"}
+    {"at_s": 12.35, "opened": 1, "bytes": "aa55…", "problem": "", "counters": {…}}
+
+``once`` is sent one time. Times are of the computer's monotonic clock, which its processes share.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import sys
+import threading
+from argparse import ArgumentParser
+from collections import deque
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from robot.port.owner import READ_S, PortOwner, SerialPort
+from robot.port.setpoint import LONGEST_FRAME
+
+WRITE_S = 0.1  # a port that takes nothing for so long is lost
+LINES_KEPT = 25  # of what was heard, while nobody reads it: half a second
+
+
+class PipeWriter:
+    """Writes lines to a pipe on a thread of its own; drops the oldest ones while nothing reads."""
+
+    def __init__(self, pipe: int) -> None:
+        self._pipe = pipe
+        self._lines: deque[bytes] = deque(maxlen=LINES_KEPT)
+        self._awake = threading.Event()
+
+    def write(self, said: dict[str, Any]) -> None:
+        """Queue a line."""
+        self._lines.append(json.dumps(said).encode() + b"\n")
+        self._awake.set()
+
+    def run(self, on_end: Callable[[], None]) -> None:
+        """Write until nobody is there to read any more, which is the end."""
+        with contextlib.suppress(OSError):
+            while True:
+                self._awake.wait()
+                self._awake.clear()
+                while self._lines:
+                    line = self._lines.popleft()
+                    while line:
+                        line = line[os.write(self._pipe, line) :]
+        on_end()
+
+
+def listen(pipe: int, order: Callable[[bytes], None], on_end: Callable[[], None]) -> None:
+    """Pass on each line of a pipe until it closes, which is the end."""
+    rest = b""
+    with contextlib.suppress(OSError):
+        while data := os.read(pipe, 65536):
+            *lines, rest = (rest + data).split(b"\n")
+            rest = rest[-LONGEST_FRAME * 8 :]  # no order is longer
+            for line in lines:
+                order(line)
+    on_end()
+
+
+def open_serial(url: str, baud: int) -> SerialPort:
+    """Open /dev/…, COM…, a pty or socket://host:port, for us alone. Raises OSError, ValueError."""
+    import serial
+
+    port = serial.serial_for_url(
+        url, baudrate=baud, timeout=READ_S, write_timeout=WRITE_S, exclusive=True
+    )
+    # Not every port can: a pty and a socket have no chip that would wait.
+    with contextlib.suppress(OSError, ValueError, AttributeError, NotImplementedError):
+        port.set_low_latency_mode(True)
+    return port
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Own the port of the command line until standard input closes or we are told to end."""
+    parser = ArgumentParser(prog="python -m robot.port", description=__doc__)
+    parser.add_argument("url", help="/dev/kobuki, COM3, a pty, or socket://host:port")
+    parser.add_argument("--baud", type=int, default=115200)
+    parser.add_argument("--stop", type=bytes.fromhex, required=True, help="the frame that stops it")
+    options = parser.parse_args(arguments)
+    writer = PipeWriter(sys.stdout.fileno())
+    owner = PortOwner(partial(open_serial, options.url, options.baud), options.stop, writer.write)
+    for name in ("SIGTERM", "SIGHUP", "SIGBREAK"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), lambda *_: owner.end())
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who orders: the pipe closes then
+    orders = partial(listen, sys.stdin.fileno(), owner.order, owner.end)
+    for work in (orders, partial(writer.run, owner.end)):
+        threading.Thread(target=work, daemon=True).start()
+    owner.run()
+
+
+if __name__ == "__main__":
+    main()

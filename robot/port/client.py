@@ -1,0 +1,192 @@
+"""The other end of the pipes of ``robot.port``: starts that process, orders, hears and watches it.
+
+Each watches the other: the process stops the base when we fall silent, and is replaced by a new
+one, which begins with stops, when it does.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from robot.motion.limits import ORDER_HOLDS_S
+
+PACKAGES = Path(__file__).parents[2]
+OWNER_SILENT_S = 0.3  # it says a word every 0.1 s
+START_S = 3.0  # a slow computer starts Python
+END_S = 1.0
+MOST_DEATHS = 5  # in a row, without a word from any: it cannot be run here
+
+
+@dataclass(frozen=True, slots=True)
+class ReceivedBytes:
+    """Bytes received at a port: when [s], after which opening of it, and the data."""
+
+    at_s: float
+    opened: int
+    data: bytes
+
+
+class PortClient:
+    """A serial port in a process of its own.
+
+    Parameters
+    ----------
+    url
+        /dev/kobuki, COM3, a pty, or socket://host:port.
+    baud
+        Speed of the line [bit/s].
+    stop
+        The frame that stops the base.
+    hear
+        Called with what came in, on a thread of its own.
+    monotonic
+        The computer's clock [s], which the process shares.
+
+    Attributes
+    ----------
+    problem
+        Why the port is not open; empty where it is.
+    counters
+        What went wrong, of this process and the ones before it.
+    is_dead
+        Whether no process can be kept alive.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        baud: int,
+        stop: bytes,
+        hear: Callable[[ReceivedBytes], None],
+        monotonic: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._command = [sys.executable, "-m", "robot.port", url]
+        self._command += ["--baud", str(baud), "--stop", stop.hex()]
+        self._hear = hear
+        self._monotonic = monotonic
+        self.problem = "The port has not been opened yet."
+        self.counters: Counter[str] = Counter(restarts=0, junk=0)
+        self.is_dead = False
+        self._number = 0
+        self._openings = self._openings_before = 0
+        self._counted: Counter[str] = Counter()  # by the present process
+        self._word_s = self._ordered_s = monotonic()
+        self._has_spoken, self._deaths = False, 0
+        self._closing = threading.Event()
+        self._process = self._start()
+        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread.start()
+
+    def order(self, frame: bytes, once: bytes = b"") -> None:
+        """Order this frame in place of the last one; ``once`` is sent one time before it."""
+        now_s = self._monotonic()
+        if now_s - self._ordered_s > ORDER_HOLDS_S:
+            self._word_s = now_s  # it was us who hung
+        self._ordered_s = now_s
+        if now_s - self._word_s > (OWNER_SILENT_S if self._has_spoken else START_S):
+            self._word_s = now_s
+            self._process.kill()  # it hangs; the next one begins with stops
+            return
+        self._number += 1
+        order = {"number": self._number, "sent_s": now_s, "frame": frame.hex(), "once": once.hex()}
+        pipe = self._process.stdin
+        with contextlib.suppress(OSError, ValueError):  # it has just died; a new one will come
+            if pipe is not None:
+                pipe.write(json.dumps(order).encode() + b"\n")
+
+    def close(self) -> None:
+        """Stop the base, and end the process. Never raises."""
+        self._closing.set()
+        process = self._process
+        with contextlib.suppress(OSError):
+            if process.stdin is not None:
+                process.stdin.close()
+        try:
+            process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait(END_S)
+        self._thread.join(END_S)
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        paths = [str(PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])]
+        return subprocess.Popen(
+            self._command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            bufsize=0,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)},
+            start_new_session=True,  # no key of a terminal reaches it
+        )
+
+    def _listen(self) -> None:
+        """Read from one process after the other until closed or failed."""
+        try:
+            self._hear_on()
+        finally:
+            self.is_dead = not self._closing.is_set()
+
+    def _hear_on(self) -> None:
+        while True:
+            self._hear_out(self._process)
+            if self._closing.is_set():
+                return
+            self._deaths = 0 if self._has_spoken else self._deaths + 1
+            if self._deaths >= MOST_DEATHS:
+                return
+            self.counters["restarts"] += 1
+            self.counters.update(self._counted)
+            self._counted = Counter()
+            self._openings_before = self._openings
+            self._word_s, self._has_spoken = self._monotonic(), False
+            self.problem = "The process that owns the port died, and is restarted."
+            self._process = self._start()
+            if self._closing.is_set():  # closed meanwhile: nobody else knows of this one
+                self._process.kill()
+                self._process.wait(END_S)
+                return
+
+    def _hear_out(self, process: subprocess.Popen[bytes]) -> None:
+        if process.stdout is None or process.stdin is None:
+            return
+        with process.stdout, contextlib.suppress(OSError, ValueError):
+            rest = b""
+            while data := process.stdout.read(65536):
+                *lines, rest = (rest + data).split(b"\n")
+                for line in lines:
+                    self._take(line)
+        with contextlib.suppress(OSError):
+            process.stdin.close()
+        process.wait()
+
+    def _take(self, line: bytes) -> None:
+        try:
+            said = json.loads(line)
+            heard = ReceivedBytes(
+                float(said["at_s"]), int(said["opened"]), bytes.fromhex(said["bytes"])
+            )
+            self._counted = Counter(said["counters"])
+            self.problem = str(said["problem"])
+        except (ValueError, TypeError, KeyError):
+            self.counters["junk"] += 1
+            return
+        self._word_s, self._has_spoken = self._monotonic(), True
+        self._openings = self._openings_before + heard.opened
+        if heard.data:
+            self._hear(ReceivedBytes(heard.at_s, self._openings, heard.data))
+
+    def count(self) -> dict[str, int]:
+        """Return all counters, those of the present process included."""
+        total = Counter(self.counters)
+        total.update(self._counted)
+        return dict(total) | {"openings": self._openings}

@@ -1,0 +1,110 @@
+"""The frame to send to a base now: the last order while it is fresh, else the stop."""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+from collections import Counter
+from dataclasses import dataclass
+
+from robot.motion.limits import ORDER_HOLDS_S
+
+EARLY_S = 0.05  # an order from further in the future was made up
+LONGEST_FRAME = 64  # a Kobuki's buffer for commands [bytes] (docs/reference/kobuki.md#framing)
+
+
+class BadOrder(ValueError):
+    """A line that is no order; the message says what one is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """One line of the orders."""
+
+    number: int
+    sent_s: float
+    frame: bytes
+    once: bytes
+
+    @classmethod
+    def read(cls, line: bytes) -> Order:
+        """Return the order of a line. Raises BadOrder."""
+        try:
+            said = json.loads(line)
+            number, sent_s = said["number"], said["sent_s"]
+            frame, once = bytes.fromhex(said["frame"]), bytes.fromhex(said.get("once", ""))
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            raise BadOrder("An order is a JSON object with number, sent_s and frame.") from None
+        if type(number) is not int or type(sent_s) not in (int, float):
+            raise BadOrder('"number" is a whole number, "sent_s" a number.')
+        if not math.isfinite(sent_s) or not 0 < len(frame) <= LONGEST_FRAME >= len(once):
+            raise BadOrder(f"Numbers are finite, frames have up to {LONGEST_FRAME} bytes.")
+        return cls(number, float(sent_s), frame, once)
+
+
+class Setpoint:
+    """The last order while it is fresh, else the stop. Nothing is queued.
+
+    After a pause in the orders, and at the beginning, nothing but the stop is sent until just that
+    is ordered: what was interrupted does not go on by itself.
+
+    Parameters
+    ----------
+    stop
+        The frame that stops the base.
+
+    Attributes
+    ----------
+    counters
+        How many orders were ``bad`` (no order), ``old`` (their number was not new, or their time is
+        over), ``refused`` (before a stop was ordered), and how often orders ``lapsed``.
+    """
+
+    def __init__(self, stop: bytes) -> None:
+        self.stop = stop
+        self.counters: Counter[str] = Counter(bad=0, old=0, refused=0, lapsed=0)
+        self._order: Order | None = None
+        self._number = -1
+        self._is_held = True
+        self._lock = threading.Lock()  # orders come from another thread
+
+    def store(self, line: bytes, now_s: float) -> bytes:
+        """Store an order, and return the frame that it wants sent once."""
+        try:
+            order = Order.read(line)
+        except BadOrder:
+            self.counters["bad"] += 1
+            return b""
+        with self._lock:
+            return self._store(order, now_s)
+
+    def _store(self, order: Order, now_s: float) -> bytes:
+        if order.number <= self._number or not -EARLY_S <= now_s - order.sent_s <= ORDER_HOLDS_S:
+            self.counters["old"] += 1
+            return b""
+        self._number = order.number
+        if order.frame == self.stop:
+            self._is_held = False
+        if self._is_held:
+            self.counters["refused"] += 1
+        else:
+            self._order = order
+        return order.once
+
+    def frame(self, now_s: float) -> bytes:
+        """Return the frame to send now."""
+        with self._lock:
+            order = self._order
+            if order is None or order.frame == self.stop:
+                return self.stop
+            if -EARLY_S <= now_s - order.sent_s <= ORDER_HOLDS_S:
+                return order.frame
+            self.counters["lapsed"] += 1
+            self._order, self._is_held = None, True
+            return self.stop
+
+    def hold(self) -> None:
+        """Send nothing but the stop until it is ordered."""
+        with self._lock:
+            self._order, self._is_held = None, True

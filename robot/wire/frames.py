@@ -1,0 +1,107 @@
+"""Checks of what a JSON frame holds."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from typing import Any, NoReturn
+
+from robot.wire.limits import MAX_FRAME_BYTES, MAX_NAME_CHARS, MAX_NESTING
+
+NAME = re.compile(rf"[A-Za-z0-9_.:-]{{1,{MAX_NAME_CHARS}}}")
+
+
+class BadFrame(ValueError):
+    """A frame that is not the protocol; the message says what would be.
+
+    Parameters
+    ----------
+    message
+        What to send instead.
+    code
+        The ``code`` of the ``error`` message that answers it.
+    """
+
+    def __init__(self, message: str, code: str = "bad_frame") -> None:
+        super().__init__(message)
+        self.code = code
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise BadFrame(f"{name} is not JSON. Send null for a missing value.")
+
+
+_decode = json.JSONDecoder(parse_constant=_refuse_constant).decode
+
+
+def read_object(text: str | None) -> dict[str, Any]:
+    """Return a frame as a JSON object with a type.
+
+    Raises
+    ------
+    BadFrame
+        For a binary frame (None), one that is too long, and anything but such an object; also for
+        NaN and Infinity, which JSON does not know.
+    """
+    if text is None:
+        raise BadFrame("Send text frames, not binary ones.")
+    if len(text) > MAX_FRAME_BYTES:
+        raise BadFrame(f"A frame has at most {MAX_FRAME_BYTES} characters; send smaller ones.")
+    try:
+        message = _decode(text)
+    except BadFrame:
+        raise
+    except (ValueError, RecursionError):
+        raise BadFrame("A frame is one JSON object, as docs/protocol.md shows.") from None
+    if not isinstance(message, dict) or not isinstance(message.get("type", ""), str):
+        raise BadFrame('A frame is a JSON object with a "type".')
+    return message
+
+
+def read_name(message: Mapping[str, Any], name: str) -> str:
+    """Return a short name of a message. Raises BadFrame."""
+    value = message.get(name)
+    if not isinstance(value, str) or not NAME.fullmatch(value):
+        raise BadFrame(f'"{name}" is a text of 1 to {MAX_NAME_CHARS} letters, digits or _ . : -')
+    return value
+
+
+def read_whole(message: Mapping[str, Any], name: str, *, low: int) -> int:
+    """Return a whole number of a message, from ``low`` to 2³¹ - 1. Raises BadFrame."""
+    value = message.get(name)
+    if not isinstance(value, int) or isinstance(value, bool) or not low <= value < 2**31:
+        raise BadFrame(f'"{name}" is a whole number of {low} or more.')
+    return value
+
+
+def read_number(
+    message: Mapping[str, Any], name: str, low: float = -math.inf, high: float = math.inf
+) -> float:
+    """Return a finite number of a message, within bounds. Raises BadFrame."""
+    value = message.get(name)
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        if math.isfinite(number) and low <= number <= high:
+            return number
+    if math.isinf(low) and math.isinf(high):
+        raise BadFrame(f'"{name}" is a finite number.')
+    raise BadFrame(f'"{name}" is a number from {low:g} to {high:g}.')
+
+
+def check_values(value: Any, depth: int = MAX_NESTING) -> None:
+    """Check that a value can be passed on. Raises BadFrame.
+
+    Numbers have to be finite, and objects and lists may nest ``depth`` deep.
+    """
+    if isinstance(value, float) and not math.isfinite(value):
+        raise BadFrame("Numbers are finite. Send null for a missing value.")
+    if isinstance(value, dict | list):
+        if not depth:
+            raise BadFrame(f"Objects and lists nest at most {MAX_NESTING} deep here.")
+        for item in value.values() if isinstance(value, dict) else value:
+            check_values(item, depth - 1)

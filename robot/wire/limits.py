@@ -1,0 +1,22 @@
+"""Sizes, numbers and times that both ends of a websocket keep to (docs/protocol.md)."""
+
+from __future__ import annotations
+
+PROTOCOL_VERSION = 1
+
+MAX_FRAME_BYTES = 64 * 1024
+MAX_REPORT_CHARS = 8 * 1024
+MAX_STEPS = 256  # in one frame, and without an acknowledgment
+MAX_REASONS = 8  # of one step
+MAX_EXTRA = 32  # named values beside a step's own
+MAX_NAME_CHARS = 64
+MAX_CUE_GESTURES = 8  # composed ones that come along with a cue
+MAX_NESTING = 8  # of objects and lists in a report
+
+# Seconds since 1970 pass, milliseconds do not.
+TIME_MAX_S = 1e10
+# A tiny goal must not make numbers that no chart, database or JSON reader can hold.
+PERFORMANCE_MAX = 1000.0
+
+ROBOT_HEARTBEAT_S = 0.25  # robots stand still after 0.65 s of silence
+PAGE_HEARTBEAT_S = 5.0

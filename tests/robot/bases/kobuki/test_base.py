@@ -1,0 +1,245 @@
+"""A Kobuki over its port: where it is, what it feels, and what becomes of it when things break."""
+
+import math
+import os
+import signal
+import sys
+import time
+from contextlib import contextmanager
+
+import pytest
+
+from robot.bases.base import Indication
+from robot.bases.kobuki import KobukiBase
+from robot.motion.pose import HOME, Pose
+from robot.motion.twist import STILL, Twist
+from tests.support.fake_kobuki import FakeKobuki
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pty")
+
+TICK_S = 0.02
+
+
+@contextmanager
+def driving(url):
+    base = KobukiBase(time.monotonic)
+    base.port = url
+    with base:
+        yield base
+
+
+@pytest.fixture
+def kobuki():
+    with FakeKobuki() as kobuki:
+        yield kobuki
+
+
+@pytest.fixture
+def base(kobuki):
+    with driving(kobuki.url) as base:
+        yield base
+
+
+def drive(base, twist, for_s):
+    end_s = time.monotonic() + for_s
+    while time.monotonic() < end_s:
+        base.drive(twist)
+        time.sleep(TICK_S)
+
+
+def until(base, holds, within_s=8.0):
+    """Order it to stand until something holds, as a worker does."""
+    end_s = time.monotonic() + within_s
+    while not holds(base.read().sensors):
+        assert time.monotonic() < end_s, base.read()
+        base.stop()
+        time.sleep(TICK_S)
+
+
+def owner_of(base):
+    return base._client._process.pid
+
+
+@pytest.mark.realtime
+def test_it_begins_at_home_still_and_knows_its_battery(base):
+    state = base.read()
+    assert (state.pose, state.twist) == (HOME, STILL)
+    assert state.sensors.battery_v == 16.0
+    assert state.sensors.refusal == ""
+    assert state.sensors.hazards == frozenset()
+    assert state.sensors.silent_s < 0.1
+    assert base.problem == ""
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize(
+    "twist",
+    [Twist(0.2, 0), Twist(-0.2, 0), Twist(0, 1.5), Twist(0, -1.5), Twist(0.15, -0.8)],
+    ids=str,
+)
+def test_it_goes_where_it_is_told_over_wraps_of_all_counters(kobuki, base, twist):
+    began_s = time.monotonic()
+    drive(base, twist, 0.8)
+    base.stop()
+    kobuki.until(lambda: not kobuki.is_moving)
+    # How far that is depends on how busy this machine is, where it is then does not.
+    longest_s = time.monotonic() - began_s + 2 * TICK_S
+    until(base, lambda _: base.read().twist == STILL)
+    until(base, lambda _: abs(base.read().pose.heading_rad - kobuki.heading_rad) < 0.01)
+    state = base.read()
+    assert state.pose.distance_m(Pose(kobuki.x_m, kobuki.y_m)) < 0.002
+    along_m = state.pose.distance_m(HOME)
+    for gone, speed in (
+        (state.pose.heading_rad, twist.w_rad_s),
+        (math.copysign(along_m, state.pose.x_m), twist.v_m_s),
+    ):
+        way = gone * math.copysign(1, speed) if speed else abs(gone)
+        assert 0.2 * abs(speed) - 0.001 <= way <= longest_s * abs(speed) + 0.001
+    assert abs(state.sensors.slip_rad) < 0.02
+    assert state.twist == STILL
+    base.set_home()
+    assert base.read().pose == HOME
+
+
+def test_it_says_what_it_really_sends(base):
+    sent = base.drive(Twist(9.0, 0.0))
+    assert sent.v_m_s == pytest.approx(0.3)
+    assert base.drive(Twist(math.nan, 0.1)) == STILL
+    assert base.drive(Twist(0.1, math.inf)) == STILL
+
+
+@pytest.mark.parametrize("hazard", ["bump", "cliff", "wheel_drop", "over_current"])
+def test_what_it_feels(kobuki, base, hazard):
+    setattr(kobuki, {"bump": "bumper"}.get(hazard, hazard), 1)
+    until(base, lambda sensors: sensors.hazards == {hazard})
+    setattr(kobuki, {"bump": "bumper"}.get(hazard, hazard), 0)
+    until(base, lambda sensors: not sensors.hazards)
+
+
+def test_its_button_and_its_charger(kobuki, base):
+    kobuki.buttons, kobuki.charger, kobuki.battery = 1, 6, 133
+    until(base, lambda sensors: sensors.stop_pressed)
+    until(base, lambda sensors: sensors.is_charging and sensors.battery_v == 13.3)
+    kobuki.buttons = 4
+    until(base, lambda sensors: not sensors.stop_pressed)
+
+
+def test_lights_and_sounds_never_cut_the_power(kobuki, base):
+    for indication in Indication:
+        base.show(indication, aloud=True)
+        until(base, lambda sensors: sensors.refusal == "")
+        drive(base, STILL, 0.06)
+    lights = {0x00F0, 0x01F0, 0x02F0, 0x03F0}
+    kobuki.until(lambda: set(kobuki.outputs) >= lights)
+    assert set(kobuki.outputs) == lights
+    assert kobuki.melodies == [3, 4]
+    assert kobuki.bad == 0
+
+
+@pytest.mark.parametrize(
+    ("version", "refusal"),
+    [
+        ((1, 0, 0), ""),
+        ((1, 1, 4), ""),
+        ((2, 0, 0), "firmware_refused"),
+        ((0, 0, 1), "firmware_refused"),
+    ],
+)
+def test_firmware_that_it_was_not_made_for(version, refusal):
+    with FakeKobuki(version=version) as kobuki, driving(kobuki.url) as base:
+        until(base, lambda sensors: sensors.refusal != "firmware_unknown")
+        assert base.read().sensors.refusal == refusal
+
+
+@pytest.mark.realtime
+def test_noise_is_counted_and_costs_nothing(kobuki, base):
+    for _ in range(10):
+        kobuki.noise = bytes.fromhex("AA554D010F") + os.urandom(40)
+        drive(base, Twist(0.1, 0), 0.06)
+    assert base.read().sensors.silent_s < 0.1
+    assert base.counters["skipped_bytes"] > 300
+    assert base.read().pose.x_m == pytest.approx(0.06, abs=0.03)
+
+
+def test_a_base_that_falls_silent(kobuki, base):
+    kobuki.is_mute = True
+    until(base, lambda sensors: sensors.silent_s > 0.2)
+    kobuki.is_mute = False
+    until(base, lambda sensors: sensors.silent_s < 0.1)
+
+
+@pytest.mark.realtime
+def test_a_base_that_is_switched_off_and_on_jumps_nowhere(kobuki, base):
+    drive(base, Twist(0.2, 0.5), 0.4)
+    there = base.read().pose
+    kobuki.restart()
+    until(base, lambda sensors: "restarted" in sensors.hazards)
+    assert base.read().pose.distance_m(there) < 0.02
+    assert abs(base.read().pose.heading_rad - there.heading_rad) < 0.05
+
+
+@pytest.mark.realtime
+def test_a_port_that_vanishes_and_comes_back(tmp_path):
+    """It comes back stopped, from where it was, and goes on only after an order to stand."""
+    port = tmp_path / "kobuki"
+    with FakeKobuki() as kobuki:
+        port.symlink_to(kobuki.url)
+        with driving(str(port)) as base:
+            drive(base, Twist(0.2, 0), 0.3)
+            there = base.read().pose
+            kobuki.unplug()
+            end_s = time.monotonic() + 3
+            while not base.problem:
+                base.drive(Twist(0.2, 0))
+                assert time.monotonic() < end_s
+                time.sleep(TICK_S)
+            port.unlink()
+            with FakeKobuki() as again:
+                port.symlink_to(again.url)
+                end_s = time.monotonic() + 5
+                while base.counters["port_openings"] < 2 or base.counters["port_refused"] < 5:
+                    base.drive(Twist(0.2, 0))
+                    assert time.monotonic() < end_s
+                    time.sleep(TICK_S)
+                again.until(lambda: len(again.orders) >= 3)
+                assert not any(speed for _, speed, _ in again.orders)
+                until(base, lambda sensors: sensors.silent_s < 0.1 and not sensors.refusal)
+                assert base.read().pose.distance_m(there) < 0.03
+                drive(base, Twist(0.1, 0), 0.2)
+                assert again.is_moving
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP], ids=["SIGKILL", "SIGSTOP"])
+def test_a_port_process_that_dies_or_hangs_is_replaced_and_the_base_stopped(kobuki, base, how):
+    drive(base, Twist(0.2, 0), 0.3)
+    first = owner_of(base)
+    since_s = time.monotonic()
+    os.kill(first, how)
+    drive(base, Twist(0.2, 0), 1.5)
+    assert owner_of(base) != first
+    assert base.counters["port_restarts"] == 1
+    assert kobuki.moved_after(since_s) <= 1.0
+    assert not kobuki.is_moving  # until an order to stand has come
+    drive(base, STILL, 0.1)
+    drive(base, Twist(0.2, 0), 0.2)
+    assert kobuki.is_moving
+
+
+@pytest.mark.realtime
+def test_leaving_it_stops_it(kobuki):
+    with driving(kobuki.url) as base:
+        drive(base, Twist(0.2, 0), 0.3)
+        owner = owner_of(base)
+        since_s = time.monotonic()
+    time.sleep(0.05)
+    assert kobuki.moved_after(since_s) <= 0.1
+    with pytest.raises(ProcessLookupError):
+        os.kill(owner, 0)
+
+
+def test_a_port_that_is_not_there_says_so(tmp_path):
+    with driving(str(tmp_path / "nothing")) as base:
+        assert "could not open port" in base.problem
+        assert base.read().sensors.silent_s > 1
+        assert base.read().twist == STILL

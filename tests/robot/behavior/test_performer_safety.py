@@ -1,0 +1,162 @@
+"""What a base feels, who watches, how a gesture is announced: what stops a robot."""
+
+import pytest
+
+from robot.bases import Indication, SensorState
+from robot.motion.limits import TICK_S
+from robot.motion.pose import HOME
+from robot.motion.twist import STILL
+from tests.support.robot_stage import CUE, WELCOME, Stage
+
+
+def test_a_gesture_is_announced_half_a_second_before_it_moves(felt):
+    felt.walk(*[1.0] * 5)
+    felt.hear(type="step", time_s=5.0, performance=1.0)
+    begun_s = felt.now_s
+    felt.wait(TICK_S)
+    assert felt.base.shown[-1] == (Indication.MOVING, True)
+    assert felt.robot.player.is_busy
+    while felt.base.read().twist.is_still:
+        felt.wait(TICK_S)
+    assert 0.5 <= felt.now_s - begun_s <= 0.5 + 3 * TICK_S
+    felt.wait(5)
+    assert felt.ended == ["done"]
+    assert felt.base.shown[-1] == (Indication.READY, False)
+
+
+@pytest.mark.parametrize("deed", [{"type": "stop"}, {"type": "state", "state": "paused"}])
+def test_what_is_announced_can_still_be_called_off(felt, deed):
+    felt.walk(*[1.0] * 5)
+    felt.hear(type="step", time_s=5.0, performance=1.0)
+    felt.wait(0.3)
+    felt.hear(**deed)
+    felt.wait(2)
+    assert felt.base.read().pose == HOME
+    assert len(felt.ended) == 1
+
+
+def test_quiet_gestures_make_no_sound(felt):
+    felt.hear(type="cue", cue=CUE | {"intensity": 0.5})
+    felt.walk(*[1.0] * 6)
+    felt.hear(type="stop")
+    felt.wait(0.1)
+    assert {indication for indication, _ in felt.base.shown} >= {
+        Indication.MOVING,
+        Indication.STOPPED,
+    }
+    assert not any(aloud for _, aloud in felt.base.shown)
+
+
+def test_an_intensity_of_0_is_off(felt):
+    felt.hear(type="cue", cue=CUE | {"intensity": 0})
+    felt.walk(*[1.0] * 6)
+    assert felt.of("decision")[0]["reason"] == "off"
+
+
+@pytest.mark.parametrize("hazard", ["bump", "cliff", "wheel_drop", "over_current", "restarted"])
+def test_what_it_feels_halts_it_at_the_next_tick_and_holds(felt, hazard):
+    felt.walk(*[1.0] * 6)
+    felt.wait(0.5)
+    assert not felt.base.read().twist.is_still
+    felt.base.sensors = SensorState(hazards=frozenset({hazard}))
+    felt.wait(TICK_S)
+    assert felt.base.read().twist == STILL
+    assert felt.ended == [hazard]
+    assert felt.of("stop") == [{"kind": "stop", "reason": hazard}]
+    felt.wait(1)
+    assert felt.state == ("stopped", hazard)
+    assert felt.base.shown[-1] == (Indication.STOPPED, True)
+    felt.base.sensors = SensorState()
+    felt.walk(*[1.0] * 7)
+    assert felt.of("decision")[-1]["reason"] == hazard
+    felt.hear(type="stop")  # the server's echo of its report
+    felt.wait(1)
+    assert felt.state == ("stopped", hazard)
+    felt.hear(type="arm")
+    felt.walk(*[1.0] * 6)
+    assert felt.of("decision")[-1]["gesture"] == "celebrate"
+
+
+def test_it_cannot_be_armed_while_something_is_wrong(felt):
+    felt.base.sensors = SensorState(hazards=frozenset({"cliff"}))
+    felt.wait(2)
+    felt.hear(type="arm")
+    assert felt.of("stop") == [{"kind": "stop", "reason": "cliff"}] * 2
+    felt.wait(1)
+    assert felt.state == ("stopped", "cliff")
+    assert felt.of("status")[-1]["counters"] == {"refused_arms": 1}
+
+
+def test_its_button_stops_it_for_everyone(felt):
+    felt.walk(*[1.0] * 6)
+    felt.base.sensors = SensorState(stop_pressed=True)
+    felt.wait(TICK_S)
+    felt.base.sensors = SensorState()
+    assert felt.of("stop") == [{"kind": "stop", "reason": "button"}]
+    felt.wait(1)
+    assert felt.state == ("stopped", "button")
+
+
+def test_no_gesture_of_a_real_base_while_no_page_of_a_pt_is_open(felt):
+    felt.hear(type="heartbeat", watched=False)
+    felt.walk(*[1.0] * 6)
+    assert felt.of("decision")[-1]["reason"] == "unwatched"
+    assert felt.state == ("idle", "unwatched")
+    felt.hear(type="heartbeat", watched=True)
+    felt.walk(*[1.0] * 5)
+    assert felt.of("decision")[-1]["gesture"] == "celebrate"
+    felt.hear(type="heartbeat", watched=False)  # what runs comes home
+    felt.wait(5)
+    assert felt.ended == ["done"]
+
+
+def test_a_server_that_says_nothing_of_pages_has_none(felt):
+    felt.hear(**{name: value for name, value in WELCOME.items() if name != "watched"})
+    felt.walk(*[1.0] * 6)
+    assert felt.of("decision")[-1]["reason"] == "unwatched"
+
+
+def test_nobody_need_look_at_a_simulation(stage):
+    stage.hear(**WELCOME | {"watched": False})
+    stage.walk(*[1.0] * 6)
+    assert stage.of("decision")[-1]["gesture"] == "celebrate"
+
+
+def test_a_base_that_is_held_stops_for_good(felt):
+    felt.base.is_held = True
+    felt.walk(*[1.0] * 6)
+    felt.wait(3)
+    assert felt.of("stop") == [{"kind": "stop", "reason": "stalled"}]
+    felt.wait(1)
+    assert felt.state == ("stopped", "stalled")
+
+
+def test_a_robot_that_hung_mid_gesture_does_not_go_on(felt):
+    felt.walk(*[1.0] * 6)
+    felt.wait(0.5)
+    felt.now_s += 0.5
+    felt.hear(type="heartbeat")
+    felt.wait(TICK_S)
+    assert felt.base.read().twist == STILL
+    assert felt.ended == ["order_lapsed"]
+
+
+def test_a_robot_without_a_session_waits_for_one():
+    stage = Stage()
+    stage.hear(type="welcome", session=None)
+    stage.heartbeats = False
+    stage.wait(5)
+    assert stage.robot.is_linked
+    assert stage.state == ("idle", "no_session")
+
+
+@pytest.mark.parametrize(
+    ("battery_v", "share", "low"), [(None, None, False), (16.5, 1, False), (13.9, 0.25, True)]
+)
+def test_the_battery_is_told_as_people_read_it(felt, battery_v, share, low):
+    felt.base.sensors = SensorState(battery_v=battery_v)
+    felt.wait(1.1)
+    status = felt.of("status")[-1]
+    assert status["battery_v"] == battery_v
+    assert status["battery_share"] == (share if share is None else pytest.approx(share, abs=0.01))
+    assert status["battery_low"] is low

@@ -1,0 +1,170 @@
+"""Gestures on a simulated floor: home at the end, within limits always, interruptible anywhere."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robot.motion.gesture import TETHER_M, Gesture, Waypoint
+from robot.motion.gestures import GESTURES
+from robot.motion.limits import Limits
+from robot.motion.player import BAD_ODOMETRY, DONE, OUT_OF_TIME, Player
+from robot.motion.pose import HOME, Pose, advance
+from robot.motion.twist import STILL, Twist
+
+each_gesture = pytest.mark.parametrize("gesture", GESTURES.values(), ids=lambda g: g.name)
+gestures = st.sampled_from(list(GESTURES.values()))
+
+
+class Floor:
+    """A base on a floor: it does what it is told, times ``grip``, ``lag`` orders later."""
+
+    def __init__(self, pose=HOME, grip=(1.0, 1.0), lag=0):
+        self.pose, self.time_s, self.farthest_m = pose, 0.0, 0.0
+        self.orders = [STILL] * (lag + 1)
+        self.grip, self.lag = grip, lag
+
+    def play(self, player, dt_s=0.02, until=lambda floor: False):
+        """Order until the gesture ends."""
+        while player.is_busy and not until(self):
+            self.orders.append(player.step(self.time_s, self.pose))
+            sent = self.orders[-1 - self.lag]
+            real = Twist(sent.v_m_s * self.grip[0], sent.w_rad_s * self.grip[1])
+            self.pose = advance(self.pose, real, dt_s)
+            self.time_s += dt_s
+            self.farthest_m = max(self.farthest_m, self.pose.distance_m(HOME))
+            assert self.time_s < 60
+        return self
+
+
+def is_at_home(pose):
+    return pose.distance_m(HOME) < 0.02 and pose.turn_rad(HOME) < math.radians(2)
+
+
+@each_gesture
+def test_a_gesture_is_over_within_4_s_and_ends_at_home(gesture):
+    player, floor = Player(Limits()), Floor()
+    player.start(gesture, 0.0, HOME)
+    floor.play(player)
+    assert player.outcome == DONE
+    assert floor.time_s <= 4.0
+    assert floor.farthest_m + abs(floor.pose.heading_rad) > 0  # something was to be seen
+    assert is_at_home(floor.pose)
+    assert floor.orders[-1] == STILL
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    gestures,
+    st.floats(0.1, 1),
+    st.sampled_from([0.01, 0.02, 0.025]),
+    st.integers(0, 2),
+    st.tuples(st.floats(0.9, 1.1), st.floats(0.9, 1.1)),
+    st.floats(-0.04, 0.04),
+    st.floats(-0.08, 0.08),
+    st.integers(-3, 3),
+)
+def test_it_ends_at_home_whatever_the_floor(gesture, intensity, dt_s, lag, grip, x, turn, turns):
+    """Orders that come late, wheels that slip, a start a little off, full turns made before."""
+    player = Player(Limits())
+    floor = Floor(Pose(x, x / 2, turn + turns * math.tau), grip, lag)
+    player.start(gesture.scaled(intensity), 0.0, floor.pose)
+    # A base that starts beside its home may come to turn on the spot beside it.
+    floor.play(player, dt_s)
+    assert player.outcome == DONE
+    assert floor.farthest_m < TETHER_M
+    assert floor.pose.turn_rad(HOME) < math.radians(2.5)
+    if abs(x) < 0.001:
+        assert floor.pose.distance_m(HOME) < 0.02
+
+
+@settings(max_examples=60, deadline=None)
+@given(gestures, st.sampled_from([0.01, 0.02, 0.05]), st.floats(0.0, 4.0))
+def test_every_order_keeps_the_limits_also_while_it_is_stopped(gesture, dt_s, stop_s):
+    limits = Limits()
+    player, floor = Player(limits), Floor()
+    player.start(gesture, 0.0, HOME)
+    floor.play(player, dt_s, until=lambda floor: floor.time_s >= stop_s)
+    player.stop("paused")
+    stopped_s = floor.time_s
+    floor.play(player, dt_s)
+    assert floor.time_s - stopped_s <= 0.5 + 2 * dt_s
+    assert player.outcome in {"paused", DONE}
+    for before, after in zip(floor.orders, floor.orders[1:], strict=False):
+        assert abs(after.v_m_s) <= limits.v_m_s + 1e-12
+        assert abs(after.w_rad_s) <= limits.w_rad_s + 1e-12
+        assert abs(after.v_m_s - before.v_m_s) <= limits.slow_down_m_s2 * dt_s + 1e-9
+        assert abs(after.w_rad_s - before.w_rad_s) <= limits.slow_down_rad_s2 * dt_s + 1e-9
+
+
+@each_gesture
+def test_halting_orders_stillness_at_once(gesture):
+    player, floor = Player(Limits()), Floor()
+    player.start(gesture, 0.0, HOME)
+    floor.play(player, until=lambda floor: floor.time_s > 0.5)
+    assert not floor.orders[-1].is_still
+    player.halt("stopped")
+    assert player.twist == STILL
+    assert player.step(floor.time_s, floor.pose) == STILL
+    assert (player.is_busy, player.outcome) == (False, "stopped")
+
+
+def test_a_base_that_is_held_gives_up_in_time():
+    player, floor = Player(Limits()), Floor(grip=(0.0, 1.0))
+    player.start(GESTURES["celebrate"], 0.0, HOME)
+    floor.play(player)
+    assert player.outcome == OUT_OF_TIME
+    assert floor.time_s < 1.6 + 0.6
+    assert floor.orders[-1] == STILL
+
+
+@pytest.mark.parametrize("pose", [Pose(math.nan), Pose(0, math.inf), Pose(0, 0, -math.inf)])
+def test_odometry_that_is_not_finite_halts(pose):
+    player, floor = Player(Limits()), Floor()
+    player.start(GESTURES["celebrate"], 0.0, HOME)
+    floor.play(player, until=lambda floor: floor.time_s > 0.5)
+    assert player.step(floor.time_s, pose) == STILL
+    assert (player.is_busy, player.outcome) == (False, BAD_ODOMETRY)
+
+
+@given(st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=50))
+def test_no_clock_makes_it_lurch(times):
+    player = Player(Limits())
+    player.start(GESTURES["celebrate"], 0.0, HOME)
+    before = STILL
+    for time_s in times:
+        after = player.step(time_s, HOME)
+        assert abs(after.v_m_s - before.v_m_s) <= 0.5 * 0.1 + 1e-9
+        before = after
+
+
+def test_one_gesture_at_a_time():
+    player = Player(Limits())
+    player.start(GESTURES["nod"], 0.0, HOME)
+    with pytest.raises(RuntimeError, match="nod is being played"):
+        player.start(GESTURES["nod"], 0.1, HOME)
+
+
+def test_it_stays_where_it_is_told_to():
+    hold = Gesture(
+        "wait",
+        "Wait",
+        (Waypoint(0.1, 0, 0, within_s=5, hold_s=2), Waypoint(0, 0, 0, within_s=3)),
+    )
+    player, floor = Player(Limits()), Floor()
+    player.start(hold, 0.0, HOME)
+    floor.play(player)
+    assert player.outcome == DONE
+    still = sum(order.is_still for order in floor.orders)
+    assert 1.6 < still * 0.02 < 2.2
+
+
+def test_twenty_gestures_do_not_walk_away():
+    player, floor = Player(Limits()), Floor(grip=(0.98, 1.03))
+    for number in range(20):
+        gesture = list(GESTURES.values())[number % len(GESTURES)]
+        player.start(gesture, floor.time_s, floor.pose)
+        floor.play(player)
+        assert player.outcome == DONE
+        assert is_at_home(floor.pose)

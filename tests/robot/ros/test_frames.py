@@ -1,0 +1,186 @@
+"""Frames of rosbridge by hand-built JSON, and that whatever else comes is refused."""
+
+import json
+import math
+from contextlib import suppress
+
+import pytest
+from hypothesis import given
+
+from robot.motion.pose import Pose
+from robot.motion.twist import Twist
+from robot.ros.frames import (
+    Answer,
+    BadRosFrame,
+    Publication,
+    Topic,
+    advertise,
+    call_service,
+    publish,
+    read_frame,
+    subscribe,
+    to_text,
+    unadvertise,
+    unsubscribe,
+)
+from robot.ros.messages import EVENTS, read_event, read_odometry, read_twist, write_twist
+from tests.support.json_values import ANYTHING
+
+CMD = Topic("/cmd_vel", "geometry_msgs/Twist")
+
+
+@pytest.mark.parametrize(
+    ("frame", "text"),
+    [
+        (
+            advertise(CMD),
+            '{"op":"advertise","topic":"/cmd_vel","type":"geometry_msgs/Twist",'
+            '"latch":false,"queue_size":1}',
+        ),
+        (
+            publish(CMD, write_twist(Twist(0.2, -1.5))),
+            '{"op":"publish","topic":"/cmd_vel","msg":'
+            '{"linear":{"x":0.2,"y":0.0,"z":0.0},"angular":{"x":0.0,"y":0.0,"z":-1.5}}}',
+        ),
+        (unadvertise(CMD), '{"op":"unadvertise","topic":"/cmd_vel"}'),
+        (
+            subscribe(CMD),
+            '{"op":"subscribe","topic":"/cmd_vel","type":"geometry_msgs/Twist",'
+            '"id":"/cmd_vel","throttle_rate":0,"queue_length":0}',
+        ),
+        (
+            subscribe(Topic("/odom", "nav_msgs/Odometry"), newest_every_ms=20),
+            '{"op":"subscribe","topic":"/odom","type":"nav_msgs/Odometry",'
+            '"id":"/odom","throttle_rate":20,"queue_length":1}',
+        ),
+        (unsubscribe(CMD), '{"op":"unsubscribe","topic":"/cmd_vel","id":"/cmd_vel"}'),
+        (
+            call_service("/rosapi/subscribers", {"topic": "/cmd_vel"}, "who"),
+            '{"op":"call_service","service":"/rosapi/subscribers",'
+            '"args":{"topic":"/cmd_vel"},"id":"who"}',
+        ),
+    ],
+    ids=[
+        "advertise",
+        "publish",
+        "unadvertise",
+        "all of it",
+        "newest",
+        "unsubscribe",
+        "call_service",
+    ],
+)
+def test_what_is_said(frame, text):
+    assert to_text(frame) == text
+
+
+def test_no_number_is_said_that_json_has_not():
+    with pytest.raises(ValueError, match="JSON"):
+        to_text(publish(CMD, write_twist(Twist(math.nan, 0))))
+
+
+@pytest.mark.parametrize(
+    ("text", "heard"),
+    [
+        (
+            '{"topic": "/garry/good_step", "msg": {"data": true}, "op": "publish"}',
+            Publication("/garry/good_step", {"data": True}),
+        ),
+        (
+            '{"values": {"subscribers": ["/a"]}, "result": true, "id": "who", '
+            '"service": "/rosapi/subscribers", "op": "service_response"}',
+            Answer("who", {"subscribers": ["/a"]}),
+        ),
+        (
+            '{"values": "Service does not exist", "result": false, "id": "who", '
+            '"service": "/x", "op": "service_response"}',
+            Answer("who", None),
+        ),
+    ],
+    ids=["publish", "answer", "failure"],
+)
+def test_what_is_heard(text, heard):
+    assert read_frame(text) == heard
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "x", "7", "NaN", "null", "[]", "{}", "\x00", '{"op":"publish"}', "[" * 100_000),
+        '{"op":"publish","topic":7,"msg":{}}',
+        '{"op":"publish","topic":"/cmd_vel","msg":[]}',
+        '{"op":"status","level":"error","msg":"no"}',
+        '{"op":["publish"],"topic":"/cmd_vel","msg":{}}',
+        b"\xff\xfe",
+    ],
+    ids=range(15),
+)
+def test_what_is_no_frame(text):
+    with pytest.raises(BadRosFrame):
+        read_frame(text)
+
+
+def odometry(x=1.0, y=2.0, heading_rad=0.5, v=0.1, w=-0.2):
+    half = heading_rad / 2
+    turned = {"x": 0, "y": 0, "z": math.sin(half), "w": math.cos(half)}
+    pose = {"position": {"x": x, "y": y, "z": 0}, "orientation": turned}
+    return {"pose": {"pose": pose}, "twist": {"twist": {"linear": {"x": v}, "angular": {"z": w}}}}
+
+
+def test_an_odometry_is_read():
+    pose, twist = read_odometry(odometry())
+    assert (pose.x_m, pose.y_m, twist) == (1.0, 2.0, Twist(0.1, -0.2))
+    assert pose.heading_rad == pytest.approx(0.5)
+    assert isinstance(pose, Pose)
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        odometry(x=math.nan),
+        odometry(y=math.inf),
+        odometry(x=1e300),
+        odometry(x=10**400),
+        odometry(x="1"),
+        odometry(x=True),
+        odometry(x=None),
+        odometry(v=math.nan),
+        odometry(w=1e9),
+        odometry() | {"twist": {}},
+        odometry() | {"pose": {"pose": {"position": {"x": 0, "y": 0}, "orientation": {}}}},
+    ],
+    ids=range(11),
+)
+def test_an_odometry_that_cannot_be(message):
+    with pytest.raises(BadRosFrame):
+        read_odometry(message)
+
+
+def test_an_orientation_of_length_0_is_none():
+    message = odometry()
+    message["pose"]["pose"]["orientation"] = dict.fromkeys("xyzw", 0.0)
+    with pytest.raises(BadRosFrame, match="quaternion"):
+        read_odometry(message)
+
+
+@pytest.mark.parametrize(
+    ("kind", "message", "event"),
+    [
+        ("kobuki_msgs/BumperEvent", {"bumper": 1, "state": 1}, (1, True)),
+        ("kobuki_msgs/BumperEvent", {"bumper": 2, "state": 0}, (2, False)),
+        ("kobuki_msgs/CliffEvent", {"sensor": 0, "state": 1, "bottom": 900}, (0, True)),
+        ("kobuki_msgs/WheelDropEvent", {"wheel": 1, "state": 1}, (1, True)),
+        ("std_msgs/Bool", {"data": True}, (0, True)),
+    ],
+)
+def test_an_event_is_read(kind, message, event):
+    assert read_event(kind, message) == event
+
+
+@given(ANYTHING)
+def test_no_message_does_more_than_be_refused(message):
+    for read in (read_twist, read_odometry, *(lambda m, k=k: read_event(k, m) for k in EVENTS)):
+        with suppress(BadRosFrame):
+            read(message if isinstance(message, dict) else {"twist": message, "pose": message})
+    with suppress(BadRosFrame):
+        read_frame(json.dumps(message))

@@ -1,0 +1,279 @@
+"""Synthetic walkers: the same for the same seed, and alike to recorded ones.
+
+Source: docs/reference/gait.md#dynamics.
+"""
+
+import hashlib
+import tracemalloc
+from collections import deque
+from dataclasses import replace
+from itertools import groupby, islice, pairwise
+from statistics import correlation, mean, stdev
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rehab.sources.synthetic import GOOD, PROFILES, SyntheticWalker, walk
+from rehab.training.changes import Change, ChangeKind
+from rehab.training.fold import SessionFold
+from rehab.training.goals import GoalRule
+from rehab.training.measures import A2
+from rehab.training.phases import make_phase
+from rehab.training.plans import SessionPlan
+from rehab.training.steps import Side
+from rehab.training.valences import VALENCES
+from tests.sources.synthetic.protocols import SESSION_1, usable
+
+BASELINE = make_phase("baseline")
+TRAINING = make_phase("training")
+WASHOUT = make_phase("washout")
+
+
+def steady(profile=GOOD, **changes):
+    """Return a profile that learns nothing, tires of nothing and stays at its first level."""
+    return replace(
+        profile, trained_level=1.5, exploration_level=1.5, fatigue_per_100_strides=0, **changes
+    )
+
+
+# --- The same seed, the same walk ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "digest"),
+    [
+        ("good", "c5ee1420f16c204e"),
+        ("poor", "58b14b98ca073282"),
+        ("fatiguing", "8a80975b5b691206"),
+        ("dropout", "7a04d26e8d4cc00c"),
+    ],
+)
+def test_golden_walks(name, digest):
+    # Found alike on CPython 3.11, 3.12 and 3.13. Whoever changes them changes stored experiments.
+    strides = walk(PROFILES[name], 7, SESSION_1)
+    text = "\n".join(f"{m.number} {m.time_s!r} {m.value!r} {' '.join(m.reasons)}" for m in strides)
+
+    assert hashlib.sha256(text.encode()).hexdigest()[:16] == digest
+
+
+def test_golden_strides():
+    first = [(m.number, m.time_s, m.value) for m in walk(GOOD, 1, strides=4)]
+
+    assert first == [
+        (1, 1.12, 3.7869),
+        (2, 2.224, 3.7807),
+        (3, 3.282, 3.9713),
+        (4, 4.374, 3.4384),
+    ]
+
+
+def test_seeds_differ():
+    assert list(walk(GOOD, 1, strides=9)) == list(walk(GOOD, 1, strides=9))
+    assert list(walk(GOOD, 1, strides=9)) != list(walk(GOOD, 2, strides=9))
+
+
+def test_chance_does_not_depend_on_the_phase():
+    calm, trained = SyntheticWalker(PROFILES["dropout"], 3), SyntheticWalker(PROFILES["dropout"], 3)
+    for _ in range(500):
+        one, other = calm.next_stride(BASELINE), trained.next_stride(TRAINING)
+        assert one.reasons == other.reasons
+        assert (one.value is None) == (other.value is None)
+
+
+# --- Without end, in constant memory -------------------------------------------------------------
+
+
+def test_a_walk_has_no_end_and_takes_no_memory():
+    strides = walk(GOOD, 1)
+    deque(islice(strides, 1000), maxlen=0)
+    tracemalloc.start()
+    deque(islice(strides, 20_000), maxlen=0)
+    grown, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+
+    assert next(strides).number == 21_001
+    assert grown < 10_000
+
+
+@pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES)
+def test_every_stride_is_one_that_sources_may_send(profile):
+    strides = list(walk(profile, 5, SESSION_1, side=Side.RIGHT))
+
+    assert [m.number for m in strides] == list(range(1, 1631))
+    assert all(a.time_s < b.time_s for a, b in pairwise(strides))
+    assert {m.side for m in strides} == {Side.RIGHT}
+    assert all(A2.value_min <= m.value <= A2.value_max for m in strides if m.value is not None)
+    assert {reason for m in strides for reason in m.reasons} == {"flagged"}
+
+
+@pytest.mark.parametrize(("strides", "walked"), [(0, 0), (3, 3), (10, 10), (11, 10), (None, 10)])
+def test_a_walk_ends_with_its_phases_or_its_strides(strides, walked):
+    phases = [replace(BASELINE, strides=4), replace(TRAINING, strides=6)]
+
+    assert len(list(walk(GOOD, 1, phases, strides))) == walked
+
+
+PHASES = st.lists(
+    st.sampled_from(["baseline", "familiarization", "training", "catch", "washout"]).flatmap(
+        lambda kind: (
+            st.builds(lambda n: make_phase(kind, strides=n), st.integers(1, 20))
+            | st.builds(lambda s: make_phase(kind, seconds=s), st.floats(0.1, 30))
+        )
+    ),
+    min_size=1,
+    max_size=5,
+)
+
+
+@settings(deadline=None)
+@given(PHASES, st.integers(0, 99))
+def test_walker_and_session_agree_on_the_phase_of_every_stride(phases, seed):
+    plan = SessionPlan(A2, VALENCES["positive"], tuple(phases), Side.LEFT, GoalRule(value=3.9))
+    fold = SessionFold(plan)
+    fold.change(Change(ChangeKind.START))
+    walker = SyntheticWalker(GOOD, seed)
+    by_session = []
+    while not fold.completed:
+        by_session.append(walker.next_stride(fold.phase))
+        fold.step(by_session[-1])
+
+    assert list(walk(GOOD, seed, phases)) == by_session
+
+
+# --- Alike to recorded walking -------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def walks():
+    """Return usable values per phase of session 1 with twenty seeds, as ratios to the baseline."""
+    values: dict[str, list[float]] = {}
+    for seed in range(20):
+        strides = walk(GOOD, seed, SESSION_1)
+        for phase in SESSION_1:
+            phase_values = usable(islice(strides, phase.strides))
+            values.setdefault(phase.name, []).extend(v / GOOD.baseline_w_kg for v in phase_values)
+    return values
+
+
+# Mean and sd of session 1 in docs/reference/gait.md#phases, in units of its goal of 3.908 W/kg.
+@pytest.mark.parametrize(
+    ("phase", "value_mean", "value_sd"),
+    [
+        ("baseline 100", 3.908, 0.255),
+        ("familiarization 100", 4.392, 0.376),
+        ("training 100", 3.769, 0.612),
+        ("training 95", 3.604, 0.542),
+        ("training 90", 4.263, 0.701),
+        ("training 85", 5.608, 0.626),
+        ("catch 100", 4.150, 0.452),
+        ("washout 100", 4.328, 0.324),
+    ],
+)
+def test_levels_and_spread_per_phase(walks, phase, value_mean, value_sd):
+    assert mean(walks[phase]) == pytest.approx(value_mean / 3.908, rel=0.05)
+    assert stdev(walks[phase]) == pytest.approx(value_sd / 3.908, rel=0.20)
+
+
+@pytest.fixture(scope="module")
+def long_training():
+    """Walk a good while in one phase with feedback."""
+    return list(walk(GOOD, 2, [TRAINING], 100_000))
+
+
+def test_unusable_strides_come_in_bursts(long_training):
+    bad = [bool(m.reasons) for m in long_training]
+    bursts = [len(list(run)) for is_bad, run in groupby(bad) if is_bad]
+
+    assert mean(bad) == pytest.approx(0.0066, rel=0.2)  # .6 % in sessions 2 and 3
+    assert mean(bursts) == pytest.approx(1 / 0.6, rel=0.1)  # leaves with probability .6
+    assert 4 <= max(bursts) <= 12
+
+
+def test_spikes_are_on_bad_strides_only(long_training):
+    good = usable(long_training)
+    bad = [m.value for m in long_training if m.reasons]
+    limit = 1.6 * mean(good)
+
+    assert mean(value > limit for value in good) < 1e-4
+    assert mean(value > limit for value in bad) == pytest.approx(0.45, abs=0.1)
+    assert max(bad) < 20
+
+
+def test_missing_values(long_training):
+    missing = [m for m in long_training if m.value is None]
+
+    assert len(missing) / 100_000 == pytest.approx(0.0007, rel=0.4)
+    assert not any(m.reasons for m in missing)  # in the recordings, their strides were usable
+
+
+@pytest.mark.parametrize(
+    ("phase", "white", "slow", "lag_1"),
+    [(TRAINING, 0.12, 0.06, 0.19), (WASHOUT, 0.07, 0.027, 0.12)],
+)
+def test_noise_is_white_and_slow(phase, white, slow, lag_1):
+    profile = steady(p_bad=0, p_missing=0, baseline_w_kg=1)
+    values = usable(walk(profile, 4, [phase], 50_000))
+
+    assert stdev(values) == pytest.approx((white**2 + slow**2) ** 0.5, rel=0.03)
+    assert correlation(values[1:], values[:-1]) == pytest.approx(lag_1, abs=0.03)
+    # 20 strides on, only the slow part is still alike.
+    alike = slow**2 * 0.97**20 / (white**2 + slow**2)
+    assert correlation(values[20:], values[:-20]) == pytest.approx(alike, abs=0.03)
+
+
+@pytest.mark.parametrize(("phase", "stride_s"), [(BASELINE, 1.08), (TRAINING, 1.04)])
+def test_stride_times(phase, stride_s):
+    times = [m.time_s for m in walk(GOOD, 6, [phase], 5000)]
+    strides_s = [b - a for a, b in pairwise(times)]
+    walked_s = [s for s in strides_s if s < 2]
+    pauses_s = [s - stride_s for s in strides_s if s >= 2]
+
+    assert mean(walked_s) == pytest.approx(stride_s, abs=0.003)
+    assert stdev(walked_s) == pytest.approx(0.03, rel=0.1)
+    assert all(3.1 < pause < 5.3 for pause in pauses_s)
+    assert len(pauses_s) == pytest.approx(times[-1] / 124.2, abs=2)  # every two minutes of walking
+
+
+def test_levels_change_in_one_stride():
+    profile = replace(GOOD, exploration_strides=0)
+    phases = [replace(TRAINING, strides=400), make_phase("catch", strides=12)]
+    ends, begins = [], []
+    for seed in range(100):
+        values = [m.value for m in walk(profile, seed, phases) if m.number in (400, 401)]
+        ends.append(values[0] or 0)
+        begins.append(values[1] or 0)
+
+    assert mean(ends) / 3.9 == pytest.approx(1.45, abs=0.06)
+    assert mean(begins) / 3.9 == pytest.approx(1.11, abs=0.05)
+
+
+def test_washout_forgets_slowly():
+    phases = [replace(TRAINING, strides=1500), replace(WASHOUT, strides=3000)]
+    washout = [m for m in walk(steady(calm_noise=0, calm_slow_sd=0), 1, phases) if m.number > 1500]
+
+    assert mean(usable(washout[:50])) / 3.9 == pytest.approx(1.12, abs=0.01)
+    assert mean(usable(washout[1475:1525])) / 3.9 == pytest.approx(1 + 0.12 / 2.718, abs=0.01)
+
+
+def test_fatigue_is_gone_after_a_pause():
+    profile = replace(steady(), fatigue_per_100_strides=0.03, noise=0, slow_sd=0, baseline_w_kg=1)
+    phases = [replace(TRAINING, name=f"trial {n}", strides=101) for n in (1, 2)]
+    values = [m.value for m in walk(replace(profile, p_bad=0, p_missing=0), 1, phases)]
+
+    assert values[0] - values[100] == pytest.approx(0.03, abs=1e-3)
+    assert values[101] == pytest.approx(values[0], abs=1e-3)
+
+
+def test_profiles_are_what_they_are_called():
+    def late(name):
+        strides = walk(PROFILES[name], 1, [TRAINING], 3000)
+        return mean(usable(strides)[-1000:]) / PROFILES[name].baseline_w_kg
+
+    assert late("good") > 1.4
+    assert late("poor") < 1.0
+    early = mean(usable(walk(PROFILES["fatiguing"], 1, [TRAINING], 300))[200:]) / 2.2
+    assert early > 1.2 > late("fatiguing") > 0.9
+    dropout = list(walk(PROFILES["dropout"], 1, [TRAINING], 20_000))
+    assert mean(m.value is None for m in dropout) == pytest.approx(0.05 * 0.94, rel=0.1)
+    assert mean(bool(m.reasons) for m in dropout) == pytest.approx(0.0625, rel=0.15)

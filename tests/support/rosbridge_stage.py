@@ -1,0 +1,92 @@
+"""A rosbridge base with its bridge and robot, on a clock that a test moves."""
+
+import json
+from contextlib import suppress
+
+from robot.bases.rosbridge import RosbridgeBase
+from robot.bases.rosbridge.topics import PROFILES, Topics
+from robot.behavior.performer import Performer
+from robot.motion.limits import TICK_S
+from robot.motion.twist import STILL
+from robot.ros.frames import BadRosFrame, Topic, read_frame, to_text
+from tests.support.fake_ros import FakeBase, FakeRosbridge
+from tests.support.robot_stage import CUE, WELCOME
+
+CMD, ODOM = PROFILES["plain"].order, PROFILES["plain"].odometry
+BUMPER = Topic("/bumper", "std_msgs/Bool")
+CLOSED = Topics(CMD, ODOM, {"bump": BUMPER})
+OPEN = Topics(CMD)
+
+
+class Stage:
+    """A base, a bridge and what it drives; ``wait`` lets time pass, a tick after the other."""
+
+    def __init__(self, topics=CLOSED, has_rosapi=True):
+        self.now_s = 100.0
+        self.bridge = FakeRosbridge(has_rosapi=has_rosapi)
+        self.robot = FakeBase(self.bridge.graph, lambda: self.now_s)
+        self.bridge.graph.advertise(BUMPER.name, BUMPER.kind, "/base")
+        self.base = RosbridgeBase(lambda: self.now_s, topics)
+        self.base_client = self.base._client
+        self.is_frozen = False  # nothing passes any more, and nobody is told; later it does
+        self.inbox, self.outbox, self.client = [], [], None
+        self.performer = None
+        self.connect()
+        self.wait(0.2)
+
+    def connect(self):
+        self.client = self.bridge.join(self.inbox.append)
+        for frame in self.base_client.open(self.now_s):
+            self.client.take(to_text(frame))
+
+    def lose(self):
+        self.client.is_there, self.client = False, None
+        self.inbox.clear()
+        self.outbox.clear()
+        self.base_client.lose(self.now_s)
+
+    def wait(self, span_s, order=STILL):
+        for _ in range(round(span_s / TICK_S)):
+            self.now_s += TICK_S
+            if self.performer is None:
+                self.base.drive(order)
+            else:
+                self.performer.handle({"type": "heartbeat"}, self.now_s)
+                self.performer.tick(self.now_s)
+            self.pass_on()
+
+    def pass_on(self):
+        if self.client is not None:
+            self.outbox += map(to_text, self.base_client.due(self.now_s))
+        while self.outbox and not self.is_frozen:
+            self.client.take(self.outbox.pop(0))
+        self.robot.tell()
+        while self.inbox and not self.is_frozen:
+            with suppress(BadRosFrame):
+                self.base_client.hear(read_frame(self.inbox.pop(0)), self.now_s)
+
+    def tell(self, topic, message):
+        self.inbox.append(json.dumps({"op": "publish", "topic": topic, "msg": message}))
+        self.pass_on()
+
+    def perform(self, cue=CUE):
+        """Have a performer drive it, armed, with a gesture begun."""
+        self.performer = Performer(self.base)
+        self.performer.handle(WELCOME | {"cue": cue}, self.now_s)
+        self.performer.handle({"type": "arm"}, self.now_s)
+        for number in range(6):
+            step = {"type": "step", "time_s": float(number), "performance": 1.2}
+            self.performer.handle(step, self.now_s)
+        return self
+
+    def begin_moving(self):
+        self.perform().wait(0.5)
+        assert self.robot.is_moving
+        return self
+
+    def of(self, kind):
+        return [report for report in self.performer.reports if report["kind"] == kind]
+
+
+def moving(stage):
+    return [order for order in stage.robot.orders if order[1] or order[2]]
