@@ -1,4 +1,4 @@
-"""The deployment: one file, every knob a GARRY_* variable, good defaults for a clinic."""
+"""The settings: one file, every option a GARRY_* variable, good defaults for a clinic."""
 
 import os
 import secrets
@@ -12,14 +12,14 @@ from django.core.exceptions import ImproperlyConfigured
 
 BASE_DIR = Path(__file__).resolve().parent.parent
 
-# --- typed readers: a wrong value stops the start and says what would be right ------------------
+# --- typed readers: a wrong value stops the start with an error that names valid ones -----------
 
-KNOBS: dict[str, str] = {}  # every variable that was asked for, and what it is for
+VARIABLES: dict[str, str] = {}  # every variable that is read, and what it is for
 
 
 def text(name: str, default: str, about: str) -> str:
     """Read a variable as text."""
-    KNOBS[name] = about
+    VARIABLES[name] = about
     return os.environ.get(name, "") or default
 
 
@@ -39,8 +39,8 @@ def number(name: str, default: int, about: str, *, low: int, high: int) -> int:
     return int(value)
 
 
-def words(name: str, default: str, about: str) -> list[str]:
-    """Read a variable as a list separated by commas."""
+def string_list(name: str, default: str, about: str) -> list[str]:
+    """Read a variable as a comma-separated list."""
     return [word.strip() for word in text(name, default, about).split(",") if word.strip()]
 
 
@@ -49,10 +49,12 @@ def words(name: str, default: str, about: str) -> list[str]:
 HOSTED = flag("GARRY_HOSTED", False, "many clinics on one server, behind TLS")
 DEBUG = flag("GARRY_DEBUG", False, "Django's debug pages; for developers only")
 DATA_DIR = Path(text("GARRY_DATA_DIR", str(BASE_DIR / "var"), "folder of database and secrets"))
-BACKUP_KEYS = words("GARRY_BACKUP_KEYS", "", "public keys that backups are encrypted to (age1…)")
+BACKUP_KEYS = string_list(
+    "GARRY_BACKUP_KEYS", "", "public keys that backups are encrypted to (age1…)"
+)
 HOST = text("GARRY_HOST", "127.0.0.1", "address that the server listens on")
 PORT = number("GARRY_PORT", 8000, "port that the server listens on", low=1, high=65535)
-ALLOWED_HOSTS = words(
+ALLOWED_HOSTS = string_list(
     "GARRY_ALLOWED_HOSTS",
     "" if HOSTED else f"localhost,127.0.0.1,[::1],{HOST}",
     "names that browsers reach the server by",
@@ -60,7 +62,7 @@ ALLOWED_HOSTS = words(
 
 
 def _secret_key() -> str:
-    """Read the key, or make one and keep it in the data folder (one machine only)."""
+    """Return the key; without one, generate it into the data folder (one machine only)."""
     given = text("GARRY_SECRET_KEY", "", "secret that signs cookies and tokens")
     if given or HOSTED:
         return given or "garry-missing-secret-key"  # check garry.E001 refuses to start with it
@@ -71,7 +73,7 @@ def _secret_key() -> str:
             with os.fdopen(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w") as out:
                 out.write(secrets.token_urlsafe(50))
         except FileExistsError:
-            pass  # another process was faster; its key is the key
+            pass  # another process was faster; its key counts
     return file.read_text().strip()
 
 
@@ -80,7 +82,7 @@ SECRET_KEY = _secret_key()
 # --- applications -------------------------------------------------------------------------------
 
 INSTALLED_APPS = [
-    "rehab",  # before daphne: its own `runserver` wins
+    "rehab",  # before daphne: its own `runserver` takes precedence
     "daphne",
     "channels",
     "rehab.site.GarryAdmin",  # django.contrib.admin with our front page
@@ -101,7 +103,7 @@ MIDDLEWARE = [
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",
     "django.contrib.auth.middleware.AuthenticationMiddleware",
-    "rehab.people.sign_in.flow.EntryMiddleware",
+    "rehab.people.sign_in.flow.SessionValidationMiddleware",
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "rehab.stations.tablets.TabletMiddleware",
@@ -194,7 +196,7 @@ AUTH_PASSWORD_VALIDATORS = [
     )
 ]
 AUTHENTICATION_BACKENDS = [
-    "axes.backends.AxesStandaloneBackend",  # first: who has guessed too often is not even asked
+    "axes.backends.AxesStandaloneBackend",  # first: a lockout ends the sign-in here
     "rehab.people.sign_in.backends.PasswordBackend",
     "rehab.people.sign_in.backends.CodeBackend",
 ]
@@ -217,14 +219,14 @@ PROXIES = number(
     high=9,
 )
 
-# Wrong passwords and codes: rehab.people.sign_in.lockout says what counts together.
+# Wrong passwords and codes: what counts together is defined in rehab.people.sign_in.lockout.
 AXES_FAILURE_LIMIT = 5
 AXES_COOLOFF_TIME = timedelta(minutes=15)
-AXES_RESET_COOL_OFF_ON_FAILURE_DURING_LOCKOUT = False  # so that the wait that we tell is true
-AXES_LOCKOUT_PARAMETERS = "rehab.people.sign_in.lockout.counted_by"
-AXES_USERNAME_CALLABLE = "rehab.people.sign_in.lockout.counted_name"
-AXES_CLIENT_IP_CALLABLE = "rehab.people.sign_in.lockout.client_address"
-AXES_LOCKOUT_CALLABLE = "rehab.people.sign_in.lockout.answer"
+AXES_RESET_COOL_OFF_ON_FAILURE_DURING_LOCKOUT = False  # so that the wait we announce is right
+AXES_LOCKOUT_PARAMETERS = "rehab.people.sign_in.lockout.lockout_parameters"
+AXES_USERNAME_CALLABLE = "rehab.people.sign_in.lockout.attempt_username"
+AXES_CLIENT_IP_CALLABLE = "rehab.people.networks.client_address"
+AXES_LOCKOUT_CALLABLE = "rehab.people.sign_in.lockout.lockout_response"
 AXES_SENSITIVE_PARAMETERS = [
     *("username", "ip_address"),
     *("code", "passkey", "old_password", "new_password1", "new_password2", "csrfmiddlewaretoken"),

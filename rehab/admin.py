@@ -1,4 +1,4 @@
-"""Gathers the rooms' admin pages, nothing else."""
+"""The admin pages of all rooms."""
 
 from rehab.boards import admin as boards
 from rehab.feedback import admin as feedback

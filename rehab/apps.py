@@ -12,15 +12,15 @@ class RehabConfig(AppConfig):
     default_auto_field = "django.db.models.BigAutoField"
 
     def ready(self) -> None:
-        """Register the checks, the shared rows of every database, and who listens to changes."""
+        """Register checks, the shared rows of every database, and signal receivers."""
         from rehab import checks  # noqa: F401
         from rehab.boards.watching import watch
         from rehab.models import TRACKED
-        from rehab.people.audit.history import track
+        from rehab.people.audit.history import track_models
         from rehab.sessions.feedback_text_updates import connect_signals
         from rehab.sessions.setup.defaults import install_defaults
 
         post_migrate.connect(install_defaults, sender=self)
         watch()
-        track(*TRACKED)
+        track_models(*TRACKED)
         connect_signals()

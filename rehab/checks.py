@@ -12,7 +12,7 @@ from django.core.checks import CheckMessage, Error, Tags, register
 
 @register(Tags.security)
 def check_secrets(**_: Any) -> list[CheckMessage]:
-    """A hosted server has a real secret and no debug pages."""
+    """Check that a hosted server has its own secret key and no debug pages."""
     found: list[CheckMessage] = []
     if settings.HOSTED and not os.environ.get("GARRY_SECRET_KEY"):
         found.append(
@@ -35,7 +35,7 @@ def check_secrets(**_: Any) -> list[CheckMessage]:
 
 @register()
 def check_hosting(**_: Any) -> list[CheckMessage]:
-    """A hosted server has names, a real database and a layer between its processes."""
+    """Check host names, and that a hosted server has PostgreSQL and a channel layer."""
     found: list[CheckMessage] = []
     if not settings.HOSTED:
         if "*" in settings.ALLOWED_HOSTS:
@@ -76,7 +76,7 @@ def check_hosting(**_: Any) -> list[CheckMessage]:
 
 @register()
 def check_data_folder(**_: Any) -> list[CheckMessage]:
-    """The data folder can be written."""
+    """Check that the data folder is writable."""
     folder = settings.DATA_DIR
     if folder.is_dir() and os.access(folder, os.W_OK):
         return []
@@ -85,7 +85,7 @@ def check_data_folder(**_: Any) -> list[CheckMessage]:
     return [
         Error(
             f"The data folder {folder} cannot be written.",
-            hint="Give the folder to the user that runs the server, or set GARRY_DATA_DIR.",
+            hint="Make it writable for the user that runs the server, or set GARRY_DATA_DIR.",
             id="garry.E006",
         )
     ]
@@ -93,7 +93,7 @@ def check_data_folder(**_: Any) -> list[CheckMessage]:
 
 @register()
 def check_browser_libraries(**_: Any) -> list[CheckMessage]:
-    """The libraries that pages draw with are there."""
+    """Check that the browser libraries are installed."""
     missing = [name for name, folder in settings.BROWSER_LIBRARIES.items() if not folder.is_dir()]
     if not missing:
         return []
@@ -107,24 +107,24 @@ def check_browser_libraries(**_: Any) -> list[CheckMessage]:
 
 
 @register()
-def check_knobs(**_: Any) -> list[CheckMessage]:
-    """Every GARRY_* variable that is set is one that GARRY reads."""
+def check_variables(**_: Any) -> list[CheckMessage]:
+    """Check that every GARRY_* variable that is set is known."""
     return [
         checks.Warning(
             f"{name} is set, but GARRY knows no such setting.",
-            hint=f"Known settings: {', '.join(sorted(settings.KNOBS))}.",
+            hint=f"Known settings: {', '.join(sorted(settings.VARIABLES))}.",
             id="garry.W008",
         )
         for name in sorted(os.environ)
         if name.startswith("GARRY_")
         and not name.startswith("GARRY_TEST_")
-        and name not in settings.KNOBS
+        and name not in settings.VARIABLES
     ]
 
 
 @register()
 def check_durability(**_: Any) -> list[CheckMessage]:
-    """SQLite writes each commit through to the disk."""
+    """Check that SQLite writes each commit through to the disk."""
     database = settings.DATABASES["default"]
     if not database["ENGINE"].endswith("sqlite3"):
         return []
@@ -142,7 +142,7 @@ def check_durability(**_: Any) -> list[CheckMessage]:
 
 @register()
 def check_application_order(**_: Any) -> list[CheckMessage]:
-    """`rehab` comes before daphne, so that its own commands win."""
+    """Check that `rehab` comes before daphne, so that its commands take precedence."""
     apps = settings.INSTALLED_APPS
     if apps.index("rehab") < apps.index("daphne"):
         return []

@@ -1,4 +1,4 @@
-"""Gathers the rooms' models, and says of which it is kept who changed them."""
+"""The models of all rooms, and the list of those with a change history."""
 
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.feedback.models import FeedbackBand, FeedbackType
@@ -7,7 +7,7 @@ from rehab.patients.visits import Visit
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.consent.models import Consent, ConsentText
-from rehab.people.consent.tombstones import ErasedOriginal
+from rehab.people.consent.tombstones import ImportTombstone
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.sign_in.factors import Authenticator, RecoveryCode
 from rehab.people.sign_in.tokens import ApiToken
@@ -16,9 +16,9 @@ from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
-from rehab.stations.models import Device, LeaveTries, Station
+from rehab.stations.models import Device, PinAttempts, Station
 
-# People and settings. What happens in a session is a log by itself, and so is consent.
+# People and settings. Sessions and consents are logs themselves.
 TRACKED = (
     Clinic,
     User,
@@ -48,16 +48,16 @@ __all__ = [
     "Consent",
     "ConsentText",
     "Device",
-    "ErasedOriginal",
     "FeedbackBand",
     "FeedbackType",
     "Gesture",
     "GestureStep",
     "HistoryEntry",
+    "ImportTombstone",
     "Leaderboard",
-    "LeaveTries",
     "Measure",
     "Patient",
+    "PinAttempts",
     "Preset",
     "Protocol",
     "ProtocolPhase",

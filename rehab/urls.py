@@ -1,4 +1,4 @@
-"""Gathers the rooms' addresses, nothing else."""
+"""The URLs of all rooms."""
 
 from django.urls import include, path
 

@@ -16,7 +16,7 @@ import pytest
 from django.conf import settings
 from django.utils.translation import override
 
-from rehab.people.aliases import ANIMALS, MANNERS, say_alias, words
+from rehab.people.aliases import ANIMALS, MANNERS, format_alias, split_list
 
 ROOT = Path(__file__).resolve().parent.parent
 CATALOGS = sorted((ROOT / "locale").rglob("*.po"))
@@ -198,11 +198,11 @@ def test_templates_say_nothing_that_is_not_marked(template):
 @pytest.mark.parametrize("language", [code for code, _ in settings.LANGUAGES])
 def test_animal_names_are_said_in_each_language(language):
     with override(language):
-        names = {say_alias(f"{a} {b}") for a in words(MANNERS) for b in words(ANIMALS)}
-    assert len(names) == len(words(MANNERS)) * len(words(ANIMALS))
+        names = {format_alias(f"{a} {b}") for a in split_list(MANNERS) for b in split_list(ANIMALS)}
+    assert len(names) == len(split_list(MANNERS)) * len(split_list(ANIMALS))
 
 
 def test_an_animal_name_keeps_its_number_and_an_unknown_one_stays():
     with override("es"):
-        assert say_alias("Brave Otter 7") == "Nutria valiente 7"
-        assert say_alias("Odd Fellow") == "Odd Fellow"
+        assert format_alias("Brave Otter 7") == "Nutria valiente 7"
+        assert format_alias("Odd Fellow") == "Odd Fellow"

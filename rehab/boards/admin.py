@@ -20,10 +20,10 @@ from rehab.boards.figures import Figure, group_of, read_figures
 from rehab.boards.forms import LeaderboardForm
 from rehab.boards.models import Leaderboard
 from rehab.boards.showing import Viewer
-from rehab.people.access import person
+from rehab.people.access import user_of
 from rehab.people.models import Boards, Patient
 from rehab.people.roles import Role
-from rehab.people.web.admin_preview import PreviewAdmin, find_faults
+from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
 
@@ -98,7 +98,7 @@ class LeaderboardAdmin(PreviewAdmin):
         """Offer what this person may build: boards across clinics are the host's, and only they."""
         if db_field.name == "among":
             across = Leaderboard.Among.ACROSS
-            hosts = person(request).role == Role.HOST
+            hosts = user_of(request).role == Role.HOST
             kwargs["choices"] = [
                 choice for choice in Leaderboard.Among.choices if (choice[0] == across) == hosts
             ]
@@ -113,7 +113,7 @@ class LeaderboardAdmin(PreviewAdmin):
 
     def get_changeform_initial_data(self, request: HttpRequest) -> dict[str, Any]:
         """Begin with a board that can be saved."""
-        if person(request).role == Role.HOST:
+        if user_of(request).role == Role.HOST:
             return {"among": Leaderboard.Among.ACROSS, "entry": Leaderboard.Entry.BEST}
         return {}
 
@@ -126,13 +126,13 @@ class LeaderboardAdmin(PreviewAdmin):
         context["built"] = None if board is None else entries.measure_progress(board)
         return super().render_change_form(request, context, *args, **kwargs)
 
-    def draw(self, request: HttpRequest, row: Leaderboard | None) -> HttpResponse:
+    def render_preview(self, request: HttpRequest, row: Leaderboard | None) -> HttpResponse:
         """Show the board, made of the clinic's own sessions."""
         given = request.GET.copy()
         given["name"] = given.get("name", "").strip() or gettext("Leaderboard")
         form = self.get_form(request, row, change=row is not None)(given, instance=row)
         if not form.is_valid():
-            faults = list(find_faults(form))
+            faults = list(iter_form_errors(form))
             return render(request, "boards/preview_faults.html", {"faults": faults})
         if form.instance.clinic_id is None:
             fault = gettext(

@@ -13,7 +13,7 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.showing import Shown, Viewer, show_after
 from rehab.people.access import for_roles
 from rehab.people.roles import Role
-from rehab.people.web.api_base import Key, Page, Paging, answers, caller, cut
+from rehab.people.web.api_base import Key, Page, Paging, caller, paginate, responses
 from rehab.sessions.models import TrainingSession
 
 router = Router(tags=["Boards"])
@@ -60,14 +60,14 @@ class ShownOut(Schema):
         return None if shown.total is None else shown.total.value
 
 
-@router.get("/boards", response=answers(Page[BoardOut]))
+@router.get("/boards", response=responses(Page[BoardOut]))
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
 def list_boards(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
     """List the clinic's leaderboards."""
-    return cut(Leaderboard.objects.visible_to(caller(request)).order_by("pk"), wanted)
+    return paginate(Leaderboard.objects.visible_to(caller(request)).order_by("pk"), wanted)
 
 
-@router.get("/boards/{board_id}/rows", response=answers(ShownOut, 404))
+@router.get("/boards/{board_id}/rows", response=responses(ShownOut, 404))
 @for_roles(Role.LEAD, Role.PT)
 def show_board(request: HttpRequest, board_id: Path[Key]) -> Shown:
     """Show a board as it is for whoever comes by, with those who agreed to stand on it."""
@@ -75,7 +75,7 @@ def show_board(request: HttpRequest, board_id: Path[Key]) -> Shown:
     return Viewer(get_object_or_404(boards, pk=board_id), timezone.now()).show()
 
 
-@router.get("/sessions/{session_id}/boards", response=answers(list[ShownOut], 404))
+@router.get("/sessions/{session_id}/boards", response=responses(list[ShownOut], 404))
 @for_roles(Role.LEAD, Role.PT)
 def list_session_boards(request: HttpRequest, session_id: Path[Key]) -> list[Shown]:
     """Show the boards that the patient sees after a session."""

@@ -15,7 +15,7 @@ from django.db.models.functions import Cast
 from rehab.boards.models import Leaderboard
 from rehab.boards.periods import Period, period_of
 from rehab.boards.rules import TYPED
-from rehab.people.consent.models import Purpose, agreed
+from rehab.people.consent.models import Purpose, has_consented
 from rehab.people.models import Patient
 from rehab.sessions.log import SessionMetric
 from rehab.training.changes import State
@@ -95,7 +95,7 @@ def read_own(board: Leaderboard, patient: Patient, valence: str, now: datetime) 
 def standing_on(board: Leaderboard) -> QuerySet[Patient]:
     """Give the patients who may stand on a board of several."""
     patients = Patient.everywhere.filter(boards__in=board.agreed, blinded=False)
-    patients = patients.filter(Q(simulated=True) | agreed(Purpose.BOARDS))
+    patients = patients.filter(Q(simulated=True) | has_consented(Purpose.BOARDS))
     if board.among == Leaderboard.Among.ACROSS:
         return patients.filter(clinic__boards_across=True)
     patients = patients.filter(clinic=board.clinic_id)

@@ -13,7 +13,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.boards.rules import find_faults
 from rehab.people.models import Boards, Clinic, Patient
-from rehab.people.scope import ClinicRow, Scope, ScopedModel
+from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.training.metrics import METRICS
 from rehab.training.valences import VALENCES
 
@@ -53,13 +53,13 @@ def metric_choices() -> list[tuple[str, Any]]:
 class BoardScope(Scope):
     """Boards of the own clinic, and those across clinics while it takes part in them."""
 
-    def of_clinic(self, clinic_id: int) -> Q:
+    def clinic_filter(self, clinic_id: int) -> Q:
         """Give the boards that a member of this clinic may see."""
         takes_part = Exists(Clinic.everywhere.filter(pk=clinic_id, boards_across=True))
         return Q(clinic=clinic_id) | Q(takes_part, clinic__isnull=True)
 
 
-class Leaderboard(ClinicRow):
+class Leaderboard(ClinicModel):
     """Who is compared with whom, by what, over which time, and how it is shown.
 
     Without a clinic it is the host's, and compares patients of all clinics that take part.
@@ -230,7 +230,7 @@ class Leaderboard(ClinicRow):
         help_text="The patient whom building its rows has come to; nothing once they are built.",
     )
 
-    class Meta(ClinicRow.Meta):
+    class Meta(ClinicModel.Meta):
         verbose_name = _("leaderboard")
         verbose_name_plural = _("leaderboards")
         ordering: ClassVar = ["name"]

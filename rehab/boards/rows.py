@@ -10,7 +10,7 @@ from datetime import date, datetime
 from rehab.boards.choosing import Chosen
 from rehab.boards.figures import SHARES, standing_on
 from rehab.boards.models import Leaderboard
-from rehab.people.aliases import say_alias
+from rehab.people.aliases import format_alias
 from rehab.sessions.formatting import NBSP, format_day, format_duration, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.training.metrics import METRICS
@@ -83,7 +83,7 @@ def name_rows(board: Leaderboard, chosen: Sequence[Chosen], me: int | None) -> l
         elif board.names == Leaderboard.Names.INITIALS:
             name = "".join(f"{word[0].upper()}." for word in patient.nickname.split())
         else:
-            name = say_alias(patient.alias) if patient.alias else patient.pseudonym
+            name = format_alias(patient.alias) if patient.alias else patient.pseudonym
         seen[name] += 1
         if seen[name] > 1:  # as initials may: each row has a name of its own
             name = f"{name} {seen[name]}"

@@ -16,10 +16,11 @@ from rehab.boards.ranking import By, Entry, cut, rank, ranking_of, read_figures
 from rehab.boards.rows import Row, date_rows, share
 from rehab.boards.showing import Shown, show_after, show_waiting
 from rehab.people.access import actor_of, for_roles
-from rehab.people.consent.models import Purpose, withdraw
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import withdraw_consent
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.web.language import speak_to
+from rehab.people.web.language import activate_patient_language
 from rehab.sessions.formatting import NBSP, clinic_time, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN_STATES, State
@@ -41,7 +42,7 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
     A session that still runs has no place. In a blinded study there is nothing to compare.
     """
     session = find_session(request, session_id)
-    speak_to(session.patient)
+    activate_patient_language(session.patient)
     if State(session.state) in OPEN_STATES:
         return redirect("walk", session_id=session.pk)
     boards: list[Shown] = []
@@ -63,7 +64,7 @@ def leave_boards(request: HttpRequest, session_id: int) -> HttpResponse:
     """Take the session's patient off all boards, at once. Only a therapist brings one back."""
     session = find_session(request, session_id)
     by = request.user if isinstance(request.user, User) else None
-    withdraw(session.patient, Purpose.BOARDS, by, timezone.now())
+    withdraw_consent(session.patient, Purpose.BOARDS, by, timezone.now())
     return redirect("scores", session_id=session.pk)
 
 

@@ -101,12 +101,12 @@ def describe(patient: Patient) -> dict[str, Any]:
         "animal_name": patient.alias,
         "in_a_blinded_study": patient.blinded,
         "simulated": patient.simulated,
-        "participant_of_the_original": patient.original_id,
+        "participant_of_the_original": patient.legacy_id,
         "created_at": patient.created_at,
         "program_ended_at": patient.ended_at,
-        "program_ended_because": patient.ended_because or None,
+        "program_end_reason": patient.end_reason or None,
         "erased_at": patient.erased_at,
-        "erased_because": patient.erased_because or None,
+        "erasure_reason": patient.erasure_reason or None,
     }
 
 
@@ -149,10 +149,10 @@ def list_boards(user: User, patient: Patient) -> list[dict[str, Any]]:
 
 def list_changes(user: User, patient: Patient) -> list[dict[str, Any]]:
     """Give the history of the details; an erased value is null. Who works here stays unnamed."""
-    noun = Patient.__name__
-    changes = HistoryEntry.objects.visible_to(user).filter(noun=noun, row=patient.pk)
+    model = Patient.__name__
+    changes = HistoryEntry.objects.visible_to(user).filter(model_name=model, object_id=patient.pk)
     return [
-        {"at": change.at, "kind": change.kind, "before_and_after": change.values}
+        {"at": change.at, "kind": change.kind, "before_and_after": change.changes}
         for change in changes.order_by("pk")
     ]
 

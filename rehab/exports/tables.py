@@ -193,7 +193,7 @@ class Selection:
                 session.protocol and session.protocol.name,
                 session.plan["activation_threshold"],
                 session.simulated,
-                session.original_id is not None,
+                session.legacy_id is not None,
                 session.source if self.named else "",
                 *(figures.get(slug) for slug in METRICS),
             )

@@ -13,7 +13,7 @@ from django.views.decorators.http import require_GET, require_safe
 from rehab.exports.archive import ZipResponse
 from rehab.exports.patient_data import patient_files, session_files
 from rehab.patients.pages.records import get_patient
-from rehab.people.access import for_roles, person
+from rehab.people.access import for_roles, user_of
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.models import Patient
@@ -26,7 +26,7 @@ from rehab.sessions.models import TrainingSession
 @require_GET
 def give_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Give all that is kept of one patient as a file."""
-    user, now = person(request), timezone.now()
+    user, now = user_of(request), timezone.now()
     patient = get_patient(user, patient_id)
     note_export(request, now, patient)
     name = f"garry-{patient.pseudonym}-{now:%Y-%m-%d}.zip"
@@ -37,7 +37,7 @@ def give_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
 @require_safe
 def show_export(request: HttpRequest) -> HttpResponse:
     """Say what the export of all sessions holds."""
-    user = person(request)
+    user = user_of(request)
     sessions = TrainingSession.objects.visible_to(user)
     context = {
         "sessions": sessions.count(),
@@ -51,16 +51,16 @@ def show_export(request: HttpRequest) -> HttpResponse:
 @require_GET
 def give_sessions(request: HttpRequest) -> HttpResponse:
     """Give all sessions that somebody may see, by pseudonyms."""
-    user, now = person(request), timezone.now()
+    user, now = user_of(request), timezone.now()
     note_export(request, now)
     return _send(session_files(user, now), f"garry-sessions-{now:%Y-%m-%d}.zip")
 
 
 def note_export(request: HttpRequest, now: datetime, patient: Patient | None = None) -> None:
     """Tell the audit log. Where it cannot be kept, nothing is given out."""
-    audit_log.note(
+    audit_log.record(
         Act.EXPORT,
-        person(request),
+        user_of(request),
         patient=None if patient is None else patient.pk,
         about=request.path,
         address=client_address(request),

@@ -21,10 +21,10 @@ from rehab.feedback.picture import show_bands
 from rehab.feedback.valences import usual_valence, valences_of
 from rehab.feedback.wording import FALLBACK
 from rehab.gestures.choices import gesture_choices
-from rehab.people.access import clinic_of, person
+from rehab.people.access import clinic_of, user_of
 from rehab.people.models import LANGUAGES
 from rehab.people.web.admin_base import ScopedOptions
-from rehab.people.web.admin_preview import PreviewAdmin, find_faults
+from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors
 from rehab.training.valences import BANDS_MAX, VALENCES
 
 READ = ("from_percent", "words", "confetti")
@@ -70,7 +70,7 @@ class FeedbackTypeAdmin(PreviewAdmin):
     def formfield_for_dbfield(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
         """Offer the gestures that this person's clinic has."""
         if db_field.name in ("cue_above", "cue_below"):
-            choices = [("", gettext_lazy("Nothing")), *gesture_choices(person(request))]
+            choices = [("", gettext_lazy("Nothing")), *gesture_choices(user_of(request))]
             label = db_field.verbose_name.capitalize()
             return forms.ChoiceField(label=label, choices=choices, required=False)
         return super().formfield_for_dbfield(db_field, request, **kwargs)
@@ -104,7 +104,7 @@ class FeedbackTypeAdmin(PreviewAdmin):
         """Show all types, those that the clinic edited and those that are as usual."""
         if not self.has_view_permission(request):
             raise PermissionDenied
-        clinic = clinic_of(person(request))
+        clinic = clinic_of(user_of(request))
         rows = {row.slug: row for row in self.get_queryset(request)}
         add = reverse("admin:rehab_feedbacktype_add")
         types = [
@@ -170,7 +170,7 @@ class FeedbackTypeAdmin(PreviewAdmin):
 
         def tell() -> None:
             told = words_edited.send(
-                FeedbackType, row=row, clinic_id=clinic_id, slug=slug, by=person(request)
+                FeedbackType, row=row, clinic_id=clinic_id, slug=slug, by=user_of(request)
             )
             for _receiver, problems in told:
                 for problem in problems or ():
@@ -178,12 +178,12 @@ class FeedbackTypeAdmin(PreviewAdmin):
 
         transaction.on_commit(tell)
 
-    def draw(self, request: HttpRequest, row: FeedbackType | None) -> HttpResponse:
+    def render_preview(self, request: HttpRequest, row: FeedbackType | None) -> HttpResponse:
         """Show what a patient would see of each band."""
         given = request.GET
         language = given.get("seen_in", "")
         if language not in dict(LANGUAGES):
-            language = clinic_of(person(request)).language
+            language = clinic_of(user_of(request)).language
         form = self.get_form(request, row, change=row is not None)(given, instance=row)
         inline = self.get_inline_instances(request, row)[0]
         rows: Any = inline.get_formset(request, row)
@@ -194,7 +194,7 @@ class FeedbackTypeAdmin(PreviewAdmin):
             context["valence"] = form.instance.to_valence(language, bands.bands(language))
             context["seen"] = list(show_bands(context["valence"]))
         else:
-            context["faults"] = [*find_faults(form), *find_row_faults(form, bands)]
+            context["faults"] = [*iter_form_errors(form), *find_row_faults(form, bands)]
         with override(language):
             return render(request, "feedback/preview.html", context)
 
@@ -222,5 +222,5 @@ def find_row_faults(form: Any, bands: Any) -> Iterator[tuple[str, str]]:
     """Give what is wrong with the bands, once nothing is wrong with the type they belong to."""
     if not form.errors:
         for row in bands.forms:
-            yield from find_faults(row)
+            yield from iter_form_errors(row)
         yield from (("", problem) for problem in bands.non_form_errors())

@@ -13,7 +13,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.people.models import LANGUAGES
 from rehab.people.web.admin_base import ClinicForm
-from rehab.people.web.refusals import in_words
+from rehab.people.web.refusals import format_refusal
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import TEXT_MAX, VALENCES, Band
 
@@ -120,4 +120,4 @@ class BandFormSet(forms.BaseInlineFormSet):
         try:
             self.instance.to_valence("en", self.bands("en"))
         except InvalidSetting as problem:
-            raise ValidationError(in_words(problem)) from problem
+            raise ValidationError(format_refusal(problem)) from problem

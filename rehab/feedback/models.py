@@ -14,8 +14,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.wording import FALLBACK, words_in
 from rehab.people.models import Clinic
-from rehab.people.scope import ClinicRow, Scope, ScopedModel
-from rehab.people.web.refusals import in_words
+from rehab.people.scope import ClinicModel, Scope, ScopedModel
+from rehab.people.web.refusals import format_refusal
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import (
     POINTS_MAX,
@@ -32,7 +32,7 @@ from rehab.training.valences import (
 words_edited = Signal()
 
 
-class FeedbackType(ClinicRow):
+class FeedbackType(ClinicModel):
     """A clinic's own points, words, confetti and gestures for one of the rules' valences."""
 
     scope = Scope(clinic="clinic")
@@ -60,7 +60,7 @@ class FeedbackType(ClinicRow):
     cue_above = models.CharField(_("after five strong seconds"), max_length=32, blank=True)
     cue_below = models.CharField(_("after five weak seconds"), max_length=32, blank=True)
 
-    class Meta(ClinicRow.Meta):
+    class Meta(ClinicModel.Meta):
         verbose_name = _("feedback type")
         verbose_name_plural = _("feedback types")
         ordering: ClassVar = ["pk"]
@@ -78,7 +78,7 @@ class FeedbackType(ClinicRow):
         except KeyError:
             raise ValidationError({"slug": _("There is no such feedback type.")}) from None
         except InvalidSetting as problem:
-            raise ValidationError(in_words(problem)) from problem
+            raise ValidationError(format_refusal(problem)) from problem
 
     def to_valence(self, language: str, bands: Sequence[Band] | None = None) -> Valence:
         """Give it as the rules know it, worded in a language; its stored bands unless given.

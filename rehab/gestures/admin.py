@@ -14,8 +14,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.gestures.picture import draw
-from rehab.people.web.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
-from rehab.people.web.refusals import in_words
+from rehab.people.web.admin_base import LabeledFormSet, ScopedAdmin, ScopedOptions
+from rehab.people.web.refusals import format_refusal
 from robot.motion.dry_run import DryRun, dry_run, validate_gesture
 from robot.motion.gesture import TETHER_M
 from robot.motion.gesture_errors import BadGesture
@@ -24,7 +24,7 @@ from robot.motion.gesture_spec import MOVES_MAX, to_data
 WINDOW_S = 5.0  # what takes longer is still running when the next decision comes
 
 
-class StepFormSet(RowFormSet):
+class StepFormSet(LabeledFormSet):
     """The steps of one gesture, which must be one together."""
 
     def clean(self) -> None:
@@ -43,7 +43,7 @@ class StepFormSet(RowFormSet):
         try:
             validate_gesture(to_data("composed", [step.to_move() for step in kept]))
         except BadGesture as problem:
-            raise ValidationError(in_words(problem)) from problem
+            raise ValidationError(format_refusal(problem)) from problem
 
 
 class StepForm(forms.ModelForm):
@@ -98,7 +98,7 @@ class GestureAdmin(ScopedAdmin):
         try:
             return tell(dry_run(validate_gesture(gesture.to_data())))
         except BadGesture as problem:
-            return in_words(problem)
+            return format_refusal(problem)
 
     @admin.display(description=_("where it goes"))
     def picture(self, gesture: Gesture) -> str:
@@ -108,6 +108,6 @@ class GestureAdmin(ScopedAdmin):
         try:
             trial = dry_run(validate_gesture(gesture.to_data()))
         except BadGesture as problem:
-            return in_words(problem)
+            return format_refusal(problem)
         words = tell(trial)
         return format_html("{}<p>{}</p>", draw(gesture.to_moves(), trial, words), words)

@@ -10,13 +10,13 @@ from django.db import models
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
-from rehab.people.scope import ClinicRow, Scope, ScopedModel
-from rehab.people.web.refusals import in_words
+from rehab.people.scope import ClinicModel, Scope, ScopedModel
+from rehab.people.web.refusals import format_refusal
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gesture_spec import Move, check_name, to_data
 
 
-class Gesture(ClinicRow):
+class Gesture(ClinicModel):
     """Steps that a robot of the clinic can perform where a session's cue names them."""
 
     scope = Scope(clinic="clinic")
@@ -28,7 +28,7 @@ class Gesture(ClinicRow):
         _("name"), max_length=32, help_text=_("Letters, digits and hyphens: slow-wave.")
     )
 
-    class Meta(ClinicRow.Meta):
+    class Meta(ClinicModel.Meta):
         verbose_name = _("gesture")
         verbose_name_plural = _("gestures")
         ordering: ClassVar = ["name"]
@@ -44,7 +44,7 @@ class Gesture(ClinicRow):
         try:
             check_name(self.name)
         except BadGesture as problem:
-            raise ValidationError({"name": in_words(problem)}) from problem
+            raise ValidationError({"name": format_refusal(problem)}) from problem
 
     def to_moves(self) -> list[Move]:
         """Give the steps as a robot knows them."""

@@ -13,12 +13,12 @@ from rehab.people.api import Short, patients_of, store
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.people.web.api_base import (
-    Given,
     Page,
     Paging,
-    answers,
+    RequestBody,
     caller,
-    cut,
+    paginate,
+    responses,
 )
 from rehab.sessions.api import ORDERS, visible_sessions
 from rehab.sessions.formatting import clinic_time
@@ -27,7 +27,7 @@ from rehab.sessions.schemas import FeedbackType
 router = Router(tags=["The paper's calls"])
 
 
-class PaperUserGiven(Given):
+class PaperUserGiven(RequestBody):
     """A new user in the paper's words."""
 
     name: Short = Field(description="A nickname. The original kept real names; GARRY does not.")
@@ -61,14 +61,14 @@ class PaperFilter(Paging):
     feedback_type: FeedbackType | None = None
 
 
-@router.get("/users/{code}", response=answers(PaperUser, 404))
+@router.get("/users/{code}", response=responses(PaperUser, 404))
 @for_roles(Role.LEAD, Role.PT)
 def show_user(request: HttpRequest, code: Path[Short]) -> Patient:
     """Return a user by the ID that a PT would type."""
     return get_object_or_404(patients_of(caller(request)), code=code)
 
 
-@router.post("/users/{code}", response=answers(PaperUser, 409, code=201))
+@router.post("/users/{code}", response=responses(PaperUser, 409, code=201))
 @for_roles(Role.LEAD, Role.PT)
 def add_user(request: HttpRequest, code: Path[Short], given: PaperUserGiven) -> Status[Patient]:
     """Create a user with this ID."""
@@ -76,7 +76,7 @@ def add_user(request: HttpRequest, code: Path[Short], given: PaperUserGiven) -> 
     return Status(201, store(patient, {"code": code, "nickname": given.name}))
 
 
-@router.get("/users/{code}/sessions", response=answers(Page[PaperSession], 404))
+@router.get("/users/{code}/sessions", response=responses(Page[PaperSession], 404))
 @for_roles(Role.LEAD, Role.PT)
 def list_user_sessions(
     request: HttpRequest, code: Path[Short], wanted: Query[PaperFilter]
@@ -87,7 +87,7 @@ def list_user_sessions(
     sessions = visible_sessions(user).filter(patient=patient).select_related("clinic")
     if wanted.feedback_type:
         sessions = sessions.filter(valence=wanted.feedback_type)
-    page = cut(sessions.order_by(*ORDERS["best"]), wanted)
+    page = paginate(sessions.order_by(*ORDERS["best"]), wanted)
     return page | {"items": [to_paper_session(session) for session in page["items"]]}
 
 

@@ -7,7 +7,7 @@ from datetime import timedelta
 from zoneinfo import ZoneInfo
 
 from rehab.legacy.database import LegacyDatabase, LegacySession
-from rehab.people.consent.tombstones import is_kept_away
+from rehab.people.consent.tombstones import is_reimport_blocked
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
@@ -41,7 +41,9 @@ class Importer:
 
     def run(self) -> None:
         """Import everything that can be, except for participants who were erased here."""
-        erased = {pk for pk in self.database.participants if is_kept_away(self.clinic.pk, pk)}
+        erased = {
+            pk for pk in self.database.participants if is_reimport_blocked(self.clinic.pk, pk)
+        }
         self.erased["participants"] = len(erased)
         patients = {
             pk: self._import_participant(pk)
@@ -61,7 +63,7 @@ class Importer:
 
     def _import_participant(self, pk: int) -> Patient | None:
         own = Patient.everywhere.filter(clinic=self.clinic)
-        patient = own.filter(original_id=pk).first()
+        patient = own.filter(legacy_id=pk).first()
         if patient is not None:
             self.existing["participants"] += 1
             return patient
@@ -76,11 +78,11 @@ class Importer:
             code=f"{pk}",
             nickname=f"P{pk}",
             language=self.clinic.language,
-            original_id=pk,
+            legacy_id=pk,
         )
 
     def _import_session(self, found: LegacySession, patient: Patient) -> None:
-        before = TrainingSession.everywhere.filter(clinic=self.clinic, original_id=found.id).first()
+        before = TrainingSession.everywhere.filter(clinic=self.clinic, legacy_id=found.id).first()
         if before is not None and before.legacy_row == found.row:
             self.existing["sessions"] += 1
             return
@@ -121,7 +123,7 @@ class Importer:
             started_at=start,
             ended_at=start + timedelta(seconds=found.duration_s),
             active_s=found.duration_s,
-            original_id=found.id,
+            legacy_id=found.id,
             legacy_row=found.row,
         )
         if plan.valence.has_points and found.score is not None:

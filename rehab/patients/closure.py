@@ -11,7 +11,7 @@ from datetime import datetime
 from django.db import transaction
 from django.utils.translation import gettext as _
 
-from rehab.people.models import Ending, Patient
+from rehab.people.models import EndReason, Patient
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN_STATES
 
@@ -20,7 +20,7 @@ class SessionStillOpen(ValueError):
     """The patient has an open session, which must be ended first."""
 
 
-def end_program(patient: Patient, because: Ending, now: datetime) -> None:
+def end_program(patient: Patient, because: EndReason, now: datetime) -> None:
     """Take a patient off the lists; no session can be set up until it is reopened.
 
     Raises SessionStillOpen.
@@ -28,22 +28,22 @@ def end_program(patient: Patient, because: Ending, now: datetime) -> None:
     with transaction.atomic():
         lock_without_open_session(patient)
         if patient.erased_at is None:
-            patient.ended_at, patient.ended_because = now, because
-            patient.save(update_fields=["ended_at", "ended_because"])
+            patient.ended_at, patient.end_reason = now, because
+            patient.save(update_fields=["ended_at", "end_reason"])
 
 
 def reopen_program(patient: Patient) -> None:
     """Put a patient back on the lists, except for an erased one."""
     with transaction.atomic():
-        patient.hold()
+        patient.lock()
         if patient.erased_at is None:
-            patient.ended_at, patient.ended_because = None, ""
-            patient.save(update_fields=["ended_at", "ended_because"])
+            patient.ended_at, patient.end_reason = None, ""
+            patient.save(update_fields=["ended_at", "end_reason"])
 
 
 def lock_without_open_session(patient: Patient) -> None:
     """Lock the patient's row. Raises SessionStillOpen where a session could still go on."""
-    patient.hold()
+    patient.lock()
     sessions = TrainingSession.everywhere.filter(
         patient=patient, state__in=[state.value for state in OPEN_STATES]
     )

@@ -16,49 +16,54 @@ from rehab.patients.closure import lock_without_open_session
 from rehab.patients.visits import Visit
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
-from rehab.people.audit.history import HistoryEntry, forget_values
-from rehab.people.consent.models import Purpose, withdraw
-from rehab.people.consent.tombstones import keep_away
-from rehab.people.models import Clinic, Erasing, Patient, User, new_pseudonym
+from rehab.people.audit.history import HistoryEntry, erase_values
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import withdraw_consent
+from rehab.people.consent.tombstones import block_reimport
+from rehab.people.models import Clinic, ErasureReason, Patient, User, generate_pseudonym
 from rehab.sessions.corrections import anonymize_corrections
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import Remark, SessionEvent
 from rehab.sessions.models import TrainingSession
 
 
-def erase(patient: Patient, because: Erasing, by: User | None, now: datetime) -> None:
+def erase(patient: Patient, because: ErasureReason, by: User | None, now: datetime) -> None:
     """Erase everything that identifies a person, permanently. Raises SessionStillOpen."""
     with transaction.atomic():
         lock_without_open_session(patient)
         if patient.erased_at is not None:
             return  # somebody else has erased it meanwhile
-        withdraw(patient, Purpose.BOARDS, by, now)
+        withdraw_consent(patient, Purpose.BOARDS, by, now)
         known_as = patient.pseudonym
-        if patient.original_id is not None:
-            keep_away(patient.clinic_id, patient.original_id)
-        patient.pseudonym = patient.code = new_pseudonym()
+        if patient.legacy_id is not None:
+            block_reimport(patient.clinic_id, patient.legacy_id)
+        patient.pseudonym = patient.code = generate_pseudonym()
         patient.nickname = _("Erased")
-        patient.body_mass_kg = patient.original_id = patient.alias = None
+        patient.body_mass_kg = patient.legacy_id = patient.alias = None
         patient.ended_at = patient.ended_at or now
-        patient.erased_at, patient.erased_because = now, because
+        patient.erased_at, patient.erasure_reason = now, because
         patient.save()
         sessions = TrainingSession.everywhere.filter(patient=patient)
         # Sources may be files that are named after a person.
         sessions.update(source="", source_args=[], legacy_row=None)
         # The session is still marked as imported, but its original cannot be found.
-        sessions.filter(original_id__isnull=False).update(original_id=-1 * F("pk"))
+        sessions.filter(legacy_id__isnull=False).update(legacy_id=-1 * F("pk"))
         SessionEvent.everywhere.filter(
             session__patient=patient, kind__in=[remark.value for remark in Remark]
         ).update(data={})
         anonymize_corrections(patient, known_as)
         Visit.everywhere.filter(patient=patient).delete()
-        forget_values("Patient", patient.pk)
+        erase_values("Patient", patient.pk)
         LogEntry.objects.filter(
             content_type=ContentType.objects.get_for_model(Patient), object_id=str(patient.pk)
         ).update(object_repr=patient.pseudonym)
-        audit_log.forget_patient(patient.pk)
-        audit_log.note(
-            Act.ERASE, by, clinic=patient.clinic_id, about=str(Erasing(because).label), now=now
+        audit_log.anonymize_patient(patient.pk)
+        audit_log.record(
+            Act.ERASE,
+            by,
+            clinic=patient.clinic_id,
+            about=str(ErasureReason(because).label),
+            now=now,
         )
 
 
@@ -69,10 +74,10 @@ def patients_past_retention(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
     are older. Patients with a planned visit are not among them.
     """
     patients = Patient.everywhere.filter(clinic=clinic, erased_at=None, simulated=False)
-    if clinic.keep_months is None:
+    if clinic.retention_months is None:
         return patients.none()
     last = Greatest(Coalesce(Max("sessions__created_at"), "created_at"), "created_at")
-    before = months_before(now, clinic.keep_months)
+    before = months_before(now, clinic.retention_months)
     today = clinic_time(now, clinic).date()
     expected = Visit.everywhere.filter(patient=OuterRef("pk"), day__gte=today)
     kept = patients.annotate(last_here=last).filter(last_here__lt=before)
@@ -81,9 +86,9 @@ def patients_past_retention(clinic: Clinic, now: datetime) -> QuerySet[Patient]:
 
 def delete_old_logs(clinic: Clinic, now: datetime) -> int:
     """Delete entries that are older than a clinic keeps its logs; return how many."""
-    before = months_before(now, clinic.keep_log_months)
+    before = months_before(now, clinic.log_retention_months)
     changes, _each = HistoryEntry.everywhere.filter(clinic=clinic, at__lt=before).delete()
-    return changes + audit_log.forget_before(clinic.pk, before)
+    return changes + audit_log.delete_before(clinic.pk, before)
 
 
 def months_before(moment: datetime, months: int) -> datetime:

@@ -11,12 +11,13 @@ from django.db import transaction
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import clinic_of
-from rehab.people.consent.models import Purpose, give, join_boards, offered
-from rehab.people.forms import PatientRowForm
-from rehab.people.models import Boards, Ending, Erasing, Patient, User
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import offered_purposes, record_boards_consent, record_consent
+from rehab.people.forms import PatientFieldsForm
+from rehab.people.models import Boards, EndReason, ErasureReason, Patient, User
 
 
-class PatientForm(PatientRowForm):
+class PatientForm(PatientFieldsForm):
     """A patient of the PT's clinic, new or to be edited."""
 
     class Meta:
@@ -32,7 +33,7 @@ class PatientForm(PatientRowForm):
         if self.instance.is_new:
             self.fields["agrees"] = forms.MultipleChoiceField(
                 label=_("What the patient agrees to"),
-                choices=[(one.value, one.label) for one in offered(self.instance.clinic)],
+                choices=[(one.value, one.label) for one in offered_purposes(self.instance.clinic)],
                 required=False,
                 widget=forms.CheckboxSelectMultiple,
                 help_text=_(
@@ -55,13 +56,13 @@ class PatientForm(PatientRowForm):
             patient = super().save(commit)
             for purpose in map(Purpose, self.cleaned_data.get("agrees", [])):
                 if purpose is Purpose.BOARDS:
-                    join_boards(patient, Boards.CLINIC, self._by, self._now)
+                    record_boards_consent(patient, Boards.CLINIC, self._by, self._now)
                 else:
-                    give(patient, purpose, self._by, self._now)
+                    record_consent(patient, purpose, self._by, self._now)
         return patient
 
 
-class ScreenForm(PatientRowForm):
+class ScreenForm(PatientFieldsForm):
     """How the patient's page looks and sounds for this patient."""
 
     class Meta:
@@ -74,7 +75,7 @@ class EndingForm(forms.Form):
     """Why the program ends."""
 
     because = forms.ChoiceField(
-        label=_("Why?"), choices=Ending.choices, initial=Ending.DONE, widget=forms.RadioSelect
+        label=_("Why?"), choices=EndReason.choices, initial=EndReason.DONE, widget=forms.RadioSelect
     )
 
 
@@ -83,7 +84,9 @@ class ErasingForm(forms.Form):
 
     because = forms.ChoiceField(
         label=_("Why?"),
-        choices=[choice for choice in Erasing.choices if choice[0] != Erasing.RETENTION],
+        choices=[
+            choice for choice in ErasureReason.choices if choice[0] != ErasureReason.RETENTION
+        ],
         widget=forms.RadioSelect,
     )
     code = forms.CharField(

@@ -12,7 +12,7 @@ from django.db.models import Count
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.scope import ClinicRow, Scope
+from rehab.people.scope import ClinicModel, Scope
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.today import IS_OPEN, todays_sessions
@@ -22,7 +22,7 @@ SOON_DAYS = (0, 1, 2, 7)  # days from today that one tap plans
 QUARTER_MIN = 15
 
 
-class Visit(ClinicRow):
+class Visit(ClinicModel):
     """A day, and perhaps a time, on which a patient is expected."""
 
     scope = Scope(clinic="clinic")
@@ -36,7 +36,7 @@ class Visit(ClinicRow):
     day = models.DateField(_("day"))
     at = models.TimeField(_("time"), null=True, blank=True)
 
-    class Meta(ClinicRow.Meta):
+    class Meta(ClinicModel.Meta):
         verbose_name = _("visit")
         ordering: ClassVar = ["day", "at", "pk"]
         indexes: ClassVar = [models.Index(fields=["clinic", "day"], name="visit_by_clinic_and_day")]

@@ -1,7 +1,7 @@
-"""Who may open a page: every view says so, and one that does not is closed to all.
+"""Who may open a page: every view declares it, and a view that does not is closed to all.
 
 `@public` opens a view to strangers, `@for_roles(Role.PT, …)` to signed-in people of these roles.
-Which rows they then see is `visible_to`'s business. The admin guards itself (`ScopedAdmin`).
+Which rows they see is decided by `visible_to`. The admin checks access itself (`ScopedAdmin`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ PUBLIC: frozenset[Role] = frozenset()
 
 
 class UndeclaredView(PermissionDenied):
-    """A view that does not say who may open it."""
+    """A view that does not declare who may open it."""
 
 
 def public(view: Open) -> Open:
@@ -36,80 +36,86 @@ def public(view: Open) -> Open:
 
 
 def for_roles(
-    *roles: Role, tablets: bool = False, setting_up: bool = False, patients: bool = True
+    *roles: Role, tablets: bool = False, enrolling: bool = False, patients: bool = True
 ) -> Callable[[Open], Open]:
-    """Open a view to signed-in people of these roles, to paired ``tablets``, and to people who
-    have to set up a second factor before they are signed in (``setting_up``).
+    """Open a view to signed-in people of these roles.
 
-    ``patients``: whether it may show anything of patients, so that opening it is noted.
+    Parameters
+    ----------
+    tablets
+        Paired tablets may open it as well.
+    enrolling
+        So may people who have to enroll a second factor before they are signed in.
+    patients
+        It may show data of patients, so opening it is recorded in the audit log.
     """
 
     def declare(view: Open) -> Open:
         view.access = frozenset(roles)  # type: ignore[attr-defined]
         view.tablets = tablets  # type: ignore[attr-defined]
-        view.setting_up = setting_up  # type: ignore[attr-defined]
+        view.enrolling = enrolling  # type: ignore[attr-defined]
         view.patients = patients  # type: ignore[attr-defined]
         return view
 
     return declare
 
 
-def person(request: HttpRequest) -> User:
-    """Give the signed-in person. Raises PermissionDenied for a stranger."""
+def user_of(request: HttpRequest) -> User:
+    """Return the signed-in person. Raises PermissionDenied for a stranger."""
     if not isinstance(request.user, User):
         raise PermissionDenied
     return request.user
 
 
 def tablet_of(request: HttpRequest) -> Any:
-    """Give the paired tablet that a request comes from; None for any other browser."""
+    """Return the paired tablet of a request; None for any other browser."""
     return getattr(request, "tablet", None)
 
 
 def actor_of(request: HttpRequest) -> Any:
-    """Give whose eyes a page is for: the person who is signed in, or else the tablet."""
+    """Return who will see a page: the signed-in person, else the tablet."""
     return request.user if request.user.is_authenticated else tablet_of(request)
 
 
 def clinic_of(user: User) -> Clinic:
-    """Give somebody's clinic. Raises PermissionDenied for a host, who has none."""
+    """Return a person's clinic. Raises PermissionDenied for a host, who has none."""
     if user.clinic is None:
         raise PermissionDenied
     return user.clinic
 
 
 def _is_guarded(request: HttpRequest) -> bool:
-    """Whether not everyone may open what was asked for: a page, or a call of the API."""
+    """Return whether the page or API call of a request is not public."""
     match = request.resolver_match
     opened = getattr(request, "call", match and match.func)
     return getattr(opened, "access", PUBLIC) != PUBLIC
 
 
-def _forbid_keeping(response: HttpResponseBase) -> None:
-    """Let nobody but the server keep it: going back after the sign-out shows nothing."""
+def _forbid_caching(response: HttpResponseBase) -> None:
+    """Forbid browsers to store a response: going back after the sign-out shows nothing."""
     if not response.has_header("Cache-Control"):
         patch_cache_control(response, private=True, no_store=True)
 
 
 class AccessMiddleware:
-    """Holds every view to what it declared, and notes who saw what. Sync; it keeps no state."""
+    """Enforces what views declare, and records who saw what. Sync; it keeps no state."""
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
         self.get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponseBase:
-        """Pass the request on; what it changes is its doing, and what it shows is noted."""
-        with history.acting(request):
+        """Pass the request on; attribute its changes and record what it showed."""
+        with history.attribute_changes_to(request):
             response = self.get_response(request)
-        access_log.note_request(request, response, timezone.now())
+        access_log.record_request(request, response, timezone.now())
         if _is_guarded(request):
-            _forbid_keeping(response)
+            _forbid_caching(response)
         return response
 
     def process_view(
         self, request: HttpRequest, view: View, args: Any, kwargs: Any
     ) -> HttpResponseBase | None:
-        """Let the view run, send to the login, or refuse."""
+        """Let the view run, redirect to the sign-in, or refuse."""
         match = request.resolver_match
         if match is not None and match.app_names == ["admin"]:
             return None
@@ -126,7 +132,7 @@ class AccessMiddleware:
             return None
         if getattr(view, "tablets", False) and tablet_of(request) is not None:
             return None
-        if getattr(view, "setting_up", False) and flow.setting_up(request, timezone.now()):
+        if getattr(view, "enrolling", False) and flow.pending_enrollment(request, timezone.now()):
             return None
         if not user.is_authenticated:
             return redirect_to_login(request.get_full_path())

@@ -21,16 +21,22 @@ from django.utils.html import format_html
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.access import person
-from rehab.people.aliases import say_alias
-from rehab.people.audit.audit_log import Act, note_safety
+from rehab.people.access import user_of
+from rehab.people.aliases import format_alias
+from rehab.people.audit.audit_log import Act, record_security_change
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.networks import client_address
 from rehab.people.pages.sign_in import sign_out
 from rehab.people.roles import Role
 from rehab.people.sign_in import factors, lockout
 from rehab.people.sign_in.tokens import ApiToken
-from rehab.people.web.admin_base import RowAdmin, ScopedAdmin, ScopedOptions, TokenAdmin, rights
+from rehab.people.web.admin_base import (
+    ScopedAdmin,
+    ScopedOptions,
+    TokenAdmin,
+    TrackedAdmin,
+    rights_for,
+)
 
 admin.site.site_header = "GARRY"
 admin.site.site_title = "GARRY"
@@ -38,37 +44,37 @@ admin.site.index_title = "Clinic"
 admin.site.unregister(Group)  # rights come from roles
 
 
-def to_sign_in(request: HttpRequest, extra_context: Any = None) -> HttpResponseBase:
-    """Send to the one page where everybody signs in."""
+def redirect_to_sign_in(request: HttpRequest, extra_context: Any = None) -> HttpResponseBase:
+    """Redirect to the page where everybody signs in."""
     return redirect_to_login(request.GET.get("next", "") or reverse("admin:index"))
 
 
-def to_own_password(request: HttpRequest, extra_context: Any = None) -> HttpResponseBase:
-    """Send to the one page where people change their own password."""
+def redirect_to_own_password(request: HttpRequest, extra_context: Any = None) -> HttpResponseBase:
+    """Redirect to the page where people change their own password."""
     return redirect("own-password")
 
 
-# One door: the admin's own pages for these know no second factor.
-admin.site.login = to_sign_in  # type: ignore[assignment]
+# The admin's own pages for these know no second factor.
+admin.site.login = redirect_to_sign_in  # type: ignore[assignment]
 admin.site.logout = sign_out  # type: ignore[assignment]
-admin.site.password_change = to_own_password  # type: ignore[assignment]
+admin.site.password_change = redirect_to_own_password  # type: ignore[assignment]
 
 
 @admin.register(Clinic)
 class ClinicAdmin(ScopedAdmin):
-    """Clinics: the host adds them, a lead keeps the details of the own one."""
+    """Clinics: the host adds them, a lead edits the own one."""
 
     list_display = ("name", "language", "time_zone", "second_factor_required", "boards_across")
     search_fields = ("name",)
     fields = (
         *("name", "language", "time_zone", "boards_across", "second_factor_required"),
         *("care_needs_consent", "research_needs_consent", "networks"),
-        *("keep_months", "keep_log_months"),
+        *("retention_months", "log_retention_months"),
     )
 
 
 class NewAccountForm(AdminUserCreationForm):
-    """Django's form for a new account; names are taken server-wide."""
+    """Django's form for a new account; names are unique on the whole server."""
 
     class Meta(AdminUserCreationForm.Meta):
         model = User
@@ -82,8 +88,8 @@ class NewAccountForm(AdminUserCreationForm):
 
 
 @admin.register(User)
-class AccountAdmin(ScopedOptions, RowAdmin, UserAdmin):
-    """Accounts: a lead keeps those of the own clinic, a host all of them."""
+class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
+    """Accounts: a lead manages those of the own clinic, a host all of them."""
 
     list_display = (
         "username",
@@ -104,12 +110,12 @@ class AccountAdmin(ScopedOptions, RowAdmin, UserAdmin):
 
     @admin.action(description=_("Unlock after too many wrong tries"), permissions=["change"])
     def unlock(self, request: HttpRequest, accounts: QuerySet[User]) -> None:
-        """Let the chosen accounts try again at once."""
+        """End the lockouts of the chosen accounts."""
         for account in accounts:
             with transaction.atomic():
-                by, address = person(request), client_address(request)
-                note_safety(Act.UNLOCK, by, account, address, timezone.now())
-                lockout.forgive(account)
+                by, address = user_of(request), client_address(request)
+                record_security_change(Act.UNLOCK, by, account, address, timezone.now())
+                lockout.reset_attempts(account)
         words = gettext("Accounts that may try again: %(count)s.")
         messages.success(request, words % {"count": accounts.count()})
 
@@ -117,12 +123,12 @@ class AccountAdmin(ScopedOptions, RowAdmin, UserAdmin):
         description=_("Remove second factors (lost phone or key)"), permissions=["change"]
     )
     def remove_second_factors(self, request: HttpRequest, accounts: QuerySet[User]) -> None:
-        """Take the chosen accounts back to their passwords alone."""
+        """Remove all second factors of the chosen accounts."""
         for account in accounts:
             with transaction.atomic():
-                by, address = person(request), client_address(request)
-                note_safety(Act.FACTORS, by, account, address, timezone.now())
-                factors.forget_all(account)
+                by, address = user_of(request), client_address(request)
+                record_security_change(Act.FACTORS, by, account, address, timezone.now())
+                factors.remove_second_factors(account)
         words = gettext(
             "%(count)s account(s) sign in by password alone now, or set up a new second "
             "factor where the clinic asks for one. If a phone was stolen, give a new password too."
@@ -130,26 +136,26 @@ class AccountAdmin(ScopedOptions, RowAdmin, UserAdmin):
         messages.warning(request, words % {"count": accounts.count()})
 
     def has_module_permission(self, request: HttpRequest) -> bool:
-        """Whether accounts are on the front page."""
-        return bool(rights(request, User))
+        """Return whether accounts are on the front page."""
+        return bool(rights_for(request, User))
 
     def get_fieldsets(self, request: HttpRequest, obj: Any = None) -> Any:
-        """Give the fields; only a host, who has no clinic, chooses one."""
-        works = ("role", "clinic") if person(request).role == Role.HOST else ("role",)
+        """Return the fields; only a host, who has no clinic, chooses one."""
+        work = ("role", "clinic") if user_of(request).role == Role.HOST else ("role",)
         if obj is None:
             passwords = ("usable_password", "password1", "password2")
-            return [(None, {"fields": ("username", *passwords, *works)})]
+            return [(None, {"fields": ("username", *passwords, *work)})]
         return [
-            (None, {"fields": ("username", "password", *works, "is_active")}),
+            (None, {"fields": ("username", "password", *work, "is_active")}),
             (_("Person"), {"fields": ("first_name", "last_name", "email")}),
         ]
 
     def get_form(
         self, request: HttpRequest, obj: Any = None, change: bool = False, **kwargs: Any
     ) -> Any:
-        """Give the form; a lead's new account is of the lead's own clinic."""
+        """Return the form; a lead's new account belongs to the lead's own clinic."""
         form: Any = super().get_form(request, obj, change=change, **kwargs)
-        clinic_id = person(request).clinic_id
+        clinic_id = user_of(request).clinic_id
         if clinic_id is None:
             return form
 
@@ -161,15 +167,15 @@ class AccountAdmin(ScopedOptions, RowAdmin, UserAdmin):
         return OfClinic
 
     def formfield_for_choice_field(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
-        """Offer the roles that this person may give: only a host makes hosts."""
-        if db_field.name == "role" and person(request).role != Role.HOST:
+        """Offer the roles that this person may assign: only a host creates hosts."""
+        if db_field.name == "role" and user_of(request).role != Role.HOST:
             kwargs["choices"] = [choice for choice in Role.choices if choice[0] != Role.HOST]
         return super().formfield_for_choice_field(db_field, request, **kwargs)
 
 
 @admin.register(ApiToken)
 class ApiTokenAdmin(TokenAdmin):
-    """What lets programs use the API."""
+    """API tokens of programs."""
 
     list_display = ("name", "user", "role", "created_at", "last_seen_at", "revoked_at")
     list_filter = ("role", "last_seen_at", "revoked_at")
@@ -192,7 +198,7 @@ class PatientAdmin(ScopedAdmin):
     )
     list_filter = ("paretic_side", "boards", "blinded", "simulated", "language", "created_at")
     list_select_related = ("clinic",)
-    ordering = ("nickname", "code")  # rows that are counted with others have no order of their own
+    ordering = ("nickname", "code")  # rows with aggregates lose the model's ordering
     search_fields = ("nickname", "code")
     fields = (
         "code",
@@ -215,51 +221,51 @@ class PatientAdmin(ScopedAdmin):
     actions = row_actions = ("draw_aliases",)
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Any]:
-        """Give the visible patients with how often and when they were here last."""
+        """Return the visible patients with the number of sessions and the last visit."""
         rows: QuerySet[Any] = (
             super()
             .get_queryset(request)
-            .annotate(walks=Count("sessions"), last_visit=Max("sessions__created_at"))
+            .annotate(sessions_total=Count("sessions"), last_visit=Max("sessions__created_at"))
         )
         return rows
 
     def get_object(self, request: HttpRequest, object_id: str, from_field: Any = None) -> Any:
-        """Find a patient; one who is about to be changed is held, so that no erasing is undone."""
+        """Return a patient, locked before a change, so that no erasure is undone."""
         patient = super().get_object(request, object_id, from_field)
         if patient is not None and request.method == "POST" and connection.in_atomic_block:
-            patient.hold()
+            patient.lock()
         return patient
 
     def save_model(self, request: HttpRequest, obj: Any, form: Any, change: bool) -> None:
-        """Store what the form asked for."""
+        """Save the changed fields alone."""
         if change:
-            obj.keep(*form.changed_data)
+            obj.save_fields(*form.changed_data)
         else:
             super().save_model(request, obj, form, change)
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
-        """Lead to where the patient walks, and to what was walked."""
+        """Return links to start a session, to past sessions and to consent."""
         return [
             (reverse("patient", args=[row.pk]), _("Start a session")),
             (reverse("history", args=[row.pk]), _("Past sessions")),
             (reverse("consent", args=[row.pk]), _("Consent")),
         ]
 
-    @admin.display(description=_("sessions"), ordering="walks")
+    @admin.display(description=_("sessions"), ordering="sessions_total")
     def session_count(self, patient: Any) -> int:
-        """Count the sessions."""
-        count: int = patient.walks
+        """Return the number of sessions."""
+        count: int = patient.sessions_total
         return count
 
     @admin.display(description=_("last here"), ordering="last_visit")
     def last_here(self, patient: Any) -> Any:
-        """Give the day of the last session by the clinic's clock."""
+        """Return the date of the last session in the clinic's time zone."""
         zone = ZoneInfo(patient.clinic.time_zone)
         return patient.last_visit and patient.last_visit.astimezone(zone).date()
 
     @admin.display(description=_("leaderboards"))
     def boards_agreed(self, patient: Patient) -> Any:
-        """Say on which boards the patient agrees to stand, and where that is noted."""
+        """Return the boards the patient has consented to, with a link to the consent page."""
         if patient.is_new:
             return _("Noted on the patient's consent page, once the patient is here.")
         return format_html(
@@ -271,15 +277,15 @@ class PatientAdmin(ScopedAdmin):
 
     @admin.display(description=_("animal name"))
     def animal_name(self, patient: Patient) -> str:
-        """Say what the patient is called on boards."""
-        return say_alias(patient.alias) if patient.alias else "–"
+        """Return the patient's alias on boards."""
+        return format_alias(patient.alias) if patient.alias else "–"
 
     @admin.action(description=_("Draw new animal names for boards"), permissions=["change"])
     def draw_aliases(self, request: HttpRequest, patients: QuerySet[Patient]) -> None:
-        """Give the chosen patients other names on boards."""
+        """Draw new aliases for the chosen patients."""
         drawn = list(patients.filter(erased_at=None))
         for patient in drawn:
             patient.draw_alias()
-            patient.keep("alias")
+            patient.save_fields("alias")
         names = ", ".join(f"{patient.nickname}: {self.animal_name(patient)}" for patient in drawn)
         messages.success(request, gettext("New names on boards. %(names)s") % {"names": names})

@@ -1,4 +1,4 @@
-"""What patients are called where others can see it: a friendly name that says nothing of them."""
+"""Aliases of patients on boards: friendly names that reveal nothing about them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 from django.utils.translation import gettext, gettext_noop
 
-# Everyday words, easy to say and to read after a stroke; none says anything of a body, an age or a
-# skin, and no animal is an insult. A translation has as many, in the same order; names are kept in
-# English, and each page says them in its language. A manner goes with every animal there.
+# Everyday words, easy to say and to read after a stroke; none describes a body, an age or a skin,
+# and no animal is an insult. A translation has as many, in the same order, and every manner fits
+# every animal: names are stored in English and shown in the language of the page.
 MANNERS = gettext_noop(
     "Amber, Blue, Brave, Bright, Calm, Cheery, Clever, Coral, Gentle, Golden, Green, Happy, Jolly, "
     "Keen, Kind, Lucky, Merry, Mighty, Noble, Orange, Proud, Purple, Quick, Quiet, Red, Silver, "
@@ -21,34 +21,34 @@ ANIMALS = gettext_noop(
     "Moose, Newt, Otter, Owl, Panda, Parrot, Pelican, Penguin, Puffin, Rabbit, Raven, Robin, "
     "Salmon, Seal, Sparrow, Squirrel, Stork, Swan, Tiger, Trout, Turtle, Wolf, Wren, Yak, Zebra"
 )
-TRIES = 20
+MAX_DRAWS = 20
 
 
 def draw_alias(is_taken: Callable[[str], bool]) -> str:
-    """Draw a name that nobody has; with a number once the plain ones become rare."""
-    for attempt in range(TRIES):
-        name = f"{secrets.choice(words(MANNERS))} {secrets.choice(words(ANIMALS))}"
-        if attempt >= TRIES // 2:
+    """Draw a name that is not taken; with a number once the plain ones become rare."""
+    for attempt in range(MAX_DRAWS):
+        name = f"{secrets.choice(split_list(MANNERS))} {secrets.choice(split_list(ANIMALS))}"
+        if attempt >= MAX_DRAWS // 2:
             name += f" {secrets.randbelow(9998) + 2}"
         if not is_taken(name):
             return name
-    raise RuntimeError("No free name for boards was found. Try again.")
+    raise RuntimeError("No free alias was found. Try again.")
 
 
-def say_alias(alias: str) -> str:
-    """Give a name as it is said in the language of the page."""
+def format_alias(alias: str) -> str:
+    """Return a name in the language of the page."""
     try:
         manner, animal, *number = alias.split()
-        said = {
-            "manner": words(gettext(MANNERS))[words(MANNERS).index(manner)],
-            "animal": words(gettext(ANIMALS))[words(ANIMALS).index(animal)],
+        translated = {
+            "manner": split_list(gettext(MANNERS))[split_list(MANNERS).index(manner)],
+            "animal": split_list(gettext(ANIMALS))[split_list(ANIMALS).index(animal)],
         }
     except ValueError:  # drawn by an older version, from other words
         return alias
     # Translators: of an animal name such as Brave Otter
-    return " ".join([gettext("%(manner)s %(animal)s") % said, *number])
+    return " ".join([gettext("%(manner)s %(animal)s") % translated, *number])
 
 
-def words(text: str) -> list[str]:
-    """Give the words of one of the lists."""
+def split_list(text: str) -> list[str]:
+    """Return the words of one of the lists."""
     return text.split(", ")

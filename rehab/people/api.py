@@ -1,4 +1,4 @@
-"""Calls about people: who calls, and the clinic's patients (the paper's users)."""
+"""API calls about people: the caller, and the clinic's patients (the paper's users)."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from rehab.people.access import clinic_of, for_roles
 from rehab.people.models import LANGUAGES, Patient, User
 from rehab.people.roles import Role
 from rehab.people.web.api_base import (
-    Given,
     Key,
     Page,
     Paging,
     Rejected,
-    Words,
-    answers,
+    RequestBody,
+    TextLine,
     caller,
-    cut,
-    left_out,
-    say_errors,
-    sees_names,
+    format_errors,
+    may_see_names,
+    optional,
+    paginate,
+    responses,
 )
 from rehab.training.steps import Side
 
 router = Router(tags=["People"])
 
-Short = Annotated[Words, Field(max_length=32)]
+Short = Annotated[TextLine, Field(max_length=32)]
 Language = Annotated[str, Field(json_schema_extra={"enum": [code for code, _ in LANGUAGES]})]
 
 
 class Me(Schema):
-    """Who calls."""
+    """The person who calls."""
 
     username: str
     role: Role
@@ -46,12 +46,12 @@ class Me(Schema):
 
     @staticmethod
     def resolve_clinic(user: User) -> str | None:
-        """Give the clinic's name; a host has none."""
+        """Return the clinic's name; a host has none."""
         return None if user.clinic is None else user.clinic.name
 
 
 class PatientName(Schema):
-    """Who somebody is to the caller. Researchers get the pseudonym and nothing else."""
+    """How a patient is named to the caller. Researchers get the pseudonym alone."""
 
     pseudonym: str
     id: int | None
@@ -60,18 +60,18 @@ class PatientName(Schema):
 
     @staticmethod
     def resolve_id(patient: Patient, context: Any) -> int | None:
-        """Give the key where it leads somewhere."""
-        return patient.pk if sees_names(context) else None
+        """Return the key, for callers who may see names."""
+        return patient.pk if may_see_names(context) else None
 
     @staticmethod
     def resolve_code(patient: Patient, context: Any) -> str | None:
-        """Give the clinic's own number."""
-        return patient.code if sees_names(context) else None
+        """Return the clinic's own code, for callers who may see names."""
+        return patient.code if may_see_names(context) else None
 
     @staticmethod
     def resolve_nickname(patient: Patient, context: Any) -> str | None:
-        """Give what the screens say."""
-        return patient.nickname if sees_names(context) else None
+        """Return the nickname on the screens, for callers who may see names."""
+        return patient.nickname if may_see_names(context) else None
 
 
 class PatientOut(PatientName):
@@ -85,21 +85,21 @@ class PatientOut(PatientName):
 
     @staticmethod
     def resolve_paretic_side(patient: Patient) -> str | None:
-        """Give the side; null where nobody has said."""
+        """Return the side; null where it is not set."""
         return patient.paretic_side or None
 
 
-class PatientChanges(Given):
-    """What may be changed of a patient; what is left out stays."""
+class PatientChanges(RequestBody):
+    """Changes of a patient; omitted fields stay."""
 
-    code: Short = left_out(description="The clinic's own number, never a name.")
-    nickname: Short = left_out(description="What the screens say, never a full name.")
-    paretic_side: Side = left_out(strict=False)
+    code: Short = optional(description="The clinic's own number, never a name.")
+    nickname: Short = optional(description="What the screens say, never a full name.")
+    paretic_side: Side = optional(strict=False)
     body_mass_kg: float | None = Field(None, ge=10, le=300)
-    language: Language = left_out()
+    language: Language = optional()
 
 
-class PatientGiven(PatientChanges):
+class PatientIn(PatientChanges):
     """A new patient."""
 
     code: Short = Field(description="The clinic's own number, never a name.")
@@ -107,18 +107,18 @@ class PatientGiven(PatientChanges):
 
 
 class PatientFilter(Paging):
-    """Which patients are wanted."""
+    """Filters of a list of patients."""
 
     code: Short | None = None
 
 
 def patients_of(user: User) -> QuerySet[Patient]:
-    """Give the patients that somebody sees, by age of their file."""
+    """Return the patients that a person sees, oldest first."""
     return Patient.objects.visible_to(user).order_by("pk")
 
 
 def store(patient: Patient, values: dict[str, Any]) -> Patient:
-    """Fill a patient in and save; of one who is here these values alone.
+    """Set these values of a patient and save them; of a stored one these fields alone.
 
     Raises Rejected for what the model refuses.
     """
@@ -130,47 +130,47 @@ def store(patient: Patient, values: dict[str, Any]) -> Patient:
             if patient.is_new:
                 patient.save()
             else:
-                patient.keep(*values)
+                patient.save_fields(*values)
     except ValidationError as problem:
-        raise Rejected(say_errors(problem.message_dict)) from problem
-    except IntegrityError as problem:  # somebody else was quicker
+        raise Rejected(format_errors(problem.message_dict)) from problem
+    except IntegrityError as problem:  # another request was faster
         raise Rejected({"code": "This code has just been taken."}) from problem
     return patient
 
 
-@router.get("/me", response=answers(Me))
+@router.get("/me", response=responses(Me))
 @for_roles(*Role, patients=False)
 def show_me(request: HttpRequest) -> User:
-    """Say whom the token or the browser speaks for."""
+    """Show the person of the token or browser."""
     return caller(request)
 
 
-@router.get("/patients", response=answers(Page[PatientOut]))
+@router.get("/patients", response=responses(Page[PatientOut]))
 @for_roles(Role.LEAD, Role.PT)
-def list_patients(request: HttpRequest, wanted: Query[PatientFilter]) -> dict[str, Any]:
+def list_patients(request: HttpRequest, filters: Query[PatientFilter]) -> dict[str, Any]:
     """List the clinic's patients. Researchers find sessions by pseudonym instead."""
     patients = patients_of(caller(request))
-    return cut(patients.filter(code=wanted.code) if wanted.code else patients, wanted)
+    return paginate(patients.filter(code=filters.code) if filters.code else patients, filters)
 
 
-@router.post("/patients", response=answers(PatientOut, 409, code=201))
+@router.post("/patients", response=responses(PatientOut, 409, code=201))
 @for_roles(Role.LEAD, Role.PT)
-def add_patient(request: HttpRequest, given: PatientGiven) -> Status[Patient]:
-    """Take a new patient in."""
+def add_patient(request: HttpRequest, body: PatientIn) -> Status[Patient]:
+    """Add a patient."""
     patient = Patient(clinic=clinic_of(caller(request)))
-    return Status(201, store(patient, given.model_dump(mode="json", exclude_unset=True)))
+    return Status(201, store(patient, body.model_dump(mode="json", exclude_unset=True)))
 
 
-@router.get("/patients/{patient_id}", response=answers(PatientOut, 404))
+@router.get("/patients/{patient_id}", response=responses(PatientOut, 404))
 @for_roles(Role.LEAD, Role.PT)
 def show_patient(request: HttpRequest, patient_id: Path[Key]) -> Patient:
     """Show a patient."""
     return get_object_or_404(patients_of(caller(request)), pk=patient_id)
 
 
-@router.patch("/patients/{patient_id}", response=answers(PatientOut, 404, 409))
+@router.patch("/patients/{patient_id}", response=responses(PatientOut, 404, 409))
 @for_roles(Role.LEAD, Role.PT)
-def change_patient(request: HttpRequest, patient_id: Path[Key], given: PatientChanges) -> Patient:
-    """Mend what is written of a patient."""
+def change_patient(request: HttpRequest, patient_id: Path[Key], body: PatientChanges) -> Patient:
+    """Change fields of a patient."""
     patient = get_object_or_404(patients_of(caller(request)), pk=patient_id)
-    return store(patient, given.model_dump(mode="json", exclude_unset=True))
+    return store(patient, body.model_dump(mode="json", exclude_unset=True))

@@ -1,4 +1,4 @@
-"""Admin of the logs: a clinic's lead reads who looked at what, and who changed what."""
+"""Admin of the audit log and the change history, for the leads of a clinic."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from django.utils.translation import gettext_lazy
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.roles import Role
-from rehab.people.web.admin_base import ReadOnlyAdmin, rights
+from rehab.people.web.admin_base import ReadOnlyAdmin, rights_for
 
 
 class LogAdmin(ReadOnlyAdmin):
-    """Pages of a log of the whole clinic, which only its leads look through."""
+    """Pages of a log of the whole clinic, for its leads alone."""
 
     date_hierarchy = "at"
     list_per_page = 100
 
     def has_module_permission(self, request: HttpRequest) -> bool:
-        """Put it on the leads' front page."""
-        return bool(rights(request, self.model)) and self._leads(request)
+        """Return whether the log is on the front page: it is for leads."""
+        return bool(rights_for(request, self.model)) and self._leads(request)
 
     def has_view_permission(self, request: HttpRequest, obj: Any = None) -> bool:
-        """Whether the log may be looked through."""
+        """Return whether the log may be read."""
         return self._leads(request) and super().has_view_permission(request, obj)
 
     @staticmethod
@@ -37,7 +37,7 @@ class LogAdmin(ReadOnlyAdmin):
 
     @admin.display(description=gettext_lazy("who"), ordering="by")
     def who(self, entry: Any) -> str:
-        """Give the person, and the program or device by which."""
+        """Return the person, and the program or device used."""
         names = [str(entry.by)] if entry.by else []
         names += [entry.through] if entry.through else []
         return " · ".join(names) or _("the server")
@@ -45,7 +45,7 @@ class LogAdmin(ReadOnlyAdmin):
 
 @admin.register(AuditEntry)
 class AuditAdmin(LogAdmin):
-    """Who looked at patients' data, took it out, or gave a robot orders."""
+    """Who looked at or exported patients' data, or commanded a robot."""
 
     list_display = ("at", "who", "act", "patient", "about", "address")
     list_filter: ClassVar[Any] = (
@@ -59,15 +59,15 @@ class AuditAdmin(LogAdmin):
 
 @admin.register(HistoryEntry)
 class HistoryAdmin(LogAdmin):
-    """Who changed what of people and settings. Each row's own page shows its changes in words."""
+    """Who changed people and settings. Each row's own page shows its changes in full."""
 
-    list_display = ("at", "who", "kind", "noun", "row", "what")
-    list_filter: ClassVar[Any] = ("kind", "noun", ("by", RelatedOnlyFieldListFilter))
+    list_display = ("at", "who", "kind", "model_name", "object_id", "fields_changed")
+    list_filter: ClassVar[Any] = ("kind", "model_name", ("by", RelatedOnlyFieldListFilter))
     list_select_related = ("by",)
 
     @admin.display(description=gettext_lazy("fields"))
-    def what(self, entry: HistoryEntry) -> str:
-        """Name the fields."""
-        fields = apps.get_model("rehab", entry.noun)._meta.get_fields()
+    def fields_changed(self, entry: HistoryEntry) -> str:
+        """Return the names of the fields."""
+        fields = apps.get_model("rehab", entry.model_name)._meta.get_fields()
         names = {field.name: str(getattr(field, "verbose_name", field.name)) for field in fields}
-        return ", ".join(names.get(name, name) for name in entry.values)
+        return ", ".join(names.get(name, name) for name in entry.changes)

@@ -1,4 +1,4 @@
-"""What people type to come in, and about their own account."""
+"""Forms for patients and for the consent text."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.models import Patient
 
 
-class PatientRowForm(forms.ModelForm):
-    """What is written of a patient. Of one who is here it stores its own fields, nothing else."""
+class PatientFieldsForm(forms.ModelForm):
+    """Fields of a patient. Of one who is stored already it saves its own fields alone."""
 
     instance: Patient
 
     def save(self, commit: bool = True) -> Patient:
-        """Store the patient. Raises PersonErased, and IntegrityError where a code is taken."""
+        """Store the patient. Raises PatientErased, and IntegrityError where a code is taken."""
         if self.instance.is_new:
             patient: Patient = super().save(commit)
             return patient
-        self.instance.keep(*self.fields)
+        self.instance.save_fields(*self.fields)
         return self.instance
 
-    def keep(self) -> bool:
-        """Store the patient, or say in ``errors`` what hinders; whatever others do meanwhile."""
+    def save_or_report(self) -> bool:
+        """Save a valid form. Return whether it worked; ``errors`` has the reason if it did not."""
         if not self.is_valid():
             return False
         try:
@@ -33,19 +33,19 @@ class PatientRowForm(forms.ModelForm):
         except ValidationError as problem:
             self.add_error(None, problem)
         except IntegrityError:
-            self.full_clean()  # somebody was quicker, and is found now
+            self.full_clean()  # another request has taken the code meanwhile; it is found now
             if self.is_valid():
                 raise
         return self.is_valid()
 
 
 class ConsentTextForm(forms.Form):
-    """The words that patients agree to."""
+    """The text that patients agree to."""
 
     text = forms.CharField(
         label=_("Words"), max_length=10_000, widget=forms.Textarea(attrs={"rows": 18})
     )
 
     def clean_text(self) -> str:
-        """Keep line ends as everybody else writes them."""
+        """Normalize line ends."""
         return str(self.cleaned_data["text"]).replace("\r\n", "\n")

@@ -1,6 +1,7 @@
-"""From where somebody watches: from the clinic, or from elsewhere with the patient's consent alone.
+"""Network addresses of clients, and whether they belong to a clinic's own networks.
 
-A clinic names its own networks; one that names none makes no difference, and offers no remote view.
+From elsewhere a session is watched only with the patient's consent to remote view. A clinic that
+names no networks makes no difference and offers no remote view.
 """
 
 from __future__ import annotations
@@ -12,11 +13,11 @@ from django.core.exceptions import ValidationError
 from django.http import HttpRequest
 from django.utils.translation import gettext_lazy as _
 
-WHOLE_IPV6 = 64  # of an IPv6 address no more is known (`find_address`)
+IPV6_PREFIX_LENGTH = 64  # of an IPv6 address only its network is kept
 
 
-def check_networks(text: str) -> None:
-    """Refuse what names no networks."""
+def validate_networks(text: str) -> None:
+    """Refuse text that is not a list of networks."""
     for word in text.split():
         try:
             network = ip_network(word)
@@ -25,41 +26,48 @@ def check_networks(text: str) -> None:
                 _("“%(word)s” is no network. Give one such as 192.168.1.0/24."),
                 params={"word": word},
             ) from None
-        if isinstance(network, IPv6Network) and network.prefixlen > WHOLE_IPV6:
+        if isinstance(network, IPv6Network) and network.prefixlen > IPV6_PREFIX_LENGTH:
             raise ValidationError(
                 _("“%(word)s” is too small. Give the whole network, such as 2001:db8:1:2::/64."),
                 params={"word": word},
             )
 
 
-def is_within(networks: str, address: str) -> bool:
-    """Whether an address is of these networks, or of the server's own computer."""
-    here = ip_address(address)
-    known: list[IPv4Network | IPv6Network] = [ip_network(word) for word in networks.split()]
-    return here.is_loopback or any(here in network for network in known)
+def is_in_networks(networks: str, address: str) -> bool:
+    """Return whether an address is in these networks or on the server's own machine."""
+    client = ip_address(address)
+    own: list[IPv4Network | IPv6Network] = [ip_network(word) for word in networks.split()]
+    return client.is_loopback or any(client in network for network in own)
 
 
 def client_address(request: HttpRequest) -> str:
-    """Give the address that a request comes from."""
-    return find_address(
+    """Return the client address of a request."""
+    return resolve_client_address(
         request.META.get("HTTP_X_FORWARDED_FOR", ""), request.META.get("REMOTE_ADDR", "")
     )
 
 
-def find_address(forwarded: str, remote: str) -> str:
-    """Give the address of a client, as the outermost of our own proxies saw it.
+def resolve_client_address(forwarded: str, remote: str) -> str:
+    """Return the address of a client, as the outermost of our own proxies saw it.
 
-    What stands further left in X-Forwarded-For was written by the client and is not believed.
-    Of an IPv6 address the network counts: whoever has one has 2^64 of them.
+    Entries further left in X-Forwarded-For were written by the client and are not trusted.
+    Of an IPv6 address the /64 network is returned: a client has all 2^64 addresses of it.
+
+    Parameters
+    ----------
+    forwarded
+        The header X-Forwarded-For, "" without one.
+    remote
+        The address of the peer that connected to the server.
     """
-    seen = [word.strip() for word in forwarded.split(",") if word.strip()]
-    seen.append(remote)
+    hops = [word.strip() for word in forwarded.split(",") if word.strip()]
+    hops.append(remote)
     try:
-        address = ip_address(seen[max(0, len(seen) - 1 - settings.PROXIES)])
+        address = ip_address(hops[max(0, len(hops) - 1 - settings.PROXIES)])
     except ValueError:
-        return "0.0.0.0"  # noqa: S104  (an address that is none; such clients share one count)
+        return "0.0.0.0"  # noqa: S104  (no valid address; such clients are counted together)
     if isinstance(address, IPv6Address):
         if address.ipv4_mapped:
             return str(address.ipv4_mapped)
-        return str(ip_network((address, 64), strict=False).network_address)
+        return str(ip_network((address, IPV6_PREFIX_LENGTH), strict=False).network_address)
     return str(address)

@@ -9,7 +9,7 @@ from django.utils.translation import gettext_lazy as _
 
 
 class Role(TextChoices):
-    """What a person is to GARRY. A device is no person: see `stations.models.Device`."""
+    """The role of a person. Devices have none: see `stations.models.Device`."""
 
     HOST = "host", _("Host")
     LEAD = "lead", _("Clinic lead")
@@ -18,7 +18,7 @@ class Role(TextChoices):
 
 
 class Right(Flag):
-    """What a role may do with the rows of a noun that it can see."""
+    """What a role may do with the visible rows of a model."""
 
     NONE = 0
     VIEW = auto()
@@ -29,7 +29,7 @@ class Right(Flag):
     ALL = VIEW | ADD | CHANGE | DELETE
 
 
-# Noun (model name) → role → rights. What is not named is not allowed. A host runs the server and
+# Model name → role → rights. What is not listed is not allowed. A host runs the server and
 # sees accounts and shared settings, never a patient. A researcher sees pseudonyms only. Sessions,
 # steps and events are a log: nobody edits them in place.
 RIGHTS: dict[str, dict[Role, Right]] = {
@@ -41,13 +41,13 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Patient": {Role.LEAD: Right.EDIT, Role.PT: Right.EDIT},
     "Consent": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
     "ConsentText": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
-    "ErasedOriginal": {},
+    "ImportTombstone": {},
     "AuditEntry": {Role.LEAD: Right.VIEW},
     "HistoryEntry": dict.fromkeys(Role, Right.VIEW),
     "Station": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
     "Device": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
     "Pairing": {},
-    "LeaveTries": {},
+    "PinAttempts": {},
     "Visit": {Role.LEAD: Right.ALL, Role.PT: Right.ALL},
     "Measure": {
         Role.HOST: Right.EDIT,
@@ -96,21 +96,21 @@ RIGHTS: dict[str, dict[Role, Right]] = {
 }
 
 
-def rights_of(role: str, noun: str) -> Right:
-    """Give what a role may do with a noun; nothing for a role or noun that the table lacks."""
+def rights_of(role: str, model_name: str) -> Right:
+    """Return what a role may do with a model; nothing for one that the table lacks."""
     if role not in Role.values:
         return Right.NONE
-    return RIGHTS.get(noun, {}).get(Role(role), Right.NONE)
+    return RIGHTS.get(model_name, {}).get(Role(role), Right.NONE)
 
 
-# What a person may lend to a program: the own role, or one that sees or does less.
-LENT: dict[Role, tuple[Role, ...]] = {
+# The roles that a person may delegate to a program: the own one, or one with fewer rights.
+DELEGABLE_ROLES: dict[Role, tuple[Role, ...]] = {
     Role.LEAD: (Role.LEAD, Role.PT, Role.RESEARCHER),
     Role.PT: (Role.PT, Role.RESEARCHER),
     Role.RESEARCHER: (Role.RESEARCHER,),
 }
 
 
-def may_lend(role: str, lent: str) -> bool:
-    """Say whether somebody with a role may let a program work with another one."""
-    return role in Role.values and lent in LENT.get(Role(role), ())
+def may_delegate(role: str, delegated: str) -> bool:
+    """Return whether a person with a role may delegate another one to a program."""
+    return role in Role.values and delegated in DELEGABLE_ROLES.get(Role(role), ())

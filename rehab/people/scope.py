@@ -1,8 +1,8 @@
 """Which rows an actor may see: the one place that keeps clinics apart.
 
-Every model of GARRY says how its rows belong to a clinic (`scope`), and offers two managers:
-`objects`, which gives nothing but `visible_to(actor)`, and `everywhere`, for the server's own work
-(the session writer, migrations, tests), where no person's eyes are involved.
+Every model declares how its rows belong to a clinic (`scope`) and has two managers: `objects`,
+which offers `visible_to(actor)` alone, and `everywhere`, for the server's own work (the session
+writer, migrations, tests), whose results are shown to nobody directly.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ M = TypeVar("M", bound=models.Model)
 
 
 class Member(Protocol):
-    """What decides which rows an account sees."""
+    """The attributes of an account that decide which rows it sees."""
 
     is_active: bool
     role: str
@@ -27,21 +27,27 @@ class Member(Protocol):
 
 
 class UnscopedQuery(RuntimeError):
-    """A query that does not say for whose eyes it is."""
+    """A query without an actor."""
 
 
-class CrossClinic(ValueError):
-    """A row of one clinic that points to a row of another."""
+class CrossClinicReference(ValueError):
+    """A row of one clinic that refers to a row of another."""
 
 
 @dataclass(frozen=True)
 class Scope:
     """How a model's rows belong to a clinic.
 
-    ``clinic`` is the lookup that leads to the clinic; ``station`` the one to the station, for
-    models that a device may see; ``shared`` says that rows without a clinic belong to all;
-    ``host`` narrows what a host sees (None: nothing); ``narrow`` what a role sees of its own
-    clinic.
+    Attributes
+    ----------
+    clinic
+        The lookup of the clinic.
+    station
+        The lookup of the station, for models that devices may see.
+    shared
+        Rows without a clinic belong to all clinics.
+    host
+        The condition on the rows that a host sees; None: no rows.
     """
 
     clinic: str
@@ -49,21 +55,21 @@ class Scope:
     shared: bool = False
     host: Q | None = None
 
-    def of_clinic(self, clinic_id: int) -> Q:
-        """Give the rows that a member of this clinic may see."""
+    def clinic_filter(self, clinic_id: int) -> Q:
+        """Return the condition on the rows that a member of this clinic may see."""
         mine = Q(**{self.clinic: clinic_id})
         return mine | Q(**{f"{self.clinic}__isnull": True}) if self.shared else mine
 
-    def narrow(self, role: Role) -> Q:
-        """Give what else must hold for a member with this role. Usually nothing."""
+    def role_filter(self, role: Role) -> Q:
+        """Return a further condition for a member with this role. Usually none."""
         return Q()
 
 
-def visible(model: type[models.Model], actor: Any) -> Q | None:
-    """Give the condition on the rows that an actor may see; None for no row at all.
+def visible_rows(model: type[models.Model], actor: Any) -> Q | None:
+    """Return the condition on the rows that an actor may see; None for no rows at all.
 
     An actor is a User or a Device. Anything else (a stranger, None) sees nothing, and so does an
-    account that is switched off, without a role, or without the clinic that its role needs.
+    account that is inactive, without a role, or without the clinic that its role needs.
     """
     scope: Scope | None = getattr(model, "scope", None)
     if scope is None:
@@ -76,14 +82,14 @@ def visible(model: type[models.Model], actor: Any) -> Q | None:
     return None
 
 
-def _visible_to_user(scope: Scope, user: Member, noun: str) -> Q | None:
-    if not user.is_active or Right.VIEW not in rights_of(user.role, noun):
+def _visible_to_user(scope: Scope, user: Member, model_name: str) -> Q | None:
+    if not user.is_active or Right.VIEW not in rights_of(user.role, model_name):
         return None
     if user.role == Role.HOST:
         return scope.host
     if not user.clinic_id:
         return None
-    return scope.of_clinic(user.clinic_id) & scope.narrow(Role(user.role))
+    return scope.clinic_filter(user.clinic_id) & scope.role_filter(Role(user.role))
 
 
 def _visible_to_device(scope: Scope, device: Any) -> Q | None:
@@ -93,22 +99,22 @@ def _visible_to_device(scope: Scope, device: Any) -> Q | None:
 
 
 class ScopedManager(models.Manager[M]):
-    """Gives rows only once it is told for whose eyes: `Patient.objects.visible_to(user)`."""
+    """A manager that needs an actor for every query: `Patient.objects.visible_to(user)`."""
 
-    rows: type[QuerySet[Any]] = QuerySet
+    queryset_class: type[QuerySet[Any]] = QuerySet
 
     def get_queryset(self) -> NoReturn:
-        """Refuse: a query must say who will see its rows."""
+        """Raise UnscopedQuery: a query must name who will see its rows."""
         name = self.model.__name__
         raise UnscopedQuery(
-            f"Say for whose eyes this is: {name}.objects.visible_to(actor). "
+            f"Name who will see the rows: {name}.objects.visible_to(actor). "
             f"The server's own work uses {name}.everywhere."
         )
 
     def visible_to(self, actor: Any) -> QuerySet[M]:
-        """Give the rows that this actor may see."""
-        rows: QuerySet[M] = self.rows(self.model, using=self._db)
-        condition = visible(self.model, actor)
+        """Return the rows that this actor may see."""
+        rows: QuerySet[M] = self.queryset_class(self.model, using=self._db)
+        condition = visible_rows(self.model, actor)
         return rows.none() if condition is None else rows.filter(condition)
 
 
@@ -126,8 +132,8 @@ class ScopedModel(models.Model):
         base_manager_name = "everywhere"
 
 
-class ClinicRow(ScopedModel):
-    """A row that names its clinic. It never points to a row of another clinic."""
+class ClinicModel(ScopedModel):
+    """A model with a clinic. Its rows never refer to a row of another clinic."""
 
     class Meta(ScopedModel.Meta):
         abstract = True
@@ -146,7 +152,7 @@ class ClinicRow(ScopedModel):
             related = getattr(self, field.name)
             theirs = getattr(related, "clinic_id", None)
             if theirs is not None and theirs != mine:
-                raise CrossClinic(
+                raise CrossClinicReference(
                     f"{self._meta.verbose_name} and its {field.verbose_name} belong to different "
                     f"clinics. Choose a {field.verbose_name} of the same clinic."
                 )

@@ -1,4 +1,4 @@
-"""What a host sees first in the admin: clinics, accounts and the server itself. No patient."""
+"""The host's front page of the admin: clinics, accounts and the server. No patients."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from rehab.people.roles import Role
 LOW_DISK = 2 * 2**30  # bytes; a year of a clinic's sessions takes about one GB
 
 
-def look_at_server(user: User) -> dict[str, Any]:
-    """Give the clinics with their accounts, and how the server is."""
+def server_status(user: User) -> dict[str, Any]:
+    """Return the context of the host's front page."""
     clinics = Clinic.objects.visible_to(user).annotate(
         accounts=Count("users", filter=Q(users__is_active=True)),
         leads=Count("users", filter=Q(users__is_active=True, users__role=Role.LEAD)),
@@ -28,30 +28,30 @@ def look_at_server(user: User) -> dict[str, Any]:
     accounts = User.objects.visible_to(user)
     free = shutil.disk_usage(settings.DATA_DIR).free if settings.DATA_DIR.exists() else None
     executor = MigrationExecutor(connection)
-    due = len(executor.migration_plan(executor.loader.graph.leaf_nodes()))
-    matters = [
+    pending = len(executor.migration_plan(executor.loader.graph.leaf_nodes()))
+    alerts = [
         gettext("%(clinic)s has no lead. Give one of its accounts that role.") % {"clinic": clinic}
         for clinic in clinics
         if not clinic.leads
     ]
-    if due:
-        matters.append(
-            gettext("%(count)s migrations are due. Run manage.py migrate.") % {"count": due}
+    if pending:
+        alerts.append(
+            gettext("%(count)s migrations are due. Run manage.py migrate.") % {"count": pending}
         )
     if free is not None and free < LOW_DISK:
-        matters.append(gettext("The disk is nearly full. Make room before sessions run."))
+        alerts.append(gettext("The disk is nearly full. Make room before sessions run."))
     return {
         "clinics": clinics,
         "accounts": accounts.filter(is_active=True).count(),
         "switched_off": accounts.filter(is_active=False).count(),
-        "server_matters": matters,
+        "server_alerts": alerts,
         "server": {
             gettext("GARRY"): _version(),
             gettext("Django"): django.get_version(),
             gettext("Database"): connection.display_name,
             gettext("Migrations"): gettext("up to date")
-            if not due
-            else gettext("%(count)s due") % {"count": due},
+            if not pending
+            else gettext("%(count)s due") % {"count": pending},
             gettext("Free on the disk"): "–" if free is None else f"{free / 2**30:.1f} GB",
             gettext("Many clinics behind TLS"): gettext("yes")
             if settings.HOSTED

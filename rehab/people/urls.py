@@ -1,4 +1,4 @@
-"""Addresses of the front page, of coming in, and of the own account."""
+"""URLs of the front page, the sign-in, the own account and consent."""
 
 from django.urls import path
 
@@ -19,6 +19,6 @@ urlpatterns = [
     path("account/second-factor/passkey/", second_factor.add_passkey, name="add-passkey"),
     path("account/second-factor/remove/", second_factor.remove, name="remove-authenticator"),
     path("patients/<int:patient_id>/consent/", consent.show_consent, name="consent"),
-    path("consent/words/", consent.write_words, name="consent-text"),
+    path("consent/words/", consent.edit_text, name="consent-text"),
     path("account/recovery-codes/", second_factor.renew_codes, name="recovery-codes"),
 ]

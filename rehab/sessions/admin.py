@@ -12,7 +12,7 @@ from django.utils.html import format_html, format_html_join
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.access import person
+from rehab.people.access import user_of
 from rehab.people.roles import Role
 from rehab.people.web.admin_base import ReadOnlyAdmin, ScopedAdmin
 from rehab.sessions.corrections import SessionCorrection, can_correct, describe_corrections
@@ -75,7 +75,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         """Return a session with its corrections as this person may read them."""
         row = super().get_object(request, *args, **kwargs)
         if row is not None:
-            row.described_corrections = describe_corrections(row, person(request))
+            row.described_corrections = describe_corrections(row, user_of(request))
         return row
 
     def get_list_display(self, request: HttpRequest) -> Any:
@@ -92,14 +92,14 @@ class TrainingSessionAdmin(ScopedAdmin):
 
     def get_search_fields(self, request: HttpRequest) -> Any:
         """Return what can be searched: for researchers nothing that identifies a person."""
-        if person(request).role == Role.RESEARCHER:
+        if user_of(request).role == Role.RESEARCHER:
             return ("patient__pseudonym",)
         return self.search_fields
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Return links to the session's own pages, and to the form that corrects it."""
         links = [(reverse("session", args=[row.pk]), _("Every stride"))]
-        if person(request).role == Role.RESEARCHER:
+        if user_of(request).role == Role.RESEARCHER:
             return links
         if State(row.state) in OPEN_STATES:
             links.append((reverse("monitor", args=[row.pk]), _("Monitor")))
@@ -108,7 +108,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         return links
 
     def _for(self, request: HttpRequest, names: tuple[str, ...]) -> tuple[str, ...]:
-        if person(request).role != Role.RESEARCHER:
+        if user_of(request).role != Role.RESEARCHER:
             return names
         # A source may be a file that is named after a person.
         shown = (name for name in names if name != "source")
@@ -199,7 +199,7 @@ class TrainingSessionAdmin(ScopedAdmin):
 class SessionLogAdmin(ReadOnlyAdmin):
     """Pages of a session's log, linked from the session's own page."""
 
-    linked_by = ("session__id__exact",)
+    link_lookups = ("session__id__exact",)
 
 
 @admin.register(Step)

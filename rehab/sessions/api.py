@@ -13,7 +13,16 @@ from ninja.errors import HttpError
 from rehab.people.access import for_roles
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
-from rehab.people.web.api_base import Key, Page, Paging, Rejected, answers, caller, cut, say_errors
+from rehab.people.web.api_base import (
+    Key,
+    Page,
+    Paging,
+    Rejected,
+    caller,
+    format_errors,
+    paginate,
+    responses,
+)
 from rehab.sessions.forms.session import SessionForm, initial_choices
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import NotStored
@@ -59,21 +68,21 @@ def get_session(user: User, session_id: int) -> TrainingSession:
     return get_object_or_404(visible_sessions(user), pk=session_id)
 
 
-@router.get("/protocols", response=answers(Page[NamedRow]))
+@router.get("/protocols", response=responses(Page[NamedRow]))
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
 def list_protocols(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
     """List the protocols that a session may follow."""
-    return cut(Protocol.objects.visible_to(caller(request)).order_by("pk"), wanted)
+    return paginate(Protocol.objects.visible_to(caller(request)).order_by("pk"), wanted)
 
 
-@router.get("/stations", response=answers(Page[NamedRow]))
+@router.get("/stations", response=responses(Page[NamedRow]))
 @for_roles(Role.LEAD, Role.PT, patients=False)
 def list_stations(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
     """List the stations where a session may be."""
-    return cut(Station.objects.visible_to(caller(request)).order_by("pk"), wanted)
+    return paginate(Station.objects.visible_to(caller(request)).order_by("pk"), wanted)
 
 
-@router.get("/sessions", response=answers(Page[SessionOut]))
+@router.get("/sessions", response=responses(Page[SessionOut]))
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
 def list_sessions(request: HttpRequest, wanted: Query[SessionFilter]) -> dict[str, Any]:
     """List the clinic's sessions; `order=best` is by non-ascending score."""
@@ -87,10 +96,10 @@ def list_sessions(request: HttpRequest, wanted: Query[SessionFilter]) -> dict[st
         "created_at__lt": wanted.until,
     }
     given = Q(**{name: value for name, value in asked.items() if value is not None})
-    return cut(visible_sessions(user).filter(given).order_by(*ORDERS[wanted.order]), wanted)
+    return paginate(visible_sessions(user).filter(given).order_by(*ORDERS[wanted.order]), wanted)
 
 
-@router.post("/sessions", response=answers(SessionOut, 404, 409, code=201))
+@router.post("/sessions", response=responses(SessionOut, 404, 409, code=201))
 @for_roles(Role.LEAD, Role.PT)
 def add_session(request: HttpRequest, given: SessionRequestBody) -> Status[TrainingSession]:
     """Create a session that is ready to start: the same as by the set-up page."""
@@ -108,19 +117,19 @@ def add_session(request: HttpRequest, given: SessionRequestBody) -> Status[Train
     session = form.create()
     if session is None:
         api_names = {field: name for name, field in FORM_NAMES.items()}
-        objections = say_errors(form.errors)
+        objections = format_errors(form.errors)
         raise Rejected({api_names.get(name, name): message for name, message in objections.items()})
     return Status(201, get_session(user, session.pk))
 
 
-@router.get("/sessions/{session_id}", response=answers(SessionOut, 404))
+@router.get("/sessions/{session_id}", response=responses(SessionOut, 404))
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
 def show_session(request: HttpRequest, session_id: Path[Key]) -> TrainingSession:
     """Show a session."""
     return get_session(caller(request), session_id)
 
 
-@router.post("/sessions/{session_id}/changes", response=answers(SessionOut, 404, 409, 503))
+@router.post("/sessions/{session_id}/changes", response=responses(SessionOut, 404, 409, 503))
 @for_roles(Role.LEAD, Role.PT)
 def change(
     request: HttpRequest, session_id: Path[Key], given: ChangeRequestBody
@@ -139,7 +148,7 @@ def change(
     return get_session(user, session_id)
 
 
-@router.get("/sessions/{session_id}/steps", response=answers(StepPage, 404))
+@router.get("/sessions/{session_id}/steps", response=responses(StepPage, 404))
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
 def list_steps(
     request: HttpRequest, session_id: Path[Key], wanted: Query[StepFilter]
@@ -153,7 +162,7 @@ def list_steps(
     return {"items": found, "next_after": found[-1].number if more else None}
 
 
-@router.get("/sessions/{session_id}/metrics", response=answers(list[MetricOut], 404))
+@router.get("/sessions/{session_id}/metrics", response=responses(list[MetricOut], 404))
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
 def list_metrics(request: HttpRequest, session_id: Path[Key]) -> QuerySet[SessionMetric]:
     """List the figures of a finished session."""

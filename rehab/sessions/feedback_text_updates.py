@@ -14,7 +14,7 @@ from django.utils.translation import gettext as _
 from rehab.feedback.models import FeedbackType, words_edited
 from rehab.feedback.valences import usual_valence
 from rehab.people.models import User
-from rehab.people.web.refusals import in_words
+from rehab.people.web.refusals import format_refusal
 from rehab.sessions.live import runtime
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import NotStored
@@ -51,7 +51,7 @@ def update_open_sessions(
 
 
 def _describe_problem(problem: Exception) -> str:
-    return in_words(problem) if isinstance(problem, InvalidSetting) else str(problem)
+    return format_refusal(problem) if isinstance(problem, InvalidSetting) else str(problem)
 
 
 async def _update_session(session_id: int, valence: Valence, by: User) -> None:

@@ -12,7 +12,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.consent.models import PatientScope
 from rehab.people.models import SIDES, Clinic, Patient, User
-from rehab.people.scope import ClinicRow
+from rehab.people.scope import ClinicModel
 from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import State
@@ -28,7 +28,7 @@ STATES = {
 }
 
 
-class TrainingSession(ClinicRow):
+class TrainingSession(ClinicModel):
     """One session of one patient.
 
     ``plan`` is what every step is scored with; the columns beside it are for queries.
@@ -115,13 +115,13 @@ class TrainingSession(ClinicRow):
         help_text=_("Corrected: in no figure, board or trend."),
     )
     # Of an imported session, which has no steps: its key and row in the original GARRY's database.
-    original_id = models.BigIntegerField(_("imported session"), null=True, editable=False)
+    legacy_id = models.BigIntegerField(_("imported session"), null=True, editable=False)
     legacy_row = models.JSONField(null=True, editable=False)
     # The process that writes the log; each change of owner raises the epoch and locks out the last.
     epoch = models.PositiveIntegerField(default=0, editable=False)
     owner = models.CharField(max_length=200, blank=True, editable=False)
 
-    class Meta(ClinicRow.Meta):
+    class Meta(ClinicModel.Meta):
         verbose_name = _("session")
         verbose_name_plural = _("sessions")
         ordering: ClassVar = ["-created_at", "-pk"]
@@ -131,7 +131,7 @@ class TrainingSession(ClinicRow):
         ]
         constraints: ClassVar = [
             models.UniqueConstraint(
-                fields=["clinic", "original_id"], name="session_imported_once_per_clinic"
+                fields=["clinic", "legacy_id"], name="session_imported_once_per_clinic"
             )
         ]
 

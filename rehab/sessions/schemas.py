@@ -9,7 +9,16 @@ from ninja import Field, Schema
 from pydantic import AfterValidator
 
 from rehab.people.api import PatientName, Short
-from rehab.people.web.api_base import Given, Key, Moment, Paging, Whole, Words, left_out, sees_names
+from rehab.people.web.api_base import (
+    AwareDatetime,
+    Key,
+    Paging,
+    RequestBody,
+    StrictInt,
+    TextLine,
+    may_see_names,
+    optional,
+)
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
@@ -76,12 +85,12 @@ class SessionOut(Schema):
     @staticmethod
     def resolve_imported(session: TrainingSession) -> bool:
         """Return whether it was imported from the original GARRY."""
-        return session.original_id is not None
+        return session.legacy_id is not None
 
     @staticmethod
     def resolve_source(session: TrainingSession, context: Any) -> str | None:
         """Return where its steps come from, to those who may see the patient's name."""
-        return session.source if sees_names(context) else None
+        return session.source if may_see_names(context) else None
 
     @staticmethod
     def resolve_trained_side(session: TrainingSession) -> str | None:
@@ -96,30 +105,30 @@ class SessionFilter(Paging):
     pseudonym: Short | None = None
     feedback_type: FeedbackType | None = None
     state: State | None = None
-    since: Moment | None = Field(None, description="Created at this moment or later.")
-    until: Moment | None = Field(None, description="Created before this moment.")
+    since: AwareDatetime | None = Field(None, description="Created at this moment or later.")
+    until: AwareDatetime | None = Field(None, description="Created before this moment.")
     order: Literal["newest", "oldest", "best"] = "newest"
 
 
-class SessionRequestBody(Given):
+class SessionRequestBody(RequestBody):
     """A new session. What is left out is like the patient's last time."""
 
     patient: Key
-    feedback_type: FeedbackType = left_out()
-    goal: float = left_out(description="In the measure's unit, or give `goal_percent`.")
-    goal_percent: float = left_out(description="Percent of the baseline.")
-    wanted_hits: Whole | None = Field(None, description="Percent of the steps.")
-    minutes: Whole | None = None
-    protocol: Key = left_out()
-    station: Key = left_out()
-    source: Words = left_out(description="`live`, `synthetic good`, `recording walk.csv`, …")
-    trained_side: Side = left_out(strict=False)
-    robot: Words = left_out(description="As in the set-up: `off`, `quiet`, `normal`, …")
-    robot_above: Words = left_out(description="Gesture after a window above the threshold.")
-    robot_below: Words = left_out(description="Gesture after a window below it.")
+    feedback_type: FeedbackType = optional()
+    goal: float = optional(description="In the measure's unit, or give `goal_percent`.")
+    goal_percent: float = optional(description="Percent of the baseline.")
+    wanted_hits: StrictInt | None = Field(None, description="Percent of the steps.")
+    minutes: StrictInt | None = None
+    protocol: Key = optional()
+    station: Key = optional()
+    source: TextLine = optional(description="`live`, `synthetic good`, `recording walk.csv`, …")
+    trained_side: Side = optional(strict=False)
+    robot: TextLine = optional(description="As in the set-up: `off`, `quiet`, `normal`, …")
+    robot_above: TextLine = optional(description="Gesture after a window above the threshold.")
+    robot_below: TextLine = optional(description="Gesture after a window below it.")
 
 
-class ChangeRequestBody(Given):
+class ChangeRequestBody(RequestBody):
     """What is to be changed of a session, as on the therapist's page."""
 
     kind: RequestedChangeKind

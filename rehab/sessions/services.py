@@ -10,7 +10,7 @@ from django.db import transaction
 from django.utils.translation import gettext
 
 from rehab.feedback.valences import valences_of
-from rehab.people.consent.models import may_be_cared_for
+from rehab.people.consent.services import is_care_allowed
 from rehab.people.models import Patient, User
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
@@ -98,7 +98,7 @@ def create_session(request: SessionRequest) -> TrainingSession:
         goal=plan.goal.value,
     )
     with transaction.atomic():
-        patient.hold()  # so that the patient is not erased meanwhile
+        patient.lock()  # so that the patient is not erased meanwhile
         _check_patient_may_train(patient)
         if station is not None and station.clinic_id == patient.clinic_id:
             # Of two set-ups at once, the second waits here and then finds the first one's session.
@@ -160,7 +160,7 @@ def _check_patient_may_train(patient: Patient) -> None:
             "%(patient)s's program has ended. Reopen it on the page “Consent and data” first."
         )
         raise InvalidSetting(message % names)
-    if may_be_cared_for(patient):
+    if is_care_allowed(patient):
         return
     message = gettext(
         "%(patient)s has not agreed to care, and this clinic needs that. Note it on the page "

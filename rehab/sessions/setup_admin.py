@@ -16,8 +16,8 @@ from django.utils.text import capfirst
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.access import person
-from rehab.people.web.admin_base import RowFormSet, ScopedAdmin, ScopedOptions
+from rehab.people.access import user_of
+from rehab.people.web.admin_base import LabeledFormSet, ScopedAdmin, ScopedOptions
 from rehab.sessions.forms.session import STRIDE_S, protocol_minutes
 from rehab.sessions.setup.gestures import robot_gesture_choices
 from rehab.sessions.setup.presets import Preset
@@ -61,7 +61,7 @@ class PhaseForm(forms.ModelForm):
         return super()._get_validation_exclusions() | {"position"}  # type: ignore[misc, no-any-return]
 
 
-class PhaseFormSet(RowFormSet):
+class PhaseFormSet(LabeledFormSet):
     """The phases of one protocol, in the order of their numbers."""
 
     def clean(self) -> None:
@@ -104,7 +104,7 @@ class ProtocolAdmin(SharedAdmin):
     list_display = ("named", "whose", "phase_count", "length", "about")
     search_fields = ("name", "description", "phases__name")
     inlines = (PhaseRows,)
-    actions = row_actions = for_viewers = ("copy_to_clinic",)
+    actions = row_actions = viewer_actions = ("copy_to_clinic",)
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Protocol]:
         """Return the visible protocols with their phases."""
@@ -148,7 +148,7 @@ class ProtocolAdmin(SharedAdmin):
     def get_actions(self, request: HttpRequest) -> Any:
         """Return the actions; copying needs a clinic to copy to."""
         actions = super().get_actions(request)
-        if person(request).clinic_id is None or not self.has_add_permission(request):
+        if user_of(request).clinic_id is None or not self.has_add_permission(request):
             actions.pop("copy_to_clinic", None)
         return actions
 
@@ -170,7 +170,7 @@ class ProtocolAdmin(SharedAdmin):
         stem = protocol.name[:50]
         names = (f"{stem} ({gettext('copy')} {n})" for n in range(1, len(taken) + 2))
         copy = Protocol(
-            clinic=person(request).clinic,
+            clinic=user_of(request).clinic,
             name=next(name for name in names if name not in taken),
             description=protocol.description,
         )
@@ -211,7 +211,7 @@ class PresetAdmin(ScopedAdmin):
         """Offer the gestures that this clinic has."""
         if db_field.name in {"robot_above", "robot_below"}:
             return forms.ChoiceField(
-                choices=robot_gesture_choices(person(request)),
+                choices=robot_gesture_choices(user_of(request)),
                 label=capfirst(db_field.verbose_name),
             )
         return super().formfield_for_dbfield(db_field, request, **kwargs)

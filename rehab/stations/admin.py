@@ -1,4 +1,4 @@
-"""Admin of stations and the devices that dial in from them."""
+"""Admin of stations and the devices that connect from them."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.web.admin_base import ClinicForm, ScopedAdmin, ScopedOptions, TokenAdmin
 from rehab.stations.models import Device, Station
-from rehab.stations.pins import LONGEST, set_pin
-from rehab.stations.presence import say_state
+from rehab.stations.pins import MAX_LENGTH, set_pin
+from rehab.stations.presence import format_device_state
 
 
 class DeviceRows(ScopedOptions, admin.TabularInline):
@@ -32,32 +32,32 @@ class DeviceRows(ScopedOptions, admin.TabularInline):
     can_delete = False
 
     def has_add_permission(self, request: HttpRequest, obj: Any = None) -> bool:
-        """Devices are added on a page of their own, which shows the token."""
+        """Return False: a new device's own page shows its token."""
         return False
 
     def has_change_permission(self, request: HttpRequest, obj: Any = None) -> bool:
-        """Devices are changed on their own page."""
+        """Return False: devices are changed on their own page."""
         return False
 
     @admin.display(description=_("device"))
     def device(self, device: Device) -> str:
-        """Lead to the device."""
+        """Return a link to the device."""
         url = reverse("admin:rehab_device_change", args=[device.pk])
         return format_html_join("", '<a href="{}">{}</a>', [(url, device.name)])
 
     @admin.display(description=_("state"))
     def state(self, device: Device) -> str:
-        """Say when it was seen last."""
-        return say_state(device, timezone.now())
+        """Return when the device last connected."""
+        return format_device_state(device, timezone.now())
 
 
 class StationForm(ClinicForm):
-    """A station with its PIN, which is written and never read."""
+    """A station with its PIN, which is never shown."""
 
     pin = forms.CharField(
         label=_("New PIN to leave the patient’s page"),
         required=False,
-        max_length=LONGEST,
+        max_length=MAX_LENGTH,
         widget=forms.PasswordInput(attrs={"inputmode": "numeric", "autocomplete": "new-password"}),
         help_text=_(
             "Four to eight digits, asked for at this station’s tablet. Empty: stays as it is."
@@ -66,7 +66,7 @@ class StationForm(ClinicForm):
     no_pin = forms.BooleanField(label=_("No PIN: leaving asks a plain question"), required=False)
 
     def clean(self) -> dict[str, Any] | None:
-        """Take the PIN; only its hash is kept."""
+        """Set the PIN; only its hash is stored."""
         data = super().clean()
         pin = self.cleaned_data.get("pin", "")
         try:
@@ -79,7 +79,7 @@ class StationForm(ClinicForm):
 
 @admin.register(Station)
 class StationAdmin(ScopedAdmin):
-    """Stations of the clinic, each with what belongs there."""
+    """Stations of the clinic, each with its devices."""
 
     form = StationForm
     fields = ("name", "pin", "no_pin")
@@ -88,12 +88,12 @@ class StationAdmin(ScopedAdmin):
     inlines = (DeviceRows,)
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Station]:
-        """Give the visible stations with their devices."""
+        """Return the visible stations with their devices."""
         devices = Device.objects.visible_to(request.user).order_by("name")
         return super().get_queryset(request).prefetch_related(Prefetch("devices", devices))
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
-        """Lead to where a tablet is let in, and a device added."""
+        """Return links to pair a tablet and to add a device."""
         links = [(reverse("pair"), _("Let a tablet in"))]
         if self.has_change_permission(request, row):
             url = reverse("admin:rehab_device_add")
@@ -102,23 +102,23 @@ class StationAdmin(ScopedAdmin):
 
     @admin.display(description=_("tablet"))
     def tablets(self, station: Station) -> str:
-        """Say which tablet is here."""
-        return self._tell(station, Device.Kind.TABLET)
+        """Return the tablets with their states."""
+        return self._format_devices(station, Device.Kind.TABLET)
 
     @admin.display(description=_("source of steps"))
     def sources(self, station: Station) -> str:
-        """Say which source is here."""
-        return self._tell(station, Device.Kind.SOURCE)
+        """Return the sources with their states."""
+        return self._format_devices(station, Device.Kind.SOURCE)
 
     @admin.display(description=_("robot"))
     def robots(self, station: Station) -> str:
-        """Say which robot is here."""
-        return self._tell(station, Device.Kind.ROBOT)
+        """Return the robots with their states."""
+        return self._format_devices(station, Device.Kind.ROBOT)
 
-    def _tell(self, station: Station, kind: Device.Kind) -> str:
+    def _format_devices(self, station: Station, kind: Device.Kind) -> str:
         now = timezone.now()
         found = [
-            (device.name, say_state(device, now))
+            (device.name, format_device_state(device, now))
             for device in station.devices.all()
             if device.kind == kind
         ]
@@ -126,7 +126,7 @@ class StationAdmin(ScopedAdmin):
 
     @admin.display(description=_("PIN to leave"), boolean=True)
     def has_pin(self, station: Station) -> bool:
-        """Whether leaving the patient's page asks for a PIN."""
+        """Return whether leaving the patient's page asks for a PIN."""
         return bool(station.pin_hash)
 
 
@@ -149,7 +149,7 @@ class DeviceAdmin(TokenAdmin):
 
     @admin.display(description=_("state"), ordering="last_seen_at")
     def state(self, device: Device) -> str:
-        """Say whether it may dial in, and when it last did."""
+        """Return that the device is revoked, or when it last connected."""
         if not device.pk:
             return gettext("Its token is shown once you save it.")
-        return say_state(device, timezone.now())
+        return format_device_state(device, timezone.now())

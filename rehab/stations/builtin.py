@@ -1,4 +1,4 @@
-"""What the server itself runs at a station: a simulated patient, a recording, a simulated robot."""
+"""Devices that the server itself runs: a simulated patient, a recording, a simulated robot."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ FIRST_STATION = "Station 1"
 
 
 def first_station(clinic: Clinic) -> Station:
-    """Give a clinic's first station; made on first use."""
+    """Return a clinic's first station; create it on first use."""
     stations = Station.everywhere.filter(clinic=clinic).order_by("pk")
     return stations.first() or Station.everywhere.create(clinic=clinic, name=FIRST_STATION)
 
 
-def builtin_token(station: Station, kind: Device.Kind) -> str:
-    """Give a fresh token for the station's built-in device of this kind; the one before is dead."""
+def issue_builtin_token(station: Station, kind: Device.Kind) -> str:
+    """Return a new token of the station's built-in device; the one before stops working."""
     device = Device.everywhere.filter(station=station, kind=kind, builtin=True).first()
     if device is None:
         device = Device(

@@ -1,4 +1,4 @@
-"""Stations: places with a tablet, a source and a robot, and the devices that dial in from them."""
+"""Stations: places with a tablet, a source and a robot, and the devices that connect from them."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from django.db import models
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
-from rehab.people.scope import ClinicRow, Scope, ScopedModel
-from rehab.people.sign_in.tokens import TokenRow, find_holder
+from rehab.people.scope import ClinicModel, Scope, ScopedModel
+from rehab.people.sign_in.tokens import TokenModel, find_by_token
 
 
-class Station(ClinicRow):
+class Station(ClinicModel):
     """A place in a clinic with its tablet, source and robot."""
 
     scope = Scope(clinic="clinic", station="pk")
@@ -24,7 +24,7 @@ class Station(ClinicRow):
     name = models.CharField(_("name"), max_length=64)
     pin_hash = models.CharField(max_length=128, blank=True, editable=False)
 
-    class Meta(ClinicRow.Meta):
+    class Meta(ClinicModel.Meta):
         verbose_name = _("station")
         verbose_name_plural = _("stations")
         ordering: ClassVar = ["name"]
@@ -36,11 +36,11 @@ class Station(ClinicRow):
         return self.name
 
 
-class Device(TokenRow):
-    """A tablet, source or robot that dials in with its token and sees its own station only."""
+class Device(TokenModel):
+    """A tablet, source or robot. It connects with its token and sees its own station only."""
 
     class Kind(models.TextChoices):
-        """What a device does."""
+        """The kind of device."""
 
         SOURCE = "source", _("Source of steps")
         TABLET = "tablet", _("Tablet")
@@ -61,7 +61,7 @@ class Device(TokenRow):
         _("built in"), default=False, editable=False, help_text=_("The server runs it itself.")
     )
 
-    class Meta(TokenRow.Meta):
+    class Meta(TokenModel.Meta):
         verbose_name = _("device")
         verbose_name_plural = _("devices")
         ordering: ClassVar = ["station", "kind", "name"]
@@ -71,7 +71,7 @@ class Device(TokenRow):
 
 
 class Pairing(ScopedModel):
-    """A tablet that shows a code and waits for somebody to approve it. Nobody's until then."""
+    """A tablet that shows a code and waits for approval. Until then it belongs to no clinic."""
 
     scope = Scope(clinic="device__clinic")
 
@@ -87,27 +87,29 @@ class Pairing(ScopedModel):
         return "Pairing"
 
 
-class LeaveTries(ScopedModel):
-    """Wrong PINs of one screen at one station, and until when it has to wait (see ``pins``)."""
+class PinAttempts(ScopedModel):
+    """Failed PIN attempts of one screen at one station, and its lockout (see ``pins``)."""
 
     scope = Scope(clinic="station__clinic")
 
     station = models.ForeignKey(
         Station, on_delete=models.CASCADE, related_name="+", verbose_name=_("station")
     )
-    who = models.CharField(max_length=64)
-    wrong = models.PositiveIntegerField(default=0)
-    open_at = models.DateTimeField()
+    screen = models.CharField(max_length=64)
+    failures = models.PositiveIntegerField(default=0)
+    locked_until = models.DateTimeField()
 
     class Meta(ScopedModel.Meta):
         constraints: ClassVar = [
-            models.UniqueConstraint(fields=["station", "who"], name="leave_tries_once_a_screen")
+            models.UniqueConstraint(
+                fields=["station", "screen"], name="pin_attempts_once_per_screen"
+            )
         ]
 
     def __str__(self) -> str:
-        return "Tries"
+        return "PIN attempts"
 
 
 def find_device(token: str, now: datetime) -> Device | None:
-    """Give the device that this token belongs to; None for an unknown or revoked one."""
-    return find_holder(Device, token, now)
+    """Return the device that this token belongs to; None for an unknown or revoked one."""
+    return find_by_token(Device, token, now)

@@ -1,4 +1,4 @@
-"""How a tablet comes to a station: it shows a code, and somebody who is signed in approves it."""
+"""Pairing of a tablet with a station: it shows a code, and a signed-in person approves it."""
 
 from __future__ import annotations
 
@@ -8,70 +8,71 @@ from datetime import datetime, timedelta
 from django.core.cache import cache
 from django.utils.translation import gettext as _
 
-from rehab.people.models import UNAMBIGUOUS
+from rehab.people.random_codes import random_code
 from rehab.people.sign_in.tokens import hash_token
 from rehab.stations.models import Device, Pairing, Station
 
 LIFETIME = timedelta(minutes=5)
-CODE_LENGTH = 6  # of 31 characters: one in 900 million, with ten tries in five minutes
-MOST_OPEN = 500  # codes at a time on one server; a flood of strangers ends there
-MOST_SHOWN = 20  # of these for one address, as a clinic's tablets may share one
-MOST_BEGUN = 100  # for one address within the lifetime of a code; a tablet keeps its own
-TRIES = 10
+CODE_LENGTH = 6  # of 31 characters: one in 900 million, with ten attempts in five minutes
+MAX_PENDING = 500  # codes at a time on one server, against floods
+MAX_PENDING_PER_ADDRESS = 20  # a clinic's tablets may share an address
+MAX_STARTED_PER_ADDRESS = 100  # within the lifetime of a code; a tablet keeps its own
+MAX_ATTEMPTS = 10
 
 
 class PairingRefused(ValueError):
-    """A pairing that cannot be; the message says what to do."""
+    """A pairing that is not possible; the message tells what to do."""
 
 
-class PairingFlooded(PairingRefused):
-    """One address asks for more codes than tablets can show."""
+class PairingRateLimited(PairingRefused):
+    """One address asks for more codes than its tablets can need."""
 
 
-def begin(address: str, now: datetime) -> tuple[Pairing, str]:
-    """Make a code to be shown, and the secret by which the tablet is known until it is approved.
+def start_pairing(address: str, now: datetime) -> tuple[Pairing, str]:
+    """Start a pairing. Return it, and the secret that identifies the tablet until its approval.
 
-    A new code takes the place of the oldest one of an address that has its share of them. Raises
-    PairingFlooded where that address never stops, and PairingRefused where too many are open.
+    The oldest pairing of an address with too many pending ones is removed. Raises
+    PairingRateLimited where an address starts too many, PairingRefused where the server has too
+    many pending.
     """
     Pairing.everywhere.filter(expires_at__lte=now).delete()
-    if _count(f"pairing-begun-{address}") > MOST_BEGUN:
-        raise PairingFlooded(
+    if _count(f"pairing-started-{address}") > MAX_STARTED_PER_ADDRESS:
+        raise PairingRateLimited(
             _("Too many codes were asked for from this network. Try again in five minutes.")
         )
-    shown = f"pairing-shown-{address}"
-    mine = Pairing.everywhere.filter(pk__in=cache.get(shown, []), device__isnull=True)
-    kept = list(mine.order_by("-pk").values_list("pk", flat=True)[: MOST_SHOWN - 1])
+    pending = f"pairing-pending-{address}"
+    mine = Pairing.everywhere.filter(pk__in=cache.get(pending, []), device__isnull=True)
+    kept = list(mine.order_by("-pk").values_list("pk", flat=True)[: MAX_PENDING_PER_ADDRESS - 1])
     mine.exclude(pk__in=kept).delete()
-    if Pairing.everywhere.count() >= MOST_OPEN:
+    if Pairing.everywhere.count() >= MAX_PENDING:
         raise PairingRefused(_("Too many tablets are being paired. Try again in five minutes."))
     secret = secrets.token_urlsafe(32)
-    code = "".join(secrets.choice(UNAMBIGUOUS) for _ in range(CODE_LENGTH))
+    code = random_code(CODE_LENGTH)
     pairing = Pairing(code=code, secret_hash=hash_token(secret), expires_at=now + LIFETIME)
     pairing.save()
-    cache.set(shown, [*kept, pairing.pk], LIFETIME.total_seconds())
+    cache.set(pending, [*kept, pairing.pk], LIFETIME.total_seconds())
     return pairing, secret
 
 
 def _count(name: str) -> int:
-    """Count one more of something within the lifetime of a code; give how many there were."""
+    """Increment a counter that lasts as long as a code. Return its new value."""
     cache.add(name, 0, LIFETIME.total_seconds())
     return cache.incr(name)
 
 
-def find(secret: str, now: datetime) -> Pairing | None:
-    """Give the pairing that a tablet has begun; None once it has expired."""
-    begun = Pairing.everywhere.filter(secret_hash=hash_token(secret), expires_at__gt=now)
-    return begun.select_related("device").first()
+def find_pairing(secret: str, now: datetime) -> Pairing | None:
+    """Return the pairing that a tablet has started; None once it has expired."""
+    started = Pairing.everywhere.filter(secret_hash=hash_token(secret), expires_at__gt=now)
+    return started.select_related("device").first()
 
 
-def approve(code: str, station: Station, by: int, now: datetime) -> Device:
-    """Let the tablet that shows this code in at a station. ``by`` is who asks, to count tries.
+def approve_pairing(code: str, station: Station, approver_id: int, now: datetime) -> Device:
+    """Pair the tablet that shows this code with a station. Attempts count per ``approver_id``.
 
     Raises PairingRefused.
     """
-    tries = f"pairing-tries-{by}"
-    if _count(tries) > TRIES:
+    attempts = f"pairing-attempts-{approver_id}"
+    if _count(attempts) > MAX_ATTEMPTS:
         raise PairingRefused(_("Too many wrong codes. Wait five minutes."))
     wanted = Pairing.everywhere.filter(
         code=code.strip().upper(), device__isnull=True, expires_at__gt=now
@@ -87,17 +88,17 @@ def approve(code: str, station: Station, by: int, now: datetime) -> Device:
         kind=Device.Kind.TABLET,
         name=_("Tablet %(number)s") % {"number": count + 1},
     )
-    device.new_token()  # nobody knows it: the tablet gets its own when it comes back
+    device.new_token()  # never shown: the tablet claims its own when it asks again
     device.save()
-    if not wanted.update(device=device):  # somebody else was quicker
+    if not wanted.update(device=device):  # another request was faster
         device.delete()
         raise PairingRefused(_("This tablet has just been paired."))
-    cache.delete(tries)
+    cache.delete(attempts)
     return device
 
 
-def collect(pairing: Pairing) -> str | None:
-    """Give an approved tablet its token, once. None where it is not approved, or had it."""
+def claim_token(pairing: Pairing) -> str | None:
+    """Return the token of an approved tablet, once; None without approval or the second time."""
     device = pairing.device
     if device is None or device.is_revoked:
         return None

@@ -1,7 +1,7 @@
-"""The PIN that lets somebody out of the patient's page: set for a station, checked here alone.
+"""The PIN to leave the patient's page: set for a station, checked here alone.
 
-Wrong PINs are counted for each screen, so that nobody at one tablet shuts out another one, and
-only leaving waits: whatever walks goes on, and pause and end stay where they are.
+Wrong PINs are counted for each screen, so that attempts at one tablet lock no other one. Only
+leaving is locked: a session goes on, and can be paused and ended.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ from datetime import datetime, timedelta
 from django.contrib.auth.hashers import check_password, make_password
 from django.utils.translation import gettext as _
 
-from rehab.stations.models import LeaveTries, Station
+from rehab.stations.models import PinAttempts, Station
 
-SHORTEST, LONGEST = 4, 8
-FREE_TRIES = 3  # a slip of the finger costs nothing
-FIRST_WAIT = timedelta(seconds=30)  # after that, twice as long each time
-LONGEST_WAIT = timedelta(hours=1)
+MIN_LENGTH, MAX_LENGTH = 4, 8
+FREE_ATTEMPTS = 3  # failures up to here lock nothing: fingers slip
+FIRST_LOCKOUT = timedelta(seconds=30)  # each further one lasts twice as long
+LONGEST_LOCKOUT = timedelta(hours=1)
 
 
 class PinRefused(ValueError):
-    """A PIN that does not open; the message says what to do."""
+    """A PIN that is not accepted; the message tells what to do."""
 
     def __init__(self, message: str, wait_s: int = 0) -> None:
         super().__init__(message)
@@ -28,46 +28,45 @@ class PinRefused(ValueError):
 
 
 def set_pin(station: Station, pin: str) -> None:
-    """Give a station another PIN, or none (""); the row is not saved. Raises ValueError."""
-    if pin and not (pin.isascii() and pin.isdigit() and SHORTEST <= len(pin) <= LONGEST):
+    """Set the PIN of a station, "" for none; the row is not saved. Raises ValueError."""
+    if pin and not (pin.isascii() and pin.isdigit() and MIN_LENGTH <= len(pin) <= MAX_LENGTH):
         raise ValueError(_("A PIN has four to eight digits and nothing else."))
     station.pin_hash = make_password(pin) if pin else ""
 
 
-def check_pin(station: Station, who: str, pin: str, now: datetime) -> None:
-    """Return where this PIN opens, or none is set. Raises PinRefused.
+def check_pin(station: Station, screen: str, pin: str, now: datetime) -> None:
+    """Check a PIN; any is right where none is set. Raises PinRefused.
 
-    A try is counted before it is looked at: many at the same moment are no more than one.
+    An attempt is counted before it is checked, so that simultaneous ones count as one.
     """
     if not station.pin_hash:
         return
-    tries, _new = LeaveTries.everywhere.get_or_create(
-        station=station, who=who, defaults={"open_at": now}
+    attempts, _new = PinAttempts.everywhere.get_or_create(
+        station=station, screen=screen, defaults={"locked_until": now}
     )
-    if tries.open_at > now:
-        raise _wait(tries.open_at - now)
-    wait = wait_after(tries.wrong + 1)
-    counted = LeaveTries.everywhere.filter(pk=tries.pk, wrong=tries.wrong).update(
-        wrong=tries.wrong + 1, open_at=now + wait
-    )
-    if not counted:  # another try came between
-        raise _wait(timedelta(seconds=1))
+    if attempts.locked_until > now:
+        raise _locked(attempts.locked_until - now)
+    lockout = lockout_after(attempts.failures + 1)
+    unchanged = PinAttempts.everywhere.filter(pk=attempts.pk, failures=attempts.failures)
+    counted = unchanged.update(failures=attempts.failures + 1, locked_until=now + lockout)
+    if not counted:  # there was another attempt meanwhile
+        raise _locked(timedelta(seconds=1))
     if check_password(pin, station.pin_hash):
-        LeaveTries.everywhere.filter(pk=tries.pk).delete()
-    elif wait:
-        raise _wait(wait)
+        PinAttempts.everywhere.filter(pk=attempts.pk).delete()
+    elif lockout:
+        raise _locked(lockout)
     else:
         raise PinRefused(_("This is not the PIN."))
 
 
-def wait_after(wrong: int) -> timedelta:
-    """Give how long a screen waits after so many wrong PINs in a row."""
-    if wrong < FREE_TRIES:
+def lockout_after(failures: int) -> timedelta:
+    """Return how long a screen is locked after so many wrong PINs in a row."""
+    if failures < FREE_ATTEMPTS:
         return timedelta()
-    return min(FIRST_WAIT * (1 << min(wrong - FREE_TRIES, 20)), LONGEST_WAIT)
+    return min(FIRST_LOCKOUT * (1 << min(failures - FREE_ATTEMPTS, 20)), LONGEST_LOCKOUT)
 
 
-def _wait(left: timedelta) -> PinRefused:
+def _locked(left: timedelta) -> PinRefused:
     seconds = max(1, round(left.total_seconds()))
     if seconds < 60:
         words = _("Wrong PIN. Wait %(count)s seconds.") % {"count": seconds}

@@ -1,4 +1,4 @@
-"""When a device was last there, in words."""
+"""When a device last connected, as text."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from django.utils.translation import gettext, ngettext
 
 from rehab.stations.models import Device
 
-NOW = timedelta(minutes=2)  # a token's use is noted once a minute
-NEVER_AFTER = timedelta(minutes=10)  # by then a new token should have been used
+JUST_NOW = timedelta(minutes=2)  # `last_seen_at` is stored once a minute
+OVERDUE_AFTER = timedelta(minutes=10)  # a new token should have been used by then
 
 
-def say_seen(moment: datetime | None, now: datetime) -> str:
-    """Say how long ago a moment was; beyond a day, its date by the clock of ``now``."""
+def format_last_seen(moment: datetime | None, now: datetime) -> str:
+    """Return how long ago a moment was; after a day, its date in the time zone of ``now``."""
     if moment is None:
         return gettext("never seen")
     ago = now - moment
-    if ago < NOW:
+    if ago < JUST_NOW:
         return gettext("seen just now")
     if ago < timedelta(hours=1):
         minutes = round(ago.total_seconds() / 60)
@@ -35,14 +35,14 @@ def say_seen(moment: datetime | None, now: datetime) -> str:
     }
 
 
-def say_state(device: Device, now: datetime) -> str:
-    """Say whether a device may dial in, and when it last did."""
+def format_device_state(device: Device, now: datetime) -> str:
+    """Return that a device is revoked, or when it last connected."""
     if device.is_revoked:
         return gettext("revoked")
-    return say_seen(device.last_seen_at, now)
+    return format_last_seen(device.last_seen_at, now)
 
 
 def is_overdue(device: Device, now: datetime) -> bool:
-    """Whether a device has a token that it has never used."""
+    """Return whether a device has a token that it has never used."""
     never = not device.builtin and not device.is_revoked and device.last_seen_at is None
-    return never and now - device.created_at > NEVER_AFTER
+    return never and now - device.created_at > OVERDUE_AFTER

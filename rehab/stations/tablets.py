@@ -1,4 +1,4 @@
-"""Tablets among browsers: known by a cookie that pairing gave them."""
+"""Paired tablets, recognized by the cookie that pairing has set."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from django.utils import timezone
 from rehab.stations.models import Device, find_device
 
 COOKIE = "garry_tablet"
-COOKIE_AGE_S = 400 * 24 * 3600  # the longest that browsers keep one; each visit renews it
+COOKIE_AGE_S = 400 * 24 * 3600  # the longest that browsers keep a cookie; each visit renews it
 
 
 def find_tablet(token: str | None, now: datetime) -> Device | None:
-    """Give the tablet that this token belongs to; None for any other device."""
+    """Return the tablet that this token belongs to; None for any other device."""
     device = find_device(token, now) if token and token.isascii() else None
     return device if device is not None and device.kind == Device.Kind.TABLET else None
 
 
-def remember(response: HttpResponseBase, name: str, value: str, age_s: float) -> None:
-    """Keep a secret in the browser, out of scripts' reach."""
+def set_secret_cookie(response: HttpResponseBase, name: str, value: str, age_s: float) -> None:
+    """Set a cookie that scripts cannot read."""
     response.set_cookie(
         name,
         value,
@@ -34,7 +34,7 @@ def remember(response: HttpResponseBase, name: str, value: str, age_s: float) ->
 
 
 class TabletMiddleware:
-    """Says which paired tablet a request comes from, where it does. Keeps no state."""
+    """Sets ``request.tablet`` to the paired tablet of a request, or None. Keeps no state."""
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
         self.get_response = get_response

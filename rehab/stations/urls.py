@@ -1,4 +1,4 @@
-"""Addresses of stations."""
+"""URLs of stations."""
 
 from django.urls import path
 

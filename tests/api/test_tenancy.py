@@ -153,7 +153,7 @@ def test_every_call_says_what_it_may_answer_and_is_in_the_documentation():
     for path, methods in described()["paths"].items():
         for method, call in methods.items():
             assert {"401", "403", "422", "429"} <= set(call["responses"]), (method, path)
-            assert call["security"] == [{"Token": []}, {"Browser": []}]
+            assert call["security"] == [{"TokenAuth": []}, {"SessionAuth": []}]
 
 
 def test_a_host_reads_nothing_but_who_it_is():

@@ -208,7 +208,7 @@ def test_a_clinics_other_settings_hide_no_board(sessions):
     boards = [across, make_board(sessions[0])]
     for board in boards:
         build(board)
-    clinic.keep_log_months, clinic.name = 40, "Yew"
+    clinic.log_retention_months, clinic.name = 40, "Yew"
     clinic.save()
     assert entries.find_unbuilt() is None
     clinic.time_zone = "Asia/Tokyo"

@@ -11,7 +11,7 @@ from django.urls import reverse, reverse_lazy
 from rehab.boards import admin, figures
 from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.boards.rules import FIRST_DAY, LAST_DAY
-from rehab.people.aliases import MANNERS, draw_alias, words
+from rehab.people.aliases import MANNERS, draw_alias, split_list
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from tests.support.world import build_world, client_of, fill_board, signed_in
@@ -287,7 +287,7 @@ def test_animal_names_are_drawn_on_agreeing_and_again_on_demand(world):
     patient.save(update_fields=["boards"])
     patient.refresh_from_db()
     first = patient.alias
-    assert str(first).split()[0] in words(MANNERS)
+    assert str(first).split()[0] in split_list(MANNERS)
     client = client_of(world)
     sent = {"action": "draw_aliases", "_selected_action": [patient.pk]}
     assert client.post(reverse("admin:rehab_patient_changelist"), sent).status_code == 302

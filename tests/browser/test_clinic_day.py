@@ -108,8 +108,8 @@ def test_from_today_to_walking_in_three_taps(server: Server, browser: Browser) -
 # --- leaving ------------------------------------------------------------------------------------
 
 FORGET = """
-from rehab.stations.models import LeaveTries
-LeaveTries.everywhere.all().delete()
+from rehab.stations.models import PinAttempts
+PinAttempts.everywhere.all().delete()
 """
 
 
@@ -133,7 +133,8 @@ def test_nobody_leaves_a_tablet_without_the_pin(server: Server, browser: Browser
         page.tap("text=Stay here")
         assert page.url.endswith(walk.path)
         run(
-            server, "from rehab.stations.models import LeaveTries as T; T.everywhere.all().delete()"
+            server,
+            "from rehab.stations.models import PinAttempts as T; T.everywhere.all().delete()",
         )
         page.tap("button.out")
         page.fill("[name=pin]", "4711")

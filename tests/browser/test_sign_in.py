@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from rehab.people.sign_in.totp import STEP_S, code_of
+from rehab.people.sign_in.totp import TIME_STEP_S, generate_code
 from tests.support.browsers import SIZES
 from tests.support.servers import Server, serve
 
@@ -51,7 +51,7 @@ def sign_out(page: Page) -> None:
 
 def fresh_code(secret: str, after: str = "") -> str:
     """Give a code that was not used yet, waiting for it where need be."""
-    while (code := code_of(secret, int(time.time()) // STEP_S)) == after:
+    while (code := generate_code(secret, int(time.time()) // TIME_STEP_S)) == after:
         time.sleep(0.5)
     return code
 

@@ -25,7 +25,8 @@ from rehab.exports.archive import ZipResponse, write_csv, write_zip
 from rehab.exports.tables import PAGE, STEPS, TABLES, Selection, to_cell
 from rehab.patients.visits import plan_visit
 from rehab.people.audit.audit_log import Act, AuditEntry
-from rehab.people.consent.models import Purpose, withdraw
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import withdraw_consent
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.corrections import CorrectedField, correct_session
@@ -111,9 +112,9 @@ RENAMED = {
     "boards": "leaderboards",
     "alias": "animal_name",
     "blinded": "in_a_blinded_study",
-    "original_id": "participant_of_the_original",
+    "legacy_id": "participant_of_the_original",
     "ended_at": "program_ended_at",
-    "ended_because": "program_ended_because",
+    "end_reason": "program_end_reason",
 }
 
 
@@ -140,7 +141,7 @@ def test_visits_boards_and_earlier_values_are_told(world):
     patient, board = world.patient, world.rows[Leaderboard]
     plan_visit(patient, date(2031, 2, 3), time(9, 15))
     client_of(world).post(
-        reverse("mend-patient", args=[patient.pk]),
+        reverse("edit-patient", args=[patient.pk]),
         {"nickname": "Rosa", "code": "R-1", "paretic_side": "right"},
     )
     board.group.add(patient)
@@ -225,7 +226,7 @@ def test_giving_a_file_is_noted_each_time_with_who_and_whose(world):
 
 def test_an_imported_session_without_steps_or_log_is_in_it(world):
     TrainingSession.everywhere.filter(pk=world.session.pk).update(
-        original_id=7, protocol=None, trained_side=""
+        legacy_id=7, protocol=None, trained_side=""
     )
     Step.everywhere.all().delete()
     row = rows_of(fetch(world)["sessions.csv"])[0]
@@ -249,7 +250,7 @@ def test_all_sessions_go_out_by_pseudonyms_alone(role, world):
 
 
 def test_researchers_get_no_session_of_who_has_not_agreed(world):
-    withdraw(world.patient, Purpose.RESEARCH, None, NOW)
+    withdraw_consent(world.patient, Purpose.RESEARCH, None, NOW)
     response = client_of(world, Role.RESEARCHER).get(reverse("export-sessions"))
     files = open_archive(body_of(response))
     assert not any(rows_of(files[table.file]) for table in TABLES)

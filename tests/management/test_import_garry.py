@@ -15,8 +15,8 @@ import pytest
 from django.core.management import CommandError, call_command
 
 from rehab.patients.erasure import erase
-from rehab.people.consent.tombstones import is_kept_away
-from rehab.people.models import Clinic, Erasing, Patient, User
+from rehab.people.consent.tombstones import is_reimport_blocked
+from rehab.people.models import Clinic, ErasureReason, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
@@ -96,7 +96,7 @@ def run(file: Path, *options: str) -> str:
 
 
 def refused(file: Path, *options: str) -> tuple[str, str]:
-    """Give what was told, and why nothing was changed."""
+    """Return what was told, and why nothing was changed."""
     out = StringIO()
     with pytest.raises(CommandError) as caught:
         call_command("import_garry", str(file), *options, stdout=out)
@@ -119,12 +119,12 @@ def test_ids_dates_scores_types_and_goals_are_those_of_the_original(file, clinic
     assert counts(report) == {"participants": [4, 4, 0, 0], "sessions": [67, 67, 0, 0]}
     with closing(sqlite3.connect(file)) as database:
         rows = database.execute(SELECT).fetchall()
-    sessions = TrainingSession.everywhere.select_related("patient").order_by("original_id")
-    scores = dict(SessionMetric.everywhere.values_list("session__original_id", "value"))
+    sessions = TrainingSession.everywhere.select_related("patient").order_by("legacy_id")
+    scores = dict(SessionMetric.everywhere.values_list("session__legacy_id", "value"))
     for row, session in zip(rows, sessions, strict=True):
         pk, kind, participant, start, day, month, year, score, duration, goal = row
-        assert session.original_id == pk
-        assert (session.patient.code, session.patient.original_id) == (
+        assert session.legacy_id == pk
+        assert (session.patient.code, session.patient.legacy_id) == (
             f"{participant}",
             participant,
         )
@@ -164,34 +164,34 @@ def test_importing_again_takes_only_what_is_new(file, clinic):
         INSERT.format("'Binary', 5, '2024-01-02 10:00:00.0', 2, 1, 2024, 7, '0:00:31.5', 4.0"),
     )
     assert counts(run(file)) == {"participants": [5, 1, 4, 0], "sessions": [68, 1, 67, 0]}
-    patient = Patient.everywhere.get(original_id=5)
+    patient = Patient.everywhere.get(legacy_id=5)
     patient.code, patient.nickname = "K7", "Rosa"  # a therapist's own; it stays
     patient.save()
     run(file)
-    assert Patient.everywhere.get(original_id=5).nickname == "Rosa"
+    assert Patient.everywhere.get(legacy_id=5).nickname == "Rosa"
 
 
 def test_who_was_erased_stays_away_with_all_sessions(file, clinic):
     run(file)
-    bo = Patient.everywhere.get(original_id=2)
+    bo = Patient.everywhere.get(legacy_id=2)
     walked = bo.sessions.count()
-    erase(bo, Erasing.ASKED, None, NOW)
+    erase(bo, ErasureReason.ASKED, None, NOW)
     said = run(file)
     assert counts(said) == {"participants": [4, 0, 3, 0], "sessions": [67, 0, 67 - walked, 0]}
     assert f"1 participant(s) who were erased here, and their {walked} session(s)" in said
     assert (Patient.everywhere.count(), TrainingSession.everywhere.count()) == (4, 67)
     elsewhere = Clinic.everywhere.create(name="Birch")
     assert counts(run(file, "--clinic", "Birch"))["participants"] == [4, 4, 0, 0]
-    assert elsewhere.patients.filter(original_id=2).exists()
+    assert elsewhere.patients.filter(legacy_id=2).exists()
 
 
 def test_of_whom_was_erased_nothing_is_kept_that_tells_the_number(file, clinic, settings):
     run(file)
-    erase(Patient.everywhere.get(original_id=2), Erasing.ASKED, None, NOW)
-    assert is_kept_away(clinic.pk, 2)
-    assert not is_kept_away(clinic.pk, 1)
+    erase(Patient.everywhere.get(legacy_id=2), ErasureReason.ASKED, None, NOW)
+    assert is_reimport_blocked(clinic.pk, 2)
+    assert not is_reimport_blocked(clinic.pk, 1)
     settings.SECRET_KEY = "another server's"
-    assert not is_kept_away(clinic.pk, 2)
+    assert not is_reimport_blocked(clinic.pk, 2)
 
 
 @pytest.mark.parametrize(("given", "shown"), [("'x9'", "'x9'"), ("NULL", "None")])
@@ -332,7 +332,7 @@ def test_a_start_before_midnight_keeps_its_own_day(file, clinic):
         "UPDATE sessions SET start_time = '10:15' WHERE session_id = 2",
     )
     run(file)
-    first, second = TrainingSession.everywhere.order_by("original_id")[:2]
+    first, second = TrainingSession.everywhere.order_by("legacy_id")[:2]
     assert first.started_at.astimezone(MADRID).day == 31
     assert f"{second.started_at.astimezone(MADRID):%H:%M}" == "10:15"
 

@@ -29,7 +29,7 @@ def run(valence: str, base: str) -> dict[str, Any]:
 
 
 def expect_gestures(above: str | None, below: str | None) -> list[tuple[str, float]]:
-    """Give the gestures, with the step that starts each, from the stored steps alone."""
+    """Return the gestures, with the step that starts each, from the stored steps alone."""
     rows = Step.everywhere.filter(valid=True, points__isnull=False).order_by("number")
     steps = [(step.time_s, step.shown / step.goal) for step in rows]
     windows: dict[int, list[tuple[float, float]]] = {}

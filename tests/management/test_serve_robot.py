@@ -80,7 +80,7 @@ def wait_for_child(folder) -> dict[str, Any]:
 
 
 def family(pid: int) -> list[psutil.Process]:
-    """Give the robot's process and all that it has started: its port, its twin."""
+    """Return the robot's process and all that it has started: its port, its twin."""
     robot = psutil.Process(pid)
     return [robot, *robot.children(recursive=True)]
 

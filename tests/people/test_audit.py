@@ -12,7 +12,13 @@ from django.urls import get_resolver, reverse
 from django.utils import timezone
 
 from rehab.people.audit import access_log, audit_log
-from rehab.people.audit.audit_log import Act, AppendOnly, AuditEntry, Recent, shorten
+from rehab.people.audit.audit_log import (
+    Act,
+    AppendOnlyViolation,
+    AuditEntry,
+    RecentViews,
+    truncate_address,
+)
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.factors import Authenticator
@@ -30,7 +36,7 @@ pytestmark = pytest.mark.django_db
 
 @pytest.fixture(autouse=True)
 def nothing_noted_yet(monkeypatch):
-    monkeypatch.setattr(audit_log, "recent", Recent())
+    monkeypatch.setattr(audit_log, "recent_views", RecentViews())
 
 
 def entries():
@@ -77,7 +83,7 @@ def test_every_route_that_shows_patients_leaves_an_entry(world, monkeypatch):
     ]
     for route in all_routes((world,)):
         for client in people:
-            monkeypatch.setattr(audit_log, "recent", Recent())
+            monkeypatch.setattr(audit_log, "recent_views", RecentViews())
             before = entries().count()
             response = client.get(route.url)
             body_of(response)
@@ -168,10 +174,10 @@ def test_a_page_costs_at_most_two_statements_more_and_one_that_polls_none(
     request.resolver_match = get_resolver().resolve(request.path)
     response = client.get(request.path)
     with django_assert_num_queries(0):
-        access_log.note_request(request, response, NOW)
-    audit_log.recent = Recent()
+        access_log.record_request(request, response, NOW)
+    audit_log.recent_views = RecentViews()
     with django_assert_max_num_queries(4):  # whose session, the entry, and a savepoint around it
-        access_log.note_request(request, response, NOW)
+        access_log.record_request(request, response, NOW)
 
 
 def test_care_goes_on_when_the_log_cannot_be_written_but_nothing_is_given_out(world, monkeypatch):
@@ -191,7 +197,7 @@ def test_care_goes_on_when_the_log_cannot_be_written_but_nothing_is_given_out(wo
 
 
 def test_entries_cannot_be_changed_or_deleted(world):
-    audit_log.note(Act.VIEW, world.people[Role.PT], patient=world.patient.pk, now=NOW)
+    audit_log.record(Act.VIEW, world.people[Role.PT], patient=world.patient.pk, now=NOW)
     entry = entries().get()
     visible = AuditEntry.objects.visible_to(world.people[Role.LEAD])
     for attempt in (
@@ -204,13 +210,13 @@ def test_entries_cannot_be_changed_or_deleted(world):
         visible.delete,
         lambda: visible.update(about="x"),
     ):
-        with pytest.raises(AppendOnly, match="only added to"):
+        with pytest.raises(AppendOnlyViolation, match="append-only"):
             attempt()
     assert entries().get().about == ""
 
 
 def test_leads_read_it_in_the_admin_and_nobody_writes_there(world):
-    audit_log.note(
+    audit_log.record(
         Act.EXPORT, world.people[Role.PT], patient=world.patient.pk, about="here", now=NOW
     )
     entry = entries().get()
@@ -242,12 +248,12 @@ def test_leads_read_it_in_the_admin_and_nobody_writes_there(world):
     ],
 )
 def test_of_an_address_the_network_is_kept(address, kept):
-    assert shorten(address) == kept
+    assert truncate_address(address) == kept
 
 
 def test_what_was_noted_is_forgotten_in_its_turn(monkeypatch):
-    monkeypatch.setattr(audit_log, "REMEMBERED", 2)
-    recent = Recent()
+    monkeypatch.setattr(audit_log, "MAX_RECENT", 2)
+    recent = RecentViews()
     assert [recent.is_new(key, NOW) for key in "abab"] == [True, True, False, False]
     assert recent.is_new("c", NOW)
     assert recent.is_new("a", NOW)

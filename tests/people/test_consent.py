@@ -11,17 +11,14 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.boards.models import BoardEntry
-from rehab.people.consent.models import (
-    Consent,
-    ConsentText,
-    FixedText,
-    Purpose,
+from rehab.people.consent.models import Consent, ConsentText, ImmutableConsentText, Purpose
+from rehab.people.consent.services import (
+    active_consents,
     current_text,
-    give,
-    holding,
-    offered,
-    withdraw,
-    write_text,
+    offered_purposes,
+    publish_text,
+    record_consent,
+    withdraw_consent,
 )
 from rehab.people.models import Boards, Clinic, Patient
 from rehab.people.roles import Role
@@ -41,9 +38,9 @@ def pt(world) -> Client:
     return client_of(world)
 
 
-def tap(client: Client, patient: Patient, purpose: str, says: str) -> Patient:
+def tap(client: Client, patient: Patient, purpose: str, answer: str) -> Patient:
     url = reverse("consent", kwargs={"patient_id": patient.pk})
-    assert client.post(url, {"purpose": purpose, "says": says}).status_code == 302
+    assert client.post(url, {"purpose": purpose, "answer": answer}).status_code == 302
     patient.refresh_from_db()
     return patient
 
@@ -54,7 +51,7 @@ def tap(client: Client, patient: Patient, purpose: str, says: str) -> Patient:
 def test_words_that_somebody_agreed_to_never_change(world):
     text = current_text(world.clinic)
     text.text = "Something else"
-    with pytest.raises(FixedText, match="new version"):
+    with pytest.raises(ImmutableConsentText, match="new version"):
         text.save()
 
 
@@ -64,7 +61,7 @@ def test_a_clinic_begins_with_words_that_name_all_it_asks_for_but_are_its_own_to
     first = current_text(clinic)
     assert first.version == 1
     named = [purpose for purpose in Purpose if f"{purpose.label}:" in first.text]
-    assert named == offered(clinic)
+    assert named == offered_purposes(clinic)
     assert (Purpose.REMOTE in named) == bool(networks)
     assert current_text(clinic) == first
     assert ConsentText.everywhere.filter(clinic=clinic).count() == 1
@@ -72,13 +69,13 @@ def test_a_clinic_begins_with_words_that_name_all_it_asks_for_but_are_its_own_to
 
 def test_new_words_are_a_new_version_and_old_consent_stays_with_the_old_ones(world):
     old = current_text(world.clinic)
-    assert write_text(world.clinic, old.text, None, NOW) == old  # nothing new in it
-    new = write_text(world.clinic, "New words", world.people[Role.LEAD], NOW)
+    assert publish_text(world.clinic, old.text, None, NOW) == old  # nothing new in it
+    new = publish_text(world.clinic, "New words", world.people[Role.LEAD], NOW)
     assert (new.version, new.written_by) == (old.version + 1, world.people[Role.LEAD])
-    held = holding(world.patient)["research"]
+    held = active_consents(world.patient)["research"]
     assert held.text == old
-    give(world.patient, Purpose.RESEARCH, world.people[Role.PT], NOW)
-    assert holding(world.patient)["research"].text == new
+    record_consent(world.patient, Purpose.RESEARCH, world.people[Role.PT], NOW)
+    assert active_consents(world.patient)["research"].text == new
     held.refresh_from_db()
     assert held.withdrawn_at == NOW
 
@@ -98,7 +95,7 @@ def test_a_lead_writes_the_words_and_others_do_not(world, pt):
 
 def test_a_tap_notes_consent_and_another_withdraws_it_with_who_and_when(world, pt):
     tap(pt, world.patient, "care", "yes")
-    row = holding(world.patient)["care"]
+    row = active_consents(world.patient)["care"]
     assert (row.recorded_by, row.text) == (world.people[Role.PT], current_text(world.clinic))
     tap(pt, world.patient, "care", "yes")  # nothing new
     assert Consent.everywhere.filter(patient=world.patient, purpose="care").count() == 1
@@ -106,20 +103,22 @@ def test_a_tap_notes_consent_and_another_withdraws_it_with_who_and_when(world, p
     row.refresh_from_db()
     assert row.withdrawn_by == world.people[Role.PT]
     assert row.withdrawn_at >= row.given_at
-    assert "care" not in holding(world.patient)
+    assert "care" not in active_consents(world.patient)
 
 
-@pytest.mark.parametrize(("purpose", "says"), [("care", "maybe"), ("fame", "yes"), ("boards", "x")])
-def test_what_was_not_offered_is_refused(world, pt, purpose, says):
+@pytest.mark.parametrize(
+    ("purpose", "answer"), [("care", "maybe"), ("fame", "yes"), ("boards", "x")]
+)
+def test_what_was_not_offered_is_refused(world, pt, purpose, answer):
     before = list(Consent.everywhere.values_list("pk", "withdrawn_at"))
-    tap(pt, world.patient, purpose, says)
+    tap(pt, world.patient, purpose, answer)
     assert list(Consent.everywhere.values_list("pk", "withdrawn_at")) == before
 
 
 def test_the_page_says_where_the_words_have_changed_since(world, pt):
     url = reverse("consent", kwargs={"patient_id": world.patient.pk})
     assert b"words have changed since" not in pt.get(url).content
-    write_text(world.clinic, "New words", None, NOW)
+    publish_text(world.clinic, "New words", None, NOW)
     assert b"words have changed since" in pt.get(url).content
 
 
@@ -153,12 +152,12 @@ def test_the_new_patient_form_notes_what_is_agreed_to(world, pt):
     given = {"nickname": "Rosa", "code": "R1", "paretic_side": "left", "agrees": ["care", "boards"]}
     assert pt.post(reverse("new-patient"), given).status_code == 302
     rosa = Patient.everywhere.get(code="R1")
-    assert set(holding(rosa)) == {"care", "boards"}
+    assert set(active_consents(rosa)) == {"care", "boards"}
     assert rosa.boards == Boards.CLINIC
     given |= {"code": "R2"}
     del given["agrees"]
     pt.post(reverse("new-patient"), given)
-    assert not holding(Patient.everywhere.get(code="R2"))
+    assert not active_consents(Patient.everywhere.get(code="R2"))
 
 
 # --- boards ---------------------------------------------------------------------------------------
@@ -169,7 +168,7 @@ def test_boards_with_others_need_consent(world):
     patient.boards = Boards.TOTAL
     with pytest.raises(ValidationError, match="consent to boards"):
         patient.full_clean()
-    give(patient, Purpose.BOARDS, None, NOW)
+    record_consent(patient, Purpose.BOARDS, None, NOW)
     patient.full_clean()
 
 
@@ -191,8 +190,8 @@ def test_the_admin_shows_boards_and_leads_to_where_they_are_agreed_to(before, as
 def test_every_level_of_boards_is_noted_and_who_goes_further_agrees_again(world, pt):
     Clinic.everywhere.update(boards_across=True)
     Consent.everywhere.filter(patient=world.patient, purpose="boards").delete()
-    for says in ("total", "across", "across", "clinic"):
-        tap(pt, world.patient, "boards", says)
+    for answer in ("total", "across", "across", "clinic"):
+        tap(pt, world.patient, "boards", answer)
     rows = Consent.everywhere.filter(patient=world.patient, purpose="boards").order_by("pk")
     assert [row.level for row in rows] == ["total", "across", "clinic"]
     assert [row.withdrawn_at is None for row in rows] == [False, False, True]
@@ -206,12 +205,12 @@ def test_withdrawing_takes_the_patient_off_all_boards_at_once(world, pt):
     assert patient.boards == Boards.OWN
     assert not BoardEntry.everywhere.filter(patient=patient).exists()
     assert tap(pt, patient, "boards", "total").boards == Boards.TOTAL
-    assert "boards" in holding(patient)
+    assert "boards" in active_consents(patient)
 
 
 def test_leaving_boards_on_the_tablet_withdraws_the_consent(world, pt):
     pt.post(reverse("leave-boards", kwargs={"session_id": world.session.pk}))
-    assert "boards" not in holding(world.patient)
+    assert "boards" not in active_consents(world.patient)
 
 
 # --- care -----------------------------------------------------------------------------------------
@@ -240,7 +239,7 @@ def test_a_clinic_may_need_consent_to_care_before_a_session(world, pt):
         set_up(world)
     tap(pt, world.patient, "care", "yes")
     set_up(world)
-    page = pt.post(consent, {"purpose": "care", "says": "no"}, follow=True).content.decode()
+    page = pt.post(consent, {"purpose": "care", "answer": "no"}, follow=True).content.decode()
     assert "This clinic sets up no session without it." in page
     assert f'href="{reverse("records", args=[world.patient.pk])}">End the program' in page
     with pytest.raises(InvalidSetting):
@@ -278,10 +277,12 @@ def test_from_elsewhere_a_session_is_watched_with_consent_only(name, world, pt):
 
 def test_what_is_not_offered_can_be_withdrawn_but_not_given(world, pt):
     tap(pt, world.patient, "remote", "yes")
-    assert "remote" not in holding(world.patient)
-    give(world.patient, Purpose.REMOTE, None, NOW)  # before the clinic took its networks away
+    assert "remote" not in active_consents(world.patient)
+    record_consent(
+        world.patient, Purpose.REMOTE, None, NOW
+    )  # before the clinic took its networks away
     tap(pt, world.patient, "remote", "no")
-    assert "remote" not in holding(world.patient)
+    assert "remote" not in active_consents(world.patient)
 
 
 @pytest.mark.parametrize(
@@ -319,7 +320,7 @@ def test_researchers_see_sessions_of_those_only_who_agreed(world, pt):
 
 
 def test_a_clinic_may_do_without_and_simulated_patients_need_none(world):
-    withdraw(world.patient, Purpose.RESEARCH, None, NOW)
+    withdraw_consent(world.patient, Purpose.RESEARCH, None, NOW)
     world.clinic.research_needs_consent = False
     world.clinic.save()
     assert seen(world) == {True}
@@ -337,18 +338,18 @@ def test_what_exists_when_garry_is_updated_goes_on(world):
     assert not world.clinic.research_needs_consent
     assert [(row.patient, row.text) for row in Consent.everywhere.all()] == [(world.patient, None)]
     world.patient.full_clean()
-    assert not holding(quiet)
+    assert not active_consents(quiet)
 
 
 def test_an_update_lets_boards_and_consent_say_the_same(world):
     board = BoardEntry.everywhere.get(patient=world.patient).board
     left = Patient.everywhere.create(clinic=world.clinic, code="l", nickname="L", boards="across")
     kept = Patient.everywhere.create(clinic=world.clinic, code="k", nickname="K")
-    give(kept, Purpose.BOARDS, None, NOW)
+    record_consent(kept, Purpose.BOARDS, None, NOW)
     Consent.everywhere.update(level="")
     import_module("rehab.migrations.0004_what_was_agreed_to").tell_levels(apps, None)
-    assert holding(world.patient)["boards"].level == "clinic"
-    assert "boards" not in holding(kept)
+    assert active_consents(world.patient)["boards"].level == "clinic"
+    assert "boards" not in active_consents(kept)
     left.refresh_from_db()
     assert left.boards == Boards.OWN
     board.refresh_from_db()

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.django_db
 
 
 def last_of(row) -> HistoryEntry:
-    return HistoryEntry.everywhere.filter(noun=type(row).__name__, row=row.pk).first()
+    return HistoryEntry.everywhere.filter(model_name=type(row).__name__, object_id=row.pk).first()
 
 
 @pytest.mark.parametrize("model", TRACKED, ids=lambda model: model.__name__)
@@ -33,12 +33,12 @@ def test_every_row_of_people_and_settings_has_its_making_on_record(model, world)
 
 
 def test_a_change_tells_the_field_before_and_after_and_who_did_it(world):
-    url = reverse("mend-patient", kwargs={"patient_id": world.patient.pk})
+    url = reverse("edit-patient", kwargs={"patient_id": world.patient.pk})
     given = {"nickname": "Rosa", "code": "R1", "paretic_side": "right"}
     assert client_of(world, Role.PT).post(url, given).status_code == 302
     entry = last_of(world.patient)
     assert entry.by == world.people[Role.PT]
-    assert entry.values == {
+    assert entry.changes == {
         "nickname": [mark("amber", Patient), "Rosa"],
         "code": [mark("amber", Patient), "R1"],
         "paretic_side": ["left", "right"],
@@ -71,11 +71,11 @@ def test_passwords_pins_and_tokens_are_never_kept(world):
     station = world.device.station
     set_pin(station, "4711")
     station.save()
-    assert last_of(station).values["pin_hash"] == ["", history.HIDDEN]
-    assert last_of(user).values["password"] == [history.HIDDEN, history.HIDDEN]
+    assert last_of(station).changes["pin_hash"] == ["", history.MASK]
+    assert last_of(user).changes["password"] == [history.MASK, history.MASK]
     world.device.new_token()
     world.device.save()
-    kept = str(list(HistoryEntry.everywhere.values_list("values")))
+    kept = str(list(HistoryEntry.everywhere.values_list("changes")))
     assert world.device.token_hash not in kept
     assert user.password not in kept
 
@@ -85,15 +85,15 @@ def test_revoking_a_token_in_the_admin_is_on_record(world):
     client_of(world, Role.LEAD).post(reverse("admin:rehab_device_changelist"), chosen)
     entry = last_of(Device.everywhere.get(pk=world.device.pk))
     assert entry.by == world.people[Role.LEAD]
-    assert list(entry.values) == ["revoked_at"]
+    assert list(entry.changes) == ["revoked_at"]
 
 
 def test_the_group_of_a_board_is_on_record(world):
     board = world.rows[Leaderboard]
     board.group.add(world.patient)
-    assert last_of(board).values == {"group": [None, [world.patient.pk]]}
+    assert last_of(board).changes == {"group": [None, [world.patient.pk]]}
     board.group.clear()
-    assert last_of(board).values == {"group": [[world.patient.pk], None]}
+    assert last_of(board).changes == {"group": [[world.patient.pk], None]}
 
 
 def test_a_rows_page_tells_its_changes_and_those_of_its_parts(world):
@@ -120,7 +120,7 @@ def test_each_role_reads_the_changes_of_what_it_may_read_and_of_its_clinic(world
     def nouns(user: User) -> set[str]:
         entries = HistoryEntry.objects.visible_to(user)
         assert not entries.filter(clinic=birch.clinic).exists()
-        return set(entries.values_list("noun", flat=True))
+        return set(entries.values_list("model_name", flat=True))
 
     assert {"Patient", "User", "Clinic"} <= nouns(world.people[Role.LEAD])
     assert "User" not in nouns(world.people[Role.PT])
@@ -128,7 +128,7 @@ def test_each_role_reads_the_changes_of_what_it_may_read_and_of_its_clinic(world
     assert "Protocol" in researcher
     assert not {"Patient", "User", "Device"} & researcher
     host = User.everywhere.create_user("host", role=Role.HOST)
-    hosts = HistoryEntry.objects.visible_to(host).values_list("noun", flat=True)
+    hosts = HistoryEntry.objects.visible_to(host).values_list("model_name", flat=True)
     assert set(hosts) <= {"Clinic", "User", "Measure", "Protocol", "ProtocolPhase"}
 
 
@@ -141,9 +141,9 @@ def test_who_may_not_see_a_row_does_not_see_its_changes(world):
 
 
 def test_erased_values_are_gone_but_not_who_and_when(world):
-    history.forget_values("Patient", world.patient.pk)
+    history.erase_values("Patient", world.patient.pk)
     entry = last_of(world.patient)
-    assert entry.values["nickname"] is None
+    assert entry.changes["nickname"] is None
     url = reverse("admin:rehab_patient_history", args=[world.patient.pk])
     assert "erased" in client_of(world, Role.LEAD).get(url).content.decode()
 

@@ -120,7 +120,7 @@ def test_a_lead_makes_accounts_of_the_own_clinic_and_never_a_host(world):
 
 def test_a_host_makes_clinics_and_their_leads(world):
     client = signed_in(User.everywhere.create_user("host", role=Role.HOST))
-    given = {"name": "Oak", "language": "en", "time_zone": "UTC", "keep_log_months": 36}
+    given = {"name": "Oak", "language": "en", "time_zone": "UTC", "log_retention_months": 36}
     client.post("/admin/rehab/clinic/add/", given)
     oak = Clinic.everywhere.get(name="Oak")
     form = {

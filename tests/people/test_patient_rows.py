@@ -14,16 +14,15 @@ from django.urls import reverse
 from rehab.boards import entries
 from rehab.boards.models import BoardEntry
 from rehab.patients.erasure import erase
-from rehab.people.consent.models import (
-    Consent,
-    Purpose,
+from rehab.people.consent.models import Consent, Purpose
+from rehab.people.consent.services import (
+    active_consents,
     current_text,
-    give,
-    holding,
-    join_boards,
-    withdraw,
+    record_boards_consent,
+    record_consent,
+    withdraw_consent,
 )
-from rehab.people.models import Boards, Erasing, Patient
+from rehab.people.models import Boards, ErasureReason, Patient
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.services import SessionRequest, create_session
@@ -42,7 +41,7 @@ def save_screen(world: World) -> Any:
 
 
 def save_details(world: World) -> Any:
-    return client_of(world).post(reverse("mend-patient", args=[world.patient.pk]), DETAILS)
+    return client_of(world).post(reverse("edit-patient", args=[world.patient.pk]), DETAILS)
 
 
 def patch(world: World) -> Any:
@@ -72,7 +71,7 @@ def between(monkeypatch: pytest.MonkeyPatch, act: Callable[[], Any]) -> None:
 )
 def test_who_is_erased_while_somebody_saves_stays_erased(save, status, world, monkeypatch):
     patient = Patient.everywhere.get(pk=world.patient.pk)
-    between(monkeypatch, lambda: erase(patient, Erasing.ASKED, None, NOW))
+    between(monkeypatch, lambda: erase(patient, ErasureReason.ASKED, None, NOW))
     answer = save(world)
     assert (answer.status_code, b"This person is erased" in answer.content) == (status, True)
     stored = Patient.everywhere.get(pk=patient.pk)
@@ -88,17 +87,17 @@ def test_who_leaves_the_boards_while_somebody_saves_has_left_them(save, world, m
     assert save(world).status_code in (200, 302)
     stored = Patient.everywhere.get(pk=world.patient.pk)
     assert stored.boards == Boards.OWN
-    assert "boards" not in holding(stored)
+    assert "boards" not in active_consents(stored)
     assert not BoardEntry.everywhere.filter(patient=stored).exists()
 
 
 def test_whoever_read_the_patient_before_withdraws_and_erases_what_is_there_now(world):
     early, erasing = (Patient.everywhere.get(pk=world.patient.pk) for _ in range(2))
     early.boards = erasing.boards = Boards.OWN  # read before the patient joined
-    withdraw(early, Purpose.BOARDS, None, NOW)
+    withdraw_consent(early, Purpose.BOARDS, None, NOW)
     assert Patient.everywhere.get(pk=early.pk).boards == Boards.OWN
-    join_boards(world.patient, Boards.ACROSS, None, NOW)
-    erase(erasing, Erasing.ASKED, None, NOW)
+    record_boards_consent(world.patient, Boards.ACROSS, None, NOW)
+    erase(erasing, ErasureReason.ASKED, None, NOW)
     stored = Patient.everywhere.get(pk=early.pk)
     assert (stored.boards, stored.alias) == (Boards.OWN, None)
     assert not BoardEntry.everywhere.filter(patient=stored).exists()
@@ -106,10 +105,10 @@ def test_whoever_read_the_patient_before_withdraws_and_erases_what_is_there_now(
 
 def test_nobody_agrees_joins_or_walks_for_a_person_who_was_just_erased(world):
     stale = [Patient.everywhere.get(pk=world.patient.pk) for _ in range(3)]
-    erase(world.patient, Erasing.ASKED, None, NOW)
+    erase(world.patient, ErasureReason.ASKED, None, NOW)
     agreed = Consent.everywhere.count()
-    give(stale[0], Purpose.CARE, None, NOW)
-    join_boards(stale[1], Boards.CLINIC, None, NOW)
+    record_consent(stale[0], Purpose.CARE, None, NOW)
+    record_boards_consent(stale[1], Boards.CLINIC, None, NOW)
     assert Consent.everywhere.count() == agreed
     assert Patient.everywhere.get(pk=world.patient.pk).boards == Boards.OWN
     walked = world.session
@@ -140,10 +139,10 @@ def test_a_screen_setting_costs_boards_nothing(world):
     entry.delete()  # whoever looks at boards again would bring it back
     patient = Patient.everywhere.get(pk=world.patient.pk)
     patient.screen_still = True
-    patient.keep("screen_still")
+    patient.save_fields("screen_still")
     assert not BoardEntry.everywhere.exists()
     patient.blinded = False
-    patient.keep("blinded")
+    patient.save_fields("blinded")
     assert BoardEntry.everywhere.exists()
 
 
@@ -183,7 +182,7 @@ def test_the_admin_holds_the_patient_whom_it_changes(busy, monkeypatch):
     found, threads = Patient.full_clean, list[threading.Thread]()
 
     def run() -> None:
-        erase(other, Erasing.ASKED, None, NOW)
+        erase(other, ErasureReason.ASKED, None, NOW)
         connections.close_all()
 
     def erase_beside(row: Patient, *args: Any, **kwargs: Any) -> None:
@@ -208,9 +207,9 @@ def test_a_consent_that_is_tapped_twice_is_noted_once(busy):
     url = reverse("consent", args=[busy.patient.pk])
     browsers = [client_of(busy) for _ in range(2)]
     for _ in range(5):
-        withdraw(busy.patient, Purpose.CARE, None, NOW)
+        withdraw_consent(busy.patient, Purpose.CARE, None, NOW)
         taps = [
-            lambda one=one: one.post(url, {"purpose": "care", "says": "yes"}).status_code
+            lambda one=one: one.post(url, {"purpose": "care", "answer": "yes"}).status_code
             for one in browsers
         ]
         assert at_once(*taps) == [302, 302]

@@ -16,7 +16,7 @@ from django.utils.translation import override
 
 from rehab.people.models import Clinic, Patient
 from rehab.people.roles import Role
-from rehab.people.web.refusals import in_words
+from rehab.people.web.refusals import format_refusal
 from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind, NotAllowed, State
@@ -42,7 +42,7 @@ def said(act: Callable[[], object], language: str = "es") -> str:
         try:
             act()
         except (InvalidSetting, BadGesture) as problem:
-            return in_words(problem)
+            return format_refusal(problem)
     raise AssertionError("nothing was refused")
 
 
@@ -94,7 +94,7 @@ def test_the_message_itself_stays_english():
 
 
 def test_what_is_no_template_is_said_as_it_is():
-    assert in_words(InvalidSetting("Rosa {K-7} ended.")) == "Rosa {K-7} ended."
+    assert format_refusal(InvalidSetting("Rosa {K-7} ended.")) == "Rosa {K-7} ended."
 
 
 def test_every_translated_refusal_takes_the_values_of_its_source():

@@ -17,7 +17,12 @@ from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.people.sign_in import factors, recovery_codes, totp
 from rehab.people.sign_in.factors import Authenticator, RecoveryCode
-from rehab.people.sign_in.totp import STEP_S, code_of, new_secret, step_of
+from rehab.people.sign_in.totp import (
+    TIME_STEP_S,
+    generate_code,
+    generate_secret,
+    matching_time_step,
+)
 
 pytestmark = pytest.mark.postgres
 
@@ -40,35 +45,35 @@ RFC_SECRET = "GEZDGNBVGY3TQOJQGEZDGNBVGY3TQOJQ"  # "12345678901234567890"
     ],
 )
 def test_codes_are_those_of_the_standard(now_s, code):
-    assert code_of(RFC_SECRET, now_s // STEP_S) == code
-    assert step_of(RFC_SECRET, f"{code[:3]} {code[3:]}", now_s) == now_s // STEP_S
+    assert generate_code(RFC_SECRET, now_s // TIME_STEP_S) == code
+    assert matching_time_step(RFC_SECRET, f"{code[:3]} {code[3:]}", now_s) == now_s // TIME_STEP_S
 
 
 @pytest.mark.parametrize("drift", [-2, -1, 0, 1, 2])
 def test_a_phone_may_be_half_a_minute_off(drift):
     now = 1234567890
-    code = code_of(RFC_SECRET, now // STEP_S + drift)
-    assert (step_of(RFC_SECRET, code, now) is not None) == (abs(drift) <= 1)
+    code = generate_code(RFC_SECRET, now // TIME_STEP_S + drift)
+    assert (matching_time_step(RFC_SECRET, code, now) is not None) == (abs(drift) <= 1)
 
 
 @pytest.mark.parametrize("code", ["", " ", "28708", "2870820", "٢٨٧٠٨٢", "28708x", "-287082"])
 def test_what_is_no_code_is_refused(code):
-    assert step_of(RFC_SECRET, code, 59) is None
+    assert matching_time_step(RFC_SECRET, code, 59) is None
 
 
 def test_recovery_codes_are_read_as_people_type_them():
-    code = recovery_codes.new_recovery_code()
+    code = recovery_codes.generate_code()
     assert re.fullmatch("([2-9A-Z]{4}-){2}[2-9A-Z]{4}", code)
-    assert recovery_codes.digest_of(
+    assert recovery_codes.hash_code(
         f" {code.lower().replace('-', ' ')} "
-    ) == recovery_codes.digest_of(code)
-    assert recovery_codes.digest_of(code) != recovery_codes.digest_of(
-        recovery_codes.new_recovery_code()
+    ) == recovery_codes.hash_code(code)
+    assert recovery_codes.hash_code(code) != recovery_codes.hash_code(
+        recovery_codes.generate_code()
     )
 
 
 def test_an_app_reads_who_and_where_from_the_square():
-    address = totp.address(RFC_SECRET, "rosa@elm")
+    address = totp.provisioning_uri(RFC_SECRET, "rosa@elm")
     assert address == f"otpauth://totp/GARRY%3Arosa%40elm?secret={RFC_SECRET}&issuer=GARRY"
 
 
@@ -84,9 +89,11 @@ def pt(db: None) -> User:
 @pytest.fixture
 def app(pt) -> App:
     """An app of the therapist's, set up a while ago."""
-    secret = new_secret()
+    secret = generate_secret()
     then = timezone.now() - timedelta(days=3)
-    kept = factors.add_app(pt, secret, code_of(secret, int(then.timestamp()) // STEP_S), then)
+    kept = factors.add_app(
+        pt, secret, generate_code(secret, int(then.timestamp()) // TIME_STEP_S), then
+    )
     return App(secret, kept)
 
 
@@ -98,7 +105,9 @@ class App:
         self.recovery_codes = recovery_codes
 
     def code(self, steps_ago: int = 0) -> str:
-        return code_of(self.secret, int(timezone.now().timestamp()) // STEP_S - steps_ago)
+        return generate_code(
+            self.secret, int(timezone.now().timestamp()) // TIME_STEP_S - steps_ago
+        )
 
 
 def enter(client: Client, username: str = "rosa", then: str = ""):
@@ -130,7 +139,7 @@ def test_the_password_alone_takes_nobody_past_the_second_factor(client, pt, app)
     assert is_in(client)
 
 
-def test_whoever_has_a_second_factor_cannot_set_up_another_one_halfway(client, pt, app):
+def test_whoever_has_a_second_factor_cannot_enroll_another_one_while_pending(client, pt, app):
     enter(client)
     for name in ("set-up-second-factor", "add-app", "add-passkey", "account", "recovery-codes"):
         assert client.get(reverse(name)).headers["Location"].startswith("/sign-in/?next="), name
@@ -152,13 +161,15 @@ def test_a_recovery_code_lets_in_once(pt, app):
         enter(client)
         prove(client, app.recovery_codes[3].lower())
         assert is_in(client) == is_good
-    assert factors.recovery_codes_left(pt) == 9
+    assert factors.count_recovery_codes(pt) == 9
 
 
-def test_the_way_halfway_ends(client, pt, app):
+def test_a_pending_sign_in_expires(client, pt, app):
     enter(client)
     store = client.session
-    store["halfway"] = store["halfway"] | {"at": timezone.now().timestamp() - 601}
+    store["pending_second_factor"] = store["pending_second_factor"] | {
+        "at": timezone.now().timestamp() - 601
+    }
     store.save()
     assert prove(client, app.code()).headers["Location"] == "/sign-in/"
     enter(client)
@@ -168,7 +179,7 @@ def test_the_way_halfway_ends(client, pt, app):
     assert not is_in(client)
 
 
-def test_a_key_that_somebody_else_planted_gets_nobody_halfway(client, pt, app):
+def test_a_key_that_somebody_else_planted_signs_nobody_in(client, pt, app):
     client.get(reverse("sign-in"))
     store = client.session
     store["x"] = 1
@@ -204,12 +215,12 @@ def test_wrong_passwords_of_strangers_do_not_close_the_second_door(client, pt, a
 
 def test_no_secret_lies_open_in_the_database(pt, app, settings):
     row = Authenticator.everywhere.get()
-    assert app.secret not in row.material
-    digests = RecoveryCode.everywhere.values_list("digest", flat=True)
-    assert not set(digests) & set(app.recovery_codes)
+    assert app.secret not in row.credential
+    hashes = RecoveryCode.everywhere.values_list("code_hash", flat=True)
+    assert not set(hashes) & set(app.recovery_codes)
     settings.SECRET_KEY = "another one " * 5  # as for whoever has the database alone
-    assert not factors.take_code(pt, app.code(), timezone.now())
-    assert factors.take_code(pt, app.recovery_codes[0], timezone.now())
+    assert not factors.verify_code(pt, app.code(), timezone.now())
+    assert factors.verify_code(pt, app.recovery_codes[0], timezone.now())
 
 
 # --- setting up ---------------------------------------------------------------------------------
@@ -237,7 +248,7 @@ def test_an_app_is_kept_once_it_shows_the_right_code(client, pt):
     assert "10 left" in account
     assert not any(code in account for code in shown)
     assert set_up_app(client)[1] != secret  # a second one has a secret, and no codes, of its own
-    assert factors.recovery_codes_left(pt) == 10
+    assert factors.count_recovery_codes(pt) == 10
     elsewhere = Client()
     assert enter(elsewhere) == "/sign-in/code/"
     prove(elsewhere, shown[0])
@@ -253,11 +264,11 @@ def test_removing_and_renewing_take_the_password(client, pt, app):
         assert "That is not your password" in refused.content.decode()
     renewed = client.post(reverse("recovery-codes"), {"password": PASSWORD})
     shown = re.findall("<code>([^<]+)</code>", renewed.content.decode())
-    assert not factors.take_code(pt, app.recovery_codes[0], timezone.now())
-    assert factors.take_code(pt, shown[0], timezone.now())
+    assert not factors.verify_code(pt, app.recovery_codes[0], timezone.now())
+    assert factors.verify_code(pt, shown[0], timezone.now())
     client.post(removal, {"password": PASSWORD})
     assert not factors.authenticators_of(pt).exists()
-    assert factors.recovery_codes_left(pt) == 0
+    assert factors.count_recovery_codes(pt) == 0
     assert enter(Client()) == "/start/"
 
 
@@ -335,7 +346,7 @@ def test_a_lead_asks_for_it_and_helps_whoever_lost_it(client, pt, app):
         "name": "Elm",
         "language": "en",
         "time_zone": "UTC",
-        "keep_log_months": 36,
+        "log_retention_months": 36,
         "second_factor_required": "on",
     }
     client.post(f"/admin/rehab/clinic/{pt.clinic.pk}/change/", form)

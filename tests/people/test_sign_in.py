@@ -13,7 +13,7 @@ from django.utils import timezone
 from rehab.people.models import Clinic, User
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
-from rehab.people.sign_in.browser_sessions import SEEN_AT, SIGNED_IN_AT
+from rehab.people.sign_in.browser_sessions import LAST_ACTIVITY_AT, SIGNED_IN_AT
 
 pytestmark = pytest.mark.django_db
 PASSWORD = "walk well 2026"
@@ -185,7 +185,7 @@ def away(client: Client, minutes: float) -> None:
     """Let time pass: everything that is known of the sign-in moves into the past."""
     end = Session.objects.get().expire_date - timedelta(minutes=minutes)
     store = client.session
-    for name in (SEEN_AT, SIGNED_IN_AT):
+    for name in (LAST_ACTIVITY_AT, SIGNED_IN_AT):
         store[name] -= minutes * 60
     store.save()
     Session.objects.update(expire_date=end)
@@ -217,7 +217,7 @@ def test_being_there_is_written_down_once_a_minute(client, pt, django_assert_num
         client.get("/account/password/")
     away(client, 2)
     client.get("/account/password/")
-    assert client.session[SEEN_AT] == pytest.approx(timezone.now().timestamp(), abs=5)
+    assert client.session[LAST_ACTIVITY_AT] == pytest.approx(timezone.now().timestamp(), abs=5)
 
 
 # --- the own password ---------------------------------------------------------------------------

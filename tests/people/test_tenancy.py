@@ -22,7 +22,7 @@ from rehab.people import api as people_api
 from rehab.people.access import for_roles, public
 from rehab.people.models import Patient
 from rehab.people.roles import Right, Role, rights_of
-from rehab.people.scope import CrossClinic, Scope, ScopedManager, UnscopedQuery
+from rehab.people.scope import CrossClinicReference, Scope, ScopedManager, UnscopedQuery
 from rehab.people.web.admin_base import ScopedOptions
 from rehab.stations.models import Device, Station
 from tests.support.tenancy import all_routes, find_leaks, find_offers, may_read, walk_patterns
@@ -110,10 +110,10 @@ def test_rows_of_two_clinics_are_never_tied_together(worlds):
     stray = Device(
         clinic=amber.clinic, station=birch.rows[Station], kind="robot", name="x", token_hash="x"
     )
-    with pytest.raises(CrossClinic, match="same clinic"):
+    with pytest.raises(CrossClinicReference, match="same clinic"):
         stray.save()
     amber.session.patient = birch.patient
-    with pytest.raises(CrossClinic):
+    with pytest.raises(CrossClinicReference):
         amber.session.save()
 
 
@@ -156,7 +156,7 @@ def test_every_form_offers_rows_of_the_own_clinic_only(worlds):
 class NoScope(Scope):
     """A scope that somebody forgot: rights hold, clinics do not."""
 
-    def of_clinic(self, clinic_id: int) -> Q:
+    def clinic_filter(self, clinic_id: int) -> Q:
         return Q()
 
 
@@ -277,7 +277,7 @@ def test_unscoped_calls_of_the_api_are_caught(worlds, monkeypatch):
 
 
 def test_a_name_that_the_api_tells_researchers_is_caught(worlds, monkeypatch):
-    monkeypatch.setattr(people_api, "sees_names", lambda context: True)
+    monkeypatch.setattr(people_api, "may_see_names", lambda context: True)
     leaks, _ = find_leaks(worlds, all_actors(*worlds), under="/api/v1/")
     assert "researcher of amber: /api/v1/sessions shows Patient of amber" in leaks
 

@@ -15,7 +15,8 @@ from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
 from rehab.boards.models import Leaderboard
-from rehab.people.consent.models import Purpose, give
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import record_consent
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection
@@ -124,7 +125,7 @@ def test_a_researcher_finds_by_pseudonym_alone(world, walked):
     client = client_of(world, Role.RESEARCHER)
     rosa = walked["weak"].patient
     for name in ("weak", "told"):
-        give(walked[name].patient, Purpose.RESEARCH, None, NOW)
+        record_consent(walked[name].patient, Purpose.RESEARCH, None, NOW)
     assert found(client, walked, who=rosa.pseudonym) == {"weak", "strong"}
     page = client.get(SESSIONS).content.decode()
     assert "Rosa" not in page
@@ -209,7 +210,7 @@ def protocol(world) -> Protocol:
 
 
 def rows(protocol: Protocol, *phases: dict[str, object]) -> dict[str, object]:
-    """Give the form of a protocol with these phases."""
+    """Return the form of a protocol with these phases."""
     stored = protocol.phases.count() if protocol.pk else 0
     form: dict[str, object] = {
         "name": protocol.name,

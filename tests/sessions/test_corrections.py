@@ -13,8 +13,9 @@ from django.urls import reverse
 from rehab.boards import entries
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.patients.erasure import erase
-from rehab.people.consent.models import Purpose, give
-from rehab.people.models import Erasing, Patient
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import record_consent
+from rehab.people.models import ErasureReason, Patient
 from rehab.people.roles import Role
 from rehab.sessions import corrections
 from rehab.sessions.corrections import CorrectedField, SessionCorrection, correct_session
@@ -53,7 +54,7 @@ def opened(world: World, session: TrainingSession, role: Role = Role.PT) -> dict
 
 
 def sent_by(page: str) -> dict[str, str]:
-    """Give what a page with the form sends."""
+    """Return what a page with the form sends."""
     form = re.search(r'<form method="post" class="fields card">.*?</form>', page, re.DOTALL)
     found: dict[str, str] = {}
     for tag in re.findall(r"<input[^>]*>", form[0] if form else ""):
@@ -77,7 +78,7 @@ def correct(world: World, session: TrainingSession, role: Role = Role.PT, **chan
 
 
 def log_of(session: TrainingSession) -> list[object]:
-    """Give everything that was recorded of a session."""
+    """Return everything that was recorded of a session."""
     return [
         list(model.everywhere.filter(session=session).order_by("pk").values())
         for model in (Step, SessionEvent, SessionMetric)
@@ -271,7 +272,7 @@ def test_a_session_that_still_runs_is_ended_first(world, rosa):
 
 def test_a_researcher_reads_corrections_by_pseudonym_and_makes_none(world, rosa, omar):
     for patient in (rosa, omar):
-        give(patient, Purpose.RESEARCH, None, NOW)
+        record_consent(patient, Purpose.RESEARCH, None, NOW)
     session = walk(rosa, "positive", strides(3, 1))
     correct(world, session, patient=omar.pk)
     assert correct(world, session, Role.RESEARCHER, counts="no").status_code == 403
@@ -319,7 +320,7 @@ def test_the_api_says_what_is_left_out(world, rosa):
 
 
 def test_nobody_who_is_erased_is_offered_or_taken_as_who_walked(world, rosa, omar):
-    erase(rosa, Erasing.ASKED, None, NOW)
+    erase(rosa, ErasureReason.ASKED, None, NOW)
     pt, url = client_of(world), reverse("correct", args=[world.session.pk])
     page = pt.get(url).content.decode()
     assert f'value="{omar.pk}"' in page
@@ -332,7 +333,7 @@ def test_nobody_who_is_erased_is_offered_or_taken_as_who_walked(world, rosa, oma
             world.people[Role.PT],
             NOW,
         )
-    erase(world.patient, Erasing.ASKED, None, NOW)  # who did walk stays chosen
+    erase(world.patient, ErasureReason.ASKED, None, NOW)  # who did walk stays chosen
     assert f'value="{world.patient.pk}" selected' in pt.get(url).content.decode()
     group = pt.get(reverse("admin:rehab_leaderboard_add")).content.decode()
     assert f'name="group" value="{omar.pk}"' in group

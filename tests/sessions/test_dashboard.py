@@ -12,7 +12,8 @@ import pytest
 from django.urls import reverse
 from django.utils import timezone
 
-from rehab.people.consent.models import Purpose, give
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import record_consent
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.live import runtime
@@ -21,7 +22,7 @@ from rehab.sessions.reports import dashboard
 from rehab.sessions.reports.dashboard import dashboard_context, find_alerts, sessions_today
 from rehab.sessions.reports.week import week_summary
 from rehab.stations.models import Device, Station
-from rehab.stations.presence import say_seen
+from rehab.stations.presence import format_last_seen
 from rehab.training.changes import ChangeKind, State
 from rehab.training.tallies import Tally
 from tests.support.walks import RIGHT, strides, walk
@@ -55,7 +56,7 @@ def rosa(world: World) -> Patient:
 
 
 def ago(patient: Patient, valence: str, walked, moment: datetime, **how) -> TrainingSession:
-    """Let somebody walk from a moment on."""
+    """Store a walk that began at a moment."""
     return walk(patient, valence, walked, now=moment, **how)
 
 
@@ -194,7 +195,7 @@ def test_a_session_left_open_and_devices_shut_out_want_attention(world, rosa):
     ],
 )
 def test_it_is_said_when_a_device_was_there(ago, words):
-    assert say_seen(ago and NOW - ago, NOW) == words
+    assert format_last_seen(ago and NOW - ago, NOW) == words
 
 
 # --- the page, for each role --------------------------------------------------------------------
@@ -216,7 +217,7 @@ def test_a_therapist_is_led_to_the_monitor_of_who_walks(world, rosa):
 
 
 def test_a_researcher_sees_pseudonyms_and_no_station(world, rosa):
-    give(rosa, Purpose.RESEARCH, None, timezone.now())
+    record_consent(rosa, Purpose.RESEARCH, None, timezone.now())
     session = ago(rosa, "positive", strides(3, 1), timezone.now(), end=None)
     page = front(world.people[Role.RESEARCHER])
     assert rosa.pseudonym in page

@@ -20,7 +20,7 @@ from rehab.patients.visits import Visit
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.audit.history import HistoryEntry
-from rehab.people.models import Ending, Erasing, Patient
+from rehab.people.models import EndReason, ErasureReason, Patient
 from rehab.people.roles import Role
 from rehab.sessions.corrections import CorrectedField, SessionCorrection, correct_session
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
@@ -59,7 +59,7 @@ def test_an_ended_program_leaves_the_lists_and_is_found_by_name(world):
     client.post(reverse("end-program", kwargs=key), {"because": "moved"})
     world.patient.refresh_from_db()
     assert world.patient.ended_at is not None
-    assert world.patient.ended_because == Ending.MOVED
+    assert world.patient.end_reason == EndReason.MOVED
     address = reverse("patient", kwargs=key)
     assert address not in client.get(reverse("start")).content.decode()
     found = client.get(reverse("start"), {"q": world.patient.code}).content.decode()
@@ -68,7 +68,7 @@ def test_an_ended_program_leaves_the_lists_and_is_found_by_name(world):
 
 def test_an_ended_program_cannot_be_started_until_it_is_reopened(world):
     client = client_of(world)
-    end_program(world.patient, Ending.DONE, NOW)
+    end_program(world.patient, EndReason.DONE, NOW)
     page = page_of(world, client)
     setup = reverse("setup", kwargs={"patient_id": world.patient.pk})
     assert f'action="{setup}"' not in page
@@ -77,7 +77,7 @@ def test_an_ended_program_cannot_be_started_until_it_is_reopened(world):
         start(world)
     client.post(reverse("reopen", kwargs={"patient_id": world.patient.pk}))
     world.patient.refresh_from_db()
-    assert (world.patient.ended_at, world.patient.ended_because) == (None, "")
+    assert (world.patient.ended_at, world.patient.end_reason) == (None, "")
     assert f'action="{setup}"' in page_of(world, client)
     start(world)
 
@@ -85,8 +85,8 @@ def test_an_ended_program_cannot_be_started_until_it_is_reopened(world):
 def test_who_has_an_open_session_is_neither_ended_nor_erased(world):
     start(world)
     for act in (
-        lambda: end_program(world.patient, Ending.DONE, NOW),
-        lambda: erase(world.patient, Erasing.ASKED, None, NOW),
+        lambda: end_program(world.patient, EndReason.DONE, NOW),
+        lambda: erase(world.patient, ErasureReason.ASKED, None, NOW),
     ):
         with pytest.raises(SessionStillOpen, match="End it first"):
             act()
@@ -107,7 +107,7 @@ def test_the_page_asks_for_a_reason(world):
 
 
 def everything_stored() -> str:
-    """Give every row of every model, and the admin's own notes, as text."""
+    """Return every row of every model, and the admin's own notes, as text."""
     rows: list[Any] = [*scoped_models(), LogEntry]
     return "\n".join(serialize("json", model._base_manager.all()) for model in rows)
 
@@ -115,7 +115,7 @@ def everything_stored() -> str:
 def test_erasing_leaves_nothing_that_leads_to_the_person(world):
     patient, lead = world.patient, client_of(world, Role.LEAD)
     secrets = {"nickname": "Rosamunde", "code": "CASE-4711", "body_mass_kg": 87.125}
-    details = reverse("mend-patient", kwargs={"patient_id": patient.pk})
+    details = reverse("edit-patient", kwargs={"patient_id": patient.pk})
     lead.post(details, secrets | {"paretic_side": "left"})
     change = reverse("admin:rehab_patient_change", args=[patient.pk])
     given = secrets | {"language": "en", "screen_side": "right", "boards": "clinic", "blinded": ""}
@@ -124,9 +124,9 @@ def test_erasing_leaves_nothing_that_leads_to_the_person(world):
         source="Recording rosamunde.csv",
         source_args=["recording", "/data/rosamunde.csv"],
         legacy_row={"name": "Rosamunde"},
-        original_id=990_017,
+        legacy_id=990_017,
     )
-    Patient.everywhere.filter(pk=patient.pk).update(original_id=880_018)
+    Patient.everywhere.filter(pk=patient.pk).update(legacy_id=880_018)
     SessionEvent.everywhere.create(
         session=world.session, after_number=1, kind="pain", at=NOW, data={"note": "CASE-4711"}
     )
@@ -159,35 +159,35 @@ def test_erasing_leaves_nothing_that_leads_to_the_person(world):
 def test_erasing_keeps_the_figures_and_says_who_did_it(world):
     before = {model: model.everywhere.count() for model in (Step, SessionMetric, TrainingSession)}
     values = list(Step.everywhere.values_list("value", "points"))
-    erase(world.patient, Erasing.ASKED, world.people[Role.LEAD], NOW)
+    erase(world.patient, ErasureReason.ASKED, world.people[Role.LEAD], NOW)
     assert {model: model.everywhere.count() for model in before} == before
     assert list(Step.everywhere.values_list("value", "points")) == values
     entry = AuditEntry.everywhere.get(act=Act.ERASE)
     assert (entry.by, entry.at, entry.patient) == (world.people[Role.LEAD], NOW, None)
-    change = HistoryEntry.everywhere.filter(noun="Patient").first()
-    assert change.values.keys() >= {"nickname", "code"}
-    assert not any(change.values.values())
+    change = HistoryEntry.everywhere.filter(model_name="Patient").first()
+    assert change.changes.keys() >= {"nickname", "code"}
+    assert not any(change.changes.values())
 
 
 def test_an_imported_session_still_tells_its_score_once_erased(world):
-    TrainingSession.everywhere.filter(pk=world.session.pk).update(original_id=17)
-    erase(world.patient, Erasing.ASKED, None, NOW)
+    TrainingSession.everywhere.filter(pk=world.session.pk).update(legacy_id=17)
+    erase(world.patient, ErasureReason.ASKED, None, NOW)
     world.session.refresh_from_db()
-    assert world.session.original_id == -world.session.pk
+    assert world.session.legacy_id == -world.session.pk
     url = reverse("session", kwargs={"session_id": world.session.pk})
     assert client_of(world).get(url).status_code == 200
 
 
 def test_an_erased_patient_never_comes_back(world):
-    erase(world.patient, Erasing.ASKED, None, NOW)
+    erase(world.patient, ErasureReason.ASKED, None, NOW)
     reopen_program(world.patient)
     assert world.patient.ended_at == NOW
     client = client_of(world, Role.LEAD)
     consent = reverse("consent", kwargs={"patient_id": world.patient.pk})
-    client.post(consent, {"purpose": "boards", "says": "clinic"})
+    client.post(consent, {"purpose": "boards", "answer": "clinic"})
     assert Patient.everywhere.get(pk=world.patient.pk).boards == "own"
     assert "Reopen" not in page_of(world, client)
-    details = reverse("mend-patient", kwargs={"patient_id": world.patient.pk})
+    details = reverse("edit-patient", kwargs={"patient_id": world.patient.pk})
     given = {"nickname": "Rosa", "code": "R-1", "paretic_side": "left"}
     assert b"This person is erased" in client.post(details, given).content
     assert Patient.everywhere.get(pk=world.patient.pk).nickname == "Erased"
@@ -236,7 +236,7 @@ def last_walked(world: World, days: int) -> None:
 
 @pytest.mark.parametrize(("days", "erased"), [(58, False), (63, True)])
 def test_who_was_kept_long_enough_is_erased(days, erased, world):
-    world.clinic.keep_months = 2
+    world.clinic.retention_months = 2
     world.clinic.save()
     last_walked(world, days)
     said = retain()
@@ -244,12 +244,12 @@ def test_who_was_kept_long_enough_is_erased(days, erased, world):
     assert (world.patient.erased_at is not None) == erased
     assert f"{int(erased)} patient(s) erased" in said
     if erased:
-        assert world.patient.erased_because == Erasing.RETENTION
+        assert world.patient.erasure_reason == ErasureReason.RETENTION
         assert "0 patient(s) erased" in retain()
 
 
 def test_who_was_imported_a_moment_ago_stays_however_old_the_sessions_are(world):
-    world.clinic.keep_months = 2
+    world.clinic.retention_months = 2
     last_walked(world, 400)
     taken_in = datetime.now(UTC) - timedelta(days=58)
     Patient.everywhere.filter(pk=world.patient.pk).update(created_at=taken_in)
@@ -266,7 +266,7 @@ def test_who_was_imported_a_moment_ago_stays_however_old_the_sessions_are(world)
 )
 def test_who_is_expected_again_stays_by_the_clinics_day(zone, day, stays, world):
     now = datetime(2026, 11, 21, 8, 0, tzinfo=UTC)  # in Honolulu it is still the day before
-    world.clinic.keep_months, world.clinic.time_zone = 2, zone
+    world.clinic.retention_months, world.clinic.time_zone = 2, zone
     last_walked(world, 400)
     Visit.everywhere.filter(patient=world.patient).update(day=now.date().replace(day=day))
     assert patients_past_retention(world.clinic, now).exists() == (not stays)
@@ -274,7 +274,7 @@ def test_who_is_expected_again_stays_by_the_clinics_day(zone, day, stays, world)
 
 def test_without_a_wish_nobody_goes_and_each_clinic_has_its_own(world):
     birch = build_world("birch")
-    birch.clinic.keep_months = 1
+    birch.clinic.retention_months = 1
     birch.clinic.save()
     for one in (world, birch):
         last_walked(one, 5000)
@@ -284,7 +284,7 @@ def test_without_a_wish_nobody_goes_and_each_clinic_has_its_own(world):
 
 
 def test_a_dry_run_says_whom_and_changes_nothing(world):
-    world.clinic.keep_months = 1
+    world.clinic.retention_months = 1
     world.clinic.save()
     last_walked(world, 400)
     before = everything_stored()
@@ -293,7 +293,7 @@ def test_a_dry_run_says_whom_and_changes_nothing(world):
 
 
 def test_an_open_session_holds_up_one_patient_and_no_other(world):
-    world.clinic.keep_months = 1
+    world.clinic.retention_months = 1
     world.clinic.save()
     other = Patient.everywhere.create(clinic=world.clinic, code="o", nickname="O")
     start(world)
@@ -305,7 +305,7 @@ def test_an_open_session_holds_up_one_patient_and_no_other(world):
 
 
 def test_simulated_patients_stay(world):
-    world.clinic.keep_months = 1
+    world.clinic.retention_months = 1
     Patient.everywhere.filter(pk=world.patient.pk).update(simulated=True)
     assert not patients_past_retention(world.clinic, NOW + timedelta(days=5000)).exists()
 
@@ -314,9 +314,11 @@ def test_both_logs_go_when_the_clinic_has_kept_them_long_enough(world):
     now = datetime.now(UTC)
     for months, about in ((13, "old"), (11, "new")):
         at = months_before(now, months)
-        audit_log.note(Act.VIEW, world.people[Role.PT], about=about, now=at)
-        HistoryEntry.everywhere.create(clinic=world.clinic, noun=about, row=1, kind="added", at=at)
-    world.clinic.keep_log_months = 12
+        audit_log.record(Act.VIEW, world.people[Role.PT], about=about, now=at)
+        HistoryEntry.everywhere.create(
+            clinic=world.clinic, model_name=about, object_id=1, kind="added", at=at
+        )
+    world.clinic.log_retention_months = 12
     world.clinic.save()
     retain("--dry-run")
     assert AuditEntry.everywhere.filter(about="old").exists()
@@ -324,7 +326,9 @@ def test_both_logs_go_when_the_clinic_has_kept_them_long_enough(world):
     assert not AuditEntry.everywhere.filter(about="old").exists()
     assert AuditEntry.everywhere.filter(about="new").exists()
     assert set(
-        HistoryEntry.everywhere.filter(row=1, noun__in=["old", "new"]).values_list("noun")
+        HistoryEntry.everywhere.filter(object_id=1, model_name__in=["old", "new"]).values_list(
+            "model_name"
+        )
     ) == {("new",)}
 
 

@@ -13,7 +13,8 @@ from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 
-from rehab.people.consent.models import Purpose, give
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import record_consent
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.formatting import (
@@ -60,7 +61,7 @@ def plain(page: str) -> str:
 
 
 def items(page: str) -> list[str]:
-    """Give the words of each session in the list, markup left out."""
+    """Return the words of each session in the list, markup left out."""
     return [words(item) for item in re.findall(r'<a class="item".*?</a>', page, re.DOTALL)]
 
 
@@ -350,7 +351,7 @@ def test_thousands_of_strides_are_told_by_few_queries(client, patient, django_as
 
 
 def test_who_may_look(world, patient):
-    give(patient, Purpose.RESEARCH, None, timezone.now())
+    record_consent(patient, Purpose.RESEARCH, None, timezone.now())
     session = walk(patient, "positive", strides(3, 1), simulated=True)
     other = build_world("birch")
     past, one = (

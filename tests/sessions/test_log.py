@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rehab.people.models import Clinic, Patient
-from rehab.people.scope import CrossClinic
+from rehab.people.scope import CrossClinicReference
 from rehab.sessions.live.actor import SessionActor, StepRow
 from rehab.sessions.live.writer import STEP_COLUMNS
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
@@ -281,7 +281,7 @@ def test_which_leg_is_trained_must_be_known(patient):
 def test_a_session_stays_within_one_clinic(patient):
     elsewhere = Clinic.everywhere.create(name="Oak")
     station = Station.everywhere.create(clinic=elsewhere, name="Belt 1")
-    with pytest.raises(CrossClinic, match="same clinic"):
+    with pytest.raises(CrossClinicReference, match="same clinic"):
         begin(patient, station=station)
     assert not TrainingSession.everywhere.exists()
 

@@ -59,7 +59,7 @@ def preset_of(world: World, **fields: object) -> Preset:
 
 
 def filled(page: str) -> dict[str, str]:
-    """Give what a set-up would send: checked choices, numbers, selected options."""
+    """Return what a set-up would send: checked choices, numbers, selected options."""
     page = page[page.index('class="set-up"') :]
     found = dict(re.findall(r'<input\s+class="num"\s+name="(\w+)"[^>]*\svalue="([^"]*)"', page))
     for tag in re.findall(r"<input\s[^>]*type=\"radio\"[^>]*>", page):

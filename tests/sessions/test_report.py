@@ -9,7 +9,8 @@ from datetime import UTC, datetime, timedelta
 import pytest
 import time_machine
 
-from rehab.people.consent.models import Purpose, give
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import record_consent
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent
@@ -33,7 +34,7 @@ def patient(world: World) -> Patient:
 
 
 def read(world: World, session: TrainingSession, role: Role = Role.PT) -> str:
-    """Give the page's words."""
+    """Return the page's words."""
     client = client_of(world, role)
     page = client.get(f"/sessions/{session.pk}/report/").content.decode()
     paper = page.split("<article")[1].split("</article>")[0]
@@ -106,7 +107,7 @@ def test_of_many_events_the_count_is_right_and_the_list_short(world, patient):
 
 
 def test_a_researcher_reads_a_pseudonym(world, patient):
-    give(patient, Purpose.RESEARCH, None, NOW)
+    record_consent(patient, Purpose.RESEARCH, None, NOW)
     words = read(world, walk(patient, "explicit", [HIT]), Role.RESEARCHER)
     assert patient.pseudonym in words
     assert "Rosa" not in words

@@ -38,7 +38,7 @@ def begin(world, valence="positive", language="en"):
 
 
 def form(slug="positive", **changes):
-    """Give the form of a type with two bands."""
+    """Return the form of a type with two bands."""
     return {
         "slug": slug,
         "hit_points": "3",

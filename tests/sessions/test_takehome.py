@@ -25,7 +25,7 @@ def patient(world: World) -> Patient:
 
 
 def read(world: World, patient: Patient, role: Role = Role.PT) -> str:
-    """Give the page's words."""
+    """Return the page's words."""
     client = client_of(world, role)
     page = client.get(reverse("take-home", kwargs={"patient_id": patient.pk})).content.decode()
     paper = page.split("<article")[1].split("</article>")[0]

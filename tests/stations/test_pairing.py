@@ -9,7 +9,7 @@ from django.core.cache import cache
 from django.test import Client
 from django.utils import timezone
 
-from rehab.people.models import UNAMBIGUOUS
+from rehab.people.random_codes import ALPHABET
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device, Pairing, Station
 from tests.support.world import World, build_world, client_of
@@ -47,7 +47,7 @@ def test_a_tablet_shows_one_code_until_it_is_let_in(pt, station):
     tablet = Client()
     code = shown_code(tablet)
     assert len(code) == 6
-    assert set(code) <= set(UNAMBIGUOUS)
+    assert set(code) <= set(ALPHABET)
     assert shown_code(tablet) == code  # also after a reload
     assert shown_code(Client()) != code
     assert tablet.get("/tablet/state/").json() == {"paired": False, "go": ""}
@@ -91,7 +91,7 @@ def test_the_token_is_given_to_the_tablet_that_showed_the_code_and_once(pt, stat
 
 
 def test_wrong_codes_are_few(pt, station):
-    for _ in range(pairing.TRIES):
+    for _ in range(pairing.MAX_ATTEMPTS):
         page = pt.post("/tablets/pair/", {"code": "XXXXXX", "station": station.pk})
         assert "No tablet shows this code" in page.content.decode()
     code = shown_code(Client())
@@ -101,16 +101,16 @@ def test_wrong_codes_are_few(pt, station):
 
 
 def test_a_flood_of_strangers_ends_somewhere(monkeypatch):
-    monkeypatch.setattr(pairing, "MOST_OPEN", 3)
+    monkeypatch.setattr(pairing, "MAX_PENDING", 3)
     pages = [Client().get("/tablet/") for _ in range(4)]
     assert [page.status_code for page in pages] == [200, 200, 200, 503]
     assert "Try again in five minutes" in pages[-1].content.decode()
 
 
 def test_a_flood_from_one_address_shuts_no_other_clinic_out(monkeypatch):
-    monkeypatch.setattr(pairing, "MOST_OPEN", 6)
-    monkeypatch.setattr(pairing, "MOST_SHOWN", 3)
-    monkeypatch.setattr(pairing, "MOST_BEGUN", 8)
+    monkeypatch.setattr(pairing, "MAX_PENDING", 6)
+    monkeypatch.setattr(pairing, "MAX_PENDING_PER_ADDRESS", 3)
+    monkeypatch.setattr(pairing, "MAX_STARTED_PER_ADDRESS", 8)
     early, elsewhere = Client(REMOTE_ADDR="203.0.113.9"), Client(REMOTE_ADDR="203.0.113.9")
     code = shown_code(early)
     pages = [Client(REMOTE_ADDR="198.51.100.7").get("/tablet/") for _ in range(10)]
@@ -130,7 +130,7 @@ def test_a_flood_from_one_address_shuts_no_other_clinic_out(monkeypatch):
 
 
 def test_a_tablet_that_was_let_in_gives_way_to_none(pt, station, monkeypatch):
-    monkeypatch.setattr(pairing, "MOST_SHOWN", 1)
+    monkeypatch.setattr(pairing, "MAX_PENDING_PER_ADDRESS", 1)
     tablet = Client()
     pt.post("/tablets/pair/", {"code": shown_code(tablet), "station": station.pk})
     assert shown_code(Client())

@@ -9,8 +9,8 @@ from django.test import Client
 from django.utils import timezone
 
 from rehab.people.roles import Role
-from rehab.stations.models import Device, LeaveTries, Station
-from rehab.stations.pins import FREE_TRIES, LONGEST_WAIT, PinRefused, check_pin, set_pin
+from rehab.stations.models import Device, PinAttempts, Station
+from rehab.stations.pins import FREE_ATTEMPTS, LONGEST_LOCKOUT, PinRefused, check_pin, set_pin
 from rehab.stations.tablets import COOKIE
 from tests.support.world import NOW, World, build_world, client_of
 
@@ -56,12 +56,12 @@ def test_a_pin_is_four_to_eight_digits(station, pin):
 
 def test_wrong_pins_wait_longer_each_time(station):
     now, waits = NOW, []
-    for _ in range(FREE_TRIES + 12):
+    for _ in range(FREE_ATTEMPTS + 12):
         waits.append(wait_for(station, "0000", now))
         now += timedelta(seconds=waits[-1])
-    assert waits[: FREE_TRIES + 3] == [0, 0, 30, 60, 120, 240]
+    assert waits[: FREE_ATTEMPTS + 3] == [0, 0, 30, 60, 120, 240]
     assert waits == sorted(waits)
-    assert waits[-1] == LONGEST_WAIT.total_seconds()
+    assert waits[-1] == LONGEST_LOCKOUT.total_seconds()
     assert wait_for(station, "4711", now - timedelta(seconds=5)) == 5  # the right one waits too
     check_pin(station, "tablet 2", "4711", NOW)  # another screen does not
     check_pin(station, SCREEN, "4711", now)
@@ -73,15 +73,15 @@ def test_a_try_is_counted_before_it_is_looked_at(station, monkeypatch):
     seen = []
 
     def slow(pin: str, kept: str) -> bool:
-        seen.append(LeaveTries.everywhere.get(station=station).wrong)
+        seen.append(PinAttempts.everywhere.get(station=station).failures)
         return False
 
     monkeypatch.setattr("rehab.stations.pins.check_password", slow)
-    for _ in range(FREE_TRIES):
+    for _ in range(FREE_ATTEMPTS):
         wait_for(station, "0000", NOW)
     assert seen == [1, 2, 3]
     assert wait_for(station, "0001", NOW) > 0
-    assert len(seen) == FREE_TRIES  # not even looked at
+    assert len(seen) == FREE_ATTEMPTS  # not even looked at
 
 
 def test_a_tablet_leaves_with_the_pin_and_stays_paired(tablet, station):
@@ -114,7 +114,7 @@ def test_wrong_pins_stop_no_session(world, tablet, station):
     type(world.session).everywhere.filter(pk=world.session.pk).update(
         station=station, state="running"
     )
-    for _ in range(FREE_TRIES + 2):
+    for _ in range(FREE_ATTEMPTS + 2):
         client.post("/tablets/leave/", {"station": station.pk, "pin": "0000"})
     page = client.get(f"/sessions/{world.session.pk}/")
     assert page.status_code == 200

@@ -16,8 +16,9 @@ from rehab.gestures.models import Gesture, GestureStep
 from rehab.patients.visits import Visit
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
-from rehab.people.consent.models import Consent, ConsentText, Purpose, give
-from rehab.people.consent.tombstones import ErasedOriginal
+from rehab.people.consent.models import Consent, ConsentText, Purpose
+from rehab.people.consent.services import record_consent
+from rehab.people.consent.tombstones import ImportTombstone
 from rehab.people.models import Boards, Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.factors import Authenticator, RecoveryCode
@@ -30,7 +31,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
-from rehab.stations.models import Device, LeaveTries, Pairing, Station
+from rehab.stations.models import Device, Pairing, PinAttempts, Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.steps import Measurement, Side
@@ -76,7 +77,7 @@ def scoped_models() -> list[type[Any]]:
 def agreeing(patient: Patient) -> Patient:
     """Give a patient who agrees to stand on the boards that are set."""
     if patient.boards != Boards.OWN:
-        give(patient, Purpose.BOARDS, None, NOW, patient.boards)
+        record_consent(patient, Purpose.BOARDS, None, NOW, patient.boards)
     return patient
 
 
@@ -144,7 +145,7 @@ def build_world(name: str) -> World:
     text = ConsentText.everywhere.create(clinic=clinic, version=1, text=mark(name, ConsentText))
     for purpose in (Purpose.BOARDS, Purpose.RESEARCH):
         level = patient.boards if purpose == Purpose.BOARDS else ""
-        give(patient, purpose, people[Role.PT], NOW, level)
+        record_consent(patient, purpose, people[Role.PT], NOW, level)
     session = create_session(
         SessionRequest(
             patient=patient,
@@ -214,7 +215,7 @@ def build_world(name: str) -> World:
         text,
         Consent.everywhere.filter(patient=patient).last(),
         AuditEntry.everywhere.create(clinic=clinic, act="view", about=mark(name, AuditEntry)),
-        HistoryEntry.everywhere.get(noun="Patient", row=patient.pk),
+        HistoryEntry.everywhere.get(model_name="Patient", object_id=patient.pk),
         ApiToken.everywhere.create(
             clinic=clinic,
             user=people[Role.PT],
@@ -223,11 +224,13 @@ def build_world(name: str) -> World:
             token_hash=f"program-{name}",
         ),
         Authenticator.everywhere.create(
-            user=people[Role.PT], kind="app", name=mark(name, Authenticator), material="-"
+            user=people[Role.PT], kind="app", name=mark(name, Authenticator), credential="-"
         ),
-        RecoveryCode.everywhere.create(user=people[Role.PT], digest=mark(name, RecoveryCode)),
-        LeaveTries.everywhere.create(station=station, who=f"tablet {device.pk}", open_at=NOW),
-        ErasedOriginal.everywhere.create(clinic=clinic, mark=mark(name, ErasedOriginal)),
+        RecoveryCode.everywhere.create(user=people[Role.PT], code_hash=mark(name, RecoveryCode)),
+        PinAttempts.everywhere.create(
+            station=station, screen=f"tablet {device.pk}", locked_until=NOW
+        ),
+        ImportTombstone.everywhere.create(clinic=clinic, id_hash=mark(name, ImportTombstone)),
         Visit.everywhere.create(clinic=clinic, patient=patient, day=NOW.date()),
         Pairing.everywhere.create(
             code=f"P{clinic.pk}",

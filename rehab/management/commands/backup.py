@@ -24,11 +24,11 @@ class Command(BaseCommand):
     help = "Write everything into FILE, encrypted to the public keys in GARRY_BACKUP_KEYS."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Ask where to."""
+        """Add the argument FILE."""
         parser.add_argument("file", type=Path, metavar="FILE")
 
     def handle(self, *args: Any, file: Path, **options: Any) -> None:
-        """Write it. A file of that name is replaced only by a whole one."""
+        """Write the backup. An existing file is replaced only by a complete one."""
         now = timezone.now()
         try:
             recipients = read_recipients(settings.BACKUP_KEYS)
@@ -51,7 +51,7 @@ class Command(BaseCommand):
         finally:
             new.unlink(missing_ok=True)
         for clinic in Clinic.everywhere.all():
-            audit_log.note(Act.BACKUP, None, clinic=clinic.pk, about="manage.py backup", now=now)
+            audit_log.record(Act.BACKUP, None, clinic=clinic.pk, about="manage.py backup", now=now)
         size_mb = file.stat().st_size / 1e6
         self.stdout.write(
             f"{file}: {size_mb:.1f} MB, {counts['rehab.patient']} patients, "

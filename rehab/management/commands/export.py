@@ -42,7 +42,7 @@ class Command(BaseCommand):
             if whose is None:
                 raise CommandError(f"{username} sees no patient with the code {patient!r}.")
             files, key = patient_files(user, whose, now), whose.pk
-        audit_log.note(
+        audit_log.record(
             Act.EXPORT,
             None,
             clinic=user.clinic_id,

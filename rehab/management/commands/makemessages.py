@@ -1,13 +1,13 @@
-"""Django's `makemessages`, which also finds the texts of our scripts (shared/language.js)."""
+"""Django's `makemessages`, extended by the keywords of our scripts (static/js/language.js)."""
 
 from pathlib import Path
 
 from django.core.management.commands import makemessages
 
 OPTIONS = makemessages.Command
-DATED = '"POT-Creation-Date:'  # differs each time, and says nothing
+DATE_HEADER = '"POT-Creation-Date:'  # omitted: it would change every time
 
-# Which argument says what a pure room refuses. The comment tells that no patient reads it.
+# Which argument is the template of an error. The comment tells translators: no patient reads it.
 REFUSALS = [
     f'--keyword={name}:{place},"refusal"'
     for name, place in (
@@ -21,16 +21,16 @@ REFUSALS = [
 
 
 class Command(makemessages.Command):
-    """Collects what is to be translated into locale/. Guesses no translation."""
+    """Collects the strings to translate into locale/. Guesses no translation."""
 
     xgettext_options = [*OPTIONS.xgettext_options, "--keyword=n_:1,2", *REFUSALS]
     msgmerge_options = [*OPTIONS.msgmerge_options, "--no-fuzzy-matching"]
 
     def write_po_file(self, potfile: str, locale: str) -> None:
-        """Bring a language up to date."""
+        """Update the catalog of a language."""
         super().write_po_file(potfile, locale)
         for folder in self.locale_paths:
             file = Path(folder, locale, "LC_MESSAGES", f"{self.domain}.po")
             lines = file.read_text(encoding="utf-8").splitlines(keepends=True)
-            kept = (line for line in lines if not line.startswith(DATED))
+            kept = (line for line in lines if not line.startswith(DATE_HEADER))
             file.write_text("".join(kept), encoding="utf-8")

@@ -13,12 +13,12 @@ from rehab.exports.encryption import CannotDecrypt, InvalidKey, read_identities
 
 
 class Command(BaseCommand):
-    """Makes the tables, and takes in everything or nothing."""
+    """Creates the tables and restores everything or nothing."""
 
     help = "Restore FILE into a new installation, decrypted with a secret key."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Ask where from."""
+        """Add the arguments."""
         parser.add_argument("file", type=Path, metavar="FILE")
         parser.add_argument(
             "--key",
@@ -29,7 +29,7 @@ class Command(BaseCommand):
         )
 
     def handle(self, *args: Any, file: Path, key: Path, **options: Any) -> None:
-        """Take it in. Raises CommandError, with the cure."""
+        """Restore the backup. Raises CommandError, with the cure."""
         try:
             identities = read_identities(key.read_text())
         except OSError as problem:

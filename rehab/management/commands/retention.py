@@ -11,7 +11,7 @@ from django.utils import timezone
 
 from rehab.patients.closure import SessionStillOpen
 from rehab.patients.erasure import delete_old_logs, erase, patients_past_retention
-from rehab.people.models import Clinic, Erasing
+from rehab.people.models import Clinic, ErasureReason
 
 
 class Command(BaseCommand):
@@ -33,7 +33,7 @@ class Command(BaseCommand):
                     self.stdout.write(f"{clinic}: would erase {patient.code}")
                     continue
                 try:
-                    erase(patient, Erasing.RETENTION, None, now)
+                    erase(patient, ErasureReason.RETENTION, None, now)
                     erased += 1
                 except SessionStillOpen as problem:
                     self.stderr.write(f"{clinic}, {patient.code}: {problem}")

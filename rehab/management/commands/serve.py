@@ -21,18 +21,18 @@ from rehab.people.sign_in.first_start import (
 )
 from rehab.sessions.live.runtime import current
 from rehab.sessions.live.sources import local_address
-from rehab.stations.builtin import builtin_token, first_station
+from rehab.stations.builtin import first_station, issue_builtin_token
 from rehab.stations.models import Device
 from robot.bases import BASES
 
 
 class Command(BaseCommand):
-    """Prepares the database, says where to go, and serves pages and sockets until Ctrl-C."""
+    """Prepares the database, prints the address, and serves pages and sockets until Ctrl-C."""
 
     help = "Serve GARRY: pages and sockets, one process."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Offer address and port."""
+        """Add the options."""
         parser.add_argument("--host", default=settings.HOST)
         parser.add_argument("--port", type=int, default=settings.PORT)
         parser.add_argument(
@@ -58,7 +58,7 @@ class Command(BaseCommand):
             raise CommandError("A hosted server runs no robot. Run `python -m robot` beside it.")
         check_port(host, port)
         prepare_database()
-        self._say_where(local_address(host, port))
+        self._print_address(local_address(host, port))
         token = robot_token() if robot != "none" else None
         from rehab.sessions.live.server import LiveServer  # installs a reactor: not at import
 
@@ -67,21 +67,23 @@ class Command(BaseCommand):
             endpoints=[f"tcp:port={port}:interface={host.replace(':', chr(92) + ':')}"],
             server_name="GARRY",
             verbosity=0,
-            on_ready=lambda: self._begin(child, local_address(host, port), robot, token),
+            on_ready=lambda: self._start_children(child, local_address(host, port), robot, token),
         ).run()
 
-    def _begin(self, commands: list[str], address: str, base: str, token: str | None) -> None:
+    def _start_children(
+        self, commands: list[str], address: str, base: str, token: str | None
+    ) -> None:
         current().address = address
         if token is not None:
             robot = [sys.executable, "-m", "robot", "--base", base, "--server", address, "--child"]
             current().children.start("robot", robot, {"GARRY_ROBOT_TOKEN": token})
         for number, command in enumerate(commands, start=1):
             current().children.start(f"child {number}", shlex.split(command))
-        builder.wake()  # of boards that the last run left unbuilt
+        builder.wake()  # for boards that the last run has left unbuilt
         self.stdout.write("Ready. Ctrl-C stops the server.")
         self.stdout.flush()
 
-    def _say_where(self, address: str) -> None:
+    def _print_address(self, address: str) -> None:
         self.stdout.write(f"GARRY serves at {address}/")
         password = None if settings.HOSTED else first_password()
         if password:
@@ -92,16 +94,16 @@ class Command(BaseCommand):
 
 
 def robot_token() -> str | None:
-    """Give the first station's built-in robot a fresh token; None where a robot of its own is."""
+    """Return a token for the first station's built-in robot; None if the station has its own."""
     station = first_station(first_clinic())
     robots = Device.everywhere.filter(station=station, kind=Device.Kind.ROBOT, builtin=False)
     if robots.filter(revoked_at__isnull=True).exists():
         return None
-    return builtin_token(station, Device.Kind.ROBOT)
+    return issue_builtin_token(station, Device.Kind.ROBOT)
 
 
 def check_port(host: str, port: int) -> None:
-    """Raise CommandError, with the cure, where the address cannot be served at."""
+    """Check that the address is free. Raises CommandError, with the cure, where it is not."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -14,9 +14,9 @@ from django.views.decorators.http import require_POST, require_safe
 from rehab.patients.closure import SessionStillOpen, end_program, reopen_program
 from rehab.patients.erasure import erase
 from rehab.patients.forms import EndingForm, ErasingForm
-from rehab.people.access import for_roles, person
-from rehab.people.consent.models import holding
-from rehab.people.models import Ending, Erasing, Patient, User
+from rehab.people.access import for_roles, user_of
+from rehab.people.consent.services import active_consents
+from rehab.people.models import EndReason, ErasureReason, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 
@@ -31,17 +31,17 @@ def get_patient(user: User, patient_id: int) -> Patient:
 @require_safe
 def show_records(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Show the page on consent, data and the end of the program."""
-    patient = get_patient(person(request), patient_id)
+    patient = get_patient(user_of(request), patient_id)
     return render_records(request, patient)
 
 
 def render_records(request: HttpRequest, patient: Patient, **forms: Any) -> HttpResponse:
     """Return the page, with the forms as they were sent."""
-    user = person(request)
+    user = user_of(request)
     sessions = TrainingSession.objects.visible_to(user).filter(patient=patient)
     context = {
         "patient": patient,
-        "held": list(holding(patient).values()),
+        "held": list(active_consents(patient).values()),
         "count": sessions.count(),
         "may_erase": user.role == Role.LEAD,
         "ending": EndingForm(),
@@ -55,12 +55,12 @@ def render_records(request: HttpRequest, patient: Patient, **forms: Any) -> Http
 @require_POST
 def end(request: HttpRequest, patient_id: int) -> HttpResponse:
     """End a patient's program: off the lists, with the summary to take home."""
-    patient = get_patient(person(request), patient_id)
+    patient = get_patient(user_of(request), patient_id)
     form = EndingForm(request.POST)
     if not form.is_valid():
         return render_records(request, patient, ending=form)
     try:
-        end_program(patient, Ending(form.cleaned_data["because"]), timezone.now())
+        end_program(patient, EndReason(form.cleaned_data["because"]), timezone.now())
     except SessionStillOpen as problem:
         form.add_error(None, str(problem))
         return render_records(request, patient, ending=form)
@@ -73,7 +73,7 @@ def end(request: HttpRequest, patient_id: int) -> HttpResponse:
 @require_POST
 def reopen(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Take a patient back in."""
-    patient = get_patient(person(request), patient_id)
+    patient = get_patient(user_of(request), patient_id)
     reopen_program(patient)
     return redirect("patient", patient_id=patient.pk)
 
@@ -82,13 +82,13 @@ def reopen(request: HttpRequest, patient_id: int) -> HttpResponse:
 @require_POST
 def erase_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Erase everything that identifies a person, after the code was typed as confirmation."""
-    user = person(request)
+    user = user_of(request)
     patient = get_patient(user, patient_id)
     form = ErasingForm(request.POST, patient=patient)
     if patient.erased_at is not None or not form.is_valid():
         return render_records(request, patient, erasing=form)
     try:
-        erase(patient, Erasing(form.cleaned_data["because"]), user, timezone.now())
+        erase(patient, ErasureReason(form.cleaned_data["because"]), user, timezone.now())
     except SessionStillOpen as problem:
         form.add_error(None, str(problem))
         return render_records(request, patient, erasing=form)

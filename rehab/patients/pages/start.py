@@ -16,7 +16,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from rehab.patients.forms import PatientForm, ScreenForm
 from rehab.patients.visits import SOON_DAYS, Visit, patients_today, suggested_time
-from rehab.people.access import clinic_of, for_roles, person
+from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
@@ -72,7 +72,7 @@ def start_lists(user: User, query: str = "") -> dict[str, Any]:
 def choose_patient(request: HttpRequest) -> HttpResponse:
     """List who is expected today, then all patients."""
     query = request.GET.get("q", "").strip()
-    context = start_lists(person(request), query) | {"q": query}
+    context = start_lists(user_of(request), query) | {"q": query}
     return render(request, "patients/start.html", context)
 
 
@@ -81,7 +81,7 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
 @require_safe
 def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Offer a patient the session like last time, another one, the past ones, the next visit."""
-    user = person(request)
+    user = user_of(request)
     patient = get_object_or_404(patients_by_last_visit(user), pk=patient_id)
     first_station(patient.clinic)
     initial = initial_choices(patient, user)
@@ -108,21 +108,21 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
 @require_http_methods(["GET", "HEAD", "POST"])
 def add_patient(request: HttpRequest) -> HttpResponse:
     """Add a new patient."""
-    user = person(request)
+    user = user_of(request)
     form = PatientForm(request.POST or None, by=user, now=timezone.now())
-    if request.method == "POST" and form.keep():
+    if request.method == "POST" and form.save_or_report():
         return redirect("setup", patient_id=form.instance.pk)
     return render(request, "patients/form.html", {"form": form})
 
 
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
-def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
+def edit_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Edit a patient's details."""
-    user = person(request)
+    user = user_of(request)
     patient = get_object_or_404(patients_by_last_visit(user), pk=patient_id)
     form = PatientForm(request.POST or None, by=user, now=timezone.now(), instance=patient)
-    if request.method == "POST" and form.keep():
+    if request.method == "POST" and form.save_or_report():
         return redirect("patient", patient_id=patient.pk)
     context = {"form": form, "patient": Patient.objects.visible_to(user).get(pk=patient_id)}
     return render(request, "patients/form.html", context)
@@ -132,9 +132,9 @@ def mend_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
 @require_http_methods(["GET", "HEAD", "POST"])
 def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Set how the patient's page looks and sounds."""
-    patient = get_object_or_404(patients_by_last_visit(person(request)), pk=patient_id)
+    patient = get_object_or_404(patients_by_last_visit(user_of(request)), pk=patient_id)
     form = ScreenForm(request.POST or None, instance=patient)
-    if request.method == "POST" and form.keep():
+    if request.method == "POST" and form.save_or_report():
         return redirect("patient", patient_id=patient.pk)
     return render(request, "patients/screen_form.html", {"form": form, "patient": patient})
 
@@ -143,7 +143,7 @@ def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
 @require_POST
 def add_demo(request: HttpRequest) -> HttpResponse:
     """Add a simulated patient, for people who want to try GARRY."""
-    user = person(request)
+    user = user_of(request)
     patient, _made = Patient.objects.visible_to(user).get_or_create(
         clinic=clinic_of(user),
         code=DEMO_CODE,

@@ -14,7 +14,7 @@ from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST
 
 from rehab.patients.visits import SOON_DAYS, Visit, plan_visit, suggested_time
-from rehab.people.access import for_roles, person
+from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
@@ -30,7 +30,7 @@ class InvalidVisitDay(ValueError):
 @require_POST
 def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Plan a visit (``in``: days from today, or ``day`` and ``at``) or remove one (``remove``)."""
-    user = person(request)
+    user = user_of(request)
     patient = get_object_or_404(
         Patient.objects.visible_to(user).select_related("clinic"), pk=patient_id
     )

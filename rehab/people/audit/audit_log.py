@@ -1,8 +1,8 @@
-"""Who looked at patients' data, took it out, or gave a robot orders. Rows are only added.
+"""The audit log: who looked at or exported patients' data, or commanded a robot. Append-only.
 
-Views are written by `AccessMiddleware` for every page and call that does not say that it shows no
-patients; sockets, exports and commands write their own. What is taken out is noted before the first
-byte goes. A page that asks again and again is noted once in some minutes.
+`AccessMiddleware` records views of every page and API call that is not declared to show no
+patients; sockets, exports and commands record their own. An export is recorded before its first
+byte is sent. A page that reloads is recorded once in some minutes.
 """
 
 from __future__ import annotations
@@ -26,40 +26,40 @@ from rehab.people.scope import Scope, ScopedManager, ScopedModel
 
 log = logging.getLogger(__name__)
 
-AGAIN_AFTER = timedelta(minutes=5)
-REMEMBERED = 10_000  # views; what is forgotten early is noted twice
+REPEAT_AFTER = timedelta(minutes=5)
+MAX_RECENT = 10_000  # views; beyond that some are recorded twice
 SERVER = "server console"
 
 
-class AppendOnly(TypeError):
-    """A log's row that somebody tried to change or take away."""
+class AppendOnlyViolation(TypeError):
+    """An attempt to change or delete a row of the log."""
 
     def __init__(self) -> None:
         super().__init__(
-            "The audit log is only added to. What is too old goes with `manage.py retention`."
+            "The audit log is append-only. `manage.py retention` deletes what is too old."
         )
 
 
-class Appended(QuerySet["AuditEntry"]):
-    """Rows that can be read and added."""
+class AppendOnlyQuerySet(QuerySet["AuditEntry"]):
+    """A queryset that can read and add rows."""
 
     def update(self, **values: Any) -> NoReturn:
-        """Refuse."""
-        raise AppendOnly
+        """Raise AppendOnlyViolation."""
+        raise AppendOnlyViolation
 
     def delete(self) -> NoReturn:
-        """Refuse."""
-        raise AppendOnly
+        """Raise AppendOnlyViolation."""
+        raise AppendOnlyViolation
 
     def bulk_update(self, *rows: Any, **options: Any) -> NoReturn:
-        """Refuse."""
-        raise AppendOnly
+        """Raise AppendOnlyViolation."""
+        raise AppendOnlyViolation
 
 
-class VisibleEntries(ScopedManager["AuditEntry"]):
-    """Entries by scope, to be read."""
+class ScopedEntryManager(ScopedManager["AuditEntry"]):
+    """Entries by scope, append-only."""
 
-    rows = Appended
+    queryset_class = AppendOnlyQuerySet
 
 
 class Act(models.TextChoices):
@@ -92,7 +92,7 @@ class AuditEntry(ScopedModel):
     )
     through = models.CharField(_("by which program or device"), max_length=64, blank=True)
     act = models.CharField(_("what"), max_length=16, choices=Act.choices)
-    # The log outlives what it tells of: a row that goes takes nothing from it.
+    # The log outlives the rows it refers to.
     patient = models.ForeignKey(
         Patient,
         on_delete=models.DO_NOTHING,
@@ -104,8 +104,8 @@ class AuditEntry(ScopedModel):
     about = models.CharField(_("where in GARRY"), max_length=200, blank=True)
     address = models.CharField(_("from"), max_length=45, blank=True)
 
-    everywhere: ClassVar[Any] = models.Manager.from_queryset(Appended)()
-    objects: ClassVar[VisibleEntries] = VisibleEntries()
+    everywhere: ClassVar[Any] = models.Manager.from_queryset(AppendOnlyQuerySet)()
+    objects: ClassVar[ScopedEntryManager] = ScopedEntryManager()
 
     class Meta(ScopedModel.Meta):
         verbose_name = _("audit entry")
@@ -120,38 +120,38 @@ class AuditEntry(ScopedModel):
         return f"{self.get_act_display()}: {self.about}"
 
     def save(self, *args: Any, **kwargs: Any) -> None:
-        """Add the row. Raises AppendOnly for one that is there already."""
+        """Add the row. Raises AppendOnlyViolation for a stored one."""
         if not self._state.adding:
-            raise AppendOnly
+            raise AppendOnlyViolation
         super().save(*args, **kwargs)
 
     def delete(self, *args: Any, **kwargs: Any) -> NoReturn:
-        """Refuse."""
-        raise AppendOnly
+        """Raise AppendOnlyViolation."""
+        raise AppendOnlyViolation
 
 
-class Recent:
-    """What was noted a moment ago. Shared by the threads of a process."""
+class RecentViews:
+    """The views that were recorded in the last minutes. Shared by the threads of a process."""
 
     def __init__(self) -> None:
-        self._noted: OrderedDict[Hashable, datetime] = OrderedDict()
+        self._recorded: OrderedDict[Hashable, datetime] = OrderedDict()
         self._lock = Lock()
 
     def is_new(self, key: Hashable, now: datetime) -> bool:
-        """Whether this was not noted within some minutes; from now on it is."""
+        """Return whether a view was not recorded in the last minutes, and remember it."""
         with self._lock:
-            last = self._noted.pop(key, None)
-            fresh = last is None or now - last >= AGAIN_AFTER
-            self._noted[key] = now if last is None or fresh else last
-            while len(self._noted) > REMEMBERED:
-                self._noted.popitem(last=False)
-        return fresh
+            last = self._recorded.pop(key, None)
+            is_new = last is None or now - last >= REPEAT_AFTER
+            self._recorded[key] = now if last is None or is_new else last
+            while len(self._recorded) > MAX_RECENT:
+                self._recorded.popitem(last=False)
+        return is_new
 
 
-recent = Recent()
+recent_views = RecentViews()
 
 
-def compose(
+def build_entry(
     act: Act,
     actor: Any,
     *,
@@ -161,8 +161,9 @@ def compose(
     clinic: int | None = None,
     now: datetime,
 ) -> AuditEntry:
-    """Give an entry. ``actor`` is a person or a device; None the server's own console, whose
-    ``clinic`` has to be told.
+    """Return an entry, not saved. ``actor`` is a person or a device.
+
+    Without one it is the server's console, which needs a ``clinic``.
     """
     person = actor if isinstance(actor, User) else None
     through = SERVER if actor is None else person.program if person else str(actor)
@@ -175,29 +176,29 @@ def compose(
         act=act,
         patient_id=patient,
         about=about[:200],
-        address=shorten(address),
+        address=truncate_address(address),
     )
 
 
-def note(act: Act, actor: Any, **facts: Any) -> None:
-    """Add an entry. Raises DatabaseError where it cannot be kept: nothing may then be given out."""
-    compose(act, actor, **facts).save()
+def record(act: Act, actor: Any, **details: Any) -> None:
+    """Add an entry. Raises DatabaseError on failure: then nothing may be exported."""
+    build_entry(act, actor, **details).save()
 
 
-def note_safety(act: Act, actor: User, row: Any, address: str, now: datetime) -> None:
-    """Add an entry of what alters who gets in: an account's, a device's or a program's row."""
+def record_security_change(act: Act, actor: User, row: Any, address: str, now: datetime) -> None:
+    """Add an entry about a change to who has access: of an account, a device or an API token."""
     clinic = clinic_id_of(row) or actor.clinic_id
     about = f"{row._meta.verbose_name}: {row}"
-    if clinic is None:  # a host's own account: no clinic has a log of it
-        log.warning("%s, %s, by %s from %s", act.label, about, actor, shorten(address))
+    if clinic is None:  # a host's own account belongs to no clinic's log
+        log.warning("%s, %s, by %s from %s", act.label, about, actor, truncate_address(address))
         return
-    note(act, actor, clinic=clinic, about=about, address=address, now=now)
+    record(act, actor, clinic=clinic, about=about, address=address, now=now)
 
 
-def try_to_keep(entries: list[AuditEntry]) -> None:
-    """Add entries of what has happened already. If they cannot be kept, care goes on without.
+def record_after_the_fact(entries: list[AuditEntry]) -> None:
+    """Add entries about what has happened already. A failure is logged: care must go on.
 
-    What belongs to no clinic is left out: it is a host's, who sees no patients.
+    Entries without a clinic are skipped: they are a host's, who sees no patients.
     """
     try:
         with transaction.atomic():
@@ -206,8 +207,8 @@ def try_to_keep(entries: list[AuditEntry]) -> None:
         log.exception("The audit log missed: %s", ", ".join(str(one) for one in entries))
 
 
-def shorten(address: str) -> str:
-    """Give the network of an address: whether somebody was in the clinic, not at which machine."""
+def truncate_address(address: str) -> str:
+    """Return the network of an address, enough to tell a clinic but not a machine."""
     try:
         parsed = ip_address(address)
     except ValueError:
@@ -216,16 +217,16 @@ def shorten(address: str) -> str:
     return str(ip_network((parsed, bits), strict=False))
 
 
-def forget_before(clinic: int, moment: datetime) -> int:
-    """Let go of a clinic's entries from before a moment; give how many."""
-    return _rows().filter(clinic=clinic, at__lt=moment).delete()[0]
+def delete_before(clinic: int, moment: datetime) -> int:
+    """Delete a clinic's entries from before a moment. Return how many."""
+    return _mutable_rows().filter(clinic=clinic, at__lt=moment).delete()[0]
 
 
-def forget_patient(patient: int) -> None:
-    """Let the entries of an erased patient lead to nobody."""
-    _rows().filter(patient=patient).update(patient=None, about="")
+def anonymize_patient(patient: int) -> None:
+    """Remove an erased patient from the entries."""
+    _mutable_rows().filter(patient=patient).update(patient=None, about="")
 
 
-def _rows() -> QuerySet[AuditEntry]:
-    """Give rows that can be altered: only what the law asks for, and only here."""
+def _mutable_rows() -> QuerySet[AuditEntry]:
+    """Return rows that can be changed: for retention and erasure, and only in this module."""
     return QuerySet(AuditEntry)

@@ -1,8 +1,8 @@
-"""Who changed what, and when: of people and of settings, each value before and after.
+"""The change history of people and settings: who changed what and when, old and new values.
 
-One table for all models. django-simple-history was weighed and left: it looks rows up by
-`Model.objects` (ours refuses), opens a version by its number before it asks whose it is, and keeps
-whole copies of patients in a dozen tables that an erasure would have to search.
+One table for all models. django-simple-history was considered: it queries `Model.objects` (ours
+refuses), opens a version before it checks the clinic, and keeps whole copies of patients in a dozen
+tables that an erasure would have to search.
 """
 
 from __future__ import annotations
@@ -26,12 +26,20 @@ from rehab.people.models import Clinic, User
 from rehab.people.roles import RIGHTS, Right, Role, rights_of
 from rehab.people.scope import Scope, ScopedModel
 
-# What no person changes, or what time alone does.
-LEFT_OUT = {"id", "created_at", "last_login", "last_seen_at", "token_hash", "epoch", "owner"}
-SECRET = {"password", "pin_hash"}  # it is noted that it changed, never what it was
-HIDDEN = "•••"
-BEFORE = "row before the save"
-M2M_ACTIONS = {"post_add": 1, "post_remove": 0, "pre_clear": 0}  # place of the keys: old, new
+# Fields that no person changes, or that change with time alone.
+UNTRACKED_FIELDS = {
+    "id",
+    "created_at",
+    "last_login",
+    "last_seen_at",
+    "token_hash",
+    "epoch",
+    "owner",
+}
+SECRET_FIELDS = {"password", "pin_hash"}  # that they changed is recorded, never their values
+MASK = "•••"
+ROW_BEFORE = "_row_before_save"
+M2M_ACTIONS = {"post_add": 1, "post_remove": 0, "pre_clear": 0}  # index of the keys in [old, new]
 
 _tracked: list[type[Any]] = []
 _request: ContextVar[HttpRequest | None] = ContextVar("request", default=None)
@@ -39,39 +47,40 @@ _request: ContextVar[HttpRequest | None] = ContextVar("request", default=None)
 
 @dataclass(frozen=True)
 class HistoryScope(Scope):
-    """Changes of the own clinic's rows, of those nouns that the role may read."""
+    """Changes of the own clinic's rows, of the models that the role may read."""
 
-    def narrow(self, role: Role) -> Q:
-        """Leave out what the role could not read where it stands."""
-        return Q(noun__in=[noun for noun in RIGHTS if Right.VIEW in rights_of(role, noun)])
+    def role_filter(self, role: Role) -> Q:
+        """Return the condition that the role may read the model."""
+        readable = [name for name in RIGHTS if Right.VIEW in rights_of(role, name)]
+        return Q(model_name__in=readable)
 
 
-def nouns() -> list[tuple[str, Any]]:
-    """Give the models whose history is kept, by name, with the words for one of their rows."""
+def model_choices() -> list[tuple[str, Any]]:
+    """Return the tracked models as choices: name and verbose name."""
     return [(model.__name__, model._meta.verbose_name) for model in _tracked]
 
 
 class HistoryEntry(ScopedModel):
-    """One change of one row. ``values``: for each field what it was and what it became."""
+    """One change of one row. ``changes``: for each field its old and its new value."""
 
     class Kind(models.TextChoices):
-        """What became of the row."""
+        """The kind of change."""
 
         ADDED = "added", _("Added")
         CHANGED = "changed", _("Changed")
         DELETED = "deleted", _("Deleted")
 
     scope = HistoryScope(
-        clinic="clinic", host=Q(clinic__isnull=True) | Q(noun__in=["Clinic", "User"])
+        clinic="clinic", host=Q(clinic__isnull=True) | Q(model_name__in=["Clinic", "User"])
     )
 
     clinic = models.ForeignKey(
         Clinic, on_delete=models.CASCADE, related_name="+", null=True, verbose_name=_("clinic")
     )
-    noun = models.CharField(_("what"), max_length=32, choices=nouns)
-    row = models.BigIntegerField(_("number"))
+    model_name = models.CharField(_("what"), max_length=32, choices=model_choices)
+    object_id = models.BigIntegerField(_("number"))
     kind = models.CharField(_("kind"), max_length=8, choices=Kind.choices)
-    values = models.JSONField(_("values"), default=dict, encoder=DjangoJSONEncoder)
+    changes = models.JSONField(_("values"), default=dict, encoder=DjangoJSONEncoder)
     by = models.ForeignKey(
         User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("by")
     )
@@ -87,24 +96,26 @@ class HistoryEntry(ScopedModel):
         verbose_name = _("change")
         verbose_name_plural = _("changes")
         ordering: ClassVar = ["-at", "-pk"]
-        indexes: ClassVar = [models.Index(fields=["noun", "row"], name="history_by_row")]
+        indexes: ClassVar = [
+            models.Index(fields=["model_name", "object_id"], name="history_by_row")
+        ]
 
     def __str__(self) -> str:
-        return f"{self.get_noun_display()} {self.row}: {self.get_kind_display()}"
+        return f"{self.get_model_name_display()} {self.object_id}: {self.get_kind_display()}"
 
 
 @contextmanager
-def acting(request: HttpRequest) -> Iterator[None]:
-    """Let whatever changes in this block be this request's doing."""
-    mark = _request.set(request)
+def attribute_changes_to(request: HttpRequest) -> Iterator[None]:
+    """Attribute all changes in this block to the actor of this request."""
+    token = _request.set(request)
     try:
         yield
     finally:
-        _request.reset(mark)
+        _request.reset(token)
 
 
-def doer() -> tuple[User | None, str]:
-    """Give who acts now, and the program or tablet by which; (None, "") for the server itself."""
+def current_actor() -> tuple[User | None, str]:
+    """Return who acts now, and through which program or tablet; (None, "") for the server."""
     request = _request.get()
     if request is None:
         return None, ""
@@ -115,46 +126,48 @@ def doer() -> tuple[User | None, str]:
     return None, "" if tablet is None else str(tablet)[:64]
 
 
-def track(*tracked: type[Any]) -> None:
-    """Keep the history of these models from the start of the process on."""
+def track_models(*tracked: type[Any]) -> None:
+    """Record the changes of these models from now on."""
     _tracked.extend(tracked)
     for model in tracked:
-        pre_save.connect(_look, sender=model)
+        pre_save.connect(_read_before_save, sender=model)
         post_save.connect(_on_save, sender=model)
         post_delete.connect(_on_delete, sender=model)
         for field in model._meta.many_to_many:
-            heed = partial(_on_relation, name=field.name)
-            m2m_changed.connect(heed, sender=getattr(model, field.name).through, weak=False)
+            receiver = partial(_on_relation, name=field.name)
+            m2m_changed.connect(receiver, sender=getattr(model, field.name).through, weak=False)
 
 
-def forget_values(noun: str, row: int) -> None:
-    """Take the values out of a row's history; who changed which field, and when, stays."""
-    for entry in HistoryEntry.everywhere.filter(noun=noun, row=row):
-        entry.values = dict.fromkeys(entry.values)
-        entry.save(update_fields=["values"])
+def erase_values(model_name: str, object_id: int) -> None:
+    """Remove the values from a row's history; who changed which field, and when, stays."""
+    for entry in HistoryEntry.everywhere.filter(model_name=model_name, object_id=object_id):
+        entry.changes = dict.fromkeys(entry.changes)
+        entry.save(update_fields=["changes"])
 
 
 def _values_of(row: Model) -> dict[str, Any]:
     return {
         field.name: getattr(row, field.attname)
         for field in row._meta.concrete_fields
-        if field.name not in LEFT_OUT
+        if field.name not in UNTRACKED_FIELDS
     }
 
 
-def _look(instance: ScopedModel, raw: bool = False, update_fields: Any = None, **_: Any) -> None:
-    """Read, before a save, what is there."""
-    only_quiet = update_fields is not None and LEFT_OUT.issuperset(update_fields)
+def _read_before_save(
+    instance: ScopedModel, raw: bool = False, update_fields: Any = None, **_: Any
+) -> None:
+    """Read the stored row before a save."""
+    only_untracked = update_fields is not None and UNTRACKED_FIELDS.issuperset(update_fields)
     before = None
-    if not (raw or only_quiet or instance.pk is None):
+    if not (raw or only_untracked or instance.pk is None):
         before = type(instance).everywhere.filter(pk=instance.pk).first()
-    vars(instance)[BEFORE] = before
+    vars(instance)[ROW_BEFORE] = before
 
 
 def _on_save(
     instance: ScopedModel, created: bool, raw: bool = False, update_fields: Any = None, **_: Any
 ) -> None:
-    before = vars(instance).pop(BEFORE, None)
+    before = vars(instance).pop(ROW_BEFORE, None)
     if raw or (before is None and not created):
         return
     old, new = _values_of(before) if before is not None else {}, _values_of(instance)
@@ -167,12 +180,12 @@ def _on_save(
     }
     if created or changed:
         kinds = HistoryEntry.Kind
-        _write(instance, kinds.ADDED if created else kinds.CHANGED, changed)
+        _add_entry(instance, kinds.ADDED if created else kinds.CHANGED, changed)
 
 
 def _on_delete(instance: ScopedModel, **_: Any) -> None:
-    values = {name: [value, None] for name, value in _values_of(instance).items()}
-    _write(instance, HistoryEntry.Kind.DELETED, values)
+    changes = {name: [value, None] for name, value in _values_of(instance).items()}
+    _add_entry(instance, HistoryEntry.Kind.DELETED, changes)
 
 
 def _on_relation(
@@ -184,19 +197,19 @@ def _on_relation(
     if keys:
         pair: list[Any] = [None, None]
         pair[M2M_ACTIONS[action]] = sorted(keys)
-        _write(instance, HistoryEntry.Kind.CHANGED, {name: pair})
+        _add_entry(instance, HistoryEntry.Kind.CHANGED, {name: pair})
 
 
-def _write(row: ScopedModel, kind: str, values: dict[str, list[Any]]) -> None:
-    by, through = doer()
+def _add_entry(row: ScopedModel, kind: str, changes: dict[str, list[Any]]) -> None:
+    by, through = current_actor()
     HistoryEntry.everywhere.create(
         clinic_id=clinic_id_of(row),
-        noun=type(row).__name__,
-        row=row.pk,
+        model_name=type(row).__name__,
+        object_id=row.pk,
         kind=kind,
-        values={
-            name: [HIDDEN if value and name in SECRET else value for value in pair]
-            for name, pair in values.items()
+        changes={
+            name: [MASK if value and name in SECRET_FIELDS else value for value in pair]
+            for name, pair in changes.items()
         },
         by=by,
         through=through,
@@ -204,7 +217,7 @@ def _write(row: ScopedModel, kind: str, values: dict[str, list[Any]]) -> None:
 
 
 def clinic_id_of(row: ScopedModel) -> int | None:
-    """Give the key of the clinic that a row belongs to; None for shared rows and hosts."""
+    """Return the key of the clinic that a row belongs to; None for shared rows and hosts."""
     owner: Any = row
     for step in row.scope.clinic.split("__"):
         owner = getattr(owner, step)

@@ -1,4 +1,4 @@
-"""A row's history in words, for those who may see the row."""
+"""The history of a row as text, for people who may see the row."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from django.utils.translation import gettext as _
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.scope import ScopedModel
 
-SHOWN = 200  # the newest
+MAX_ENTRIES = 200  # the newest
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
-    """What became of one field."""
+class FieldChange:
+    """The change of one field, as text."""
 
     label: str
     old: str
@@ -25,18 +25,18 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """A change in words. ``part``: the kind of row on the page, where it is not the row itself."""
+class RowChange:
+    """A change as text. ``part``: the kind of a row that is a part of the page's own row."""
 
     entry: HistoryEntry
     part: str
-    lines: list[Line]
+    fields: list[FieldChange]
 
 
-def changes_of(user: Any, row: ScopedModel, parts: Sequence[type[Model]] = ()) -> list[Told]:
-    """Give the changes of a row and of the rows of ``parts`` on its page, newest first."""
+def changes_of(user: Any, row: ScopedModel, parts: Sequence[type[Model]] = ()) -> list[RowChange]:
+    """Return the changes of a row and of the rows of ``parts`` that refer to it, newest first."""
     models = {type(row).__name__: type(row), **{part.__name__: part for part in parts}}
-    wanted = Q(noun=type(row).__name__, row=row.pk)
+    wanted = Q(model_name=type(row).__name__, object_id=row.pk)
     for part in parts:
         link = next(
             field.name
@@ -45,46 +45,50 @@ def changes_of(user: Any, row: ScopedModel, parts: Sequence[type[Model]] = ()) -
         )
         mine: Any = part
         keys = mine.objects.visible_to(user).filter(**{link: row.pk}).values("pk")
-        gone = Q(kind=HistoryEntry.Kind.DELETED, **{f"values__{link}__0": row.pk})
-        wanted |= Q(noun=part.__name__) & (Q(row__in=keys) | gone)
-    entries = HistoryEntry.objects.visible_to(user).filter(wanted).select_related("by")[:SHOWN]
+        gone = Q(kind=HistoryEntry.Kind.DELETED, **{f"changes__{link}__0": row.pk})
+        wanted |= Q(model_name=part.__name__) & (Q(object_id__in=keys) | gone)
+    entries = (
+        HistoryEntry.objects.visible_to(user).filter(wanted).select_related("by")[:MAX_ENTRIES]
+    )
     return [
-        Told(
+        RowChange(
             entry,
-            "" if entry.noun == type(row).__name__ else str(models[entry.noun]._meta.verbose_name),
-            list(_tell(user, models[entry.noun], entry)),
+            ""
+            if entry.model_name == type(row).__name__
+            else str(models[entry.model_name]._meta.verbose_name),
+            list(_field_changes(user, models[entry.model_name], entry)),
         )
         for entry in entries
     ]
 
 
-def _tell(user: Any, model: type[Model], entry: HistoryEntry) -> Iterator[Line]:
+def _field_changes(user: Any, model: type[Model], entry: HistoryEntry) -> Iterator[FieldChange]:
     fields = {
         field.name: field for field in (*model._meta.concrete_fields, *model._meta.many_to_many)
     }
-    for name, pair in entry.values.items():
+    for name, pair in entry.changes.items():
         field: Any = fields.get(name)
         label = getattr(field, "verbose_name", name)
         if pair is None:
-            yield Line(str(label), _("erased"), "")
+            yield FieldChange(str(label), _("erased"), "")
         elif entry.kind != HistoryEntry.Kind.DELETED:
-            old, new = (_say(user, field, value) for value in pair)
+            old, new = (_format_value(user, field, value) for value in pair)
             added = entry.kind == HistoryEntry.Kind.ADDED
-            yield Line(str(label), new, "") if added else Line(str(label), old, new)
+            yield FieldChange(str(label), new, "") if added else FieldChange(str(label), old, new)
 
 
-def _say(user: Any, field: Field[Any, Any] | None, value: Any) -> str:
-    """Put a stored value into words. Rows that the reader may not see stay numbers."""
+def _format_value(user: Any, field: Field[Any, Any] | None, value: Any) -> str:
+    """Return a stored value as text. Rows that the reader may not see stay numbers."""
     if value in (None, ""):
         return "–"
     if isinstance(value, bool):
         return _("yes") if value else _("no")
-    if isinstance(value, dict):  # words by language, say
-        return "; ".join(f"{name}: {said}" for name, said in value.items()) or "–"
+    if isinstance(value, dict):  # for example text by language
+        return "; ".join(f"{name}: {text}" for name, text in value.items()) or "–"
     related: Any = getattr(field, "related_model", None)
     keys = value if isinstance(value, list) else [value]
     if related is not None:
-        seen = related.objects.visible_to(user).in_bulk(keys)
-        return ", ".join(str(seen.get(key, f"#{key}")) for key in keys)
+        visible = related.objects.visible_to(user).in_bulk(keys)
+        return ", ".join(str(visible.get(key, f"#{key}")) for key in keys)
     choices = dict(getattr(field, "flatchoices", []))
     return ", ".join(str(choices.get(key, key)) for key in keys)

@@ -1,8 +1,8 @@
-"""Who was erased and must not come back: participants whom the original's database still names.
+"""Tombstones of erased patients, so that the import does not bring them back.
 
-What is kept is a keyed hash of the clinic and the original's number. It answers one question,
-whether this very number was erased here, to whoever holds the server's key. It leads
-to no row of ours.
+The legacy database still has them as participants. A tombstone is a keyed hash of the clinic and
+the legacy id. It only tells, with the server's key, whether a given id was erased here, and refers
+to no other row.
 """
 
 from __future__ import annotations
@@ -17,36 +17,38 @@ from rehab.people.models import Clinic
 from rehab.people.scope import Scope, ScopedModel
 
 
-class ErasedOriginal(ScopedModel):
-    """A participant of the original GARRY who was erased at a clinic."""
+class ImportTombstone(ScopedModel):
+    """A participant of the legacy database who was erased at a clinic."""
 
     scope = Scope(clinic="clinic")
 
     clinic = models.ForeignKey(
         Clinic, on_delete=models.CASCADE, related_name="+", verbose_name=_("clinic")
     )
-    mark = models.CharField(max_length=64)
+    id_hash = models.CharField(max_length=64)
 
     class Meta(ScopedModel.Meta):
         constraints: ClassVar = [
-            models.UniqueConstraint(fields=["clinic", "mark"], name="erased_once_per_clinic")
+            models.UniqueConstraint(
+                fields=["clinic", "id_hash"], name="import_tombstone_once_per_clinic"
+            )
         ]
 
     def __str__(self) -> str:
-        return self.mark[:8]
+        return self.id_hash[:8]
 
 
-def keep_away(clinic: int, original_id: int) -> None:
-    """Remember that a participant was erased."""
-    ErasedOriginal.everywhere.get_or_create(clinic_id=clinic, mark=_mark(clinic, original_id))
+def block_reimport(clinic: int, legacy_id: int) -> None:
+    """Block a participant from being imported again."""
+    ImportTombstone.everywhere.get_or_create(clinic_id=clinic, id_hash=_hash_id(clinic, legacy_id))
 
 
-def is_kept_away(clinic: int, original_id: int) -> bool:
-    """Whether a participant was erased here."""
-    mark = _mark(clinic, original_id)
-    return ErasedOriginal.everywhere.filter(clinic=clinic, mark=mark).exists()
+def is_reimport_blocked(clinic: int, legacy_id: int) -> bool:
+    """Return whether a participant was erased here."""
+    id_hash = _hash_id(clinic, legacy_id)
+    return ImportTombstone.everywhere.filter(clinic=clinic, id_hash=id_hash).exists()
 
 
-def _mark(clinic: int, original_id: int) -> str:
-    hashed = salted_hmac(__name__, f"{clinic} {original_id}", algorithm="sha256")
+def _hash_id(clinic: int, legacy_id: int) -> str:
+    hashed = salted_hmac("garry.import_tombstones", f"{clinic} {legacy_id}", algorithm="sha256")
     return hashed.hexdigest()

@@ -1,4 +1,4 @@
-"""The own account."""
+"""Pages of the own account."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.debug import sensitive_post_parameters
 from django.views.decorators.http import require_http_methods, require_safe
 
-from rehab.people.access import for_roles, person
+from rehab.people.access import for_roles, user_of
 from rehab.people.models import LANGUAGES
 from rehab.people.roles import Role
 from rehab.people.sign_in import factors, passkeys
@@ -22,15 +22,15 @@ from rehab.people.sign_in.forms import NewPasswordForm
 @never_cache
 @require_safe
 def show_account(request: HttpRequest) -> HttpResponse:
-    """Show what signs the person in."""
-    user = person(request)
+    """Show the account with its second factors and language."""
+    user = user_of(request)
     context = {
         "owner": user,
         "languages": LANGUAGES,
         "authenticators": factors.authenticators_of(user),
         "is_required": factors.is_required(user),
-        "codes_left": factors.recovery_codes_left(user),
-        "passkeys": passkeys.are_possible(request),
+        "codes_left": factors.count_recovery_codes(user),
+        "passkeys": passkeys.are_supported(request),
     }
     return render(request, "people/account.html", context)
 
@@ -40,8 +40,8 @@ def show_account(request: HttpRequest) -> HttpResponse:
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
 def change_password(request: HttpRequest) -> HttpResponse:
-    """Replace the own password. All other sign-ins of the account end."""
-    user = person(request)
+    """Change the own password. All other sessions of the account end."""
+    user = user_of(request)
     form = NewPasswordForm(request, user, request.POST if request.method == "POST" else None)
     if form.is_valid():
         form.save()

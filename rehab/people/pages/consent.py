@@ -1,4 +1,4 @@
-"""What a patient agrees to, noted with taps; and the words that patients agree to."""
+"""Pages for a patient's consents and for the consent text."""
 
 from __future__ import annotations
 
@@ -12,18 +12,17 @@ from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 from django.views.decorators.http import require_http_methods
 
-from rehab.people.access import clinic_of, for_roles, person
-from rehab.people.consent.models import (
-    Consent,
-    Purpose,
+from rehab.people.access import clinic_of, for_roles, user_of
+from rehab.people.consent.models import Consent, Purpose
+from rehab.people.consent.services import (
+    active_consents,
     current_text,
-    give,
-    holding,
-    join_boards,
-    may_be_cared_for,
-    offered,
-    withdraw,
-    write_text,
+    is_care_allowed,
+    offered_purposes,
+    publish_text,
+    record_boards_consent,
+    record_consent,
+    withdraw_consent,
 )
 from rehab.people.forms import ConsentTextForm
 from rehab.people.models import Boards, Patient
@@ -47,30 +46,36 @@ LEVELS = {
 
 @dataclass(frozen=True)
 class Choice:
-    """A purpose on the page."""
+    """A purpose on the page, with its options."""
 
     purpose: Purpose
     meaning: str
-    held: Consent | None
-    is_old: bool  # to words that have changed since
-    options: list[tuple[str, str, bool]]  # what is sent, its words, whether it is so now
-    lacks: bool  # without it no session is set up
+    consent: Consent | None
+    is_outdated: bool  # given to an older text
+    options: list[tuple[str, str, bool]]  # value, label, whether it is chosen now
+    is_missing: bool  # without it no session can be set up
 
 
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
 def show_consent(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Show what a patient agrees to, and note what is tapped."""
-    user = person(request)
+    """Show a patient's consents, and record the answer that was tapped."""
+    user = user_of(request)
     patients = Patient.objects.visible_to(user).select_related("clinic")
     patient = get_object_or_404(patients, pk=patient_id)
     if request.method == "POST" and patient.erased_at is None:
-        purpose, says = request.POST.get("purpose"), request.POST.get("says", "")
-        if purpose == Purpose.BOARDS and says in Boards.values:
-            join_boards(patient, Boards(says), user, timezone.now())
-        elif purpose in (*offered(patient.clinic), *holding(patient)) and says in ("yes", "no"):
-            act = give if says == "yes" else withdraw
-            act(patient, Purpose(purpose), user, timezone.now())
+        purpose, answer = request.POST.get("purpose"), request.POST.get("answer", "")
+        if purpose == Purpose.BOARDS and answer in Boards.values:
+            record_boards_consent(patient, Boards(answer), user, timezone.now())
+        elif purpose in (
+            *offered_purposes(patient.clinic),
+            *active_consents(patient),
+        ) and answer in (
+            "yes",
+            "no",
+        ):
+            change = record_consent if answer == "yes" else withdraw_consent
+            change(patient, Purpose(purpose), user, timezone.now())
         else:
             messages.error(request, _("That cannot be chosen. Tap one of the answers."))
         return redirect("consent", patient_id=patient.pk)
@@ -79,42 +84,44 @@ def show_consent(request: HttpRequest, patient_id: int) -> HttpResponse:
         "patient": patient,
         "text": current_text(patient.clinic),
         "choices": list_choices(patient),
-        "past": rows.select_related("text", "recorded_by", "withdrawn_by"),
+        "history": rows.select_related("text", "recorded_by", "withdrawn_by"),
     }
     return render(request, "people/consent.html", context)
 
 
 def list_choices(patient: Patient) -> list[Choice]:
-    """Give every purpose with what holds of it."""
-    held, text = holding(patient), current_text(patient.clinic)
+    """Return every purpose with the patient's consent."""
+    active, text = active_consents(patient), current_text(patient.clinic)
     choices = []
-    asked = {*offered(patient.clinic), *map(Purpose, held)}
+    asked = {*offered_purposes(patient.clinic), *map(Purpose, active)}
     for purpose in (one for one in Purpose if one in asked):
-        row = held.get(purpose)
+        consent = active.get(purpose)
         if purpose == Purpose.BOARDS:
-            now = patient.boards if row else Boards.OWN
+            now = patient.boards if consent else Boards.OWN
             across = patient.clinic.boards_across or now == Boards.ACROSS
             levels = [level for level in Boards if across or level != Boards.ACROSS]
             options = [(level.value, str(LEVELS[level]), level == now) for level in levels]
         else:
-            options = [("yes", _("Yes"), row is not None), ("no", _("No"), row is None)]
-        is_old = row is not None and row.text_id != text.pk
-        lacks = purpose == Purpose.CARE and not may_be_cared_for(patient)
-        choices.append(Choice(purpose, str(MEANING[purpose]), row, is_old, options, lacks))
+            options = [("yes", _("Yes"), consent is not None), ("no", _("No"), consent is None)]
+        is_outdated = consent is not None and consent.text_id != text.pk
+        is_missing = purpose == Purpose.CARE and not is_care_allowed(patient)
+        choices.append(
+            Choice(purpose, str(MEANING[purpose]), consent, is_outdated, options, is_missing)
+        )
     return choices
 
 
 @for_roles(Role.LEAD, patients=False)
 @require_http_methods(["GET", "HEAD", "POST"])
-def write_words(request: HttpRequest) -> HttpResponse:
-    """Let a lead put new words in force. Those that somebody agreed to stay as they are."""
-    user = person(request)
+def edit_text(request: HttpRequest) -> HttpResponse:
+    """Let a lead publish a new version of the text. Older versions stay as they are."""
+    user = user_of(request)
     clinic = clinic_of(user)
     text = current_text(clinic)
     form = ConsentTextForm(request.POST or None, initial={"text": text.text}, label_suffix="")
     if request.method == "POST" and form.is_valid():
-        new = write_text(clinic, form.cleaned_data["text"], user, timezone.now())
-        said = _("Version %(version)d is in force. Ask patients again when they come.")
-        messages.success(request, said % {"version": new.version})
+        new = publish_text(clinic, form.cleaned_data["text"], user, timezone.now())
+        message = _("Version %(version)d is in force. Ask patients again when they come.")
+        messages.success(request, message % {"version": new.version})
         return redirect("consent-text")
     return render(request, "people/consent_text.html", {"form": form, "text": text})

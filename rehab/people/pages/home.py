@@ -1,4 +1,4 @@
-"""The front page, and the sign of life."""
+"""The front page and the health check."""
 
 from django.conf import settings
 from django.db import connection
@@ -14,7 +14,7 @@ from rehab.training.valences import VALENCES
 @public
 @require_safe
 def home(request: HttpRequest) -> HttpResponse:
-    """Say what can be done here."""
+    """Show the front page."""
     return render(
         request, "people/home.html", {"hosted": settings.HOSTED, "valences": VALENCES.values()}
     )
@@ -24,7 +24,7 @@ def home(request: HttpRequest) -> HttpResponse:
 @never_cache
 @require_safe
 def healthz(request: HttpRequest) -> HttpResponse:
-    """Say that the server answers and reaches its database."""
+    """Answer with "ok" while the server reaches its database."""
     with connection.cursor() as cursor:
         cursor.execute("SELECT 1")
     return HttpResponse("ok\n", content_type="text/plain")

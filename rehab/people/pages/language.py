@@ -1,4 +1,4 @@
-"""The words of the pages' scripts, and the language of the own account."""
+"""The catalog of the scripts' translations, and the language of the own account."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from django.views.decorators.cache import cache_control
 from django.views.decorators.http import conditional_page, require_POST, require_safe
 from django.views.i18n import JavaScriptCatalog
 
-from rehab.people.access import for_roles, person, public
+from rehab.people.access import for_roles, public, user_of
 from rehab.people.models import LANGUAGES
 from rehab.people.roles import Role
 from rehab.people.web.language import language_of
 
-in_scripts = JavaScriptCatalog.as_view(packages=["rehab"])
+javascript_catalog = JavaScriptCatalog.as_view(packages=["rehab"])
 
 
 @public
@@ -24,18 +24,18 @@ in_scripts = JavaScriptCatalog.as_view(packages=["rehab"])
 @cache_control(public=True, max_age=600)
 @conditional_page
 def show_catalog(request: HttpRequest, language: str) -> HttpResponseBase:
-    """Give the words of scripts in a language, whoever asks."""
+    """Show the translations of the scripts in a language."""
     if language not in dict(LANGUAGES):
         raise Http404
     with translation.override(language):
-        return in_scripts(request)
+        return javascript_catalog(request)
 
 
 @for_roles(*Role)
 @require_POST
 def choose_language(request: HttpRequest) -> HttpResponse:
-    """Take a language for the own account; "" for the clinic's."""
-    user = person(request)
+    """Set the language of the own account; "" for the clinic's."""
+    user = user_of(request)
     chosen = request.POST.get("language", "")
     if chosen not in {"", *dict(LANGUAGES)}:
         messages.error(request, _("There is no such language. Choose one of the list."))

@@ -1,4 +1,4 @@
-"""Setting up a second factor, from the own account or before the clinic lets somebody in."""
+"""Pages to enroll a second factor, from the own account or during a pending sign-in."""
 
 from __future__ import annotations
 
@@ -14,47 +14,47 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.debug import sensitive_post_parameters
 from django.views.decorators.http import require_http_methods, require_safe
 
-from rehab.people.access import for_roles, person
+from rehab.people.access import for_roles, user_of
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.sign_in import factors, flow, passkeys, totp
 from rehab.people.sign_in.forms import WRONG_FIRST_CODE, AppForm, OwnPasswordForm
 
-SECRET = "app_secret"  # noqa: S105 (its name in the browser session, until the app has proven it)
+SECRET = "app_secret"  # noqa: S105 (key of the browser session, until the app has shown a code)
 
 
 def owner(request: HttpRequest) -> User:
-    """Give whose account is set up. Raises PermissionDenied for a stranger."""
+    """Return the account that enrolls. Raises PermissionDenied for a stranger."""
     if isinstance(request.user, User):
         return request.user
-    user = flow.setting_up(request, timezone.now())
+    user = flow.pending_enrollment(request, timezone.now())
     if user is None:
         raise PermissionDenied
     return user
 
 
-@for_roles(*Role, setting_up=True, patients=False)
+@for_roles(*Role, enrolling=True, patients=False)
 @never_cache
 @require_safe
 def choose(request: HttpRequest) -> HttpResponse:
-    """Offer what can be a second factor here."""
+    """Show the kinds of second factors that can be enrolled here."""
     user = owner(request)
     context = {
         "owner": user,
         "is_required": factors.is_required(user),
-        "passkeys": passkeys.are_possible(request),
+        "passkeys": passkeys.are_supported(request),
     }
     return render(request, "people/sign_in/choose_factor.html", context)
 
 
-@for_roles(*Role, setting_up=True, patients=False)
+@for_roles(*Role, enrolling=True, patients=False)
 @never_cache
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
 def add_app(request: HttpRequest) -> HttpResponse:
-    """Show an app its secret, and keep it once the app shows the right code."""
+    """Show the secret for an app, and store it once the app has shown the right code."""
     user = owner(request)
-    secret: str = request.session.setdefault(SECRET, totp.new_secret())
+    secret: str = request.session.setdefault(SECRET, totp.generate_secret())
     form = AppForm(request.POST if request.method == "POST" else None)
     if form.is_valid():
         new = factors.add_app(user, secret, form.cleaned_data["code"], timezone.now())
@@ -62,44 +62,44 @@ def add_app(request: HttpRequest) -> HttpResponse:
             del request.session[SECRET]
             return _added(request, user, new)
         form.add_error("code", WRONG_FIRST_CODE)
-    drawing = segno.make(totp.address(secret, user.username), micro=False)
+    drawing = segno.make(totp.provisioning_uri(secret, user.username), micro=False)
     spaced = " ".join(secret[start : start + 4] for start in range(0, len(secret), 4))
     context = {"form": form, "qr": drawing.svg_inline(omitsize=True, border=2), "secret": spaced}
     return render(request, "people/sign_in/add_app.html", context)
 
 
-@for_roles(*Role, setting_up=True, patients=False)
+@for_roles(*Role, enrolling=True, patients=False)
 @never_cache
 @require_http_methods(["GET", "HEAD", "POST"])
 def add_passkey(request: HttpRequest) -> HttpResponse:
-    """Have the browser make a passkey, and keep it."""
+    """Have the browser create a passkey, and store it."""
     user = owner(request)
-    if not passkeys.are_possible(request):
+    if not passkeys.are_supported(request):
         raise Http404
     problem = ""
     if request.method == "POST":
         name = request.POST.get("name", "").strip()[:64] or _("Passkey")
         try:
             return _added(
-                request, user, passkeys.keep(request, user, name, request.POST["passkey"])
+                request, user, passkeys.register(request, user, name, request.POST["passkey"])
             )
-        except (KeyError, passkeys.NotProven):
+        except (KeyError, passkeys.PasskeyRejected):
             problem = _("This passkey was not accepted. Try again.")
-    context = {"problem": problem, "passkey": passkeys.ask_to_make(request, user)}
+    context = {"problem": problem, "passkey": passkeys.registration_options(request, user)}
     return render(request, "people/sign_in/add_passkey.html", context)
 
 
 def _added(request: HttpRequest, user: User, new: list[str]) -> HttpResponse:
-    """Go on with a new authenticator: whoever was halfway is in; first the recovery codes."""
-    then = reverse("account")
+    """Go on after an enrollment: finish a pending sign-in, and show new recovery codes."""
+    next_url = reverse("account")
     if request.user.is_authenticated:
-        request.session[flow.PROVEN] = True
+        request.session[flow.SECOND_FACTOR_VERIFIED] = True
     else:
-        then = flow.finish(request, user, timezone.now(), proven=True)
+        next_url = flow.finish(request, user, timezone.now(), second_factor_verified=True)
     if not new:
         messages.success(request, _("Added."))
-        return redirect(then)
-    return _show(request, new, then)
+        return redirect(next_url)
+    return _show(request, new, next_url)
 
 
 @for_roles(*Role, patients=False)
@@ -107,8 +107,8 @@ def _added(request: HttpRequest, user: User, new: list[str]) -> HttpResponse:
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
 def renew_codes(request: HttpRequest) -> HttpResponse:
-    """Make new recovery codes, for whoever knows the password and has a second factor."""
-    user = person(request)
+    """Make new recovery codes, after the password, for an account with a second factor."""
+    user = user_of(request)
     if not factors.authenticators_of(user).exists():
         return redirect("account")
     form = OwnPasswordForm(request, user, request.POST if request.method == "POST" else None)
@@ -123,8 +123,10 @@ def renew_codes(request: HttpRequest) -> HttpResponse:
     return render(request, "people/sign_in/confirm_password.html", context)
 
 
-def _show(request: HttpRequest, new: list[str], then: str) -> HttpResponse:
-    return render(request, "people/sign_in/recovery_codes.html", {"codes": new, "then": then})
+def _show(request: HttpRequest, new: list[str], next_url: str) -> HttpResponse:
+    return render(
+        request, "people/sign_in/recovery_codes.html", {"codes": new, "next_url": next_url}
+    )
 
 
 @for_roles(*Role, patients=False)
@@ -132,15 +134,15 @@ def _show(request: HttpRequest, new: list[str], then: str) -> HttpResponse:
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
 def remove(request: HttpRequest) -> HttpResponse:
-    """Remove one of the own authenticators, for whoever knows the password."""
-    user = person(request)
+    """Remove one of the own authenticators, after the password."""
+    user = user_of(request)
     which = request.GET.get("which", "")
     own = factors.authenticators_of(user).filter(pk=int(which) if which.isdecimal() else 0).first()
     if own is None:
         return redirect("account")
     form = OwnPasswordForm(request, user, request.POST if request.method == "POST" else None)
     if form.is_valid():
-        if factors.remove(user, own.pk):
+        if factors.remove_authenticator(user, own.pk):
             messages.success(request, _("%(name)s is removed.") % {"name": own})
         else:
             messages.error(

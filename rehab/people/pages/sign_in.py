@@ -1,4 +1,4 @@
-"""Coming in and going out."""
+"""Pages to sign in and out."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rehab.people.sign_in.forms import CodeForm, SignInForm
 
 
 def first_page(user: User) -> str:
-    """Give where somebody begins who asked for no page."""
+    """Return the page to show after a sign-in that asked for none."""
     return reverse("start" if user.role in {Role.LEAD, Role.PT} else "admin:index")
 
 
@@ -35,7 +35,7 @@ class SignIn(LoginView):
     authentication_form = SignInForm
 
     def form_valid(self, form: Any) -> HttpResponse:
-        """Let somebody in, or go on to the second factor."""
+        """Sign in, or go on to the second factor."""
         user: User = form.get_user()
         then = self.get_redirect_url() or first_page(user)
         if flow.begin(self.request, user, then, timezone.now()):
@@ -52,9 +52,9 @@ sign_in = public(SignIn.as_view())
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
 def prove(request: HttpRequest) -> HttpResponse:
-    """Take a code or a passkey of somebody whose password was right. Anyone else starts over."""
+    """Take the code or passkey of a pending sign-in. Without one, start over."""
     now = timezone.now()
-    user = flow.halfway(request, now)
+    user = flow.pending_second_factor(request, now)
     if user is None:
         return redirect("sign-in")
     answer = request.POST.get("passkey", "")
@@ -62,19 +62,21 @@ def prove(request: HttpRequest) -> HttpResponse:
     problem = ""
     if answer:
         try:
-            passkeys.take(request, user, answer, now)
-        except passkeys.NotProven:
+            passkeys.verify(request, user, answer, now)
+        except passkeys.PasskeyRejected:
             problem = _("This passkey was not accepted. Try again, or type a code.")
         else:
-            return HttpResponseRedirect(flow.finish(request, user, now, proven=True))
+            return HttpResponseRedirect(
+                flow.finish(request, user, now, second_factor_verified=True)
+            )
     elif form.is_valid():
-        return HttpResponseRedirect(flow.finish(request, user, now, proven=True))
+        return HttpResponseRedirect(flow.finish(request, user, now, second_factor_verified=True))
     own = factors.authenticators_of(user)
     context = {
         "form": form,
         "problem": problem,
         "has_app": own.filter(kind=factors.Authenticator.Kind.APP).exists(),
-        "passkey": passkeys.ask_to_sign(request, user),
+        "passkey": passkeys.authentication_options(request, user),
     }
     return render(request, "people/sign_in/second_factor.html", context)
 
@@ -82,7 +84,7 @@ def prove(request: HttpRequest) -> HttpResponse:
 @public
 @require_POST
 def sign_out(request: HttpRequest) -> HttpResponse:
-    """End the sign-in of this browser."""
+    """Sign this browser out."""
     logout(request)
     messages.success(request, _("You are signed out."))
     return redirect("sign-in")

@@ -1,7 +1,7 @@
-"""How long a sign-in lasts: as long as somebody is there, and one working day at most.
+"""How long a sign-in lasts: while there is activity, and one working day at most.
 
-The cookie lasts for the day; when a sign-in ends, the database says. A page, or a training that
-runs on one, puts the end off.
+The cookie lasts for the day; the database decides when the session expires. Opening a page, and a
+training session that runs on one, extend it.
 """
 
 from __future__ import annotations
@@ -18,55 +18,54 @@ from django.http import HttpRequest
 from django.utils import timezone
 
 SIGNED_IN_AT = "signed_in_at"
-SEEN_AT = "seen_at"
-NOTED_EVERY = timedelta(minutes=1)  # that somebody is there is written down no more often
+LAST_ACTIVITY_AT = "last_activity_at"
+ACTIVITY_RESOLUTION = timedelta(minutes=1)  # activity is stored no more often than this
 
 
-def idle_limit() -> timedelta:
-    """Give how long nobody may be there."""
+def idle_timeout() -> timedelta:
+    """Return the time without activity after which a session expires."""
     return timedelta(minutes=settings.SESSION_MINUTES)
 
 
-def ends_at(data: Mapping[str, Any], now: datetime) -> datetime:
-    """Give when a browser session ends if nobody is there from now on."""
-    end = now + idle_limit()
-    begun = data.get(SIGNED_IN_AT)
-    if begun is None:
+def expires_at(data: Mapping[str, Any], now: datetime) -> datetime:
+    """Return when a browser session expires if there is no activity from now on."""
+    end = now + idle_timeout()
+    signed_in_at = data.get(SIGNED_IN_AT)
+    if signed_in_at is None:
         return end
-    return min(
-        end, datetime.fromtimestamp(begun, UTC) + timedelta(seconds=settings.SESSION_COOKIE_AGE)
-    )
+    longest = timedelta(seconds=settings.SESSION_COOKIE_AGE)
+    return min(end, datetime.fromtimestamp(signed_in_at, UTC) + longest)
 
 
 class SessionStore(db.SessionStore):
-    """Browser sessions in the database, each with an end of its own."""
+    """Browser sessions in the database, each with its own expiry."""
 
     @classmethod
     def get_model_class(cls) -> type[Session]:
-        """Keep them in Django's own table."""
+        """Return Django's own model."""
         return Session
 
     def create_model_instance(self, data: dict[str, Any]) -> AbstractBaseSession:
-        """Make the row that is saved."""
+        """Return the row to save."""
         row = super().create_model_instance(data)
-        row.expire_date = ends_at(data, timezone.now())
+        row.expire_date = expires_at(data, timezone.now())
         return row
 
 
-def note(request: HttpRequest, now: datetime) -> None:
-    """Put off the end of a request's sign-in: somebody is there."""
+def record_activity(request: HttpRequest, now: datetime) -> None:
+    """Extend the session of a request: there is activity."""
     now_s = now.timestamp()
-    if now_s - request.session.get(SEEN_AT, 0) >= NOTED_EVERY.total_seconds():
-        request.session[SEEN_AT] = int(now_s)  # which saves it, with a new end
+    if now_s - request.session.get(LAST_ACTIVITY_AT, 0) >= ACTIVITY_RESOLUTION.total_seconds():
+        request.session[LAST_ACTIVITY_AT] = int(now_s)  # saves the session, with a new expiry
 
 
-def keep(keys: Collection[str], now: datetime) -> None:
-    """Put off the end of sign-ins whose pages watch a running training."""
+def extend_sessions(keys: Collection[str], now: datetime) -> None:
+    """Extend the sessions whose pages watch a running training session."""
     due = Session.objects.filter(
         session_key__in=keys,
         expire_date__gt=now,
-        expire_date__lt=now + idle_limit() - NOTED_EVERY,
+        expire_date__lt=now + idle_timeout() - ACTIVITY_RESOLUTION,
     )
     for row in due:
-        end = ends_at(row.get_decoded(), now)
+        end = expires_at(row.get_decoded(), now)
         Session.objects.filter(pk=row.pk, expire_date__gt=now).update(expire_date=end)

@@ -1,4 +1,4 @@
-"""What proves, beside the password, that it is you: an app with codes, passkeys, recovery codes."""
+"""Second factors: authenticator apps, passkeys and recovery codes."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.scope import Scope, ScopedModel
-from rehab.people.sign_in.recovery_codes import RECOVERY_CODES, digest_of, new_recovery_code
-from rehab.people.sign_in.totp import step_of
+from rehab.people.sign_in.recovery_codes import CODE_COUNT, generate_code, hash_code
+from rehab.people.sign_in.totp import matching_time_step
 
 
 class Authenticator(ScopedModel):
-    """An app or a passkey of an account."""
+    """An authenticator app or a passkey of an account."""
 
     class Kind(models.TextChoices):
-        """What it is."""
+        """The kind of authenticator."""
 
         APP = "app", _("Authenticator app")
         PASSKEY = "passkey", _("Passkey")
@@ -34,10 +34,10 @@ class Authenticator(ScopedModel):
     user = models.ForeignKey(User, on_delete=models.CASCADE, related_name="authenticators")
     kind = models.CharField(max_length=8, choices=Kind.choices)
     name = models.CharField(max_length=64)
-    # An app's secret, sealed; a passkey's credential, which is public.
-    material = models.TextField()
-    # The last time step of which a code was taken; a passkey's count of signatures.
-    count = models.BigIntegerField(default=0)
+    # An app's secret, encrypted; a passkey's credential, which is public.
+    credential = models.TextField()
+    # An app's last time step whose code was used; a passkey's signature counter.
+    counter = models.BigIntegerField(default=0)
     created_at = models.DateTimeField(auto_now_add=True)
     last_used_at = models.DateTimeField(null=True, blank=True)
 
@@ -47,26 +47,26 @@ class Authenticator(ScopedModel):
     def __str__(self) -> str:
         return self.name
 
-    def use(self, count: int, now: datetime) -> bool:
-        """Note a use. False where another one with this count, or a later one, came before."""
-        fresh = Q(count__lt=count)
-        if self.kind == self.Kind.PASSKEY and count == 0:  # passkeys of several devices count none
-            fresh = Q(count=0)
-        mine = Authenticator.everywhere.filter(fresh, pk=self.pk)
-        return bool(mine.update(count=count, last_used_at=now))
+    def record_use(self, counter: int, now: datetime) -> bool:
+        """Store a use. Return False where this counter, or a later one, was used before."""
+        unused = Q(counter__lt=counter)
+        if self.kind == self.Kind.PASSKEY and counter == 0:  # synced passkeys count nothing
+            unused = Q(counter=0)
+        mine = Authenticator.everywhere.filter(unused, pk=self.pk)
+        return bool(mine.update(counter=counter, last_used_at=now))
 
 
 class RecoveryCode(ScopedModel):
-    """A code that lets an account in once, kept as its digest until it is used."""
+    """A code that signs an account in once. Its hash is kept until it is used."""
 
     scope = Scope(clinic="user__clinic")
 
     user = models.ForeignKey(User, on_delete=models.CASCADE, related_name="recovery_codes")
-    digest = models.CharField(max_length=64)
+    code_hash = models.CharField(max_length=64)
 
     class Meta(ScopedModel.Meta):
         constraints: ClassVar = [
-            models.UniqueConstraint(fields=["user", "digest"], name="recovery_code_once")
+            models.UniqueConstraint(fields=["user", "code_hash"], name="recovery_code_once")
         ]
 
     def __str__(self) -> str:
@@ -74,8 +74,9 @@ class RecoveryCode(ScopedModel):
 
 
 def is_required(user: User) -> bool:
-    """Whether an account may not come in without one: its clinic says so; a hosted server's
-    hosts, who make the accounts of all clinics, always need one.
+    """Return whether an account needs a second factor to sign in.
+
+    Its clinic decides; the hosts of a hosted server, who manage all clinics' accounts, always do.
     """
     if user.clinic is None:
         return settings.HOSTED and user.role == Role.HOST
@@ -83,32 +84,36 @@ def is_required(user: User) -> bool:
 
 
 def authenticators_of(user: User) -> models.QuerySet[Authenticator]:
-    """Give an account's apps and passkeys."""
+    """Return an account's apps and passkeys."""
     return Authenticator.everywhere.filter(user=user)
 
 
-def add(user: User, kind: Authenticator.Kind, name: str, material: str, count: int) -> list[str]:
-    """Keep an authenticator. The first one brings recovery codes, which are given this once."""
+def add_authenticator(
+    user: User, kind: Authenticator.Kind, name: str, credential: str, counter: int
+) -> list[str]:
+    """Store an authenticator. Return the recovery codes that come with the first one."""
     with transaction.atomic():
         is_first = not authenticators_of(user).exists()
         Authenticator.everywhere.create(
-            user=user, kind=kind, name=name, material=material, count=count
+            user=user, kind=kind, name=name, credential=credential, counter=counter
         )
         return renew_recovery_codes(user) if is_first else []
 
 
 def add_app(user: User, secret: str, code: str, now: datetime) -> list[str] | None:
-    """Keep an app whose code proves that it has the secret; None for a wrong code."""
-    step = step_of(secret, code, now.timestamp())
-    if step is None:
+    """Store an app whose code shows that it has the secret. Return None for a wrong code."""
+    time_step = matching_time_step(secret, code, now.timestamp())
+    if time_step is None:
         return None
     kind = Authenticator.Kind.APP
-    return add(user, kind, str(kind.label), _vault().encrypt(secret.encode()).decode(), step)
+    encrypted = _cipher().encrypt(secret.encode()).decode()
+    return add_authenticator(user, kind, str(kind.label), encrypted, time_step)
 
 
-def remove(user: User, authenticator_id: int) -> bool:
-    """Forget one of an account's own authenticators. False where it has to stay: the account
-    needs one and has no other.
+def remove_authenticator(user: User, authenticator_id: int) -> bool:
+    """Remove one of an account's own authenticators.
+
+    Return False where it has to stay: the account needs one and has no other.
     """
     with transaction.atomic():
         own = list(authenticators_of(user).select_for_update().values_list("pk", flat=True))
@@ -120,43 +125,45 @@ def remove(user: User, authenticator_id: int) -> bool:
     return True
 
 
-def forget_all(user: User) -> None:
-    """Take an account back to its password alone: its owner has lost what it had."""
+def remove_second_factors(user: User) -> None:
+    """Remove all second factors of an account whose owner has lost them."""
     with transaction.atomic():
         authenticators_of(user).delete()
         RecoveryCode.everywhere.filter(user=user).delete()
 
 
 def renew_recovery_codes(user: User) -> list[str]:
-    """Make new recovery codes in place of the old ones. They can be read this once."""
-    codes = [new_recovery_code() for _ in range(RECOVERY_CODES)]
+    """Replace the recovery codes. Return the new ones, which are stored as hashes only."""
+    codes = [generate_code() for _ in range(CODE_COUNT)]
     with transaction.atomic():
         RecoveryCode.everywhere.filter(user=user).delete()
         RecoveryCode.everywhere.bulk_create(
-            RecoveryCode(user=user, digest=digest_of(code)) for code in codes
+            RecoveryCode(user=user, code_hash=hash_code(code)) for code in codes
         )
     return codes
 
 
-def recovery_codes_left(user: User) -> int:
-    """Give how many recovery codes an account has not used."""
+def count_recovery_codes(user: User) -> int:
+    """Return the number of an account's unused recovery codes."""
     return RecoveryCode.everywhere.filter(user=user).count()
 
 
-def take_code(user: User, code: str, now: datetime) -> bool:
-    """Whether a code lets an account in: an app's, or a recovery code. Each does so once."""
+def verify_code(user: User, code: str, now: datetime) -> bool:
+    """Return whether a code, of an app or for recovery, signs an account in. Each does so once."""
     for app in authenticators_of(user).filter(kind=Authenticator.Kind.APP):
         try:
-            secret = _vault().decrypt(app.material).decode()
-        except InvalidToken:  # the server's secret key has changed; recovery codes go on to count
+            secret = _cipher().decrypt(app.credential).decode()
+        except InvalidToken:  # the server's secret key has changed; recovery codes still work
             continue
-        step = step_of(secret, code, now.timestamp())
-        if step is not None and app.use(step, now):
+        time_step = matching_time_step(secret, code, now.timestamp())
+        if time_step is not None and app.record_use(time_step, now):
             return True
-    used, _ = RecoveryCode.everywhere.filter(user=user, digest=digest_of(code)).delete()
+    used, _ = RecoveryCode.everywhere.filter(user=user, code_hash=hash_code(code)).delete()
     return bool(used)
 
 
-def _vault() -> Fernet:
-    """Seal secrets with the server's own, so that a copy of the database alone opens nothing."""
-    return Fernet(urlsafe_b64encode(salted_hmac(__name__, "apps", algorithm="sha256").digest()))
+def _cipher() -> Fernet:
+    """Return a cipher with a key of the server's own: the database alone reveals no secret."""
+    return Fernet(
+        urlsafe_b64encode(salted_hmac("garry.second_factors", "apps", algorithm="sha256").digest())
+    )

@@ -1,29 +1,33 @@
-"""What a new machine needs before it can serve: tables, a clinic, and someone who may sign in."""
+"""The first start of a server: tables, a clinic, and an account to sign in with."""
 
 from __future__ import annotations
 
 import os
-import secrets
 from pathlib import Path
 
 from django.conf import settings
 from django.core.management import CommandError, call_command
-from django.db import DatabaseError, connection, transaction
+from django.db import DEFAULT_DB_ALIAS, DatabaseError, connection, connections, transaction
 from django.db.migrations.executor import MigrationExecutor
+from django.db.migrations.recorder import MigrationRecorder
 
-from rehab.people.models import UNAMBIGUOUS, Clinic, User
+from rehab.people.models import Clinic, User
+from rehab.people.random_codes import random_code
 from rehab.people.roles import Role
 
 FIRST_USERNAME = "pt"
 FIRST_CLINIC = "My clinic"
+# What development versions from before 22 November 2026 began with; today's begins otherwise.
+DEVELOPMENT_MIGRATION = ("rehab", "0001_initial")
 
 
 def prepare_database() -> None:
-    """Bring the tables up to date: by itself on one machine, by hand on a hosted server.
+    """Apply pending migrations; on a hosted server, refuse to start until somebody has.
 
     Raises CommandError, with the cure, where the database cannot be reached or is not up to date.
     """
     try:
+        refuse_development_database()
         executor = MigrationExecutor(connection)
         pending = executor.migration_plan(executor.loader.graph.leaf_nodes())
     except DatabaseError as problem:
@@ -40,22 +44,33 @@ def prepare_database() -> None:
     call_command("migrate", verbosity=0, interactive=False)
 
 
+def refuse_development_database(using: str = DEFAULT_DB_ALIAS) -> None:
+    """Raise CommandError, with the cure, for a database whose tables a development version made."""
+    if DEVELOPMENT_MIGRATION not in MigrationRecorder(connections[using]).applied_migrations():
+        return
+    name = connections[using].settings_dict["NAME"]
+    raise CommandError(
+        f"The database {name} was made by a development version of GARRY from before 22 November "
+        "2026, and this one cannot read it. Nothing was changed. To begin anew, move it away or "
+        "name another one (GARRY_DATA_DIR, GARRY_DATABASE_URL); to see what it holds, run the "
+        "version that made it."
+    )
+
+
 def first_clinic() -> Clinic:
-    """Give the clinic of a machine that serves only one; made on first use."""
+    """Return the clinic of a server that has only one; create it on first use."""
     return Clinic.everywhere.order_by("pk").first() or Clinic.everywhere.create(name=FIRST_CLINIC)
 
 
 def first_password() -> str | None:
-    """Give the first account's password for as long as it is still the one that was generated.
+    """Return the first account's generated password; None once it has been changed.
 
-    Makes clinic and account where nobody has an account yet. The password stands in a file that
-    only the server's user can read, until someone changes it.
+    Creates clinic and account where there is no account yet. Until the password is changed it is
+    kept in a file that only the server's user can read.
     """
     file: Path = settings.DATA_DIR / "first_password"
     if not User.everywhere.exists():
-        password = "-".join(
-            "".join(secrets.choice(UNAMBIGUOUS) for _ in range(4)) for _ in range(4)
-        )
+        password = "-".join(random_code(4) for _ in range(4))
         settings.DATA_DIR.mkdir(parents=True, exist_ok=True)
         file.unlink(missing_ok=True)
         with os.fdopen(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w") as out:

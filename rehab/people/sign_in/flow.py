@@ -1,6 +1,7 @@
-"""How somebody comes in: the password takes one halfway, a second factor the rest of the way.
+"""The sign-in: first the password, then a second factor for accounts that have or need one.
 
-Who is halfway is nobody to any page but those that ask for the second factor or set it up.
+Between the two a sign-in is pending. Its account counts as signed out on every page but those that
+ask for the second factor or enroll one.
 """
 
 from __future__ import annotations
@@ -17,23 +18,25 @@ from django.utils.crypto import constant_time_compare
 from rehab.people.models import User
 from rehab.people.sign_in import browser_sessions, factors, lockout
 
-HALFWAY = "halfway"
-HALFWAY_S = 10 * 60
-PROVEN = "second_factor"  # marks sign-ins that a second factor has proven
+# Keys of the browser session.
+PENDING = "pending_second_factor"
+SECOND_FACTOR_VERIFIED = "second_factor_verified"
+
+PENDING_LIFETIME_S = 10 * 60
 BACKEND = "rehab.people.sign_in.backends.PasswordBackend"
 
 
-def begin(request: HttpRequest, user: User, then: str, now: datetime) -> bool:
-    """Let in whom the password alone lets in; take anyone else halfway, and ``then`` further on.
+def begin(request: HttpRequest, user: User, next_url: str, now: datetime) -> bool:
+    """Sign in an account that needs its password alone; else wait for its second factor.
 
-    Gives whether that was all.
+    ``next_url`` is kept for `finish`. Returns whether the account is signed in now.
     """
     if not factors.is_required(user) and not factors.authenticators_of(user).exists():
-        finish(request, user, now, proven=False)
+        finish(request, user, now, second_factor_verified=False)
         return True
-    request.session.cycle_key()  # a key that somebody else may know gets nobody halfway
-    request.session[HALFWAY] = {
-        "then": then,
+    request.session.cycle_key()  # against session fixation
+    request.session[PENDING] = {
+        "next_url": next_url,
         "user": user.pk,
         "password": user.get_session_auth_hash(),
         "at": now.timestamp(),
@@ -41,51 +44,54 @@ def begin(request: HttpRequest, user: User, then: str, now: datetime) -> bool:
     return False
 
 
-def halfway(request: HttpRequest, now: datetime) -> User | None:
-    """Give the account whose password was right a moment ago; None where there is none."""
-    half = request.session.get(HALFWAY)
-    if half is None or now.timestamp() - half["at"] > HALFWAY_S:
+def pending_second_factor(request: HttpRequest, now: datetime) -> User | None:
+    """Return the account whose password was right a moment ago; None where there is none."""
+    pending = request.session.get(PENDING)
+    if pending is None or now.timestamp() - pending["at"] > PENDING_LIFETIME_S:
         return None
-    user = User.everywhere.select_related("clinic").filter(pk=half["user"], is_active=True).first()
-    if user and constant_time_compare(half["password"], user.get_session_auth_hash()):
+    accounts = User.everywhere.select_related("clinic")
+    user = accounts.filter(pk=pending["user"], is_active=True).first()
+    if user and constant_time_compare(pending["password"], user.get_session_auth_hash()):
         return user
     return None
 
 
-def setting_up(request: HttpRequest, now: datetime) -> User | None:
-    """Give the account that is halfway and has no second factor yet, so that it may set one up.
+def pending_enrollment(request: HttpRequest, now: datetime) -> User | None:
+    """Return the pending account that has no second factor yet and may therefore enroll one.
 
-    Who has one must prove it: a new one would be a way around.
+    An account that has one must use it: enrolling another would get around it.
     """
-    user = halfway(request, now)
+    user = pending_second_factor(request, now)
     return user if user and not factors.authenticators_of(user).exists() else None
 
 
-def finish(request: HttpRequest, user: User, now: datetime, *, proven: bool) -> str:
-    """Sign somebody in. Gives where the way halfway was to lead, "" where there was none."""
-    half = request.session.pop(HALFWAY, {})
+def finish(request: HttpRequest, user: User, now: datetime, *, second_factor_verified: bool) -> str:
+    """Sign an account in. Return the ``next_url`` of `begin`, "" where there was none."""
+    pending = request.session.pop(PENDING, {})
     login(request, user, backend=BACKEND)
-    request.session[PROVEN] = proven
+    request.session[SECOND_FACTOR_VERIFIED] = second_factor_verified
     request.session[browser_sessions.SIGNED_IN_AT] = int(now.timestamp())
-    request.session[browser_sessions.SEEN_AT] = int(now.timestamp())
-    lockout.forgive(user)
-    return str(half.get("then", ""))
+    request.session[browser_sessions.LAST_ACTIVITY_AT] = int(now.timestamp())
+    lockout.reset_attempts(user)
+    return str(pending.get("next_url", ""))
 
 
-def holds(data: Mapping[str, Any], user: User) -> bool:
-    """Whether the data of a browser session still sign this account in: it is not switched off,
-    its password is the same, and it has proven a second factor where one is required by now.
+def is_session_valid(data: Mapping[str, Any], user: User) -> bool:
+    """Return whether the data of a browser session still sign this account in.
+
+    The account must be active, its password the same, and a second factor verified where one is
+    required by now.
     """
     return (
         user.is_active
         and data.get(SESSION_KEY) == str(user.pk)
         and constant_time_compare(data.get(HASH_SESSION_KEY, ""), user.get_session_auth_hash())
-        and (bool(data.get(PROVEN)) or not factors.is_required(user))
+        and (bool(data.get(SECOND_FACTOR_VERIFIED)) or not factors.is_required(user))
     )
 
 
-class EntryMiddleware:
-    """Ends sign-ins that no longer hold, and notes that somebody is there. Keeps no state."""
+class SessionValidationMiddleware:
+    """Signs out sessions that are no longer valid and records activity. Keeps no state."""
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
         self.get_response = get_response
@@ -94,8 +100,8 @@ class EntryMiddleware:
         """Pass the request on."""
         if request.user.is_authenticated:
             data = cast(Mapping[str, Any], request.session)
-            if holds(data, request.user):
-                browser_sessions.note(request, timezone.now())
+            if is_session_valid(data, request.user):
+                browser_sessions.record_activity(request, timezone.now())
             else:
                 logout(request)
         return self.get_response(request)

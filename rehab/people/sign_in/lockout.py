@@ -1,7 +1,7 @@
-"""Who has guessed too often waits. django-axes counts; by what, and what is said, is here.
+"""Lockout after too many failed attempts. django-axes counts; what it counts by is defined here.
 
-Passwords are counted by name and address, so that nobody can shut another one out from elsewhere.
-Codes are counted by name alone: whoever tries those has the password already.
+Passwords are counted by name and address, so that nobody can lock another person out from
+elsewhere. Codes are counted by name alone: a person who tries those has the password already.
 """
 
 from __future__ import annotations
@@ -21,37 +21,39 @@ from django.utils.translation import ngettext
 from rehab.people.models import User
 from rehab.people.networks import client_address
 
-CODES = " (code)"  # no username has a blank
+CODE_SUFFIX = " (code)"  # no username has a blank
 
 Credentials = Mapping[str, Any] | None
 
 
-def counted_name(request: HttpRequest, credentials: Credentials) -> str:
-    """Give the name under which a try is counted."""
+def attempt_username(request: HttpRequest, credentials: Credentials) -> str:
+    """Return the name under which an attempt is counted."""
     name = str((credentials or request.POST).get("username") or "")
-    return name[:150] + (CODES if "code" in (credentials or {}) else "")
+    return name[:150] + (CODE_SUFFIX if "code" in (credentials or {}) else "")
 
 
-def counted_by(request: Any, credentials: Credentials = None) -> list[str | list[str]]:
-    """Give what makes two tries count together."""
+def lockout_parameters(request: Any, credentials: Credentials = None) -> list[str | list[str]]:
+    """Return the parameters by which attempts are counted together."""
     return ["username"] if "code" in (credentials or {}) else [["username", "ip_address"]]
 
 
-def answer(request: HttpRequest, response: HttpResponse, credentials: Credentials) -> HttpResponse:
-    """Let our own page, which says how long to wait, answer; machines read the status."""
+def lockout_response(
+    request: HttpRequest, response: HttpResponse, credentials: Credentials
+) -> HttpResponse:
+    """Answer with our own page, which tells how long to wait, and the status 429."""
     response.status_code = 429
     return response
 
 
-def wait_of(request: HttpRequest, now: datetime, **credentials: str) -> str:
-    """Say what to do where no more tries are taken; "" where they are."""
+def lockout_message(request: HttpRequest, now: datetime, **credentials: str) -> str:
+    """Return a message with the time to wait during a lockout; "" where there is none."""
     if AxesProxyHandler.is_allowed(request, credentials):
         return ""
-    name = counted_name(request, credentials)
-    tries = AccessAttempt.objects.filter(username=name)
+    name = attempt_username(request, credentials)
+    attempts = AccessAttempt.objects.filter(username=name)
     if "code" not in credentials:
-        tries = tries.filter(ip_address=client_address(request))
-    last = tries.aggregate(last=Max("attempt_time"))["last"] or now
+        attempts = attempts.filter(ip_address=client_address(request))
+    last = attempts.aggregate(last=Max("attempt_time"))["last"] or now
     left_s = (last + settings.AXES_COOLOFF_TIME - now).total_seconds()
     minutes = max(1, -int(-left_s // 60))
     return ngettext(
@@ -62,7 +64,7 @@ def wait_of(request: HttpRequest, now: datetime, **credentials: str) -> str:
     ) % {"minutes": minutes}
 
 
-def forgive(user: User) -> None:
-    """Take new tries for an account, of passwords and codes, from every address."""
-    for name in (user.username, user.username + CODES):
+def reset_attempts(user: User) -> None:
+    """End the lockouts of an account, of passwords and codes, from every address."""
+    for name in (user.username, user.username + CODE_SUFFIX):
         reset(username=name)

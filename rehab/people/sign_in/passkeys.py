@@ -1,4 +1,4 @@
-"""Passkeys (WebAuthn): a device proves itself by a signature that is good for this site alone."""
+"""Passkeys (WebAuthn): a device signs a challenge with a key that works for this site alone."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from fido2.webauthn import (
 )
 
 from rehab.people.models import User
-from rehab.people.sign_in.factors import Authenticator, add, authenticators_of
+from rehab.people.sign_in.factors import Authenticator, add_authenticator, authenticators_of
 
-STATE = "passkey"  # in the browser session, until the browser has answered
+CHALLENGE = "passkey"  # key of the browser session, until the browser has answered
 VERIFICATION = UserVerificationRequirement.PREFERRED
 
 
-class NotProven(ValueError):
-    """An answer that proves nothing."""
+class PasskeyRejected(ValueError):
+    """An answer that does not verify."""
 
 
-def are_possible(request: HttpRequest) -> bool:
-    """Whether browsers offer them here: at a name, encrypted or on the same machine."""
+def are_supported(request: HttpRequest) -> bool:
+    """Return whether browsers offer passkeys here: at a name, over TLS or on the same machine."""
     name, _ = split_domain_port(request.get_host())
     try:
         ip_address(name.strip("[]"))
@@ -41,60 +41,65 @@ def are_possible(request: HttpRequest) -> bool:
     return False
 
 
-def ask_to_make(request: HttpRequest, user: User) -> str:
-    """Give what the browser needs to make a passkey, as JSON."""
+def registration_options(request: HttpRequest, user: User) -> str:
+    """Return the options with which the browser creates a passkey, as JSON."""
     entity = PublicKeyCredentialUserEntity(
         id=str(user.pk).encode(), name=user.username, display_name=str(user)
     )
-    options, state = _server(request).register_begin(
+    options, state = _relying_party(request).register_begin(
         entity,
         _credentials_of(user),
         resident_key_requirement=ResidentKeyRequirement.DISCOURAGED,
         user_verification=VERIFICATION,
     )
-    return _ask(request, options.public_key, state)
+    return _store_challenge(request, options.public_key, state)
 
 
-def ask_to_sign(request: HttpRequest, user: User) -> str:
-    """Give what the browser needs to sign with one of the account's passkeys, as JSON; "" where it
-    has none, or none can be used here.
+def authentication_options(request: HttpRequest, user: User) -> str:
+    """Return the options with which the browser signs with one of the account's passkeys, as JSON.
+
+    Returns "" where the account has none, or none can be used here.
     """
     credentials = _credentials_of(user)
-    if not credentials or not are_possible(request):
+    if not credentials or not are_supported(request):
         return ""
-    options, state = _server(request).authenticate_begin(credentials, VERIFICATION)
-    return _ask(request, options.public_key, state)
+    options, state = _relying_party(request).authenticate_begin(credentials, VERIFICATION)
+    return _store_challenge(request, options.public_key, state)
 
 
-def keep(request: HttpRequest, user: User, name: str, answer: str) -> list[str]:
-    """Keep a passkey that the browser has made. Give recovery codes, where it is the first factor.
+def register(request: HttpRequest, user: User, name: str, answer: str) -> list[str]:
+    """Store a passkey that the browser has created. Return the first factor's recovery codes.
 
-    Raises NotProven.
+    Raises PasskeyRejected.
     """
     try:
-        made = _server(request).register_complete(_state(request), json.loads(answer))
-    except Exception as problem:  # whatever is wrong with what a stranger's program sent
-        raise NotProven from problem
-    if made.credential_data is None:
-        raise NotProven
-    material = websafe_encode(made.credential_data)
-    return add(user, Authenticator.Kind.PASSKEY, name, material, made.counter)
+        registered = _relying_party(request).register_complete(
+            _pop_challenge(request), json.loads(answer)
+        )
+    except Exception as problem:  # fido2 raises many kinds for what strangers may send
+        raise PasskeyRejected from problem
+    if registered.credential_data is None:
+        raise PasskeyRejected
+    credential = websafe_encode(registered.credential_data)
+    return add_authenticator(user, Authenticator.Kind.PASSKEY, name, credential, registered.counter)
 
 
-def take(request: HttpRequest, user: User, answer: str, now: datetime) -> None:
-    """Take a signature by one of the account's passkeys. Raises NotProven."""
+def verify(request: HttpRequest, user: User, answer: str, now: datetime) -> None:
+    """Verify a signature by one of the account's passkeys. Raises PasskeyRejected."""
     own = {_credential(key).credential_id: key for key in _passkeys_of(user)}
     try:
         given = AuthenticationResponse.from_dict(json.loads(answer))
-        _server(request).authenticate_complete(_state(request), _credentials_of(user), given)
+        _relying_party(request).authenticate_complete(
+            _pop_challenge(request), _credentials_of(user), given
+        )
         key = own[given.raw_id]
     except Exception as problem:  # as above
-        raise NotProven from problem
-    if not key.use(given.response.authenticator_data.counter, now):
-        raise NotProven  # its count has stood still: a copy of the key
+        raise PasskeyRejected from problem
+    if not key.record_use(given.response.authenticator_data.counter, now):
+        raise PasskeyRejected  # the counter has not advanced: the key may be a copy
 
 
-def _server(request: HttpRequest) -> Fido2Server:
+def _relying_party(request: HttpRequest) -> Fido2Server:
     name, _ = split_domain_port(request.get_host())
     own = f"{request.scheme}://{request.get_host()}"
     return Fido2Server(
@@ -103,13 +108,13 @@ def _server(request: HttpRequest) -> Fido2Server:
     )
 
 
-def _ask(request: HttpRequest, options: Any, state: Any) -> str:
-    request.session[STATE] = state
+def _store_challenge(request: HttpRequest, options: Any, state: Any) -> str:
+    request.session[CHALLENGE] = state
     return json.dumps(dict(options))
 
 
-def _state(request: HttpRequest) -> Any:
-    return request.session.pop(STATE)  # an answer counts once
+def _pop_challenge(request: HttpRequest) -> Any:
+    return request.session.pop(CHALLENGE)  # a challenge is answered once
 
 
 def _passkeys_of(user: User) -> list[Authenticator]:
@@ -117,7 +122,7 @@ def _passkeys_of(user: User) -> list[Authenticator]:
 
 
 def _credential(key: Authenticator) -> AttestedCredentialData:
-    return AttestedCredentialData(websafe_decode(key.material))
+    return AttestedCredentialData(websafe_decode(key.credential))
 
 
 def _credentials_of(user: User) -> list[AttestedCredentialData]:

@@ -1,26 +1,22 @@
-"""Recovery codes: each lets its owner in once, when the second factor is lost."""
+"""Recovery codes: each signs its owner in once when the second factor is lost."""
 
 from __future__ import annotations
 
 import hashlib
-import secrets
 
-RECOVERY_CODES = 10
+from rehab.people.random_codes import ALPHABET, random_code
 
-
-RECOVERY_SIGNS = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
-
-
-RECOVERY_LENGTH = 12  # of 31 signs: 59 bits, out of reach even for whoever has the digests
+CODE_COUNT = 10
+CODE_LENGTH = 12  # of 31 characters: 59 bits, out of reach even with the stored hashes
 
 
-def new_recovery_code() -> str:
-    """Make a code that lets somebody in once, written in groups of four."""
-    signs = [secrets.choice(RECOVERY_SIGNS) for _ in range(RECOVERY_LENGTH)]
-    return "-".join("".join(signs[start : start + 4]) for start in range(0, RECOVERY_LENGTH, 4))
+def generate_code() -> str:
+    """Return a new recovery code in groups of four characters."""
+    code = random_code(CODE_LENGTH)
+    return "-".join(code[start : start + 4] for start in range(0, CODE_LENGTH, 4))
 
 
-def digest_of(code: str) -> str:
-    """Give what is kept of a recovery code; capitals, blanks and hyphens do not matter."""
-    typed = "".join(sign for sign in code.upper() if sign in RECOVERY_SIGNS)
+def hash_code(code: str) -> str:
+    """Return the hash that is stored of a code; case, blanks and hyphens do not matter."""
+    typed = "".join(character for character in code.upper() if character in ALPHABET)
     return hashlib.sha256(typed.encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""Tokens: how devices and programs say who they are. Only a token's hash is ever stored."""
+"""Tokens, by which devices and programs authenticate. Only a token's hash is ever stored."""
 
 from __future__ import annotations
 
@@ -12,61 +12,61 @@ from django.db import models
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, User
-from rehab.people.roles import Role, may_lend
-from rehab.people.scope import ClinicRow, Scope
+from rehab.people.roles import Role, may_delegate
+from rehab.people.scope import ClinicModel, Scope
 
 # 256 random bits: nothing to guess, so a fast hash keeps the token as safe as a slow one would.
 TOKEN_BYTES = 32
-SEEN_EVERY = timedelta(minutes=1)  # so exactly is it known when a token was last used
+LAST_SEEN_RESOLUTION = timedelta(minutes=1)  # precision of `last_seen_at`
 
 
 def hash_token(token: str) -> str:
-    """Give the only form of a token that is ever stored."""
+    """Return the hash of a token, the only form that is ever stored."""
     return hashlib.sha256(token.encode()).hexdigest()
 
 
-class TokenRow(ClinicRow):
-    """A row that is known by its token, until that is renewed or revoked."""
+class TokenModel(ClinicModel):
+    """A model whose rows authenticate by a token, until it is renewed or revoked."""
 
     token_hash = models.CharField(max_length=64, unique=True, editable=False)
     created_at = models.DateTimeField(_("created at"), auto_now_add=True)
     last_seen_at = models.DateTimeField(_("last seen at"), null=True, blank=True, editable=False)
     revoked_at = models.DateTimeField(_("revoked at"), null=True, blank=True, editable=False)
 
-    class Meta(ClinicRow.Meta):
+    class Meta(ClinicModel.Meta):
         abstract = True
 
     @property
     def is_revoked(self) -> bool:
-        """Whether the token no longer opens anything."""
+        """Return whether the token is revoked."""
         return self.revoked_at is not None
 
     def new_token(self) -> str:
-        """Give the row a new token; the old one is dead once the row is saved.
+        """Set and return a new token; the old one stops working once the row is saved.
 
-        The token is returned this one time and never stored.
+        Only its hash is stored.
         """
         token = secrets.token_urlsafe(TOKEN_BYTES)
         self.token_hash = hash_token(token)
         return token
 
 
-T = TypeVar("T", bound=TokenRow)
+T = TypeVar("T", bound=TokenModel)
 
 
-def find_holder(model: type[T], token: str, now: datetime) -> T | None:
-    """Give the row that this token belongs to; None for an unknown or revoked one."""
-    held = model.everywhere.filter(token_hash=hash_token(token), revoked_at__isnull=True)
-    holder: T | None = held.select_related("clinic").first()  # whose language its pages have
+def find_by_token(model: type[T], token: str, now: datetime) -> T | None:
+    """Return the row that this token belongs to; None for an unknown or revoked one."""
+    rows = model.everywhere.filter(token_hash=hash_token(token), revoked_at__isnull=True)
+    holder: T | None = rows.select_related("clinic").first()  # for the language of its pages
     if holder is None:
         return None
-    if holder.last_seen_at is None or now - holder.last_seen_at > SEEN_EVERY:
+    if holder.last_seen_at is None or now - holder.last_seen_at > LAST_SEEN_RESOLUTION:
         model.everywhere.filter(pk=holder.pk).update(last_seen_at=now)
     return holder
 
 
-class ApiToken(TokenRow):
-    """Lets a program use the API as somebody, with that person's role or one that sees less."""
+class ApiToken(TokenModel):
+    """Lets a program use the API as a person, with that person's role or one that sees less."""
 
     scope = Scope(clinic="clinic")
 
@@ -91,7 +91,7 @@ class ApiToken(TokenRow):
         ),
     )
 
-    class Meta(TokenRow.Meta):
+    class Meta(TokenModel.Meta):
         verbose_name = _("API token")
         verbose_name_plural = _("API tokens")
         ordering: ClassVar = ["name"]
@@ -100,9 +100,9 @@ class ApiToken(TokenRow):
         return self.name
 
     def clean(self) -> None:
-        """Refuse a role that the account could not lend."""
+        """Refuse a role that the account cannot delegate."""
         user: Any = getattr(self, "user", None)
-        if user is not None and not may_lend(user.role, self.role):
+        if user is not None and not may_delegate(user.role, self.role):
             raise ValidationError(
                 {
                     "role": _("%(user)s is %(role)s: choose that role, or one below.")
@@ -111,18 +111,18 @@ class ApiToken(TokenRow):
             )
 
 
-def find_caller(token: str, now: datetime) -> User | None:
-    """Give the person that a program calls as, with the token's role; None for a dead token.
+def find_user_by_token(token: str, now: datetime) -> User | None:
+    """Return the person that a program calls as, with the token's role; None if it is invalid.
 
-    A token dies with its account, and with the account's right to lend its role. The person is for
-    this call alone and never saved.
+    A token is valid while its account is active and may delegate the role. The returned object is
+    for this call alone and must not be saved.
     """
-    holder = find_holder(ApiToken, token, now)
+    holder = find_by_token(ApiToken, token, now)
     if holder is None:
         return None
     user = holder.user
-    is_alive = user.is_active and user.clinic_id == holder.clinic_id
-    if not is_alive or not may_lend(user.role, holder.role):
+    is_valid = user.is_active and user.clinic_id == holder.clinic_id
+    if not is_valid or not may_delegate(user.role, holder.role):
         return None
     user.role, user.program = holder.role, holder.name
     return user

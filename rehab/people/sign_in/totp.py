@@ -1,4 +1,4 @@
-"""Codes that are typed: six digits of an authenticator app (RFC 6238)."""
+"""Time-based one-time passwords: the six digits of an authenticator app (RFC 6238)."""
 
 from __future__ import annotations
 
@@ -9,40 +9,40 @@ import secrets
 import struct
 from urllib.parse import quote, urlencode
 
-STEP_S = 30
+TIME_STEP_S = 30
 DIGITS = 6
-DRIFT = 1  # steps that a phone's clock may be off, each way
+DRIFT_STEPS = 1  # time steps that a phone's clock may be off, each way
 ISSUER = "GARRY"
 
 
-def new_secret() -> str:
-    """Make a secret that an app can share."""
+def generate_secret() -> str:
+    """Return a new secret to share with an app, in base 32."""
     return base64.b32encode(secrets.token_bytes(20)).decode()
 
 
-def address(secret: str, account: str) -> str:
-    """Give what the QR code says to an app."""
-    words = urlencode({"secret": secret, "issuer": ISSUER}, quote_via=quote)
-    return f"otpauth://totp/{quote(f'{ISSUER}:{account}')}?{words}"
+def provisioning_uri(secret: str, account: str) -> str:
+    """Return the ``otpauth`` address that the QR code hands to an app."""
+    query = urlencode({"secret": secret, "issuer": ISSUER}, quote_via=quote)
+    return f"otpauth://totp/{quote(f'{ISSUER}:{account}')}?{query}"
 
 
-def code_of(secret: str, step: int) -> str:
-    """Give the code of a time step (RFC 4226, section 5.3)."""
-    digest = hmac.digest(base64.b32decode(secret), struct.pack(">Q", step), hashlib.sha1)
+def generate_code(secret: str, time_step: int) -> str:
+    """Return the code of a time step (RFC 4226, section 5.3)."""
+    digest = hmac.digest(base64.b32decode(secret), struct.pack(">Q", time_step), hashlib.sha1)
     start = digest[-1] & 15
     (value,) = struct.unpack(">I", digest[start : start + 4])
     return f"{(value & 0x7FFFFFFF) % 10**DIGITS:0{DIGITS}}"
 
 
-def step_of(secret: str, code: str, now_s: float) -> int | None:
-    """Give the time step around now whose code this is; None for a wrong code."""
+def matching_time_step(secret: str, code: str, now_s: float) -> int | None:
+    """Return the time step around ``now_s`` whose code this is; None for a wrong code."""
     typed = "".join(code.split())
     if not (typed.isascii() and typed.isdecimal()):
         return None
-    now = int(now_s // STEP_S)
-    steps = [
-        step
-        for step in range(now - DRIFT, now + DRIFT + 1)
-        if hmac.compare_digest(code_of(secret, step), typed)
+    now = int(now_s // TIME_STEP_S)
+    matching = [
+        time_step
+        for time_step in range(now - DRIFT_STEPS, now + DRIFT_STEPS + 1)
+        if hmac.compare_digest(generate_code(secret, time_step), typed)
     ]
-    return max(steps, default=None)
+    return max(matching, default=None)

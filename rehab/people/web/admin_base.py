@@ -1,4 +1,4 @@
-"""The admin of a clinic's people: each row by scope, each act by the table of roles."""
+"""Base classes of the admin: rows by scope, permissions by the table of rights."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from django.utils.text import capfirst
 from django.utils.translation import gettext, ngettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.access import person
-from rehab.people.audit.audit_log import Act, note_safety
+from rehab.people.access import user_of
+from rehab.people.audit.audit_log import Act, record_security_change
 from rehab.people.audit.history_text import changes_of
 from rehab.people.networks import client_address
 from rehab.people.roles import Right, Role, rights_of
-from rehab.people.scope import ScopedModel, visible
-from rehab.people.sign_in.tokens import TokenRow
+from rehab.people.scope import ScopedModel, visible_rows
+from rehab.people.sign_in.tokens import TokenModel
 
 
-def rights(request: HttpRequest, model: type[models.Model]) -> Right:
-    """Give what the person behind this request may do with a model's rows."""
+def rights_for(request: HttpRequest, model: type[models.Model]) -> Right:
+    """Return what the person of this request may do with a model's rows."""
     user = request.user
     if not user.is_authenticated or not user.is_active:
         return Right.NONE
     return rights_of(user.role, model.__name__)
 
 
-def owns(user: Any, row: ScopedModel) -> bool:
-    """Whether a visible row is this person's to change: shared rows are the host's alone."""
+def may_modify(user: Any, row: ScopedModel) -> bool:
+    """Return whether a person may change a visible row: shared rows are for the host alone."""
     if not row.scope.shared or user.role == Role.HOST:
         return True
     owner: Any = row
@@ -46,85 +46,87 @@ def owns(user: Any, row: ScopedModel) -> bool:
     return owner is not None
 
 
-class NarrowedList(ChangeList):
-    """A list that only its own filters, its days and our own links narrow.
+class RestrictedChangeList(ChangeList):
+    """A list that can be filtered by its own filters, its dates and our own links alone.
 
-    Django takes any field of the model, also one that a role is not shown: letter by letter, the
-    number of rows would tell what stands in it.
+    Django accepts any field of the model, also one that a role does not see: from the number of
+    rows its value could be guessed letter by letter.
     """
 
     def get_filters(self, request: HttpRequest) -> Any:
-        """Give the filters. Refuses what none of them asks for, and days of no calendar."""
+        """Return the filters. Refuses unknown lookups and impossible dates."""
         try:
             found = super().get_filters(request)
         except (ValueError, OverflowError) as problem:  # a year after 9999
             raise IncorrectLookupParameters(problem) from problem
-        pages: Any = self.model_admin
+        model_admin: Any = self.model_admin
         days = [f"{self.date_hierarchy}__gte", f"{self.date_hierarchy}__lt"]
-        known = {*pages.linked_by, *(days if self.date_hierarchy else ())}
-        if strange := found[2].keys() - known:
-            raise DisallowedModelAdminLookup(f"Lists are not narrowed by {', '.join(strange)}.")
+        known = {*model_admin.link_lookups, *(days if self.date_hierarchy else ())}
+        if unknown := found[2].keys() - known:
+            raise DisallowedModelAdminLookup(
+                f"This list cannot be filtered by {', '.join(unknown)}."
+            )
         return found
 
 
 class ScopedOptions(admin.options.BaseModelAdmin):
-    """What a model's own pages and its rows inside another model's page have in common."""
+    """Options that a model's own pages and its inlines have in common."""
 
-    linked_by: tuple[str, ...] = ()  # what links of other pages narrow the list by
+    link_lookups: tuple[str, ...] = ()  # lookups by which links of other pages filter the list
 
     def get_changelist(self, request: HttpRequest, **kwargs: Any) -> type[ChangeList]:
-        """Give the list's class."""
-        return NarrowedList
+        """Return the list's class."""
+        return RestrictedChangeList
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Any]:
-        """Give the rows that this person may see, and no other."""
+        """Return the rows that this person may see."""
         rows: QuerySet[Any] = self.model.objects.visible_to(request.user)
         ordering = self.get_ordering(request)
         return rows.order_by(*ordering) if ordering else rows
 
     def get_field_queryset(self, db: str | None, db_field: Any, request: HttpRequest) -> Any:
-        """Offer related rows that this person may see, and no other."""
+        """Return the related rows that this person may see."""
         model = db_field.remote_field.model
-        condition = visible(model, request.user)
+        condition = visible_rows(model, request.user)
         rows = super().get_field_queryset(db, db_field, request)
         rows = QuerySet(model) if rows is None else rows
         return rows.none() if condition is None else rows.filter(condition)
 
     def has_view_permission(self, request: HttpRequest, obj: Any = None) -> bool:
-        """Whether rows may be read."""
-        return Right.VIEW in rights(request, self.model)
+        """Return whether rows may be read."""
+        return Right.VIEW in rights_for(request, self.model)
 
     def has_add_permission(self, request: HttpRequest, obj: Any = None) -> bool:
-        """Whether rows may be added."""
+        """Return whether rows may be added."""
         return self._may(request, Right.ADD, obj)
 
     def has_change_permission(self, request: HttpRequest, obj: Any = None) -> bool:
-        """Whether this row may be changed."""
+        """Return whether this row may be changed."""
         return self._may(request, Right.CHANGE, obj)
 
     def has_delete_permission(self, request: HttpRequest, obj: Any = None) -> bool:
-        """Whether this row may be deleted."""
+        """Return whether this row may be deleted."""
         return self._may(request, Right.DELETE, obj)
 
     def _may(self, request: HttpRequest, right: Right, obj: Any) -> bool:
-        """Ask the table; ``obj`` is the row, or for rows inside a page the row of that page."""
-        if right not in rights(request, self.model):
+        """Look the right up; ``obj`` is the row, or for inlines the row of the page."""
+        if right not in rights_for(request, self.model):
             return False
-        return not isinstance(obj, ScopedModel) or owns(request.user, obj)
+        return not isinstance(obj, ScopedModel) or may_modify(request.user, obj)
 
 
-class RowFormSet(forms.BaseInlineFormSet):
-    """Rows of a table inside a page: each field is named by its column, for who cannot see it."""
+class LabeledFormSet(forms.BaseInlineFormSet):
+    """Rows of a tabular inline whose fields are labeled for screen readers."""
 
     def add_fields(self, form: Any, index: int | None) -> None:
-        """Name the fields."""
+        """Label the fields."""
         super().add_fields(form, index)
         for field in form.fields.values():
             field.widget.attrs["aria-label"] = field.label
 
 
 class ClinicForm(forms.ModelForm):
-    """A form whose row belongs to a clinic that nobody chooses."""
+    """A form of a row whose clinic is set by the server."""
 
     new_clinic_id: ClassVar[int | None] = None
 
@@ -138,17 +140,17 @@ class ClinicForm(forms.ModelForm):
         return super()._get_validation_exclusions() - {"clinic"}  # type: ignore[misc, no-any-return]
 
 
-class RowAdmin(admin.ModelAdmin):
-    """Pages of a row, whose history is ours: each value before and after."""
+class TrackedAdmin(admin.ModelAdmin):
+    """Pages of a row with our own change history."""
 
     def get_object(self, request: HttpRequest, object_id: str, from_field: Any = None) -> Any:
-        """Find a row; where a form names no field to find it by (Django fails), by its key."""
+        """Return a row; by its key where ``from_field`` is empty, on which Django fails."""
         return super().get_object(request, object_id, from_field or None)
 
     def history_view(
         self, request: HttpRequest, object_id: str, extra_context: Any = None
     ) -> HttpResponse:
-        """Tell who changed what of a row, to those who may see the row."""
+        """Show the change history of a row to people who may see the row."""
         row = self.get_object(request, object_id)
         if row is None or not self.has_view_permission(request, row):
             raise Http404
@@ -164,52 +166,52 @@ class RowAdmin(admin.ModelAdmin):
         return TemplateResponse(request, "admin/changes.html", context)
 
 
-class ScopedAdmin(ScopedOptions, RowAdmin):
-    """A model's pages. New rows belong to the clinic of whoever adds them."""
+class ScopedAdmin(ScopedOptions, TrackedAdmin):
+    """Pages of a model. New rows belong to the clinic of the person who adds them."""
 
     form = ClinicForm
     list_per_page = 50
     show_facets = admin.ShowFacets.NEVER
-    row_actions: tuple[str, ...] = ()  # actions that a row's own page offers as well
-    for_viewers: tuple[str, ...] = ()  # those of them that alter nothing of the row
+    row_actions: tuple[str, ...] = ()  # actions that the row's own page offers as well
+    viewer_actions: tuple[str, ...] = ()  # those of them that change nothing of the row
 
     def has_module_permission(self, request: HttpRequest) -> bool:
-        """Whether the model is on the front page."""
-        return bool(rights(request, self.model))
+        """Return whether the model is on the front page."""
+        return bool(rights_for(request, self.model))
 
     def get_exclude(self, request: HttpRequest, obj: Any = None) -> Any:
-        """Leave the clinic out: it follows from who is signed in."""
+        """Return the excluded fields with the clinic, which follows from the person."""
         exclude = tuple(super().get_exclude(request, obj) or ())
         return (*exclude, "clinic") if hasattr(self.model, "clinic") else exclude
 
     def get_form(
         self, request: HttpRequest, obj: Any = None, change: bool = False, **kwargs: Any
     ) -> Any:
-        """Give the form; a new row's clinic is the person's own, or none for a host."""
+        """Return the form; a new row's clinic is the person's own, or none for a host."""
         form: Any = super().get_form(request, obj, change=change, **kwargs)
-        return type(form)(form.__name__, (form,), {"new_clinic_id": person(request).clinic_id})
+        return type(form)(form.__name__, (form,), {"new_clinic_id": user_of(request).clinic_id})
 
     def changelist_view(self, request: HttpRequest, extra_context: Any = None) -> HttpResponse:
-        """Show the list under what it is a list of."""
+        """Show the list with the model's name as title."""
         title = capfirst(self.opts.verbose_name_plural)
         return super().changelist_view(request, {"title": title} | (extra_context or {}))
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
-        """Give addresses and words of where one may want to go from a row's page."""
+        """Return URLs and labels of further pages about a row."""
         return []
 
     def render_change_form(
         self, request: HttpRequest, context: dict[str, Any], *args: Any, **kwargs: Any
     ) -> HttpResponse:
-        """Show the page, with ways to elsewhere and what can be done on top."""
+        """Show the page, with links and actions on top."""
         row = context.get("original")
         if row is not None:
             actions = self.get_actions(request)
             if not self._may(request, Right.CHANGE, row):
-                actions = {name: actions[name] for name in actions if name in self.for_viewers}
+                actions = {name: actions[name] for name in actions if name in self.viewer_actions}
             context["row_links"] = self.get_row_links(request, row)
             context["row_actions"] = [
-                (name, found[2], name not in self.for_viewers)
+                (name, found[2], name not in self.viewer_actions)
                 for name in self.row_actions
                 if (found := actions.get(name))
             ]
@@ -218,7 +220,7 @@ class ScopedAdmin(ScopedOptions, RowAdmin):
     def response_action(
         self, request: HttpRequest, queryset: QuerySet[Any], *args: Any
     ) -> HttpResponse | None:
-        """Do it; what was asked for on a row's own page leads back there."""
+        """Run an action; one from a row's own page returns there."""
         response = super().response_action(request, queryset, *args)
         key = request.POST.get("stay", "")
         if key.isdecimal() and getattr(response, "url", "") == request.get_full_path():
@@ -227,33 +229,33 @@ class ScopedAdmin(ScopedOptions, RowAdmin):
         return response
 
     def get_deleted_objects(self, objs: Any, request: HttpRequest) -> Any:
-        """Give what goes too, and what stays behind without it."""
-        gone, *others = super().get_deleted_objects(objs, request)
+        """Return what is deleted as well, and what stays without its reference."""
+        deleted, *others = super().get_deleted_objects(objs, request)
         keys = [row.pk for row in objs]
         for relation in self.model._meta.related_objects:
-            left = relation.related_model
-            if relation.on_delete is not models.SET_NULL or not issubclass(left, ScopedModel):
+            referrer = relation.related_model
+            if relation.on_delete is not models.SET_NULL or not issubclass(referrer, ScopedModel):
                 continue
-            rows = left.objects.visible_to(request.user)
+            rows = referrer.objects.visible_to(request.user)
             if count := rows.filter(**{f"{relation.field.name}__in": keys}).count():
                 words = gettext("Stays, without its %(what)s: %(things)s (%(count)s)")
                 named = {
                     "what": relation.field.verbose_name,
-                    "things": left._meta.verbose_name_plural,
+                    "things": referrer._meta.verbose_name_plural,
                     "count": count,
                 }
-                gone.append(words % named)
-        return (gone, *others)
+                deleted.append(words % named)
+        return (deleted, *others)
 
 
 class TokenAdmin(ScopedAdmin):
-    """Pages of rows that are known by a token. It is shown once, when it is made."""
+    """Pages of rows with a token, which is shown once, when it is issued."""
 
     readonly_fields: ClassVar[tuple[str, ...]] = ("created_at", "last_seen_at", "revoked_at")
     actions = row_actions = ("renew_tokens", "revoke_tokens")
 
     def save_model(self, request: HttpRequest, obj: Any, form: Any, change: bool) -> None:
-        """Save the row; a new one gets its token, shown this one time."""
+        """Save the row; issue and show the token of a new one."""
         token = None if change else obj.new_token()
         super().save_model(request, obj, form, change)
         if token:
@@ -264,8 +266,8 @@ class TokenAdmin(ScopedAdmin):
         """Replace the tokens of the chosen rows."""
         for holder in holders:
             with transaction.atomic():
-                by, address = person(request), client_address(request)
-                note_safety(Act.TOKEN, by, holder, address, timezone.now())
+                by, address = user_of(request), client_address(request)
+                record_security_change(Act.TOKEN, by, holder, address, timezone.now())
                 token = holder.new_token()
                 holder.revoked_at = None
                 holder.save()
@@ -273,25 +275,25 @@ class TokenAdmin(ScopedAdmin):
 
     @admin.action(description=_("Revoke tokens"), permissions=["change"])
     def revoke_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:
-        """Close the door to the chosen rows."""
-        open_ones = list(holders.filter(revoked_at__isnull=True))
-        for holder in open_ones:  # one by one: it is kept who did it
+        """Revoke the tokens of the chosen rows."""
+        valid = list(holders.filter(revoked_at__isnull=True))
+        for holder in valid:  # one by one, so that the change history records each
             holder.revoked_at = timezone.now()
             holder.save(update_fields=["revoked_at"])
-        said = ngettext("%(count)d token revoked.", "%(count)d tokens revoked.", len(open_ones))
-        messages.success(request, said % {"count": len(open_ones)})
+        said = ngettext("%(count)d token revoked.", "%(count)d tokens revoked.", len(valid))
+        messages.success(request, said % {"count": len(valid)})
 
-    def _show(self, request: HttpRequest, holder: TokenRow, token: str) -> None:
+    def _show(self, request: HttpRequest, holder: TokenModel, token: str) -> None:
         said = gettext("Token of %(holder)s, shown this one time only: %(token)s")
         messages.warning(request, said % {"holder": holder, "token": token})
 
 
 class ReadOnlyAdmin(ScopedAdmin):
-    """Pages of a log: rows are read, and reached from the session that they belong to."""
+    """Read-only pages of a log, linked from the session of its rows."""
 
     show_full_result_count = False
     actions = None
 
     def has_module_permission(self, request: HttpRequest) -> bool:
-        """Keep logs off the front page."""
+        """Return False: logs are not on the front page."""
         return False

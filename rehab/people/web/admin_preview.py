@@ -1,4 +1,4 @@
-"""An admin form that has beside it what a patient would see of it."""
+"""An admin form with a preview of what a patient would see."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from rehab.people.web.admin_base import ScopedAdmin
 
 
 class PreviewAdmin(ScopedAdmin):
-    """Rows whose form draws what it would make into a frame, at every key (form_preview.js)."""
+    """Rows whose form updates a preview in a frame while one types (js/preview.js)."""
 
     def get_urls(self) -> list[URLPattern]:
-        """Give the addresses, the preview's among them."""
+        """Return the URLs, with that of the preview."""
         name = f"{self.opts.app_label}_{self.opts.model_name}_preview"
         preview = self.admin_site.admin_view(self.preview)
         return [path("preview/", preview, name=name), *super().get_urls()]
@@ -30,19 +30,19 @@ class PreviewAdmin(ScopedAdmin):
     @method_decorator(xframe_options_sameorigin)
     @method_decorator(csp_replace({"frame-ancestors": [SELF]}))
     def preview(self, request: HttpRequest) -> HttpResponse:
-        """Show what the form describes. Stores nothing. Refuses whoever could not save it."""
+        """Show what the form describes, for people who could save it. Stores nothing."""
         row = self.get_object(request, request.GET.get("row", "")) or None
         may = self.has_change_permission if row else self.has_add_permission
         if not may(request, *([row] if row else [])):
             raise PermissionDenied
-        return self.draw(request, row)
+        return self.render_preview(request, row)
 
-    def draw(self, request: HttpRequest, row: Any) -> HttpResponse:
-        """Give the frame's page: what is in ``request.GET`` as the form of this row, or of none."""
+    def render_preview(self, request: HttpRequest, row: Any) -> HttpResponse:
+        """Return the frame's page, for the form of ``row`` (None: a new one) in ``request.GET``."""
         raise NotImplementedError
 
 
-def find_faults(form: Any) -> Iterator[tuple[str, str]]:
-    """Give what is wrong with a form: a field's label, or nothing, and the words."""
+def iter_form_errors(form: Any) -> Iterator[tuple[str, str]]:
+    """Return the errors of a form: the field's label, "" for the whole form, and the text."""
     for name, problems in form.errors.items():
         yield (form.fields[name].label if name in form.fields else "", " ".join(problems))

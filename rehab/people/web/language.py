@@ -1,8 +1,8 @@
-"""Which language a page has. This is the one place that says so.
+"""The language of each page, decided here alone.
 
-Pages of people who work here have the account's own language or else the clinic's, a tablet's
-have its clinic's, and a stranger's have the browser's. What a patient reads is in the patient's
-language: its view says so with `speak_to`. Programs are answered in English.
+Pages for people who work here are in the account's own language, else the clinic's; a tablet's in
+its clinic's; a stranger's in the browser's. Views that a patient reads call
+`activate_patient_language`. Programs are answered in English.
 """
 
 from __future__ import annotations
@@ -18,40 +18,40 @@ from rehab.people.access import tablet_of
 from rehab.people.models import LANGUAGES, Patient, User
 from rehab.people.sign_in import flow
 
-FOR_PROGRAMS = "/api/"
+API_PREFIX = "/api/"
 
 
 def language_of(user: User) -> str:
-    """Give the language of an account; "" where neither it nor its clinic says one."""
+    """Return the language of an account; "" where neither it nor its clinic has one."""
     return user.language or (user.clinic.language if user.clinic else "")
 
 
-def chosen_language(request: HttpRequest) -> str:
-    """Give the language that is known of whoever asks; "" for a stranger."""
-    if request.path_info.startswith(FOR_PROGRAMS):
+def request_language(request: HttpRequest) -> str:
+    """Return the language of the person, program or tablet of a request; "" for a stranger."""
+    if request.path_info.startswith(API_PREFIX):
         return settings.LANGUAGE_CODE
     user = request.user
-    person = user if isinstance(user, User) else flow.halfway(request, timezone.now())
+    person = user if isinstance(user, User) else flow.pending_second_factor(request, timezone.now())
     if person is not None:
         return language_of(person)
     tablet = tablet_of(request)
     return tablet.clinic.language if tablet is not None else ""
 
 
-def speak_to(patient: Patient) -> None:
+def activate_patient_language(patient: Patient) -> None:
     """Answer this request in a patient's language."""
     translation.activate(patient.language)
 
 
 class LanguageMiddleware:
-    """Answers in the language of whoever asks. Sync and thread-safe: it keeps no state."""
+    """Answers in the language of the request. Sync and thread-safe: it keeps no state."""
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
         self.get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponseBase:
-        """Pass the request on; afterwards this thread speaks as it did before."""
-        chosen = chosen_language(request)
+        """Pass the request on; then restore the language of this thread."""
+        chosen = request_language(request)
         known = chosen in dict(LANGUAGES)
         language = chosen if known else translation.get_language_from_request(request)
         with translation.override(language):

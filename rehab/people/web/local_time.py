@@ -1,7 +1,7 @@
-"""Which clock a page shows: that of the clinic of the person or tablet that asks.
+"""The time zone of pages: that of the clinic of the person or tablet of the request.
 
-Django's templates and the admin write moments by the current time zone, whatever zone a value has.
-A host's pages have the server's (GARRY_TIME_ZONE); programs get moments with their offset.
+Django's templates and the admin format times in the current time zone, whatever zone a value has.
+A host's pages are in the server's (GARRY_TIME_ZONE); programs get times with their offset.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from django.utils import timezone
 
 from rehab.people.access import tablet_of
 from rehab.people.models import User
-from rehab.people.web.language import FOR_PROGRAMS
+from rehab.people.web.language import API_PREFIX
 
 
-def zone_of(request: HttpRequest) -> ZoneInfo | None:
-    """Return the time zone of the clinic of whoever asks; None where there is none."""
-    if request.path_info.startswith(FOR_PROGRAMS):
+def request_time_zone(request: HttpRequest) -> ZoneInfo | None:
+    """Return the time zone of the clinic of a request; None where there is none."""
+    if request.path_info.startswith(API_PREFIX):
         return None
     user = request.user
     clinic = getattr(user if isinstance(user, User) else tablet_of(request), "clinic", None)
@@ -27,12 +27,12 @@ def zone_of(request: HttpRequest) -> ZoneInfo | None:
 
 
 class LocalTimeMiddleware:
-    """Writes moments by the clinic's clock. Sync and thread-safe: it keeps no state."""
+    """Formats times in the clinic's time zone. Sync and thread-safe: it keeps no state."""
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
         self.get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponseBase:
-        """Pass the request on; afterwards this thread is in the zone that it was in."""
-        with timezone.override(zone_of(request)):
+        """Pass the request on; then restore the time zone of this thread."""
+        with timezone.override(request_time_zone(request)):
             return self.get_response(request)

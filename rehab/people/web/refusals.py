@@ -1,6 +1,6 @@
-"""What the pure rules and the robot's room refuse, said in the language of the page.
+"""Translation of the errors of the pure rules and of the robot package.
 
-They know no languages: their refusals carry an English sentence with places and what stands there.
+They know no languages: their errors carry an English template and its values.
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ from robot.motion import gesture_errors
 
 
 class _Number(float):
-    """A number that is written as the page's language writes it."""
+    """A number in the format of the page's language."""
 
     def __format__(self, spec: str) -> str:
         return number_format(super().__format__(spec))
 
 
-def in_words(problem: InvalidSetting | gesture_errors.BadGesture) -> str:
-    """Say a refusal in the language in force; what was said in a language before stays as it is."""
-    said = gettext(problem.template)
+def format_refusal(problem: InvalidSetting | gesture_errors.BadGesture) -> str:
+    """Return an error in the active language; one without values may be translated already."""
+    template = gettext(problem.template)
     if not problem.values:
-        return said
-    return said.format(**{name: _say(value) for name, value in problem.values.items()})
+        return template
+    return template.format(**{name: _format_value(value) for name, value in problem.values.items()})
 
 
-def _say(value: object) -> object:
+def _format_value(value: object) -> object:
     match value:
         case marking.Marked() | gesture_errors.Marked():
             return gettext(value)

@@ -13,7 +13,7 @@ from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import SIDES, Patient, User
-from rehab.people.web.refusals import in_words
+from rehab.people.web.refusals import format_refusal
 from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_source
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
@@ -100,7 +100,7 @@ class SessionForm(forms.Form):
         try:
             check_station_is_free(station)
         except StationTaken as problem:
-            raise ValidationError(in_words(problem)) from problem
+            raise ValidationError(format_refusal(problem)) from problem
         return station
 
     def clean_source(self) -> str:
@@ -164,9 +164,9 @@ class SessionForm(forms.Form):
         try:
             return self.save()
         except StationTaken as problem:  # since the form was checked
-            self.add_error("station", in_words(problem))
+            self.add_error("station", format_refusal(problem))
         except InvalidSetting as problem:
-            self.add_error(None, in_words(problem))
+            self.add_error(None, format_refusal(problem))
         return None
 
 

@@ -44,7 +44,7 @@ class SessionActor:
     def __init__(self, session: TrainingSession) -> None:
         self.session = session
         self.fold = SessionFold(session.to_plan())
-        if session.original_id is not None:
+        if session.legacy_id is not None:
             self.fold.state = State.FINISHED  # imported: it has no log, and takes none
         self.marks: deque[dict[str, Any]] = deque(maxlen=MARKS)  # what a PT's chart points out
 

@@ -44,7 +44,7 @@ class Notes:
         """Note what was seen or ordered by a socket; what is only seen once in some minutes."""
         path = scope["path"]
         key = (type(actor).__name__, getattr(actor, "pk", None), path)
-        if act is Act.VIEW and not audit_log.recent.is_new(key, now):
+        if act is Act.VIEW and not audit_log.recent_views.is_new(key, now):
             return
         facts = {"about": path, "address": address_of(scope), "now": now}
         self._waiting.append(Note(session_id, act, actor, facts))
@@ -72,9 +72,11 @@ class Notes:
 def _store(notes: list[Note]) -> None:
     sessions = TrainingSession.everywhere.filter(pk__in={note.session_id for note in notes})
     patients = dict(sessions.values_list("pk", "patient_id"))
-    audit_log.try_to_keep(
+    audit_log.record_after_the_fact(
         [
-            audit_log.compose(note.act, note.actor, patient=patients[note.session_id], **note.facts)
+            audit_log.build_entry(
+                note.act, note.actor, patient=patients[note.session_id], **note.facts
+            )
             for note in notes
             if note.session_id in patients
         ]

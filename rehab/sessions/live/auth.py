@@ -16,11 +16,11 @@ from django.http.request import split_domain_port, validate_host
 from django.utils import timezone
 from django.utils.module_loading import import_string
 
-from rehab.people.consent.models import may_be_watched
+from rehab.people.consent.services import is_remote_view_allowed
 from rehab.people.models import Patient, User
-from rehab.people.networks import find_address
+from rehab.people.networks import resolve_client_address
 from rehab.people.sign_in import browser_sessions
-from rehab.people.sign_in.flow import holds
+from rehab.people.sign_in.flow import is_session_valid
 from rehab.sessions.models import TrainingSession
 from rehab.stations import tablets
 from rehab.stations.models import Device, find_device
@@ -88,7 +88,7 @@ def _signed_in(scope: Mapping[str, Any]) -> User | None:
     store = import_string(f"{settings.SESSION_ENGINE}.SessionStore")
     request.session = store(key)
     user = get_user(request)
-    return user if isinstance(user, User) and holds(request.session, user) else None
+    return user if isinstance(user, User) and is_session_valid(request.session, user) else None
 
 
 @database_sync_to_async
@@ -111,7 +111,7 @@ def find_unwelcome(admitted: Sequence[tuple[Actor, Mapping[str, Any]]], now: dat
         if actor is None:
             return True
         account, data = accounts.get(actor.pk), signed_in.get(session_key_of(scope) or "")
-        return account is not None and data is not None and holds(data, account)
+        return account is not None and data is not None and is_session_valid(data, account)
 
     return [index for index, one in enumerate(admitted) if not is_welcome(*one)]
 
@@ -120,7 +120,7 @@ def find_unwelcome(admitted: Sequence[tuple[Actor, Mapping[str, Any]]], now: dat
 def keep_signed_in(scopes: Sequence[Mapping[str, Any]], now: datetime) -> None:
     """Put off the end of the sign-ins by which these sockets came in: a training runs there."""
     keys = {key for scope in scopes if (key := session_key_of(scope))}
-    browser_sessions.keep(keys, now)
+    browser_sessions.extend_sessions(keys, now)
 
 
 @database_sync_to_async
@@ -132,7 +132,7 @@ def may_open(actor: Actor, session_id: int) -> bool:
 def address_of(scope: Mapping[str, Any]) -> str:
     """Give the address that a socket comes from."""
     forwarded = headers_of(scope).get("x-forwarded-for", "")
-    return find_address(forwarded, (scope.get("client") or [""])[0])
+    return resolve_client_address(forwarded, (scope.get("client") or [""])[0])
 
 
 @database_sync_to_async
@@ -141,7 +141,7 @@ def may_watch(actor: Actor, session_id: int, scope: Mapping[str, Any]) -> bool:
     if not isinstance(actor, User):
         return True
     patients = Patient.everywhere.filter(sessions=session_id).select_related("clinic")
-    return may_be_watched(patients.get(), address_of(scope))
+    return is_remote_view_allowed(patients.get(), address_of(scope))
 
 
 @database_sync_to_async

@@ -8,7 +8,7 @@ from asgiref.sync import sync_to_async
 
 from rehab.sessions.live.supervisor import Children
 from rehab.sessions.models import TrainingSession
-from rehab.stations.builtin import builtin_token
+from rehab.stations.builtin import issue_builtin_token
 from rehab.stations.models import Device
 
 
@@ -32,7 +32,7 @@ async def run_source(children: Children, session: TrainingSession, server: str) 
     name = child_name(session.pk)
     if not session.source_args or session.station is None or name in children.all:
         return
-    token = await sync_to_async(builtin_token)(session.station, Device.Kind.SOURCE)
+    token = await sync_to_async(issue_builtin_token)(session.station, Device.Kind.SOURCE)
     command = [sys.executable, "-m", "rehab.sources", *session.source_args, "--child", "--resume"]
     place = ["--server", server, "--session", str(session.pk)]
     children.start(name, [*command, *place], {"GARRY_TOKEN": token}, once=True)

@@ -14,7 +14,7 @@ from django.utils import timezone
 from django.utils.translation import gettext
 from django.views.decorators.http import require_safe
 
-from rehab.people.access import for_roles, person
+from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.formatting import (
@@ -64,7 +64,7 @@ class FilterChip:
 @require_safe
 def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
     """List a patient's sessions, newest first, with the trend over the last ones."""
-    user = person(request)
+    user = user_of(request)
     patient = get_object_or_404(
         Patient.objects.visible_to(user).select_related("clinic"), pk=patient_id
     )
@@ -124,7 +124,5 @@ def to_row(
         goal=format_number(session.goal),
         score=format_number(figures.get("score"), 0),
         hit_rate=format_rate(figures.get("hit_rate")),
-        state=gettext("imported")
-        if session.original_id is not None
-        else format_state(session.state),
+        state=gettext("imported") if session.legacy_id is not None else format_state(session.state),
     )

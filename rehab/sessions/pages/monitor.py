@@ -9,8 +9,8 @@ from django.utils.text import capfirst
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_safe
 
-from rehab.people.access import for_roles, person
-from rehab.people.consent.models import may_be_watched
+from rehab.people.access import for_roles, user_of
+from rehab.people.consent.services import is_remote_view_allowed
 from rehab.people.models import Patient
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
@@ -48,11 +48,11 @@ def redirect_to_consent(request: HttpRequest, patient: Patient) -> HttpResponse:
 @require_safe
 def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
     """Show the page that controls a session; its contents come by the session's socket."""
-    sessions = TrainingSession.objects.visible_to(person(request))
+    sessions = TrainingSession.objects.visible_to(user_of(request))
     session = get_object_or_404(
         sessions.select_related("patient__clinic", "station", "measure"), pk=session_id
     )
-    if not may_be_watched(session.patient, client_address(request)):
+    if not is_remote_view_allowed(session.patient, client_address(request)):
         return redirect_to_consent(request, session.patient)
     context = {
         "chart_marks": chart_marks(),

@@ -7,7 +7,7 @@ from django.shortcuts import get_object_or_404, render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
-from rehab.people.access import for_roles, person
+from rehab.people.access import for_roles, user_of
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
@@ -18,7 +18,7 @@ from rehab.sessions.reports.report import report_context
 @require_safe
 def show_report(request: HttpRequest, session_id: int) -> HttpResponse:
     """Show one session's report for the records; researchers see a pseudonym."""
-    user = person(request)
+    user = user_of(request)
     sessions = TrainingSession.objects.visible_to(user).select_related(
         "patient", "clinic", "measure", "station", "created_by"
     )

@@ -9,7 +9,7 @@ from django.utils import timezone
 from django.utils.translation import gettext
 from django.views.decorators.http import require_http_methods, require_safe
 
-from rehab.people.access import for_roles, person
+from rehab.people.access import for_roles, user_of
 from rehab.people.roles import Role
 from rehab.sessions.corrections import CorrectedField, can_correct, describe_corrections
 from rehab.sessions.formatting import clinic_time, format_day, format_state
@@ -24,7 +24,7 @@ from rehab.training.changes import OPEN_STATES, State
 @require_safe
 def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
     """Show one session with every stride, phase and event; researchers see a pseudonym."""
-    user = person(request)
+    user = user_of(request)
     session = get_object_or_404(
         TrainingSession.objects.visible_to(user).select_related("patient", "clinic", "measure"),
         pk=session_id,
@@ -64,7 +64,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
 @require_http_methods(["GET", "HEAD", "POST"])
 def correct(request: HttpRequest, session_id: int) -> HttpResponse:
     """Correct an ended session: who walked, whether it counts, a note. The log stays as it is."""
-    user = person(request)
+    user = user_of(request)
     session = get_object_or_404(
         TrainingSession.objects.visible_to(user).select_related("patient", "clinic"), pk=session_id
     )

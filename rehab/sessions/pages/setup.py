@@ -11,7 +11,7 @@ from django.utils.translation import gettext
 from django.views.decorators.http import require_http_methods
 
 from rehab.feedback.valences import valences_of
-from rehab.people.access import for_roles, person
+from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.forms.preset import save_preset
@@ -31,7 +31,7 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
 
     The form may also be stored as a preset.
     """
-    user = person(request)
+    user = user_of(request)
     patient = get_object_or_404(Patient.objects.visible_to(user), pk=patient_id)
     first_station(patient.clinic)
     presets = list(Preset.objects.visible_to(user).select_related("protocol"))

@@ -40,16 +40,16 @@ def show_tablet(request: HttpRequest) -> HttpResponse:
             return redirect("walk", session_id=session.pk)
         return render(request, "sessions/tablet.html", {"station": tablet.station})
     now = timezone.now()
-    begun = pairing.find(request.COOKIES.get(PAIRING_COOKIE, ""), now)
+    begun = pairing.find_pairing(request.COOKIES.get(PAIRING_COOKIE, ""), now)
     if begun is not None and begun.device is None:
         return _show_code(request, begun.code)
     try:
-        begun, secret = pairing.begin(client_address(request), now)
+        begun, secret = pairing.start_pairing(client_address(request), now)
     except pairing.PairingRefused as refused:
-        status = 429 if isinstance(refused, pairing.PairingFlooded) else 503
+        status = 429 if isinstance(refused, pairing.PairingRateLimited) else 503
         return render(request, "sessions/tablet.html", {"problem": refused}, status=status)
     response = _show_code(request, begun.code)
-    tablets.remember(response, PAIRING_COOKIE, secret, pairing.LIFETIME.total_seconds())
+    tablets.set_secret_cookie(response, PAIRING_COOKIE, secret, pairing.LIFETIME.total_seconds())
     return response
 
 
@@ -90,14 +90,14 @@ def tablet_state(request: HttpRequest) -> HttpResponse:
         there = reverse("walk", kwargs={"session_id": session.pk}) if session else ""
         response = JsonResponse({"paired": True, "go": there})
         if token := request.COOKIES.get(tablets.COOKIE):
-            tablets.remember(response, tablets.COOKIE, token, tablets.COOKIE_AGE_S)
+            tablets.set_secret_cookie(response, tablets.COOKIE, token, tablets.COOKIE_AGE_S)
         return response
-    begun = pairing.find(request.COOKIES.get(PAIRING_COOKIE, ""), timezone.now())
+    begun = pairing.find_pairing(request.COOKIES.get(PAIRING_COOKIE, ""), timezone.now())
     if begun is None:
         return JsonResponse({"paired": False, "go": reverse("tablet")})  # for a new code
-    token = pairing.collect(begun)
+    token = pairing.claim_token(begun)
     response = JsonResponse({"paired": token is not None, "go": reverse("tablet") if token else ""})
     if token is not None:
-        tablets.remember(response, tablets.COOKIE, token, tablets.COOKIE_AGE_S)
+        tablets.set_secret_cookie(response, tablets.COOKIE, token, tablets.COOKIE_AGE_S)
         response.delete_cookie(PAIRING_COOKIE)
     return response

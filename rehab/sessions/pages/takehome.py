@@ -7,10 +7,10 @@ from django.shortcuts import get_object_or_404, render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
-from rehab.people.access import for_roles, person
+from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.people.web.language import speak_to
+from rehab.people.web.language import activate_patient_language
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.takehome import summarize_for_patient
@@ -20,11 +20,11 @@ from rehab.sessions.reports.takehome import summarize_for_patient
 @require_safe
 def show_take_home(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Show in plain words what a patient has walked, without a person's simulated sessions."""
-    user = person(request)
+    user = user_of(request)
     patient = get_object_or_404(
         Patient.objects.visible_to(user).select_related("clinic"), pk=patient_id
     )
-    speak_to(patient)
+    activate_patient_language(patient)
     sessions = TrainingSession.objects.visible_to(user).filter(
         patient=patient, simulated=patient.simulated
     )

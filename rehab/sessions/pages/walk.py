@@ -10,10 +10,10 @@ from django.urls import reverse
 from django.views.decorators.clickjacking import xframe_options_sameorigin
 
 from rehab.people.access import actor_of, for_roles
-from rehab.people.consent.models import may_be_watched
+from rehab.people.consent.services import is_remote_view_allowed
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
-from rehab.people.web.language import speak_to
+from rehab.people.web.language import activate_patient_language
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.pages.monitor import redirect_to_consent
 from rehab.training.changes import ENDED_STATES, State
@@ -29,10 +29,10 @@ def show_walk(request: HttpRequest, session_id: int) -> HttpResponse:
     )
     session = get_object_or_404(sessions, pk=session_id)
     alone = not request.user.is_authenticated
-    if not alone and not may_be_watched(session.patient, client_address(request)):
+    if not alone and not is_remote_view_allowed(session.patient, client_address(request)):
         return redirect_to_consent(request, session.patient)
     mirror = "mirror" in request.GET
-    speak_to(session.patient)
+    activate_patient_language(session.patient)
     if State(session.state) in ENDED_STATES and not mirror:
         return redirect("scores", session_id=session.pk)
     context = {

@@ -89,9 +89,7 @@ def review_session(user: User, session: TrainingSession) -> SessionReview:
         for event in rows
     )
     figures = summarize_session(fold)
-    if (
-        session.original_id is not None
-    ):  # imported without a log: its stored figures are all there is
+    if session.legacy_id is not None:  # imported without a log: its stored figures are all there is
         stored = metrics_by_session(user, [session]).get(session.pk, {})
         figures |= {"score": stored.get("score"), "active_s": session.active_s}
     return SessionReview(figures, rows, events, gestures, stride_chart(user, session, fold, events))

@@ -18,7 +18,7 @@ from django.http import HttpRequest
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.access import person
+from rehab.people.access import user_of
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.forms.session import NumberField
@@ -120,7 +120,7 @@ class SessionSearchFilter(ListFilter):
         model_admin: Any,
     ) -> None:
         super().__init__(request, params, model, model_admin)
-        user = person(request)
+        user = user_of(request)
         self.zone = user.clinic.time_zone if user.clinic else settings.TIME_ZONE
         names = [name for name in SessionSearchForm(by=user).fields if name in params]
         given = {name: params.pop(name)[-1].strip() for name in names}

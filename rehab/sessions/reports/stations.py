@@ -12,7 +12,7 @@ from rehab.sessions.live import runtime
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device, Station
-from rehab.stations.presence import say_state
+from rehab.stations.presence import format_device_state
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ def station_statuses(
         session = at_station.get(station.pk)
         yield StationStatus(
             station,
-            [(device, say_state(device, now)) for device in devices[station.pk]],
+            [(device, format_device_state(device, now)) for device in devices[station.pk]],
             session,
             connected_devices(session, now) if session else {},
         )

@@ -12,7 +12,7 @@ from rehab.feedback.valences import valences_of
 from rehab.gestures.choices import gesture_choices
 from rehab.gestures.models import Gesture
 from rehab.people.models import Patient, User
-from rehab.people.web.refusals import in_words
+from rehab.people.web.refusals import format_refusal
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import CueGestures
 from robot.motion.dry_run import validate_gesture
@@ -83,7 +83,7 @@ def composed_gestures(patient: Patient, cue: CueGestures) -> Iterator[dict[str, 
         except BadGesture as problem:
             raise InvalidSetting(
                 gettext("Gesture %(name)s: %(problem)s")
-                % {"name": name, "problem": in_words(problem)}
+                % {"name": name, "problem": format_refusal(problem)}
             ) from problem
         yield data
 

@@ -12,8 +12,8 @@ from django.utils.translation import gettext, gettext_noop
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, User
-from rehab.people.scope import ClinicRow, Scope
-from rehab.people.web.refusals import in_words
+from rehab.people.scope import ClinicModel, Scope
+from rehab.people.web.refusals import format_refusal
 from rehab.sessions.formatting import (
     ROBOT_LEVEL_LABELS,
     SIMULATED_PREFIX,
@@ -33,7 +33,7 @@ from rehab.training.valences import VALENCES, find_valence
 NAME_TAKEN = gettext_noop("A preset of this name exists. Choose another name.")
 
 
-class Preset(ClinicRow):
+class Preset(ClinicModel):
     """A set-up without its patient, leg and station."""
 
     scope = Scope(clinic="clinic")
@@ -91,7 +91,7 @@ class Preset(ClinicRow):
         ],
     )
 
-    class Meta(ClinicRow.Meta):
+    class Meta(ClinicModel.Meta):
         verbose_name = _("preset")
         verbose_name_plural = _("presets")
         ordering: ClassVar = ["name"]
@@ -125,7 +125,7 @@ class Preset(ClinicRow):
                 robot_intensity=ROBOT_LEVELS[self.robot],
             )
         except InvalidSetting as problem:
-            raise ValidationError(in_words(problem)) from problem
+            raise ValidationError(format_refusal(problem)) from problem
 
     @property
     def summary(self) -> str:

@@ -11,8 +11,8 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
-from rehab.people.scope import ClinicRow, Scope, ScopedModel
-from rehab.people.web.refusals import in_words
+from rehab.people.scope import ClinicModel, Scope, ScopedModel
+from rehab.people.web.refusals import format_refusal
 from rehab.training import measures as rules
 from rehab.training.phases import PHASE_KINDS, Phase
 
@@ -22,7 +22,7 @@ def display_name(row: Measure | Protocol) -> str:
     return row.name if row.clinic_id else gettext(row.name)
 
 
-class Measure(ClinicRow):
+class Measure(ClinicModel):
     """A quantity of a stride that can be trained. Without a clinic it is shared by all."""
 
     scope = Scope(clinic="clinic", shared=True, host=Q(clinic__isnull=True))
@@ -44,7 +44,7 @@ class Measure(ClinicRow):
     goal_min = models.FloatField(_("goal min"), help_text=_("A goal lies above this."))
     goal_max = models.FloatField(_("goal max"), help_text=_("A goal lies at or below this."))
 
-    class Meta(ClinicRow.Meta):
+    class Meta(ClinicModel.Meta):
         verbose_name = _("measure")
         verbose_name_plural = _("measures")
         ordering: ClassVar = ["name"]
@@ -81,7 +81,7 @@ class Measure(ClinicRow):
         )
 
 
-class Protocol(ClinicRow):
+class Protocol(ClinicModel):
     """A list of phases that sessions are built from. Without a clinic it is shared by all."""
 
     scope = Scope(clinic="clinic", shared=True, host=Q(clinic__isnull=True))
@@ -97,7 +97,7 @@ class Protocol(ClinicRow):
     name = models.CharField(_("name"), max_length=64)
     description = models.TextField(_("description"), blank=True)
 
-    class Meta(ClinicRow.Meta):
+    class Meta(ClinicModel.Meta):
         verbose_name = _("protocol")
         verbose_name_plural = _("protocols")
         ordering: ClassVar = ["name"]
@@ -178,4 +178,4 @@ class ProtocolPhase(ScopedModel):
         try:
             self.to_rule()
         except rules.InvalidSetting as problem:
-            raise ValidationError(in_words(problem)) from problem
+            raise ValidationError(format_refusal(problem)) from problem

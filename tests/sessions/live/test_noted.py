@@ -9,7 +9,7 @@ from asgiref.sync import sync_to_async
 from django.db import DatabaseError
 
 from rehab.people.audit import audit_log
-from rehab.people.audit.audit_log import Act, AuditEntry, Recent
+from rehab.people.audit.audit_log import Act, AuditEntry, RecentViews
 from rehab.sessions.live import audit_queue as notes_module
 from rehab.sessions.live import runtime as runtimes
 from tests.support.callers import turns
@@ -22,7 +22,7 @@ ARM = {"type": "robot", "order": "arm"}
 
 @pytest.fixture(autouse=True)
 def nothing_noted_yet(monkeypatch):
-    monkeypatch.setattr(audit_log, "recent", Recent())
+    monkeypatch.setattr(audit_log, "recent_views", RecentViews())
 
 
 async def noted(count: int) -> list[tuple[Any, ...]]:

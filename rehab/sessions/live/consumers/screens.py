@@ -17,7 +17,7 @@ from rehab.people.audit.audit_log import Act
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.web.language import language_of
-from rehab.people.web.refusals import in_words
+from rehab.people.web.refusals import format_refusal
 from rehab.sessions.events import history_entry, to_text
 from rehab.sessions.live.auth import Actor, find_actor, may_open, may_watch
 from rehab.sessions.live.backlog import read_steps
@@ -189,7 +189,7 @@ class ScreenConsumer(Socket):
     def _in_words(self, problem: InvalidSetting) -> str:
         """Say a refusal in the page's language."""
         with override(self.language):
-            return in_words(problem)
+            return format_refusal(problem)
 
     async def _order_robot(self, message: Message) -> None:
         """Stop the robot, whoever asks; let it move again where a person asks."""

@@ -1,0 +1,18 @@
+"""`manage.py migrate`: Django's own, after a look at whose tables these are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.core.management.commands import migrate
+
+from rehab.people.sign_in.first_start import refuse_development_database
+
+
+class Command(migrate.Command):
+    """Applies migrations, but never to a database that a development version made."""
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Migrate. Raises CommandError, with the cure, where that cannot be done."""
+        refuse_development_database(options["database"])
+        super().handle(*args, **options)

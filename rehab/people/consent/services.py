@@ -1,0 +1,142 @@
+"""Recording and withdrawing consent, the text it refers to, and what it allows."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+
+from django.db import transaction
+from django.utils.translation import gettext_lazy as _
+from django.utils.translation import override
+
+from rehab.people.consent.models import Consent, ConsentText, Purpose
+from rehab.people.models import Boards, Clinic, Patient, User
+from rehab.people.networks import is_in_networks
+
+REMOTE_VIEW_TEXT = _("Remote view: your therapist may watch a session from another place.")
+# The first text of a clinic, in its language. The clinic may change it.
+DEFAULT_TEXT = (
+    _(
+        "GARRY measures your steps while you walk on the treadmill: how strongly you push off, "
+        "when, and how your therapist set the goal. The clinic keeps this under a nickname and a "
+        "number, never your full name."
+    ),
+    _("Care: your therapists use your sessions to plan your training."),
+    _(
+        "Research: researchers of this clinic see your sessions under a made-up name. They never "
+        "see your nickname or number."
+    ),
+    _(
+        "Boards: your results stand beside those of others, under the name of an animal. You can "
+        "leave at any time, also by yourself on the tablet."
+    ),
+    REMOTE_VIEW_TEXT,
+    _(
+        "You may say no to any of these, and change your mind at any time. Your care does not "
+        "depend on research, boards or remote view."
+    ),
+)
+
+
+def _is_included(clinic: Clinic, paragraph: Any) -> bool:
+    return paragraph is not REMOTE_VIEW_TEXT or Purpose.REMOTE in offered_purposes(clinic)
+
+
+def current_text(clinic: Clinic) -> ConsentText:
+    """Return the current version of the text; create a clinic's first one on first use."""
+    text = ConsentText.everywhere.filter(clinic=clinic).first()
+    if text is None:
+        with override(clinic.language):
+            default = "\n\n".join(str(part) for part in DEFAULT_TEXT if _is_included(clinic, part))
+        text, _created = ConsentText.everywhere.get_or_create(
+            clinic=clinic, version=1, defaults={"text": default}
+        )
+    return text
+
+
+def publish_text(clinic: Clinic, text: str, by: User | None, now: datetime) -> ConsentText:
+    """Publish a text as a new version unless it is the current one. Earlier consents stay valid."""
+    with transaction.atomic():
+        Clinic.everywhere.select_for_update().get(pk=clinic.pk)
+        current = current_text(clinic)
+        if current.text == text:
+            return current
+        return ConsentText.everywhere.create(
+            clinic=clinic, version=current.version + 1, text=text, written_by=by, written_at=now
+        )
+
+
+def active_consents(patient: Patient) -> dict[str, Consent]:
+    """Return the consents of a patient that are not withdrawn, by purpose."""
+    rows = Consent.everywhere.filter(patient=patient, withdrawn_at=None).select_related("text")
+    return {row.purpose: row for row in rows}
+
+
+def offered_purposes(clinic: Clinic) -> list[Purpose]:
+    """Return what a clinic asks for: remote view only where it has named its own networks."""
+    return [one for one in Purpose if clinic.networks or one is not Purpose.REMOTE]
+
+
+def is_remote_view_allowed(patient: Patient, address: str) -> bool:
+    """Return whether a person at this address may watch; outside the clinic it needs consent."""
+    networks = patient.clinic.networks
+    if not networks or patient.simulated or is_in_networks(networks, address):
+        return True
+    return Purpose.REMOTE in active_consents(patient)
+
+
+def is_care_allowed(patient: Patient) -> bool:
+    """Return whether sessions may be set up; a clinic may require the patient's consent."""
+    is_required = patient.clinic.care_needs_consent and not patient.simulated
+    return not is_required or Purpose.CARE in active_consents(patient)
+
+
+def record_consent(
+    patient: Patient, purpose: Purpose, by: User | None, now: datetime, level: str = ""
+) -> None:
+    """Record that a patient consents, to the current text.
+
+    A consent to an older text or another ``level`` of boards is replaced; nothing is recorded for
+    an erased patient.
+    """
+    with transaction.atomic():
+        patient.lock()
+        if patient.erased_at is not None:
+            return
+        text = current_text(patient.clinic)
+        active = Consent.everywhere.filter(patient=patient, purpose=purpose, withdrawn_at=None)
+        if active.filter(text=text, level=level).exists():
+            return
+        active.update(withdrawn_at=now, withdrawn_by=by)  # replaced below
+        Consent.everywhere.create(
+            patient=patient,
+            purpose=purpose,
+            level=level,
+            text=text,
+            given_at=now,
+            recorded_by=by,
+        )
+
+
+def withdraw_consent(patient: Patient, purpose: Purpose, by: User | None, now: datetime) -> None:
+    """Record that a patient withdraws a consent. Boards lose the patient's rows at once."""
+    with transaction.atomic():
+        patient.lock()
+        Consent.everywhere.filter(patient=patient, purpose=purpose, withdrawn_at=None).update(
+            withdrawn_at=now, withdrawn_by=by
+        )
+        if purpose == Purpose.BOARDS and patient.boards != Boards.OWN:
+            patient.boards = Boards.OWN
+            patient.save(update_fields=["boards"])
+
+
+def record_boards_consent(patient: Patient, boards: Boards, by: User | None, now: datetime) -> None:
+    """Record on which boards a patient consents to stand; OWN withdraws the consent."""
+    if boards == Boards.OWN:
+        withdraw_consent(patient, Purpose.BOARDS, by, now)
+        return
+    with transaction.atomic():
+        record_consent(patient, Purpose.BOARDS, by, now, boards.value)
+        if patient.erased_at is None:
+            patient.boards = boards
+            patient.save(update_fields=["boards"])

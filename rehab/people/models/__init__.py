@@ -1,0 +1,33 @@
+"""Clinics, the people who work there, and the patients who walk."""
+
+from rehab.people.models.accounts import ScopedUserManager, ServerUserManager, User
+from rehab.people.models.clinics import LANGUAGES, Clinic, validate_time_zone
+from rehab.people.models.patients import (
+    SIDES,
+    Boards,
+    EndReason,
+    ErasureReason,
+    Patient,
+    PatientErased,
+    ScreenSide,
+    ScreenText,
+    generate_pseudonym,
+)
+
+__all__ = [
+    "LANGUAGES",
+    "SIDES",
+    "Boards",
+    "Clinic",
+    "EndReason",
+    "ErasureReason",
+    "Patient",
+    "PatientErased",
+    "ScopedUserManager",
+    "ScreenSide",
+    "ScreenText",
+    "ServerUserManager",
+    "User",
+    "generate_pseudonym",
+    "validate_time_zone",
+]

@@ -1,0 +1,89 @@
+"""Accounts of the people who work at a clinic or run the server."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from django.contrib.auth.base_user import BaseUserManager
+from django.contrib.auth.models import AbstractUser, UserManager
+from django.db import models
+from django.db.models import Q
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.models.clinics import LANGUAGES, Clinic
+from rehab.people.roles import Role
+from rehab.people.scope import Scope, ScopedManager
+
+
+class ServerUserManager(UserManager["User"]):
+    """Creates accounts for the server's own work. `createsuperuser` creates a host."""
+
+    def create_superuser(
+        self,
+        username: str,
+        email: str | None = None,
+        password: str | None = None,
+        **extra_fields: Any,
+    ) -> User:
+        """Create the account of a host."""
+        return self.create_user(username, email, password, **extra_fields | {"role": Role.HOST})
+
+
+class ScopedUserManager(ScopedManager["User"], BaseUserManager["User"]):
+    """Accounts by scope, with the helpers that Django expects of `User.objects`."""
+
+
+class User(AbstractUser):
+    """A person with an account. The role decides what the account may do."""
+
+    actor_kind = "user"
+    scope: ClassVar[Scope] = Scope(clinic="clinic", host=Q())
+
+    clinic = models.ForeignKey(
+        Clinic,
+        on_delete=models.PROTECT,
+        related_name="users",
+        null=True,
+        blank=True,
+        verbose_name=_("clinic"),
+    )
+    role = models.CharField(_("role"), max_length=16, choices=Role.choices)
+    language = models.CharField(
+        _("language"),
+        max_length=8,
+        choices=LANGUAGES,
+        blank=True,
+        help_text=_("Of the pages that this account opens; empty: the clinic's."),
+    )
+    program = ""  # the name of the API token through which this person acts
+
+    everywhere = ServerUserManager()
+    objects: ClassVar[ScopedUserManager] = ScopedUserManager()  # type: ignore[assignment]
+
+    class Meta(AbstractUser.Meta):
+        default_manager_name = "everywhere"
+        base_manager_name = "everywhere"
+        ordering: ClassVar = ["username"]
+        constraints: ClassVar = [
+            models.CheckConstraint(
+                condition=Q(role=Role.HOST, clinic__isnull=True)
+                | (~Q(role=Role.HOST) & Q(clinic__isnull=False)),
+                name="user_clinic_fits_role",
+                violation_error_message=_("A host has no clinic; every other role needs one."),
+            ),
+            models.CheckConstraint(condition=Q(role__in=Role.values), name="user_role_is_known"),
+        ]
+
+    def save(self, *args: Any, **kwargs: Any) -> None:
+        """Save the account. Django's own flags follow from the role."""
+        self.is_staff = True  # everyone may open the admin; the role decides what it shows
+        self.is_superuser = False  # nobody bypasses the table of rights
+        super().save(*args, **kwargs)
+
+    def __str__(self) -> str:
+        return self.get_full_name() or self.username
+
+    @classmethod
+    def is_taken(cls, username: str) -> bool:
+        """Return whether an account of any clinic has this name; case does not matter."""
+        return cls.everywhere.filter(username__iexact=username).exists()

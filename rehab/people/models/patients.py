@@ -1,0 +1,221 @@
+"""Patients: how a clinic knows them, and how their pages look."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from django.core.exceptions import NON_FIELD_ERRORS, ValidationError
+from django.core.validators import MaxValueValidator, MinValueValidator
+from django.db import models, transaction
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.aliases import draw_alias
+from rehab.people.models.clinics import LANGUAGES, Clinic
+from rehab.people.random_codes import random_code
+from rehab.people.scope import ClinicModel, Scope
+from rehab.training.steps import Side
+
+SIDES = [(Side.LEFT.value, _("Left")), (Side.RIGHT.value, _("Right"))]
+
+
+def generate_pseudonym() -> str:
+    """Return a random name that reveals nothing about a patient."""
+    return "P-" + random_code(8)
+
+
+class ScreenSide(models.TextChoices):
+    """Where the thermometer stands on the patient's page; for neglect and visual field loss."""
+
+    RIGHT = "right", _("on the right (usual)")
+    LEFT = "left", _("on the left")
+    CENTER = "center", _("all of it in the middle, smaller")
+
+
+class ScreenText(models.TextChoices):
+    """The size of text on the patient's page."""
+
+    NORMAL = "normal", _("normal")
+    LARGE = "large", _("large")
+    LARGEST = "largest", _("largest")
+
+
+class Boards(models.TextChoices):
+    """Which leaderboards a patient has agreed to stand on; each includes those before it."""
+
+    OWN = "own", _("None: sees own sessions only")
+    TOTAL = "total", _("Counts in totals, stands in no row")
+    CLINIC = "clinic", _("Boards of this clinic")
+    ACROSS = "across", _("Boards of this clinic and across clinics")
+
+
+class EndReason(models.TextChoices):
+    """Why a patient's program has ended."""
+
+    DONE = "done", _("The program is complete")
+    WISH = "wish", _("The patient wishes to stop")
+    HEALTH = "health", _("Health")
+    MOVED = "moved", _("Goes on elsewhere")
+    OTHER = "other", _("Another reason")
+
+
+class ErasureReason(models.TextChoices):
+    """Why all that leads to a patient was erased."""
+
+    ASKED = "asked", _("The patient asks for it")
+    MISTAKE = "mistake", _("Was entered by mistake")
+    RETENTION = "retention", _("Kept long enough")
+
+
+class PatientErased(ValidationError):
+    """A change to a patient who has been erased."""
+
+    def __init__(self) -> None:
+        super().__init__({NON_FIELD_ERRORS: _("This person is erased. Take a new patient in.")})
+
+
+class Patient(ClinicModel):
+    """A person who walks, known by the clinic's code and a nickname, never a full name."""
+
+    scope = Scope(clinic="clinic")
+
+    clinic = models.ForeignKey(
+        Clinic, on_delete=models.PROTECT, related_name="patients", verbose_name=_("clinic")
+    )
+    code = models.CharField(
+        _("code"),
+        max_length=32,
+        help_text=_("The clinic's own number for this patient, never a name."),
+    )
+    nickname = models.CharField(
+        _("nickname"),
+        max_length=32,
+        help_text=_("What the screens say, so that patient and therapist can check."),
+    )
+    pseudonym = models.CharField(
+        _("pseudonym"), max_length=16, unique=True, default=generate_pseudonym, editable=False
+    )
+    body_mass_kg = models.FloatField(
+        _("body mass (kg)"),
+        null=True,
+        blank=True,
+        validators=[MinValueValidator(10), MaxValueValidator(300)],
+        help_text=_("Needed when sensors send raw signals: A2 is power per kilogram."),
+    )
+    paretic_side = models.CharField(_("paretic side"), max_length=8, choices=SIDES, blank=True)
+    language = models.CharField(_("language"), max_length=8, choices=LANGUAGES, default="en")
+    screen_side = models.CharField(
+        _("thermometer"), max_length=8, choices=ScreenSide.choices, default=ScreenSide.RIGHT
+    )
+    screen_text = models.CharField(
+        _("size of words"), max_length=8, choices=ScreenText.choices, default=ScreenText.NORMAL
+    )
+    screen_still = models.BooleanField(
+        _("calm page"), default=False, help_text=_("No confetti, and nothing moves but the level.")
+    )
+    screen_sounds = models.BooleanField(
+        _("sounds"),
+        default=False,
+        help_text=_(
+            "A soft tone a step, the higher the better; a second one for points. "
+            "The patient can mute it on the page."
+        ),
+    )
+    boards = models.CharField(
+        _("leaderboards"),
+        max_length=8,
+        choices=Boards.choices,
+        default=Boards.OWN,
+        help_text=_("What the patient has agreed to. Taken back, it takes effect at once."),
+    )
+    alias = models.CharField(
+        _("animal name"), max_length=32, unique=True, null=True, blank=True, editable=False
+    )
+    blinded = models.BooleanField(
+        _("in a blinded study"),
+        default=False,
+        help_text=_("No leaderboards and no scores: the patient sees none and stands on none."),
+    )
+    simulated = models.BooleanField(_("simulated"), default=False, editable=False)
+    legacy_id = models.BigIntegerField(
+        null=True, editable=False, help_text=_("The participant of the original GARRY's database.")
+    )
+    created_at = models.DateTimeField(_("created at"), auto_now_add=True)
+    ended_at = models.DateTimeField(_("program ended"), null=True, editable=False)
+    end_reason = models.CharField(
+        _("why it ended"), max_length=8, choices=EndReason.choices, blank=True, editable=False
+    )
+    erased_at = models.DateTimeField(_("erased"), null=True, editable=False)
+    erasure_reason = models.CharField(
+        _("why it was erased"),
+        max_length=9,
+        choices=ErasureReason.choices,
+        blank=True,
+        editable=False,
+    )
+
+    class Meta(ClinicModel.Meta):
+        verbose_name = _("patient")
+        verbose_name_plural = _("patients")
+        ordering: ClassVar = ["nickname", "code"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(fields=["clinic", "code"], name="patient_code_once_per_clinic"),
+            models.UniqueConstraint(
+                fields=["clinic", "legacy_id"], name="patient_imported_once_per_clinic"
+            ),
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.nickname} ({self.code})"
+
+    def save(self, *args: Any, **kwargs: Any) -> None:
+        """Save the patient; one who has agreed to boards first gets an animal name."""
+        if self.boards != Boards.OWN and self.alias is None:
+            self.draw_alias()
+            if kwargs.get("update_fields") is not None:
+                kwargs["update_fields"] = {*kwargs["update_fields"], "alias"}
+        super().save(*args, **kwargs)
+
+    @property
+    def is_new(self) -> bool:
+        """Return whether the patient is not stored yet."""
+        return self._state.adding
+
+    def lock(self) -> None:
+        """Reload the row and lock it until the end of the transaction."""
+        self.refresh_from_db(from_queryset=_locked())
+
+    def save_fields(self, *fields: str) -> None:
+        """Save these fields alone, so that other fields are not reset to what was read earlier.
+
+        Raises PatientErased where the patient has been erased meanwhile.
+        """
+        with transaction.atomic():
+            if _locked().get(pk=self.pk).erased_at is not None:
+                raise PatientErased
+            self.save(update_fields=fields)
+
+    def clean(self) -> None:
+        """Refuse boards with others without consent, and any change to an erased patient."""
+        if self.erased_at is not None:
+            raise PatientErased
+        if self.boards == Boards.OWN or self.simulated:
+            return
+        has_consent = self.pk and self.consents.filter(purpose="boards", withdrawn_at=None).exists()
+        if not has_consent:
+            raise ValidationError(
+                {
+                    "boards": _(
+                        "Boards with others need the patient's consent to boards. Note it on the "
+                        "patient's consent page first."
+                    )
+                }
+            )
+
+    def draw_alias(self) -> None:
+        """Set another animal name, one that no patient on this server has."""
+        self.alias = draw_alias(lambda name: Patient.everywhere.filter(alias=name).exists())
+
+
+def _locked() -> models.QuerySet[Patient]:
+    """Return patients to lock; rows of other tables may still refer to them meanwhile."""
+    return Patient.everywhere.select_for_update(no_key=True)
