@@ -246,7 +246,7 @@ class Ward:
             while len(runtime.sockets) > 2:  # noqa: ASYNC110 (the source and the page that stay)
                 await asyncio.sleep(0)
         noisy = runtime.sessions.get(self.session.pk)
-        assert noisy is None or not (noisy.channel.viewers or noisy.source or noisy.robot)
+        assert noisy is None or not (noisy.feed.subscribers or noisy.source or noisy.robot)
         assert not runtime.waiting[self.noisy.station.pk]
 
 

@@ -111,7 +111,7 @@ class Runtime:
         return live
 
     async def admitted(self, session_id: int) -> LiveSession:
-        """Give a live session at a moment when no viewer joins it. Raises what ``session`` does.
+        """Give a live session at a moment when no subscriber joins it. Raises what ``session`` does.
 
         Until the next ``await`` it is the one in memory: what is attached to it is told of its end.
         """
@@ -248,8 +248,10 @@ class Runtime:
         for live in self.sessions.values():
             presence = live.presence(timezone.now())
             quality = to_text({"type": "heartbeat", "presence": presence})
-            for viewer in live.channel.viewers:
-                viewer.beat(quality if viewer.audience is Audience.MONITOR else HEARTBEAT)
+            for subscriber in live.feed.subscribers:
+                subscriber.queue_heartbeat(
+                    quality if subscriber.audience is Audience.MONITOR else HEARTBEAT
+                )
 
     async def _close_idle(self) -> None:
         for live in list(self.sessions.values()):

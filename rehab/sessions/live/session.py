@@ -1,4 +1,4 @@
-"""A session that is live in this process: its fold, its viewers, its source and its robot."""
+"""A session that is live in this process: its fold, its subscribers, its source and its robot."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from rehab.sessions.events import (
     step_event,
 )
 from rehab.sessions.live.actor import Row, SessionActor
-from rehab.sessions.live.hub import Channel, Viewer
+from rehab.sessions.live.hub import EventFeed, Subscriber
 from rehab.sessions.live.lateness import Lateness
 from rehab.sessions.live.writer import Job, Writer
 from rehab.sessions.log import Remark, RobotEntry, Step
@@ -87,7 +87,7 @@ class LiveSession:
         here = f"session {self.id}" if self.station_id is None else f"station {self.station_id}"
         self.place = here
         self.actor = actor
-        self.channel = Channel()
+        self.feed = EventFeed()
         self.recent: deque[Step | ScoredStep] = deque(recent, maxlen=RECENT)
         self.source: Peer | None = None
         self.source_clock: Lateness | None = None  # of its latest run
@@ -121,7 +121,7 @@ class LiveSession:
     @property
     def is_idle(self) -> bool:
         """Whether nobody and nothing needs it in memory."""
-        return not (self.channel.viewers or self.source or self.robot or self.unwritten)
+        return not (self.feed.subscribers or self.source or self.robot or self.unwritten)
 
     @property
     def is_running(self) -> bool:
@@ -131,8 +131,8 @@ class LiveSession:
     @property
     def is_watched(self) -> bool:
         """Whether a PT's page is open: a real robot begins no gesture while none is."""
-        viewers = self.channel.viewers
-        return any(one.audience is Audience.MONITOR and one.is_attentive for one in viewers)
+        subscribers = self.feed.subscribers
+        return any(one.audience is Audience.MONITOR and one.is_attentive for one in subscribers)
 
     def take(self, measurement: Measurement, received_at: datetime, *, late: bool = False) -> None:
         """Score a stride and queue it for the log. Raises what ``SessionFold.step`` raises."""
@@ -223,7 +223,7 @@ class LiveSession:
             row = self.actor.note(LOGGED[kind], None, at, data)
             self._submit([row], [event], [], summarize=False)
         else:
-            self.channel.publish(event)
+            self.feed.publish(event)
 
     def _submit(
         self,
@@ -261,7 +261,7 @@ class LiveSession:
                 self.recent.append(step)
                 self.committed = step.number
             for event in events:
-                self.channel.publish(event)
+                self.feed.publish(event)
             if stored is not None and not stored.done():
                 stored.set_result(None)
 
@@ -288,13 +288,13 @@ class LiveSession:
         }
 
     def announce_presence(self, now: datetime) -> None:
-        """Tell the viewers who is there."""
-        self.channel.publish(presence_event(self.actor.fold, self.presence(now)))
+        """Tell the subscribers who is there."""
+        self.feed.publish(presence_event(self.actor.fold, self.presence(now)))
 
     async def join(
         self, audience: Audience, send: Callable[[str], Awaitable[None]], now: datetime
-    ) -> tuple[Message, Viewer]:
-        """Add a viewer. Give all that its page shows as of now; events follow from there.
+    ) -> tuple[Message, Subscriber]:
+        """Add a subscriber. Give all that its page shows as of now; events follow from there.
 
         New steps wait for the few milliseconds until what is under way has been committed, so that
         a page is never shown what may not have happened, and nothing twice.
@@ -315,9 +315,9 @@ class LiveSession:
                 robot_stopped=self.robot_stopped,
                 marks=self._marks(),
             )
-            viewer = Viewer(self.channel, audience, send)
-            self.channel.viewers.add(viewer)
-            return shown, viewer
+            subscriber = Subscriber(self.feed, audience, send)
+            self.feed.subscribers.add(subscriber)
+            return shown, subscriber
         finally:
             self._joining -= 1
             if not self._joining:
@@ -329,7 +329,7 @@ class LiveSession:
         return sorted([*self.actor.marks, *switches], key=lambda mark: mark["after"])
 
     async def admission(self) -> None:
-        """Wait while a viewer joins. Whoever takes steps or changes asks first.
+        """Wait while a subscriber joins. Whoever takes steps or changes asks first.
 
         Those who wait go on in the order in which they came.
         """

@@ -111,7 +111,7 @@ async def test_a_robot_hears_its_cue_states_and_steps(place, begun, ready, monke
     later = await ready(place)
     assert (await robot.hear("welcome"))["session"] == later.pk
     await turns()
-    assert len(old.channel.viewers) == 1  # the monitor's: the robot listens to the new one alone
+    assert len(old.feed.subscribers) == 1  # the monitor's: the robot listens to the new one alone
 
 
 async def test_a_robot_waits_for_a_session_at_its_station(place, ready):

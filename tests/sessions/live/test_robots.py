@@ -181,7 +181,7 @@ async def test_a_robot_is_told_whether_a_pt_looks_on(place, begun, monkeypatch):
 
 
 async def test_a_page_that_confirms_nothing_is_nobody_looking_on(place, begun, monkeypatch):
-    monkeypatch.setattr(hub, "ABSENT_S", 0.2)
+    monkeypatch.setattr(hub, "INATTENTIVE_S", 0.2)
     session = await begun(place)
     monitor = place.monitor(session)
     await monitor.watch()

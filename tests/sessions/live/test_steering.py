@@ -260,7 +260,7 @@ async def test_whoever_waits_for_a_viewer_is_not_overtaken(place, begun, monkeyp
         order.append(name)
 
     def snapshot_meanwhile(*args, **facts):
-        tasks.append(asyncio.create_task(ask("later")))  # not yet begun when the viewer is in
+        tasks.append(asyncio.create_task(ask("later")))  # not yet begun when the subscriber is in
         return snapshot(*args, **facts)
 
     monkeypatch.setattr(sessions, "snapshot", snapshot_meanwhile)

@@ -7,7 +7,7 @@ import asyncio
 from django.utils import timezone
 
 from rehab.sessions.live.consumers.device import DeviceSocket
-from rehab.sessions.live.hub import Lagged, Viewer
+from rehab.sessions.live.hub import Lagged, Subscriber
 from rehab.sessions.live.messages import read_report
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.payloads import Message, describe_cue
@@ -22,7 +22,7 @@ class RobotConsumer(DeviceSocket):
 
     kind = Device.Kind.ROBOT
     slot = "robot"
-    viewer: Viewer | None = None
+    subscriber: Subscriber | None = None
     _pumping: asyncio.Task[None] | None = None
 
     async def asked(self, message: Message, text: str) -> None:
@@ -45,8 +45,8 @@ class RobotConsumer(DeviceSocket):
     async def _pump(self, live: LiveSession) -> None:
         """Send the order and then steps. What a robot missed is past, and never made up for."""
         while self.live is live:
-            _, viewer = await live.join(Audience.ROBOT, self.send, timezone.now())
-            self.viewer = viewer
+            _, subscriber = await live.join(Audience.ROBOT, self.send, timezone.now())
+            self.subscriber = subscriber
             fold = live.actor.fold
             cue, state = describe_cue(fold), fold.state.value
             stopped, watched = live.robot_stopped, live.is_watched
@@ -54,11 +54,11 @@ class RobotConsumer(DeviceSocket):
             welcome["valence"] = fold.valence.slug
             await self.say(welcome | {"stopped": stopped, "watched": watched})
             try:
-                await viewer.pump()
+                await subscriber.pump()
             except Lagged:
                 continue
             finally:
-                live.channel.viewers.discard(viewer)
+                live.feed.subscribers.discard(subscriber)
 
     def _heard_report(self, message: Message, text: str) -> None:
         if len(text) > MAX_REPORT_CHARS:
@@ -75,6 +75,6 @@ class RobotConsumer(DeviceSocket):
 
     def left(self) -> None:
         """Stop listening, and free the session for another robot."""
-        if self.live is not None and self.viewer is not None:
-            self.live.channel.viewers.discard(self.viewer)
+        if self.live is not None and self.subscriber is not None:
+            self.live.feed.subscribers.discard(self.subscriber)
         super().left()

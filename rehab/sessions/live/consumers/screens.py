@@ -22,7 +22,7 @@ from rehab.sessions.events import history_entry, to_text
 from rehab.sessions.live.auth import Actor, find_actor, may_open, may_watch
 from rehab.sessions.live.backlog import read_steps
 from rehab.sessions.live.consumers.base import Closing, Socket
-from rehab.sessions.live.hub import Lagged, Unseen, Viewer
+from rehab.sessions.live.hub import Lagged, Stalled, Subscriber
 from rehab.sessions.live.messages import (
     read_change,
     read_order,
@@ -48,7 +48,7 @@ class ScreenConsumer(Socket):
     requester: ClassVar[Requester]  # as whom people ask for changes here
     pauses_as: ClassVar[PauseReason]
     robot_orders: ClassVar[tuple[str, ...]] = ("stop",)
-    viewer: Viewer | None = None
+    subscriber: Subscriber | None = None
     language = settings.LANGUAGE_CODE
 
     async def opened(self) -> None:
@@ -89,17 +89,17 @@ class ScreenConsumer(Socket):
     async def _pump(self, live: LiveSession, after: int | None) -> None:
         """Send a snapshot, what was missed, then events; begin anew where the page lags."""
         while True:
-            shown, viewer = await live.join(self.audience, self.send, timezone.now())
-            self.viewer = viewer
+            shown, subscriber = await live.join(self.audience, self.send, timezone.now())
+            self.subscriber = subscriber
             if isinstance(self.actor, Device) or self.audience is Audience.MONITOR:
                 live.announce_presence(timezone.now())
             try:
                 await self.say(shown)
                 if after is not None:
-                    await self._send_missed(live, viewer, after, shown["number"])
-                viewer.wake()
-                await viewer.pump()
-            except Unseen:
+                    await self._send_missed(live, subscriber, after, shown["number"])
+                subscriber.wake()
+                await subscriber.pump()
+            except Stalled:
                 raise Closing(
                     CloseCode.UNCONFIRMED,
                     "unseen",
@@ -108,9 +108,11 @@ class ScreenConsumer(Socket):
             except Lagged:
                 after = None
             finally:
-                live.channel.viewers.discard(viewer)
+                live.feed.subscribers.discard(subscriber)
 
-    async def _send_missed(self, live: LiveSession, viewer: Viewer, after: int, until: int) -> None:
+    async def _send_missed(
+        self, live: LiveSession, subscriber: Subscriber, after: int, until: int
+    ) -> None:
         """Send the steps after a number from the log, oldest first."""
         plan = live.actor.fold.plan
         while after < until:
@@ -120,7 +122,7 @@ class ScreenConsumer(Socket):
             entries = (history_entry(self.audience, plan, step) for step in steps)
             texts = [to_text(entry) for entry in entries if entry is not None]
             if texts:
-                await viewer.send_past(texts)
+                await subscriber.send_backlog(texts)
             after = steps[-1].number
 
     async def heard(self, text: str | None) -> None:
@@ -131,8 +133,8 @@ class ScreenConsumer(Socket):
         """Deal with a confirmation or a change."""
         match message.get("type"):
             case "seen":
-                if self.viewer is not None:
-                    self.viewer.seen(read_whole(message, "frame", low=0))
+                if self.subscriber is not None:
+                    self.subscriber.confirm(read_whole(message, "frame", low=0))
                 if isinstance(self.actor, Device) and self.live is not None:
                     self.live.tablet_heard_at = timezone.now()
             case "change":
@@ -217,8 +219,8 @@ class ScreenConsumer(Socket):
         """Stop listening."""
         live, self.live = self.live, None
         if live is not None:
-            if self.viewer is not None:
-                live.channel.viewers.discard(self.viewer)
+            if self.subscriber is not None:
+                live.feed.subscribers.discard(self.subscriber)
             if isinstance(self.actor, Device):
                 live.tablets -= 1
                 live.announce_presence(timezone.now())

@@ -140,7 +140,7 @@ class SourceConsumer(DeviceSocket):
             return
         fold = live.actor.fold
         if goal is not None and goal != fold.goal:
-            live.channel.publish(source_goal_event(fold, goal))
+            live.feed.publish(source_goal_event(fold, goal))
         side = Side(fold.plan.trained_side)
         time_s = self._time_plain(fold.last_time_s)
         live.take(Measurement(live.next_number, time_s, side, value), timezone.now())
