@@ -1,4 +1,4 @@
-"""What is told of a session, as plain data: state, phase, types, its robot's order, marks."""
+"""Parts of messages about a session: state, phase, types, its robot's cue, marks."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Message = dict[str, Any]
 
 
 def describe_walked(fold: SessionFold) -> Message:
-    """Give how far the session and its phase have come."""
+    """Return how far the session and its phase have come."""
     return {
         "active_s": round(fold.active_s, 2),
         "phase_s": round(fold.phase_s, 2),
@@ -26,7 +26,7 @@ def describe_walked(fold: SessionFold) -> Message:
 
 
 def describe_phase(plan: SessionPlan, index: int, valence: Valence) -> Message:
-    """Give a phase as pages show it, with the feedback type that is in force there."""
+    """Return a phase as pages show it, with the feedback type that is in force there."""
     phase = plan.phases[index]
     calm_words = ""
     if not phase.feedback:
@@ -46,7 +46,7 @@ def describe_phase(plan: SessionPlan, index: int, valence: Valence) -> Message:
 
 
 def describe_now(fold: SessionFold) -> Message:
-    """Give the phase that the next step falls in, and how its points stand."""
+    """Return the phase that the next step falls in, and how its points stand."""
     return {
         "phase": describe_phase(fold.plan, fold.phase_index, fold.valence),
         "has_points": fold.valence.has_points,
@@ -67,7 +67,7 @@ def describe_source_phase(fold: SessionFold) -> Message:
 
 
 def describe_types(fold: SessionFold) -> Message:
-    """Give which feedback type is in force and which comes next, and which it may be."""
+    """Return which feedback type is in force and which comes next, and which it may be."""
     return {
         "began": fold.plan.valence.slug,
         "changed_to": list(fold.changed_to),
@@ -78,7 +78,7 @@ def describe_types(fold: SessionFold) -> Message:
 
 
 def describe_cue(fold: SessionFold) -> Message:
-    """Give the robot's order for this session, as of now."""
+    """Return the robot's order for this session, as of now."""
     cue = fold.valence.cue
     named = {cue.above, cue.below}
     return {
@@ -93,7 +93,7 @@ def describe_cue(fold: SessionFold) -> Message:
 
 
 def describe_state(fold: SessionFold) -> Message:
-    """Give where the session stands, and who paused it."""
+    """Return where the session stands, and who paused it."""
     paused = fold.state is State.PAUSED and fold.pause_reason is not None
     return {
         "state": fold.state.value,
@@ -107,5 +107,5 @@ def change_mark(after: int, kind: str, value: ChangeValue) -> Message:
 
 
 def type_mark(after: int, slug: str) -> Message:
-    """Give the moment from which another feedback type was in force, for a PT's chart."""
+    """Return the moment from which another feedback type was in force, for a PT's chart."""
     return {"after": after, "kind": "type", "value": VALENCES[slug].label}

@@ -1,4 +1,4 @@
-"""From committed events to screens: a ring for each session, a pump for each subscriber.
+"""Publishes committed events: a ring buffer for each session, a pump for each subscriber.
 
 Nothing that a subscriber does or fails to do holds up the session or other subscribers. A slow one
 gets fewer and larger frames; one that confirms nothing is let go. The ring bounds the memory.
@@ -15,21 +15,21 @@ from rehab.training.controls import Audience
 
 RING = 512  # events a session; at two steps a second four minutes
 MAX_UNCONFIRMED = 32  # frames that may be on their way to a page
-MAX_UNCONFIRMED_BACKLOG = 4  # of these, frames of past steps: whoever reads faster is fed faster
+MAX_UNCONFIRMED_BACKLOG = 4  # of these, frames of past steps
 CONFIRM_TIMEOUT_S = 15.0  # how long a page may take to confirm one
-INATTENTIVE_S = 5.0  # after so long nobody can be said to look at it
+INATTENTIVE_S = 5.0  # a page that confirms nothing for so long is not watched
 
 
 class Lagged(Exception):
-    """A subscriber missed more than the ring holds; it needs a new snapshot."""
+    """A subscriber missed more events than the ring holds; it needs a new snapshot."""
 
 
 class Stalled(Exception):
-    """A subscriber confirms nothing any more."""
+    """A subscriber does not confirm frames any more."""
 
 
 class EventFeed:
-    """A session's latest events, and who listens to them."""
+    """A session's latest events and their subscribers."""
 
     def __init__(self) -> None:
         self.head = 0  # how many events there have ever been
@@ -44,7 +44,7 @@ class EventFeed:
             subscriber.wake()
 
     def events_after(self, position: int) -> list[LiveEvent]:
-        """Give the events after a position. Raises Lagged where some are gone."""
+        """Return the events after a position. Raises Lagged if the ring has lost some."""
         missing = self.head - position
         if missing > len(self._ring):
             raise Lagged
@@ -54,7 +54,7 @@ class EventFeed:
 
 
 class Subscriber:
-    """One page or robot: sends what it has not had, as fast as it confirms."""
+    """One page or robot: gets the events it has not had, as fast as it confirms them."""
 
     def __init__(
         self, feed: EventFeed, audience: Audience, send: Callable[[str], Awaitable[None]]
@@ -65,22 +65,22 @@ class Subscriber:
         self._send = send
         self._confirmed_frame = 0
         self._position = feed.head
-        self._unconfirmed_since_s = 0.0  # since when frames have been unconfirmed
+        self._unconfirmed_since_s = 0.0  # when the oldest unconfirmed frame was sent
         self._heartbeat: str | None = None
         self._awake = asyncio.Event()
         self._confirmed = asyncio.Event()
 
     def wake(self) -> None:
-        """Say that there is something to send."""
+        """Wake the pump: there is something to send."""
         self._awake.set()
 
     def queue_heartbeat(self, text: str) -> None:
-        """Send a sign of life before anything else."""
+        """Queue a heartbeat, which is sent before anything else."""
         self._heartbeat = text
         self._awake.set()
 
     def confirm(self, frame: int) -> None:
-        """Note that the page has dealt with frames up to this one."""
+        """Note that the page has processed the frames up to this one."""
         if self._confirmed_frame < frame <= self.frame:
             self._confirmed_frame = frame
             self._unconfirmed_since_s = asyncio.get_running_loop().time()
@@ -88,7 +88,7 @@ class Subscriber:
 
     @property
     def is_attentive(self) -> bool:
-        """Whether the page deals with what it is sent."""
+        """Whether the page processes what it is sent."""
         waited_s = asyncio.get_running_loop().time() - self._unconfirmed_since_s
         return self._confirmed_frame == self.frame or waited_s < INATTENTIVE_S
 
@@ -100,16 +100,16 @@ class Subscriber:
         await self._send(f'{{"type":"{kind}","frame":{self.frame},"{kind}":[{",".join(texts)}]}}')
 
     async def send_backlog(self, texts: list[str]) -> None:
-        """Send past steps as a frame, once the page has dealt with most of those before.
+        """Send past steps as a frame, once the page has confirmed most of the frames before.
 
-        Raises Stalled where it confirms nothing.
+        Raises Stalled if it confirms none in time.
         """
         while self.frame - self._confirmed_frame >= MAX_UNCONFIRMED_BACKLOG:
             await self._wait_for_confirmation()
         await self.send_frame("steps", texts)
 
     async def pump(self) -> None:
-        """Send until cancelled. Raises Lagged or Stalled where the subscriber must begin anew."""
+        """Send until cancelled. Raises Lagged or Stalled if the subscriber must start again."""
         while True:
             await self._awake.wait()
             self._awake.clear()

@@ -84,7 +84,7 @@ async def test_a_planted_control_needs_no_other_code(place, begun):
 
     # The fold, and the event for each audience.
     live = await runtime.current().session(session.pk)
-    assert live.actor.fold.settings["cadence"] == 80
+    assert live.aggregate.fold.settings["cadence"] == 80
     told = await monitor.until(lambda event: event["kind"] == "cadence")
     mark = {"after": 1, "kind": "cadence", "value": 80}
     assert told == {"kind": "cadence", "steps_a_minute": 80, "mark": mark}

@@ -256,7 +256,7 @@ async def test_whoever_waits_for_a_viewer_is_not_overtaken(place, begun, monkeyp
     order, tasks = [], []
 
     async def ask(name):
-        await live.admission()
+        await live.wait_for_subscriptions()
         order.append(name)
 
     def snapshot_meanwhile(*args, **facts):
@@ -265,13 +265,13 @@ async def test_whoever_waits_for_a_viewer_is_not_overtaken(place, begun, monkeyp
 
     monkeypatch.setattr(sessions, "snapshot", snapshot_meanwhile)
     settled = asyncio.Event()
-    monkeypatch.setattr(live, "settled", settled.wait)
-    monkeypatch.setattr(live, "unwritten", 1)
-    joining = asyncio.create_task(live.join(Audience.PATIENT, take_frame, NOW))
+    monkeypatch.setattr(live, "wait_until_committed", settled.wait)
+    monkeypatch.setattr(live, "uncommitted", 1)
+    joining = asyncio.create_task(live.subscribe(Audience.PATIENT, take_frame, NOW))
     await turns()
     tasks.append(asyncio.create_task(ask("earlier")))
     await turns()
-    monkeypatch.setattr(live, "unwritten", 0)
+    monkeypatch.setattr(live, "uncommitted", 0)
     settled.set()
     await joining
     await asyncio.gather(*tasks)

@@ -8,7 +8,7 @@ import pytest
 
 from rehab.sessions.live import hub
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.backlog import PAGE
+from rehab.sessions.live.backlog import PAGE_STEPS
 from rehab.training.phases import make_phase
 from tests.support.callers import (
     Caller,
@@ -32,7 +32,7 @@ TOTALS = [
 
 
 def apply(page: Page) -> Message:
-    """Give a page's totals: its first snapshot and all events after it."""
+    """Return a page's totals: its first snapshot and all events after it."""
     totals = dict(page.heard[0])
     for event in page.events:
         match event["kind"]:
@@ -146,7 +146,7 @@ async def test_a_long_past_is_fed_as_fast_as_it_is_read(place, begun):
     await Caller.overhear(slow)
     past = frames_of_past(slow)
     assert len(past) == hub.MAX_UNCONFIRMED_BACKLOG  # not one more before it has read one
-    assert max(len(frame["steps"]) for frame in past) <= PAGE
+    assert max(len(frame["steps"]) for frame in past) <= PAGE_STEPS
     while len(numbers_of(slow)) < count:
         await slow.say({"type": "seen", "frame": frames_of_past(slow)[-1]["frame"]})
         await slow.hear("steps")
