@@ -14,13 +14,13 @@ class RehabConfig(AppConfig):
     def ready(self) -> None:
         """Register checks, the shared rows of every database, and signal receivers."""
         from rehab import checks  # noqa: F401
-        from rehab.boards.watching import watch
+        from rehab.boards.signals import connect_receivers
         from rehab.models import TRACKED
         from rehab.people.audit.history import track_models
         from rehab.sessions.feedback_text_updates import connect_signals
         from rehab.sessions.setup.defaults import install_defaults
 
         post_migrate.connect(install_defaults, sender=self)
-        watch()
+        connect_receivers()
         track_models(*TRACKED)
         connect_signals()

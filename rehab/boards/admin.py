@@ -15,11 +15,13 @@ from django.utils import timezone
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.boards import entries
-from rehab.boards.figures import Figure, group_of, read_figures
+from rehab.boards.building import entries
+from rehab.boards.choices import Aggregation, Occasion, Participants
 from rehab.boards.forms import LeaderboardForm
 from rehab.boards.models import Leaderboard
-from rehab.boards.showing import Viewer
+from rehab.boards.panels.viewer import BoardViewer
+from rehab.boards.ranking.eligibility import find_group
+from rehab.boards.ranking.results import Result, read_results
 from rehab.people.access import user_of
 from rehab.people.models import Boards, Patient
 from rehab.people.roles import Role
@@ -27,7 +29,7 @@ from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
 
-SEEN_AS = 60  # patients to see a preview as, those who walked last first
+MAX_SEEN_AS = 60  # patients as whom a preview can be seen, those who walked last first
 
 
 @admin.register(Leaderboard)
@@ -36,11 +38,11 @@ class LeaderboardAdmin(PreviewAdmin):
 
     form = LeaderboardForm
     change_form_template = "boards/admin_form.html"
-    list_display = ("name", "among", "types", "metric", "period", "moment", "active")
-    list_filter = ("active", "moment", "among", "metric")
+    list_display = ("name", "among", "types", "metric", "period", "occasion", "active")
+    list_filter = ("active", "occasion", "among", "metric")
     search_fields = ("name",)
     radio_fields = dict.fromkeys(
-        ("among", "types", "entry", "period", "moment", "display", "names", "ties"),
+        ("among", "types", "entry", "period", "occasion", "display", "names", "ties"),
         admin.HORIZONTAL,
     )
     fieldsets = (
@@ -74,7 +76,7 @@ class LeaderboardAdmin(PreviewAdmin):
             _("How it is shown"),
             {
                 "fields": (
-                    "moment",
+                    "occasion",
                     "display",
                     "top_n",
                     "total_goal",
@@ -95,39 +97,39 @@ class LeaderboardAdmin(PreviewAdmin):
     )
 
     def formfield_for_choice_field(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
-        """Offer what this person may build: boards across clinics are the host's, and only they."""
+        """Offer what this person may build: a host boards across clinics, others all the rest."""
         if db_field.name == "among":
-            across = Leaderboard.Among.ACROSS
+            across = Participants.ACROSS
             hosts = user_of(request).role == Role.HOST
             kwargs["choices"] = [
-                choice for choice in Leaderboard.Among.choices if (choice[0] == across) == hosts
+                choice for choice in Participants.choices if (choice[0] == across) == hosts
             ]
         return super().formfield_for_choice_field(db_field, request, **kwargs)
 
     def formfield_for_manytomany(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
-        """Let a group be ticked, of those who are not erased."""
+        """Offer the patients of a group as checkboxes, without those who are erased."""
         kwargs["widget"] = forms.CheckboxSelectMultiple()
         field: Any = super().formfield_for_manytomany(db_field, request, **kwargs)
         field.queryset = field.queryset.filter(erased_at=None)
         return field
 
     def get_changeform_initial_data(self, request: HttpRequest) -> dict[str, Any]:
-        """Begin with a board that can be saved."""
+        """Return initial values that can be saved as they are."""
         if user_of(request).role == Role.HOST:
-            return {"among": Leaderboard.Among.ACROSS, "entry": Leaderboard.Entry.BEST}
+            return {"among": Participants.ACROSS, "entry": Aggregation.BEST}
         return {}
 
     def render_change_form(
         self, request: HttpRequest, context: dict[str, Any], *args: Any, **kwargs: Any
     ) -> HttpResponse:
-        """Show the form; patients to see the preview as stand beside it."""
-        context["seen_as"] = self._walkers(request)[:SEEN_AS]
+        """Show the form, and beside it the patients as whom the preview can be seen."""
+        context["seen_as"] = self._walkers(request)[:MAX_SEEN_AS]
         board: Leaderboard | None = kwargs.get("obj")
         context["built"] = None if board is None else entries.measure_progress(board)
         return super().render_change_form(request, context, *args, **kwargs)
 
     def render_preview(self, request: HttpRequest, row: Leaderboard | None) -> HttpResponse:
-        """Show the board, made of the clinic's own sessions."""
+        """Show the board, computed from the clinic's own sessions."""
         given = request.GET.copy()
         given["name"] = given.get("name", "").strip() or gettext("Leaderboard")
         form = self.get_form(request, row, change=row is not None)(given, instance=row)
@@ -139,14 +141,14 @@ class LeaderboardAdmin(PreviewAdmin):
                 "It is made of patients, whom a host does not see. Clinics see it on tablets."
             )
             return render(request, "boards/preview_faults.html", {"faults": [("", fault)]})
-        board = self._viewer(request, form.instance).show()
+        board = self._viewer(request, form.instance).make_panel()
         return render(request, "boards/scores.html", {"boards": [board], "ranked": True})
 
-    def _viewer(self, request: HttpRequest, board: Leaderboard) -> Viewer:
-        """Give the eyes to see it with: a patient's after the newest session, or anybody's."""
+    def _viewer(self, request: HttpRequest, board: Leaderboard) -> BoardViewer:
+        """Return who sees the preview: a patient after the newest session, or anybody."""
         now = timezone.now()
-        anybody = Viewer(board, now, made=self._make(request, board, now))
-        if board.moment == Leaderboard.Moment.WAITING:
+        anybody = BoardViewer(board, now, results=self._compute(request, board, now))
+        if board.occasion == Occasion.WAITING:
             return anybody
         finished = TrainingSession.objects.visible_to(request.user).filter(
             state=State.FINISHED.value
@@ -156,25 +158,27 @@ class LeaderboardAdmin(PreviewAdmin):
         walkers = self._walkers(request)
         if chosen.isdecimal():
             patient = walkers.filter(pk=chosen).first()
-        else:  # somebody who sees the board itself, where there is one
+        else:  # a patient who sees the board itself, where there is one
             typical = replace(anybody, session=newest.first()).find_typical()
             patient = walkers.filter(pk=typical or 0).first() or walkers.first()
         session = newest.filter(patient=patient).first()
         return replace(anybody, patient=patient, session=session)
 
-    def _make(self, request: HttpRequest, board: Leaderboard, now: datetime) -> list[Figure] | None:
-        """Make the rows that a board would have; None where those that are stored are these."""
+    def _compute(
+        self, request: HttpRequest, board: Leaderboard, now: datetime
+    ) -> list[Result] | None:
+        """Return the results that a board would have; None where the stored rows are the same."""
         saved = self.get_queryset(request).filter(pk=board.pk, built_to=None).first()
         if (
             saved is not None
-            and saved.makings == board.makings
-            and (not board.has_group or set(group_of(saved)) == set(group_of(board)))
+            and saved.defining_fields == board.defining_fields
+            and (not board.has_group or set(find_group(saved)) == set(find_group(board)))
         ):
             return None
-        return [] if board.is_own else list(read_figures(board, now))
+        return [] if board.is_own else list(read_results(board, now))
 
     def _walkers(self, request: HttpRequest) -> QuerySet[Patient]:
-        """Give the patients who have walked, those who agreed to boards first."""
+        """Return the patients who have walked, those who agreed to boards first."""
         walked = Patient.objects.visible_to(request.user).filter(
             sessions__state=State.FINISHED.value
         )

@@ -10,7 +10,8 @@ from django.utils import timezone
 from ninja import Path, Query, Router, Schema
 
 from rehab.boards.models import Leaderboard
-from rehab.boards.showing import Shown, Viewer, show_after
+from rehab.boards.panels.panel import BoardPanel
+from rehab.boards.panels.viewer import BoardViewer, make_session_panels
 from rehab.people.access import for_roles
 from rehab.people.roles import Role
 from rehab.people.web.api_base import Key, Page, Paging, caller, paginate, responses
@@ -20,7 +21,7 @@ router = Router(tags=["Boards"])
 
 
 class BoardOut(Schema):
-    """A board as it was built."""
+    """A board's settings."""
 
     id: int
     name: str
@@ -31,22 +32,22 @@ class BoardOut(Schema):
     types: str
     period: str
     display: str
-    moment: str
+    occasion: str
 
 
 class RowOut(Schema):
-    """A row, in the words of the page."""
+    """A row, formatted as on the page."""
 
     rank: int | None
     title: str
     value: str
-    stake: str
+    points_at_stake: str
     detail: str
     you: bool
 
 
-class ShownOut(Schema):
-    """A board as it is shown. `note` says why it is not the one that was built."""
+class BoardPanelOut(Schema):
+    """A board as it is shown. `note` says why it shows own sessions instead."""
 
     title: str
     note: str
@@ -55,9 +56,9 @@ class ShownOut(Schema):
     rows: list[RowOut]
 
     @staticmethod
-    def resolve_total(shown: Shown) -> str | None:
-        """Give what all have reached together, on boards of totals."""
-        return None if shown.total is None else shown.total.value
+    def resolve_total(panel: BoardPanel) -> str | None:
+        """Return what all have reached together, on boards of totals."""
+        return None if panel.total is None else panel.total.value
 
 
 @router.get("/boards", response=responses(Page[BoardOut]))
@@ -67,18 +68,18 @@ def list_boards(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
     return paginate(Leaderboard.objects.visible_to(caller(request)).order_by("pk"), wanted)
 
 
-@router.get("/boards/{board_id}/rows", response=responses(ShownOut, 404))
+@router.get("/boards/{board_id}/rows", response=responses(BoardPanelOut, 404))
 @for_roles(Role.LEAD, Role.PT)
-def show_board(request: HttpRequest, board_id: Path[Key]) -> Shown:
-    """Show a board as it is for whoever comes by, with those who agreed to stand on it."""
+def show_board(request: HttpRequest, board_id: Path[Key]) -> BoardPanel:
+    """Show a board as it is for anybody, with the patients who agreed to be on it."""
     boards = Leaderboard.objects.visible_to(caller(request)).select_related("clinic")
-    return Viewer(get_object_or_404(boards, pk=board_id), timezone.now()).show()
+    return BoardViewer(get_object_or_404(boards, pk=board_id), timezone.now()).make_panel()
 
 
-@router.get("/sessions/{session_id}/boards", response=responses(list[ShownOut], 404))
+@router.get("/sessions/{session_id}/boards", response=responses(list[BoardPanelOut], 404))
 @for_roles(Role.LEAD, Role.PT)
-def list_session_boards(request: HttpRequest, session_id: Path[Key]) -> list[Shown]:
+def list_session_boards(request: HttpRequest, session_id: Path[Key]) -> list[BoardPanel]:
     """Show the boards that the patient sees after a session."""
     sessions = TrainingSession.objects.visible_to(caller(request))
     session = get_object_or_404(sessions.select_related("patient", "clinic"), pk=session_id)
-    return show_after(session, timezone.now())
+    return make_session_panels(session, timezone.now())

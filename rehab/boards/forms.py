@@ -7,15 +7,15 @@ from typing import Any
 from django import forms
 from django.utils.translation import gettext_lazy as _
 
-from rehab.boards.models import Leaderboard
+from rehab.boards.choices import Participants
 from rehab.people.web.admin_base import ClinicForm
 from rehab.training.valences import VALENCES
 
-MOST_IN_GROUP = 1_000  # the preview's address names each, and servers refuse those beyond 16 kB
+MAX_GROUP = 1_000  # the preview's address names each; servers refuse addresses beyond 16 kB
 
 
 class LeaderboardForm(ClinicForm):
-    """All of a board on one page; what is left as it is makes a safe one."""
+    """All settings of a board on one page; the defaults are safe ones."""
 
     valences = forms.MultipleChoiceField(
         label=_("Which types"),
@@ -31,10 +31,10 @@ class LeaderboardForm(ClinicForm):
         if group is not None:
             self.instance.chosen = [patient.pk for patient in group]
         fewest = cleaned.get("min_participants") or 0
-        if cleaned.get("among") == Leaderboard.Among.GROUP and len(group or []) < fewest:
+        if cleaned.get("among") == Participants.GROUP and len(group or []) < fewest:
             few = _("Choose at least %(fewest)d patients.") % {"fewest": fewest}
             self.add_error("group", few)
-        elif len(group or []) > MOST_IN_GROUP:
+        elif len(group or []) > MAX_GROUP:
             many = _("Choose at most %(most)d patients, or all of the clinic.")
-            self.add_error("group", many % {"most": MOST_IN_GROUP})
+            self.add_error("group", many % {"most": MAX_GROUP})
         return cleaned

@@ -11,42 +11,37 @@ from django.db import models
 from django.db.models import Exists, Q
 from django.utils.translation import gettext_lazy as _
 
-from rehab.boards.rules import find_faults
+from rehab.boards.choices import (
+    Aggregation,
+    CountedTypes,
+    DisplayMode,
+    NameStyle,
+    Occasion,
+    Participants,
+    PeriodKind,
+    TieRule,
+    metric_choices,
+)
+from rehab.boards.validation import find_invalid_settings
 from rehab.people.models import Boards, Clinic, Patient
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
-from rehab.training.metrics import METRICS
 from rehab.training.valences import VALENCES
 
-# How rows are shown, and when. All else of a board decides what its rows are.
-SHOWN_BY = frozenset(
+# How rows are shown, and when. All other fields decide what a board's rows are.
+DISPLAY_FIELDS = frozenset(
     {
         "name",
-        "display",  # but whose agreement it takes: `agreed`
+        "display",  # its part in who may be on the board is `accepted_levels`
         "top_n",
         "total_goal",
         "show_ranks",
         "ties",
         "names",
         "min_participants",
-        "moment",
+        "occasion",
         "built_to",
     }
 )
-
-METRIC_LABELS = {
-    "hit_rate": _("Steps at the goal (%)"),
-    "mean_performance": _("Mean step, in % of the own goal"),
-    "improvement_over_baseline": _("Improvement over the own baseline (%)"),
-    "retention_in_washout": _("Improvement kept in the washout (%)"),
-    "active_minutes": _("Minutes walked"),
-    "target_met": _("Days on which the target was met"),
-}
-
-
-def metric_choices() -> list[tuple[str, Any]]:
-    """Give what can be ranked by, the hit rate first."""
-    slugs = sorted(METRICS, key=lambda slug: slug != "hit_rate")
-    return [(slug, METRIC_LABELS.get(slug, _(METRICS[slug].label))) for slug in slugs]
 
 
 @dataclass(frozen=True)
@@ -54,7 +49,7 @@ class BoardScope(Scope):
     """Boards of the own clinic, and those across clinics while it takes part in them."""
 
     def clinic_filter(self, clinic_id: int) -> Q:
-        """Give the boards that a member of this clinic may see."""
+        """Return the condition for boards that a member of this clinic may see."""
         takes_part = Exists(Clinic.everywhere.filter(pk=clinic_id, boards_across=True))
         return Q(clinic=clinic_id) | Q(takes_part, clinic__isnull=True)
 
@@ -62,70 +57,8 @@ class BoardScope(Scope):
 class Leaderboard(ClinicModel):
     """Who is compared with whom, by what, over which time, and how it is shown.
 
-    Without a clinic it is the host's, and compares patients of all clinics that take part.
+    A board without a clinic is the host's and compares patients of all clinics that take part.
     """
-
-    class Among(models.TextChoices):
-        """Whose sessions are on the board."""
-
-        SELF = "self", _("The patient's own sessions")
-        GROUP = "group", _("A group of patients")
-        CLINIC = "clinic", _("All patients of the clinic")
-        ACROSS = "across", _("Patients of several clinics")
-
-    class Types(models.TextChoices):
-        """Which feedback types are on the board."""
-
-        SAME = "same", _("Same as the session at hand")
-        CHOSEN = "chosen", _("Chosen types")
-        ALL = "all", _("All types")
-
-    class Entry(models.TextChoices):
-        """What stands in a row."""
-
-        EACH = "each", _("Each session")
-        BEST = "best", _("Best session")
-        LATEST = "latest", _("Latest session")
-        MEAN = "mean", _("Mean of the last sessions")
-        SUM = "sum", _("Sum over the period")
-
-    class Period(models.TextChoices):
-        """Which sessions count."""
-
-        ALL = "all", _("All time")
-        DAYS_30 = "days_30", _("Last 30 days")
-        WEEK = "week", _("This week")
-        MONTH = "month", _("This month")
-        DATES = "dates", _("Between two dates")
-
-    class Ties(models.TextChoices):
-        """How equal figures are ranked."""
-
-        STANDARD = "standard", "1, 2, 2, 4"
-        DENSE = "dense", "1, 2, 2, 3"
-        EARLIER = "earlier", _("1, 2, 3, 4: the earlier first")
-
-    class Display(models.TextChoices):
-        """Which rows are shown."""
-
-        NEIGHBORS = "neighbors", _("You and two on each side")
-        TOP = "top", _("The best")
-        TOP_AND_ME = "top_and_me", _("The best, and you")
-        TOTAL = "total", _("One total, reached together")
-
-    class Names(models.TextChoices):
-        """What patients are called."""
-
-        PSEUDONYM = "pseudonym", _("Animal names")
-        INITIALS = "initials", _("Initials")
-        CODE = "code", _("Codes")
-
-    class Moment(models.TextChoices):
-        """When it is shown."""
-
-        AFTER_SESSION = "after_session", _("After a session")
-        WAITING = "waiting", _("While the tablet waits")
-        PT_ONLY = "pt_only", _("Only here, to therapists")
 
     scope = BoardScope(clinic="clinic", shared=True, host=Q(clinic__isnull=True))
 
@@ -140,7 +73,7 @@ class Leaderboard(ClinicModel):
     name = models.CharField(_("name on the tablet"), max_length=32)
     active = models.BooleanField(_("active"), default=True)
     among = models.CharField(
-        _("compare with"), max_length=16, choices=Among.choices, default=Among.SELF
+        _("compare with"), max_length=16, choices=Participants.choices, default=Participants.SELF
     )
     group = models.ManyToManyField(
         Patient, related_name="+", blank=True, verbose_name=_("patients of the group")
@@ -150,13 +83,13 @@ class Leaderboard(ClinicModel):
     )
     higher_is_better = models.BooleanField(_("higher is better"), default=True)
     entry = models.CharField(
-        _("a row is"), max_length=16, choices=Entry.choices, default=Entry.EACH
+        _("a row is"), max_length=16, choices=Aggregation.choices, default=Aggregation.EACH
     )
     mean_of = models.PositiveSmallIntegerField(
         _("sessions in the mean"), default=3, validators=[MinValueValidator(1)]
     )
     types = models.CharField(
-        _("feedback types"), max_length=16, choices=Types.choices, default=Types.SAME
+        _("feedback types"), max_length=16, choices=CountedTypes.choices, default=CountedTypes.SAME
     )
     valences = models.JSONField(_("which types"), default=list, blank=True)
     min_valid_strides = models.PositiveIntegerField(
@@ -172,7 +105,7 @@ class Leaderboard(ClinicModel):
     )
     include_simulated = models.BooleanField(_("simulated sessions too"), default=False)
     period = models.CharField(
-        _("period"), max_length=16, choices=Period.choices, default=Period.DAYS_30
+        _("period"), max_length=16, choices=PeriodKind.choices, default=PeriodKind.DAYS_30
     )
     period_from = models.DateField(_("from"), null=True, blank=True)
     period_to = models.DateField(_("to"), null=True, blank=True)
@@ -186,7 +119,7 @@ class Leaderboard(ClinicModel):
         ),
     )
     display = models.CharField(
-        _("rows"), max_length=16, choices=Display.choices, default=Display.NEIGHBORS
+        _("rows"), max_length=16, choices=DisplayMode.choices, default=DisplayMode.NEIGHBORS
     )
     top_n = models.PositiveSmallIntegerField(
         _("how many of the best"),
@@ -202,7 +135,7 @@ class Leaderboard(ClinicModel):
     )
     show_ranks = models.BooleanField(_("show places"), default=True)
     ties = models.CharField(
-        _("equal figures"), max_length=16, choices=Ties.choices, default=Ties.STANDARD
+        _("equal figures"), max_length=16, choices=TieRule.choices, default=TieRule.STANDARD
     )
     tie_breaker = models.CharField(
         _("of equal figures, first"),
@@ -212,7 +145,7 @@ class Leaderboard(ClinicModel):
         help_text=_("Who has more of this stands first; after that, who was earlier."),
     )
     names = models.CharField(
-        _("names"), max_length=16, choices=Names.choices, default=Names.PSEUDONYM
+        _("names"), max_length=16, choices=NameStyle.choices, default=NameStyle.PSEUDONYM
     )
     min_participants = models.PositiveSmallIntegerField(
         _("fewest patients"),
@@ -220,14 +153,14 @@ class Leaderboard(ClinicModel):
         validators=[MinValueValidator(5)],
         help_text=_("With fewer, everyone sees the own sessions only."),
     )
-    moment = models.CharField(
-        _("shown"), max_length=16, choices=Moment.choices, default=Moment.AFTER_SESSION
+    occasion = models.CharField(
+        _("shown"), max_length=16, choices=Occasion.choices, default=Occasion.AFTER_SESSION
     )
 
     built_to = models.BigIntegerField(
         null=True,
         editable=False,
-        help_text="The patient whom building its rows has come to; nothing once they are built.",
+        help_text="Key of the last patient whose rows are built; empty when all are.",
     )
 
     class Meta(ClinicModel.Meta):
@@ -259,7 +192,7 @@ class Leaderboard(ClinicModel):
         return self.name
 
     def save(self, *args: Any, **kwargs: Any) -> None:
-        """Save the board, but not how far its rows are built: that may go on meanwhile."""
+        """Save the board except ``built_to``, which the builder may be advancing meanwhile."""
         if not self._state.adding and kwargs.get("update_fields") is None:
             names = {field.name for field in self._meta.concrete_fields if not field.primary_key}
             kwargs["update_fields"] = names - {"built_to"}
@@ -267,59 +200,58 @@ class Leaderboard(ClinicModel):
 
     def clean(self) -> None:
         """Refuse boards that would mislead or expose somebody, with the cure at the field."""
-        faults = dict(find_faults(self))
-        if faults:
-            raise ValidationError(faults)
+        if errors := dict(find_invalid_settings(self)):
+            raise ValidationError(errors)
 
     @property
     def is_being_built(self) -> bool:
-        """Whether its rows are not yet what they should be: it is not shown then."""
+        """Whether its rows are still being built; it is not shown until they are."""
         return self.built_to is not None
 
     @property
     def is_own(self) -> bool:
-        """Whether it compares a patient with nobody else."""
-        return self.among == self.Among.SELF
+        """Whether it compares a patient's own sessions only."""
+        return self.among == Participants.SELF
 
     @property
     def has_group(self) -> bool:
-        """Whether its group decides who stands on it."""
-        return self.among == self.Among.GROUP
+        """Whether only the patients of its group can be on it."""
+        return self.among == Participants.GROUP
 
     @property
-    def agreed(self) -> list[str]:
-        """What a patient must have agreed to, to stand on it: one of these."""
-        if self.among == self.Among.ACROSS:
+    def accepted_levels(self) -> list[str]:
+        """The levels of agreement (`Patient.boards`) with which a patient may be on it."""
+        if self.among == Participants.ACROSS:
             return [Boards.ACROSS]
-        total = [Boards.TOTAL] if self.display == self.Display.TOTAL else []
+        total = [Boards.TOTAL] if self.display == DisplayMode.TOTAL else []
         return [*total, Boards.CLINIC, Boards.ACROSS]
 
     @property
-    def makings(self) -> list[Any]:
-        """What its rows follow from, besides sessions and patients."""
-        fields = [field for field in self._meta.concrete_fields if field.name not in SHOWN_BY]
-        return [self.agreed, *(getattr(self, field.attname) for field in fields)]
+    def defining_fields(self) -> list[Any]:
+        """The values that its rows depend on, besides sessions and patients."""
+        fields = [field for field in self._meta.concrete_fields if field.name not in DISPLAY_FIELDS]
+        return [self.accepted_levels, *(getattr(self, field.attname) for field in fields)]
 
     @property
-    def slugs(self) -> list[str]:
-        """The feedback types that count; none means all."""
-        return list(self.valences) if self.types == self.Types.CHOSEN else []
+    def counted_valences(self) -> list[str]:
+        """The valences that count; an empty list means all."""
+        return list(self.valences) if self.types == CountedTypes.CHOSEN else []
 
-    def list_of(self, valence: str) -> str:
-        """Give the list that a session of this type is on: one a type, or one for all ("")."""
-        return valence if self.types == self.Types.SAME else ""
+    def list_key(self, valence: str) -> str:
+        """Return the list that sessions of a valence are ranked in: its own, or "" for all."""
+        return valence if self.types == CountedTypes.SAME else ""
 
 
 class BoardEntry(ScopedModel):
-    """A patient's row on a board of several: what the sessions that count add up to.
+    """A patient's stored row on a board of several patients.
 
-    It follows from the sessions (`entries.py`) and is there to be found by index. ``key`` orders
-    the rows: the greater, the better.
+    It is computed from the sessions that count (`building/entries.py`) and stored so that rows are
+    found by index. ``key`` orders the rows: the greater, the better.
     """
 
     scope = Scope(clinic="patient__clinic")
 
-    # No indexes of their own: those below begin with them.
+    # No index of their own: those of the model begin with these columns.
     board = models.ForeignKey(
         Leaderboard, on_delete=models.CASCADE, related_name="entries", db_index=False
     )
@@ -327,10 +259,12 @@ class BoardEntry(ScopedModel):
     valence = models.CharField(
         max_length=16, blank=True, choices=[(v.slug, _(v.label)) for v in VALENCES.values()]
     )
-    figure = models.IntegerField(help_text="As it is shown: in whole numbers.")
-    stake = models.IntegerField(null=True, help_text="What could be kept, where points are lost.")
+    figure = models.IntegerField(help_text="As it is shown: a whole number.")
+    points_at_stake = models.IntegerField(
+        null=True, help_text="The points that could be kept, where points can only be lost."
+    )
     key = models.CharField(max_length=48)
-    stale_on = models.DateField(null=True, help_text="When time alone alters it.")
+    stale_on = models.DateField(null=True, help_text="The day from which it is out of date.")
 
     class Meta(ScopedModel.Meta):
         constraints: ClassVar = [
@@ -346,7 +280,10 @@ class BoardEntry(ScopedModel):
 
 
 class BoardCount(ScopedModel):
-    """How many rows of a board have a figure: places are sums of these, never counts of rows."""
+    """How many rows of a board have one figure.
+
+    Ranks are sums of these, so that no look at a board counts its rows.
+    """
 
     scope = Scope(clinic="board__clinic")
 

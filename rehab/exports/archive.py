@@ -1,4 +1,4 @@
-"""A ZIP that is made while it is sent: no part waits for the rest, and memory stays constant."""
+"""A ZIP that is written while it is sent, in constant memory."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from django.core.serializers.json import DjangoJSONEncoder
 from django.http import StreamingHttpResponse
 from zipstream import ZipStream
 
-from rehab.exports.tables import to_cells
+from rehab.exports.tables import format_cells
 
-PART = 64 * 1024
-LINES = 500
+CHUNK_BYTES = 64 * 1024
+CSV_LINES = 500  # a chunk
 
 Files = Iterable[tuple[str, Iterable[str]]]
 
 
 def write_zip(files: Files) -> Iterator[bytes]:
-    """Yield a ZIP of texts in parts of some 64 KiB."""
+    """Yield a ZIP of texts in chunks of some 64 KiB."""
     archive = ZipStream(compress_type=ZIP_DEFLATED)
     for name, texts in files:
         archive.add((text.encode() for text in texts), name)
@@ -33,36 +33,36 @@ def write_zip(files: Files) -> Iterator[bytes]:
 
 
 def _join(chunks: Iterable[bytes]) -> Iterator[bytes]:
-    """Yield the same bytes in larger parts: each one costs a hop between threads and a frame."""
+    """Yield the same bytes in larger chunks: each costs a hop between threads and a frame."""
     parts: list[bytes] = []
     size = 0
     for chunk in chunks:
         parts.append(chunk)
         size += len(chunk)
-        if size >= PART:
+        if size >= CHUNK_BYTES:
             yield b"".join(parts)
             parts, size = [], 0
     yield b"".join(parts)
 
 
 def write_csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Iterator[str]:
-    """Give a table as text, some lines at a time."""
-    cells = to_cells(rows)
+    """Yield a table as CSV text, some lines at a time."""
+    cells = format_cells(rows)
     lines: Iterable[Sequence[Any]] = [header]
     while lines:
         text = io.StringIO()
         csv.writer(text, lineterminator="\r\n").writerows(lines)
         yield text.getvalue()
-        lines = list(islice(cells, LINES))
+        lines = list(islice(cells, CSV_LINES))
 
 
 def write_json(data: Any) -> Iterator[str]:
-    """Give data as text that people can read."""
+    """Yield data as indented JSON."""
     yield json.dumps(data, cls=DjangoJSONEncoder, ensure_ascii=False, indent=2) + "\n"
 
 
 class ZipResponse(StreamingHttpResponse):
-    """An archive on its way. Django's own would gather all of it first when served by ASGI."""
+    """A streamed ZIP. Django's response would collect all of it first when served by ASGI."""
 
     def __init__(self, files: Files, name: str) -> None:
         super().__init__(
@@ -75,8 +75,8 @@ class ZipResponse(StreamingHttpResponse):
         )
 
     async def __aiter__(self) -> AsyncIterator[bytes]:
-        """Make the next part, in the request's own thread, when the one before has gone."""
+        """Yield each part when the one before is sent, computed in the request's own thread."""
         parts: Any = self.streaming_content
-        make = sync_to_async(lambda: next(parts, None))
-        while (part := await make()) is not None:
+        make_next = sync_to_async(lambda: next(parts, None))
+        while (part := await make_next()) is not None:
             yield part

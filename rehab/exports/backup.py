@@ -1,7 +1,7 @@
-"""A whole installation as one file, and back: on SQLite or PostgreSQL, whichever it came from.
+"""Backup and restore of a whole installation as one file, between SQLite and PostgreSQL too.
 
 The content is lines of JSON, compressed by gzip and encrypted by age: a header with the version of
-the tables and the count of rows, then every row. `age -d -i KEY FILE | gunzip` shows them.
+the tables and the count of rows, then every row. `age -d -i KEY FILE | gunzip` prints them.
 """
 
 from __future__ import annotations
@@ -26,48 +26,48 @@ from rehab.exports.encryption import decrypt, encrypt
 from rehab.people.models import User
 
 FORMAT = 1
-# What a server makes anew, or what only the browsers of this one hold the other end of.
-LEFT_OUT = {
-    "admin.logentry",  # points at content types, which each installation numbers by itself
+# What each installation creates itself, or what belongs to browsers of this one.
+EXCLUDED_MODELS = {
+    "admin.logentry",  # refers to content types, which each installation numbers by itself
     "auth.permission",
     "contenttypes.contenttype",
     "rehab.pairing",
     "sessions.session",
 }
-APPS_LEFT_OUT = {"axes"}  # who failed to sign in, for some hours
-A_TIME = 2000  # rows held in memory
+EXCLUDED_APPS = {"axes"}  # failed sign-ins of the last hours
+BATCH_ROWS = 2000  # rows held in memory
 GZIP = 31  # zlib's window and header for the gzip format
 
 
 class CannotRestore(ValueError):
-    """A backup that cannot be taken in; the message says why, and what to do."""
+    """A backup that cannot be restored; the message says why, and what to do."""
 
 
-def backed_up() -> list[type[models.Model]]:
-    """Give the models of a backup, those that only join two others among them."""
+def backup_models() -> list[type[models.Model]]:
+    """Return the models of a backup, including those of many-to-many tables."""
     every = apps.get_models(include_auto_created=True)
-    return sorted(filter(_is_kept, every), key=lambda model: model._meta.label_lower)
+    return sorted(filter(_is_included, every), key=lambda model: model._meta.label_lower)
 
 
-def _is_kept(model: type[models.Model]) -> bool:
+def _is_included(model: type[models.Model]) -> bool:
     fields = model._meta.concrete_fields
     joined = [field.related_model._meta for field in fields if field.related_model]
     return (
         model._meta.managed
         and not model._meta.proxy
-        and model._meta.app_label not in APPS_LEFT_OUT
-        and LEFT_OUT.isdisjoint(meta.label_lower for meta in (model._meta, *joined))
+        and model._meta.app_label not in EXCLUDED_APPS
+        and EXCLUDED_MODELS.isdisjoint(meta.label_lower for meta in (model._meta, *joined))
     )
 
 
 def tables_version() -> list[list[str]]:
-    """Give the migrations that this installation's tables have been through."""
+    """Return the migrations that are applied to this installation's tables."""
     return sorted(list(name) for name in MigrationRecorder(connection).applied_migrations())
 
 
 @contextmanager
-def one_moment() -> Iterator[None]:
-    """See the database as it is now until the block ends, without holding up anyone who writes."""
+def consistent_read() -> Iterator[None]:
+    """See the database as it is now until the block ends, without blocking writers."""
     if connection.in_atomic_block:
         yield
     elif connection.vendor == "postgresql":
@@ -75,7 +75,7 @@ def one_moment() -> Iterator[None]:
             cursor.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY")
             yield
     else:
-        # Not atomic(): that would take SQLite's only place for a writer.
+        # Not atomic(): that would take SQLite's only write lock.
         with connection.cursor() as cursor:
             cursor.execute("BEGIN DEFERRED")
             try:
@@ -87,21 +87,21 @@ def one_moment() -> Iterator[None]:
 def write_backup(file: BinaryIO, recipients: Sequence[Recipient], now: datetime) -> dict[str, int]:
     """Write everything into a file; return how many rows of each model."""
     counts: dict[str, int] = {}
-    with one_moment():
+    with consistent_read():
         encrypt(_compress(_lines(counts, now)), file, recipients)
     return counts
 
 
 def _lines(counts: dict[str, int], now: datetime) -> Iterator[str]:
     """Yield the header, then every row. Counts are filled in."""
-    kept = backed_up()
+    kept = backup_models()
     counts.update({model._meta.label_lower: model._base_manager.count() for model in kept})
     header = {"format": FORMAT, "made_at": now.isoformat(), "tables": tables_version()}
     yield json.dumps(header | {"counts": counts}) + "\n"
     for model in kept:
         names = [field.name for field in model._meta.concrete_fields]
-        rows = model._base_manager.order_by("pk").iterator(chunk_size=A_TIME)
-        while some := list(islice(rows, A_TIME)):
+        rows = model._base_manager.order_by("pk").iterator(chunk_size=BATCH_ROWS)
+        while some := list(islice(rows, BATCH_ROWS)):
             yield serializers.serialize("jsonl", some, fields=names)
 
 
@@ -135,9 +135,9 @@ def restore_backup(file: BinaryIO, identities: Sequence[Identity]) -> dict[str, 
             f"The backup was made on {header['made_at'][:10]} by another version of GARRY. Install "
             "that version, restore, and then update."
         )
-    kept = backed_up()
+    kept = backup_models()
     with transaction.atomic():
-        for model in kept:  # a new installation comes with measures and protocols of its own
+        for model in kept:  # migrations have created measures and protocols
             model._base_manager.all()._raw_delete(connection.alias)  # noqa: SLF001
         for row in serializers.deserialize("jsonl", lines):
             row.save(save_m2m=False, force_insert=True)

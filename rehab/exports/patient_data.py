@@ -1,4 +1,4 @@
-"""What is given out: all that is kept of one patient, or all sessions that somebody may see."""
+"""The files of exports: everything stored of one patient, or all sessions that a user may see."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.exports.archive import write_csv, write_json
-from rehab.exports.tables import TABLES, Selection, codebook
+from rehab.exports.selection import Selection
+from rehab.exports.tables import TABLES, codebook_rows
 from rehab.patients.visits import Visit
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.consent.models import Consent
@@ -33,7 +34,7 @@ FILES = {
     "corrections.csv": _("a row for each correction of a session after its end"),
     "codebook.csv": _("what every column means, with its unit"),
 }
-ABOUT = _("""\
+README_TEXT = _("""\
 The tables open in any spreadsheet, R or Python: text in UTF-8, commas between cells, the names of
 the columns in the first line, an empty cell where there is nothing. Times are in UTC. Numbers have
 a decimal point and all their digits: read back, they are what GARRY computes with.
@@ -50,41 +51,43 @@ does.
 
 
 def patient_files(user: User, patient: Patient, now: datetime) -> Iterator[tuple[str, Any]]:
-    """Give all that is kept of one patient, with the name: for the patient and the therapists."""
+    """Return everything stored of one patient, by name: for the patient and the therapists."""
     title = gettext("Everything that GARRY keeps of %(patient)s") % {"patient": patient}
-    # In the language of now: the rest is made on the way, when nobody's language holds any more.
+    # Translated now: the rest is written while it is sent, after the request's language has ended.
     readme = write_readme(title, list(FILES), now)
-    return chain([("README.txt", [readme])], _details(user, patient))
+    return chain([("README.txt", [readme])], _patient_tables(user, patient))
 
 
-def _details(user: User, patient: Patient) -> Iterator[tuple[str, Any]]:
+def _patient_tables(user: User, patient: Patient) -> Iterator[tuple[str, Any]]:
     sessions = TrainingSession.objects.visible_to(user).filter(patient=patient)
-    yield "patient.json", write_json(describe(patient))
+    yield "patient.json", write_json(describe_patient(patient))
     yield "consent.json", write_json(list_consents(user, patient))
     yield "visits.json", write_json(list_visits(user, patient))
     yield "boards.json", write_json(list_boards(user, patient))
     yield "changes.json", write_json(list_changes(user, patient))
-    yield from _tables(Selection(user, sessions, named=True))
+    yield from _session_tables(Selection(user, sessions, named=True))
 
 
 def session_files(user: User, now: datetime) -> Iterator[tuple[str, Any]]:
-    """Give all sessions that somebody may see, by pseudonyms, trial by trial."""
+    """Return all sessions that a user may see, step by step, by pseudonyms."""
     sessions = TrainingSession.objects.visible_to(user)
     names = [name for name in FILES if not name.endswith(".json")]
     title = gettext("All sessions of %(clinic)s, by pseudonyms") % {"clinic": user.clinic}
     readme = write_readme(title, names, now)
-    return chain([("README.txt", [readme])], _tables(Selection(user, sessions, named=False)))
+    return chain(
+        [("README.txt", [readme])], _session_tables(Selection(user, sessions, named=False))
+    )
 
 
-def _tables(selection: Selection) -> Iterator[tuple[str, Any]]:
+def _session_tables(selection: Selection) -> Iterator[tuple[str, Any]]:
     for table in TABLES:
         header = [column.name for column in table.columns]
         yield table.file, write_csv(header, selection.read(table))
-    yield "codebook.csv", write_csv(("file", "column", "unit", "meaning"), codebook())
+    yield "codebook.csv", write_csv(("file", "column", "unit", "meaning"), codebook_rows())
 
 
-def describe(patient: Patient) -> dict[str, Any]:
-    """Give what is kept of the person."""
+def describe_patient(patient: Patient) -> dict[str, Any]:
+    """Return what is stored of the person."""
     return {
         "nickname": patient.nickname,
         "code": patient.code,
@@ -111,7 +114,7 @@ def describe(patient: Patient) -> dict[str, Any]:
 
 
 def list_consents(user: User, patient: Patient) -> list[dict[str, Any]]:
-    """Give what was agreed to, with the words."""
+    """Return what was agreed to, with the words."""
     rows = Consent.objects.visible_to(user).filter(patient=patient).select_related("text")
     return [
         {
@@ -127,13 +130,13 @@ def list_consents(user: User, patient: Patient) -> list[dict[str, Any]]:
 
 
 def list_visits(user: User, patient: Patient) -> list[dict[str, Any]]:
-    """Give the days that were planned."""
+    """Return the visits that were planned."""
     visits = Visit.objects.visible_to(user).filter(patient=patient)
     return [{"day": visit.day, "at": visit.at} for visit in visits]
 
 
 def list_boards(user: User, patient: Patient) -> list[dict[str, Any]]:
-    """Give what stands on boards of others, as it stands there."""
+    """Return the patient's rows on boards, and the boards whose group the patient is in."""
     rows = BoardEntry.everywhere.filter(patient=patient).select_related("board").order_by("pk")
     grouped = Leaderboard.objects.visible_to(user).filter(group=patient)
     return [
@@ -141,14 +144,14 @@ def list_boards(user: User, patient: Patient) -> list[dict[str, Any]]:
             "board": row.board.name,
             "feedback_type": row.valence or None,
             "figure": row.figure,
-            "could_be_kept": row.stake,
+            "could_be_kept": row.points_at_stake,
         }
         for row in rows
     ] + [{"in_the_group_of_the_board": board.name} for board in grouped]
 
 
 def list_changes(user: User, patient: Patient) -> list[dict[str, Any]]:
-    """Give the history of the details; an erased value is null. Who works here stays unnamed."""
+    """Return the history of the details; erased values are null, and staff is not named."""
     model = Patient.__name__
     changes = HistoryEntry.objects.visible_to(user).filter(model_name=model, object_id=patient.pk)
     return [
@@ -158,7 +161,7 @@ def list_changes(user: User, patient: Patient) -> list[dict[str, Any]]:
 
 
 def write_readme(title: str, names: list[str], now: datetime) -> str:
-    """Say in plain words what is in the archive."""
+    """Return the text that explains the archive."""
     listed = "\n".join(f"  {name:14} {FILES[name]}" for name in names)
     made = gettext("Made on %(moment)s UTC.") % {"moment": f"{now:%Y-%m-%d %H:%M}"}
-    return f"{title}\n{made}\n\n{listed}\n\n{ABOUT % {'version': RULES_VERSION}}"
+    return f"{title}\n{made}\n\n{listed}\n\n{README_TEXT % {'version': RULES_VERSION}}"

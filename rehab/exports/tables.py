@@ -1,35 +1,18 @@
-"""The tables that are given out: what each column means, and the rows, page by page.
-
-Rows are read in pages by key, so that neither memory nor the database holds more than a page while
-a browser is slow. Whose eyes they are for is `visible_to`'s business; `named` says whether they may
-hold anything but pseudonyms.
-"""
+"""The tables that are exported: what each column means, and how values are written."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime
-from itertools import islice
 from typing import Any, NamedTuple
 
-from django.db.models import QuerySet
-
-from rehab.people.models import User
-from rehab.sessions.corrections import SessionCorrection
-from rehab.sessions.log import SessionEvent, SessionMetric, Step
-from rehab.sessions.models import TrainingSession
-from rehab.sessions.replay import fold_log
-from rehab.training.fold import SessionFold
 from rehab.training.metrics import METRICS
-
-PAGE = 2_000  # rows held in memory
-SESSIONS_PAGE = 200
 
 
 class Column(NamedTuple):
-    """What stands in a column."""
+    """The name, unit and meaning of a column."""
 
     name: str
     unit: str
@@ -38,7 +21,7 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Table:
-    """A file of rows."""
+    """A CSV file with its columns."""
 
     file: str
     columns: tuple[Column, ...]
@@ -130,155 +113,19 @@ CORRECTIONS = Table(
     ),
 )
 TABLES = (SESSIONS, STEPS, EVENTS, CORRECTIONS)
-STEP_FIELDS = (
-    *("number", "time_s", "received_at", "side", "value", "gain", "shown", "goal", "performance"),
-    *("hit", "points", "valid", "reasons", "phase", "rules_version", "extra"),
-)
-NUMBER, SIDE, REASONS, PHASE = (
-    STEP_FIELDS.index(name) for name in ("number", "side", "reasons", "phase")
-)
 
 
-@dataclass(frozen=True)
-class Selection:
-    """Sessions as somebody may see them. ``named``: their patients and therapists may be named."""
-
-    user: User
-    sessions: QuerySet[TrainingSession]
-    named: bool
-    keys: list[int] = field(init=False)
-
-    def __post_init__(self) -> None:
-        keys = self.sessions.order_by("pk").values_list("pk", flat=True)
-        object.__setattr__(self, "keys", list(keys))
-
-    def read_sessions(self) -> Iterator[TrainingSession]:
-        """Give the sessions, oldest first."""
-        related = ("patient", "measure", "protocol")
-        for first in range(0, len(self.keys), SESSIONS_PAGE):
-            page = self.keys[first : first + SESSIONS_PAGE]
-            yield from self.sessions.filter(pk__in=page).select_related(*related).order_by("pk")
-
-    def _with_figures(self) -> Iterator[tuple[TrainingSession, dict[str, float]]]:
-        """Give the sessions with their figures, which are read for a page at once."""
-        sessions = self.read_sessions()
-        while page := list(islice(sessions, SESSIONS_PAGE)):
-            figures: dict[int, dict[str, float]] = {session.pk: {} for session in page}
-            found = SessionMetric.objects.visible_to(self.user).filter(session__in=list(figures))
-            for key, slug, value in found.values_list("session_id", "slug", "value"):
-                figures[key][slug] = value
-            yield from ((session, figures[session.pk]) for session in page)
-
-    def session_rows(self) -> Iterator[tuple[Any, ...]]:
-        """Give the rows of ``SESSIONS``."""
-        for session, figures in self._with_figures():
-            target = session.plan["target"]
-            yield (
-                session.pk,
-                session.patient.pseudonym,
-                session.created_at,
-                session.started_at,
-                session.ended_at,
-                session.state,
-                session.valence,
-                session.changed_to,
-                session.excluded,
-                session.measure.slug,
-                session.measure.unit,
-                session.trained_side,
-                session.goal,
-                target["hit_rate"],
-                target["duration_s"],
-                session.active_s,
-                session.protocol and session.protocol.name,
-                session.plan["activation_threshold"],
-                session.simulated,
-                session.legacy_id is not None,
-                session.source if self.named else "",
-                *(figures.get(slug) for slug in METRICS),
-            )
-
-    def step_rows(self) -> Iterator[tuple[Any, ...]]:
-        """Give the rows of ``STEPS``."""
-        steps = Step.objects.visible_to(self.user).order_by("number")
-        for session in self.read_sessions():
-            known = [
-                (phase["kind"], phase["name"], phase["feedback"])
-                for phase in session.plan["phases"]
-            ]
-            head = (session.pk, session.patient.pseudonym)
-            types = _types_of(session)
-            for step in _pages(steps.filter(session=session), STEP_FIELDS, "number"):
-                *row, version, extra = step
-                trained = row[SIDE] == session.trained_side
-                row[REASONS] = " ".join(row[REASONS])
-                row.insert(SIDE + 1, trained)
-                phase = known[step[PHASE]]
-                *_, feedback = phase
-                kind = next(slug for after, slug in types if after < step[NUMBER])
-                yield (*head, *row, *phase, kind if feedback else "", version, extra or None)
-
-    def event_rows(self) -> Iterator[tuple[Any, ...]]:
-        """Give the rows of ``EVENTS``."""
-        names = ("pk", "at", "after_number", "kind", "old", "value", "by__username", "data")
-        events = SessionEvent.objects.visible_to(self.user).order_by("pk")
-        for session in self.read_sessions():
-            head = (session.pk, session.patient.pseudonym)
-            for _, *row, by, data in _pages(events.filter(session=session), names, "pk"):
-                who = by if self.named or not by else "person"
-                yield (*head, *row, who, data or None)
-
-    def correction_rows(self) -> Iterator[tuple[Any, ...]]:
-        """Give the rows of ``CORRECTIONS``."""
-        names = ("pk", "at", "field", "old", "new", "reason", "by__username")
-        corrections = SessionCorrection.objects.visible_to(self.user).order_by("pk")
-        for session in self.read_sessions():
-            head = (session.pk, session.patient.pseudonym)
-            for _, *row, by in _pages(corrections.filter(session=session), names, "pk"):
-                yield (*head, *row, by if self.named or not by else "person")
-
-    def read(self, table: Table) -> Iterator[tuple[Any, ...]]:
-        """Give a table's rows."""
-        rows = {
-            SESSIONS.file: self.session_rows,
-            STEPS.file: self.step_rows,
-            EVENTS.file: self.event_rows,
-            CORRECTIONS.file: self.correction_rows,
-        }
-        return rows[table.file]()
-
-
-def _types_of(session: TrainingSession) -> list[tuple[int, str]]:
-    """Give after which step which feedback type was in force, the last one first."""
-    if not session.changed_to:
-        return [(-1, session.valence)]
-    switches = fold_log(SessionFold(session.to_plan()), session).switches
-    return [*reversed(switches), (-1, session.valence)]
-
-
-def _pages(rows: QuerySet[Any], names: Sequence[str], key: str) -> Iterator[tuple[Any, ...]]:
-    """Give values of rows, which are ordered by a key that each has alone."""
-    place, after = names.index(key), None
-    while True:
-        rest = rows if after is None else rows.filter(**{f"{key}__gt": after})
-        page = list(rest.values_list(*names)[:PAGE])
-        yield from page
-        if len(page) < PAGE:
-            return
-        after = page[-1][place]
-
-
-def codebook() -> Iterator[tuple[str, ...]]:
-    """Give what every column of every table means."""
+def codebook_rows() -> Iterator[tuple[str, ...]]:
+    """Yield file, name, unit and meaning of every column of every table."""
     for table in TABLES:
         yield from ((table.file, *column) for column in table.columns)
 
 
-def to_cell(value: Any) -> Any:
-    """Give a value as it stands in a file: floats exact, and text that no spreadsheet runs.
+def format_cell(value: Any) -> Any:
+    """Return a value as it is written to a file: floats exact, text as no formula.
 
     A text that a spreadsheet could take for a formula gets a ' before it, and so does one that
-    begins with ': taking one ' off gives back what was there.
+    begins with ': taking one ' off gives back the original.
     """
     if value is None or (isinstance(value, (int, float)) and not isinstance(value, bool)):
         return value  # csv writes a float by repr: read back, it is the same
@@ -290,6 +137,6 @@ def to_cell(value: Any) -> Any:
     return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r", "\n", "'")) else text
 
 
-def to_cells(rows: Iterable[Sequence[Any]]) -> Iterator[list[Any]]:
-    """Give rows as they stand in a file."""
-    return ([to_cell(value) for value in row] for row in rows)
+def format_cells(rows: Iterable[Sequence[Any]]) -> Iterator[list[Any]]:
+    """Return rows as they are written to a file."""
+    return ([format_cell(value) for value in row] for row in rows)

@@ -1,11 +1,11 @@
-"""Addresses of the data that is given out."""
+"""Addresses of exports."""
 
 from django.urls import path
 
 from rehab.exports import views
 
 urlpatterns = [
-    path("patients/<int:patient_id>/records/data.zip", views.give_patient, name="patient-data"),
+    path("patients/<int:patient_id>/records/data.zip", views.download_patient, name="patient-data"),
     path("export/", views.show_export, name="export"),
-    path("export/sessions.zip", views.give_sessions, name="export-sessions"),
+    path("export/sessions.zip", views.download_sessions, name="export-sessions"),
 ]

@@ -1,4 +1,4 @@
-"""Consent and data of one patient: what is kept, given out, ended and erased."""
+"""Pages that export data: of one patient, or all sessions by pseudonyms."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 
 
-@for_roles(Role.LEAD, Role.PT, patients=False)  # noted here, before the first byte
+@for_roles(Role.LEAD, Role.PT, patients=False)  # audited here, before the first byte
 @require_GET
-def give_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Give all that is kept of one patient as a file."""
+def download_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
+    """Return everything stored of one patient as a file."""
     user, now = user_of(request), timezone.now()
     patient = get_patient(user, patient_id)
-    note_export(request, now, patient)
+    audit_export(request, now, patient)
     name = f"garry-{patient.pseudonym}-{now:%Y-%m-%d}.zip"
-    return _send(patient_files(user, patient, now), name)
+    return _stream(patient_files(user, patient, now), name)
 
 
 @for_roles(Role.LEAD, Role.RESEARCHER, patients=False)
 @require_safe
 def show_export(request: HttpRequest) -> HttpResponse:
-    """Say what the export of all sessions holds."""
+    """Show what the export of all sessions contains."""
     user = user_of(request)
     sessions = TrainingSession.objects.visible_to(user)
     context = {
@@ -47,17 +47,17 @@ def show_export(request: HttpRequest) -> HttpResponse:
     return render(request, "exports/export.html", context)
 
 
-@for_roles(Role.LEAD, Role.RESEARCHER, patients=False)  # noted here, before the first byte
+@for_roles(Role.LEAD, Role.RESEARCHER, patients=False)  # audited here, before the first byte
 @require_GET
-def give_sessions(request: HttpRequest) -> HttpResponse:
-    """Give all sessions that somebody may see, by pseudonyms."""
+def download_sessions(request: HttpRequest) -> HttpResponse:
+    """Return all sessions that the user may see as a file, by pseudonyms."""
     user, now = user_of(request), timezone.now()
-    note_export(request, now)
-    return _send(session_files(user, now), f"garry-sessions-{now:%Y-%m-%d}.zip")
+    audit_export(request, now)
+    return _stream(session_files(user, now), f"garry-sessions-{now:%Y-%m-%d}.zip")
 
 
-def note_export(request: HttpRequest, now: datetime, patient: Patient | None = None) -> None:
-    """Tell the audit log. Where it cannot be kept, nothing is given out."""
+def audit_export(request: HttpRequest, now: datetime, patient: Patient | None = None) -> None:
+    """Record an export in the audit log; where that fails, nothing is exported."""
     audit_log.record(
         Act.EXPORT,
         user_of(request),
@@ -68,5 +68,5 @@ def note_export(request: HttpRequest, now: datetime, patient: Patient | None = N
     )
 
 
-def _send(files: Any, name: str) -> HttpResponse:
-    return ZipResponse(files, name)  # type: ignore[return-value]  # its body comes bit by bit
+def _stream(files: Any, name: str) -> HttpResponse:
+    return ZipResponse(files, name)  # type: ignore[return-value]  # its body is streamed

@@ -15,11 +15,11 @@ from django.urls import reverse
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy, override
 
+from rehab.feedback.clinic_valences import default_valence, valences_of
 from rehab.feedback.forms import BandForm, BandFormSet, FeedbackTypeForm, word_fields
-from rehab.feedback.models import FeedbackBand, FeedbackType, words_edited
-from rehab.feedback.picture import show_bands
-from rehab.feedback.valences import usual_valence, valences_of
-from rehab.feedback.wording import FALLBACK
+from rehab.feedback.models import FeedbackBand, FeedbackType, feedback_text_edited
+from rehab.feedback.preview import preview_bands
+from rehab.feedback.translation import SOURCE_LANGUAGE
 from rehab.gestures.choices import gesture_choices
 from rehab.people.access import clinic_of, user_of
 from rehab.people.models import LANGUAGES
@@ -41,12 +41,12 @@ class BandRows(ScopedOptions, admin.TabularInline):
     max_num = BANDS_MAX
 
     def get_extra(self, request: HttpRequest, obj: Any = None, **options: Any) -> int:
-        """Give a type that is taken over its usual bands."""
-        usual = None if obj and obj.pk else VALENCES.get(request.GET.get("slug", ""))
-        return len(usual.bands) if usual else 0
+        """Return the rows for the default bands of a type that has none of its own yet."""
+        default = None if obj and obj.pk else VALENCES.get(request.GET.get("slug", ""))
+        return len(default.bands) if default else 0
 
     def get_fields(self, request: HttpRequest, obj: Any = None) -> Any:
-        """Give a field for each language to those who may write in it."""
+        """Return a field for each language, or all words together to those who only read."""
         return self.fields if self.has_change_permission(request) else READ
 
 
@@ -62,13 +62,13 @@ class FeedbackTypeAdmin(PreviewAdmin):
     fields = ("slug", "hit_points", "miss_points", "cue_above", "cue_below")
 
     def get_fields(self, request: HttpRequest, obj: Any = None) -> Any:
-        """Give the fields that say something of this type."""
+        """Return the fields that this type uses."""
         slug = obj.slug if obj and obj.pk else request.GET.get("slug") or request.POST.get("slug")
         form = FeedbackTypeForm(initial={"slug": slug})
         return [name for name in self.fields if name in form.fields]
 
     def formfield_for_dbfield(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
-        """Offer the gestures that this person's clinic has."""
+        """Offer the gestures of this person's clinic."""
         if db_field.name in ("cue_above", "cue_below"):
             choices = [("", gettext_lazy("Nothing")), *gesture_choices(user_of(request))]
             label = db_field.verbose_name.capitalize()
@@ -76,22 +76,22 @@ class FeedbackTypeAdmin(PreviewAdmin):
         return super().formfield_for_dbfield(db_field, request, **kwargs)
 
     def get_changeform_initial_data(self, request: HttpRequest) -> dict[str, Any]:
-        """Begin with the defaults of the type that is taken over."""
-        usual = VALENCES.get(request.GET.get("slug", ""))
-        if usual is None:
+        """Return the defaults of the type that is edited for the first time."""
+        default = VALENCES.get(request.GET.get("slug", ""))
+        if default is None:
             return {}
         return {
-            "slug": usual.slug,
-            "hit_points": usual.hit_points,
-            "miss_points": usual.miss_points,
-            "cue_above": usual.cue.above or "",
-            "cue_below": usual.cue.below or "",
+            "slug": default.slug,
+            "hit_points": default.hit_points,
+            "miss_points": default.miss_points,
+            "cue_above": default.cue.above or "",
+            "cue_below": default.cue.below or "",
         }
 
     def get_formset_kwargs(
         self, request: HttpRequest, obj: Any, inline: Any, prefix: str
     ) -> dict[str, Any]:
-        """Begin with the default bands."""
+        """Return the default bands as initial values."""
         kwargs: dict[str, Any] = super().get_formset_kwargs(request, obj, inline, prefix)
         slug = request.GET.get("slug", "")
         if request.method == "GET" and obj.pk is None and slug in VALENCES:
@@ -101,7 +101,7 @@ class FeedbackTypeAdmin(PreviewAdmin):
     def changelist_view(
         self, request: HttpRequest, extra_context: dict[str, Any] | None = None
     ) -> HttpResponse:
-        """Show all types, those that the clinic edited and those that are as usual."""
+        """Show all types, those that the clinic edited and those with the defaults."""
         if not self.has_view_permission(request):
             raise PermissionDenied
         clinic = clinic_of(user_of(request))
@@ -129,7 +129,7 @@ class FeedbackTypeAdmin(PreviewAdmin):
     def add_view(
         self, request: HttpRequest, form_url: str = "", extra_context: Any = None
     ) -> HttpResponse:
-        """Take a type over: the list says which. One that is taken over already is changed."""
+        """Edit the defaults of the type that is named; one that has a row already is changed."""
         slug = request.GET.get("slug") or request.POST.get("slug")
         if slug not in VALENCES:
             return self.changelist_view(request)
@@ -143,22 +143,22 @@ class FeedbackTypeAdmin(PreviewAdmin):
     def render_change_form(
         self, request: HttpRequest, context: dict[str, Any], *args: Any, **kwargs: Any
     ) -> HttpResponse:
-        """Show the form; which type it is and the languages to see it in stand beside it."""
+        """Show the form, and beside it the type's name and the languages of the preview."""
         obj = kwargs.get("obj")
         slug = obj.slug if obj else request.GET.get("slug") or request.POST.get("slug")
-        context["usual"] = VALENCES.get(str(slug))
+        context["default"] = VALENCES.get(str(slug))
         context["languages"] = LANGUAGES
         context["show_save_and_add_another"] = False
         return super().render_change_form(request, context, *args, **kwargs)
 
     def save_related(self, request: HttpRequest, form: Any, formsets: Any, change: bool) -> None:
-        """Store the bands, then let the words reach the sessions that are open."""
+        """Store the bands, then send the words to the open sessions."""
         super().save_related(request, form, formsets, change)
         row = form.instance
         self._announce(request, row, row.clinic_id, row.slug)
 
     def delete_model(self, request: HttpRequest, obj: FeedbackType) -> None:
-        """Go back to the defaults, in sessions that are open as well."""
+        """Go back to the defaults, in open sessions as well."""
         clinic_id, slug = obj.clinic_id, obj.slug
         super().delete_model(request, obj)
         self._announce(request, None, clinic_id, slug)
@@ -166,20 +166,20 @@ class FeedbackTypeAdmin(PreviewAdmin):
     def _announce(
         self, request: HttpRequest, row: FeedbackType | None, clinic_id: int, slug: str
     ) -> None:
-        """Tell of edited words once they are stored: sessions are written beside this request."""
+        """Send the signal of edited words once they are stored."""
 
-        def tell() -> None:
-            told = words_edited.send(
+        def announce() -> None:
+            responses = feedback_text_edited.send(
                 FeedbackType, row=row, clinic_id=clinic_id, slug=slug, by=user_of(request)
             )
-            for _receiver, problems in told:
+            for _receiver, problems in responses:
                 for problem in problems or ():
                     messages.warning(request, problem)
 
-        transaction.on_commit(tell)
+        transaction.on_commit(announce)
 
     def render_preview(self, request: HttpRequest, row: FeedbackType | None) -> HttpResponse:
-        """Show what a patient would see of each band."""
+        """Show what a patient would see in each band."""
         given = request.GET
         language = given.get("seen_in", "")
         if language not in dict(LANGUAGES):
@@ -188,38 +188,37 @@ class FeedbackTypeAdmin(PreviewAdmin):
         inline = self.get_inline_instances(request, row)[0]
         rows: Any = inline.get_formset(request, row)
         context: dict[str, Any] = {"language": language, "faults": []}
-        whole = form.is_valid()
+        is_valid = form.is_valid()
         bands = rows(given, instance=form.instance, prefix="bands")
-        if whole and bands.is_valid():
+        if is_valid and bands.is_valid():
             context["valence"] = form.instance.to_valence(language, bands.bands(language))
-            context["seen"] = list(show_bands(context["valence"]))
+            context["seen"] = list(preview_bands(context["valence"]))
         else:
-            context["faults"] = [*iter_form_errors(form), *find_row_faults(form, bands)]
+            context["faults"] = [*iter_form_errors(form), *find_band_faults(form, bands)]
         with override(language):
             return render(request, "feedback/preview.html", context)
 
 
 def initial_bands(slug: str) -> list[dict[str, Any]]:
-    """Give the default bands of a type as a form begins with them, worded in each language that
-    somebody translated them to.
-    """
-    worded = {language: usual_valence(slug, language) for language in word_fields().values()}
+    """Return the default bands of a type as initial values, in each language that has them."""
+    translated = {language: default_valence(slug, language) for language in word_fields().values()}
     return [
         {
             "from_percent": round(100 * band.from_performance),
             "confetti": band.confetti.value,
             **{
-                name: worded[language].bands[index].words
+                name: translated[language].bands[index].words
                 for name, language in word_fields().items()
-                if language == FALLBACK or worded[language].bands[index].words != band.words
+                if language == SOURCE_LANGUAGE
+                or translated[language].bands[index].words != band.words
             },
         }
         for index, band in enumerate(VALENCES[slug].bands)
     ]
 
 
-def find_row_faults(form: Any, bands: Any) -> Iterator[tuple[str, str]]:
-    """Give what is wrong with the bands, once nothing is wrong with the type they belong to."""
+def find_band_faults(form: Any, bands: Any) -> Iterator[tuple[str, str]]:
+    """Yield what is wrong with the bands, unless something is wrong with their type."""
     if not form.errors:
         for row in bands.forms:
             yield from iter_form_errors(row)

@@ -19,12 +19,12 @@ from rehab.training.valences import TEXT_MAX, VALENCES, Band
 
 
 def word_fields() -> dict[str, str]:
-    """Give the names of the fields for words, each with its language."""
+    """Return the names of the fields for words, each with its language."""
     return {f"words_{language}": language for language, _name in LANGUAGES}
 
 
 class FeedbackTypeForm(ClinicForm):
-    """Points where the type has them; which type it is stands fast."""
+    """Points and gestures, where the type has them; the type itself cannot be changed."""
 
     class Meta:
         model = FeedbackType
@@ -35,31 +35,31 @@ class FeedbackTypeForm(ClinicForm):
         super().__init__(*args, **kwargs)
         fixed = self.instance.pk is not None
         slug = self.instance.slug if fixed else self.initial.get("slug") or self.data.get("slug")
-        self.usual = VALENCES.get(str(slug))
+        self.default = VALENCES.get(str(slug))
         fields: dict[str, Any] = self.fields
         if fixed and "slug" in fields:
             fields["slug"].disabled = True
-        for name in self.idle_fields():
+        for name in self.unused_fields():
             fields.pop(name, None)
 
-    def idle_fields(self) -> Iterator[str]:
-        """Give the fields that say nothing of this type: points it has not, and its robot's."""
-        usual = self.usual
-        if usual is None:
+    def unused_fields(self) -> Iterator[str]:
+        """Yield the fields that this type does not use."""
+        default = self.default
+        if default is None:
             return
-        if not usual.hit_points:
+        if not default.hit_points:
             yield "hit_points"
-        if not usual.miss_points:
+        if not default.miss_points:
             yield "miss_points"
-        if not usual.has_points:
+        if not default.has_points:
             yield from ("cue_above", "cue_below")
 
     def _post_clean(self) -> None:
-        # What the form does not ask is as the rules have it.
-        if self.usual is not None:
+        # What the form does not ask keeps its default.
+        if self.default is not None:
             for name in ("hit_points", "miss_points"):
                 if name not in self.fields:
-                    setattr(self.instance, name, getattr(self.usual, name))
+                    setattr(self.instance, name, getattr(self.default, name))
         super()._post_clean()  # type: ignore[misc]  # Django's hook between form and model
 
 
@@ -76,11 +76,12 @@ class BandForm(forms.ModelForm):
             if self.instance.pk is not None:
                 self.initial.setdefault(name, self.instance.words.get(language, ""))
             self.fields[name].widget.attrs |= {"lang": language, "class": "vTextField"}
-            if self.instance.pk is not None:  # what is said where the clinic says nothing
-                self.fields[name].widget.attrs["placeholder"] = self.instance.usual_words(language)
+            if self.instance.pk is not None:  # the words where the clinic writes none
+                placeholder = self.instance.default_words(language)
+                self.fields[name].widget.attrs["placeholder"] = placeholder
 
     def clean(self) -> dict[str, Any]:
-        """Take the words together."""
+        """Collect the words of all languages."""
         cleaned: dict[str, Any] = super().clean() or self.cleaned_data
         words = {language: cleaned.get(name, "") for name, language in word_fields().items()}
         self.instance.words = {language: text for language, text in words.items() if text}
@@ -97,10 +98,10 @@ for _field, _language in word_fields().items():
 
 
 class BandFormSet(forms.BaseInlineFormSet):
-    """The bands of one type, which must be a valence together with it."""
+    """The bands of one type, which must make a valid valence together with it."""
 
-    def kept(self) -> list[FeedbackBand]:
-        """Give the bands that would be stored, in their order."""
+    def rows_to_store(self) -> list[FeedbackBand]:
+        """Return the bands that would be stored, in their order."""
         rows = [
             form.instance
             for form in self.forms
@@ -109,11 +110,11 @@ class BandFormSet(forms.BaseInlineFormSet):
         return sorted(rows, key=lambda row: row.from_percent)
 
     def bands(self, language: str) -> list[Band]:
-        """Give them as the rules know them, worded in a language."""
-        return [row.to_band(language) for row in self.kept()]
+        """Return them as a valence has them, with words in a language."""
+        return [row.to_band(language) for row in self.rows_to_store()]
 
     def clean(self) -> None:
-        """Refuse bands that the rules refuse, in the rules' own words."""
+        """Refuse bands that no valence may have."""
         super().clean()
         if any(self.errors):
             return

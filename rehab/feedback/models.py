@@ -1,4 +1,4 @@
-"""What a clinic made of a feedback type. Without a row the defaults of the rules hold."""
+"""The feedback types that a clinic edited. Without a row the defaults hold."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from django.dispatch import Signal
 from django.utils.text import format_lazy
 from django.utils.translation import gettext_lazy as _
 
-from rehab.feedback.wording import FALLBACK, words_in
+from rehab.feedback.translation import SOURCE_LANGUAGE, pick_words
 from rehab.people.models import Clinic
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.web.refusals import format_refusal
@@ -28,12 +28,12 @@ from rehab.training.valences import (
 )
 
 # Sent with ``row`` (a FeedbackType, or None where a clinic went back to the defaults),
-# ``clinic_id``, ``slug`` and ``by``. Receivers give the problems they met, in words.
-words_edited = Signal()
+# ``clinic_id``, ``slug`` and ``by``. Receivers return the problems they met, as texts.
+feedback_text_edited = Signal()
 
 
 class FeedbackType(ClinicModel):
-    """A clinic's own points, words, confetti and gestures for one of the rules' valences."""
+    """A clinic's own points, words, confetti and gestures for one valence."""
 
     scope = Scope(clinic="clinic")
 
@@ -72,7 +72,7 @@ class FeedbackType(ClinicModel):
         return str(self.get_slug_display())
 
     def clean(self) -> None:
-        """Refuse points and gestures that the rules refuse, in the rules' own words."""
+        """Refuse points and gestures that no valence may have."""
         try:
             self.to_valence("en", VALENCES[self.slug].bands)
         except KeyError:
@@ -81,9 +81,9 @@ class FeedbackType(ClinicModel):
             raise ValidationError(format_refusal(problem)) from problem
 
     def to_valence(self, language: str, bands: Sequence[Band] | None = None) -> Valence:
-        """Give it as the rules know it, worded in a language; its stored bands unless given.
+        """Return the valence, with words in a language; with its stored bands unless given.
 
-        Raises InvalidSetting for what the rules refuse.
+        Raises InvalidSetting for points, bands or gestures that no valence may have.
         """
         if bands is None:
             rows = sorted(self.bands.all(), key=lambda band: band.from_percent)
@@ -98,7 +98,7 @@ class FeedbackType(ClinicModel):
 
 
 class FeedbackBand(ScopedModel):
-    """What is said and set free from a performance upwards."""
+    """The words and confetti from a performance upwards."""
 
     scope = Scope(clinic="feedback_type__clinic")
 
@@ -138,12 +138,12 @@ class FeedbackBand(ScopedModel):
         return str(_("from %(percent)s %%") % {"percent": self.from_percent})
 
     def to_band(self, language: str) -> Band:
-        """Give it as the rules know it, worded in a language."""
-        words = self.words.get(language) or self.usual_words(language)
+        """Return the valence's band, with words in a language."""
+        words = self.words.get(language) or self.default_words(language)
         return Band(self.from_percent / 100, words, Confetti(self.confetti))
 
-    def usual_words(self, language: str) -> str:
-        """Give what is said in a language where the clinic wrote nothing in it."""
-        usual = VALENCES[self.feedback_type.slug].band(self.from_percent / 100).words
-        others = {FALLBACK: self.words.get(FALLBACK, "")}
-        return words_in(language, {} if language == FALLBACK else others, usual)
+    def default_words(self, language: str) -> str:
+        """Return the words in a language in which the clinic wrote none."""
+        default = VALENCES[self.feedback_type.slug].band(self.from_percent / 100).words
+        others = {SOURCE_LANGUAGE: self.words.get(SOURCE_LANGUAGE, "")}
+        return pick_words(language, {} if language == SOURCE_LANGUAGE else others, default)

@@ -1,4 +1,4 @@
-"""Admin of gestures: a PT composes steps, sees where they lead, and hears what is wrong."""
+"""Admin of gestures: a PT composes steps, and sees their path or what is wrong with them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.gestures.models import Gesture, GestureStep
-from rehab.gestures.picture import draw
+from rehab.gestures.path_drawing import draw_path
 from rehab.people.web.admin_base import LabeledFormSet, ScopedAdmin, ScopedOptions
 from rehab.people.web.refusals import format_refusal
 from robot.motion.dry_run import DryRun, dry_run, validate_gesture
@@ -21,14 +21,14 @@ from robot.motion.gesture import TETHER_M
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gesture_spec import MOVES_MAX, to_data
 
-WINDOW_S = 5.0  # what takes longer is still running when the next decision comes
+WINDOW_S = 5.0  # of the robot's decisions; a longer gesture still runs at the next one
 
 
 class StepFormSet(LabeledFormSet):
-    """The steps of one gesture, which must be one together."""
+    """The steps of one gesture, which must be valid together."""
 
     def clean(self) -> None:
-        """Refuse steps that no robot plays, in the robot's own words."""
+        """Refuse steps that no robot plays."""
         super().clean()
         if any(self.errors):
             return
@@ -47,7 +47,7 @@ class StepFormSet(LabeledFormSet):
 
 
 class StepForm(forms.ModelForm):
-    """A row of small numbers."""
+    """One step, in narrow fields."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -67,17 +67,17 @@ class StepRows(ScopedOptions, admin.TabularInline):
     ordering = ("position",)
 
     def get_extra(self, request: HttpRequest, obj: Any = None, **options: Any) -> int:
-        """Give a new gesture some rows to begin with."""
+        """Return the number of empty rows: 4 for a new gesture."""
         return 0 if obj else 4
 
 
-def tell(trial: DryRun) -> str:
-    """Say how long a gesture takes and how far it goes."""
+def describe_dry_run(run: DryRun) -> str:
+    """Return how long a gesture takes and how far it goes, in words."""
     words = gettext(
         "Takes %(took).1f s, goes up to %(far).2f m from home (tether %(tether).2f m), "
         "ends at home."
-    ) % {"took": trial.took_s, "far": trial.farthest_m, "tether": TETHER_M}
-    if trial.took_s > WINDOW_S:
+    ) % {"took": run.took_s, "far": run.farthest_m, "tether": TETHER_M}
+    if run.took_s > WINDOW_S:
         words += " " + gettext("Longer than a window: it may miss the next.")
     return words
 
@@ -94,20 +94,20 @@ class GestureAdmin(ScopedAdmin):
 
     @admin.display(description=_("simulated"))
     def simulated(self, gesture: Gesture) -> str:
-        """Say how long it takes and how far it goes, or what is wrong with it."""
+        """Return how long it takes and how far it goes, or what is wrong with it."""
         try:
-            return tell(dry_run(validate_gesture(gesture.to_data())))
+            return describe_dry_run(dry_run(validate_gesture(gesture.to_data())))
         except BadGesture as problem:
             return format_refusal(problem)
 
     @admin.display(description=_("where it goes"))
     def picture(self, gesture: Gesture) -> str:
-        """Draw the way of what is stored."""
+        """Return the drawing of the stored gesture's path, or why there is none."""
         if not gesture.pk:
             return gettext("Save it to see where it goes. Its last step has to end at home.")
         try:
-            trial = dry_run(validate_gesture(gesture.to_data()))
+            run = dry_run(validate_gesture(gesture.to_data()))
         except BadGesture as problem:
             return format_refusal(problem)
-        words = tell(trial)
-        return format_html("{}<p>{}</p>", draw(gesture.to_moves(), trial, words), words)
+        words = describe_dry_run(run)
+        return format_html("{}<p>{}</p>", draw_path(gesture.to_moves(), run, words), words)

@@ -12,7 +12,7 @@ from robot.motion.gestures import GESTURES, ORIGINALS
 
 
 def gesture_choices(by: User) -> list[tuple[Any, Any]]:
-    """Give the robot's own gestures, those composed in the clinic and the paper's."""
+    """Return the robot's own gestures, those composed in the clinic, and the paper's."""
     composed = Gesture.objects.visible_to(by).values_list("name", flat=True)
     return [
         *((gesture.name, _(gesture.label)) for gesture in GESTURES.values()),

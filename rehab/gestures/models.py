@@ -1,4 +1,4 @@
-"""Gestures that a clinic composes. What makes one is the robot's rule; here it is only kept."""
+"""Gestures that a clinic composes. `robot` decides which are valid; here they are stored."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ class Gesture(ClinicModel):
             raise ValidationError({"name": format_refusal(problem)}) from problem
 
     def to_moves(self) -> list[Move]:
-        """Give the steps as a robot knows them."""
+        """Return the steps as the robot's moves."""
         return [step.to_move() for step in self.steps.order_by("position")]
 
     def to_data(self) -> dict[str, Any]:
-        """Give the gesture as it travels to a robot."""
+        """Return the gesture as it is sent to a robot."""
         return to_data(self.name, self.to_moves())
 
 
@@ -95,7 +95,7 @@ class GestureStep(ScopedModel):
         return str(_("Step %(number)d") % {"number": self.position})
 
     def to_move(self) -> Move:
-        """Give the step as a robot knows it."""
+        """Return the step as a robot's move."""
         return Move(
             turn_rad=math.radians(self.turn_deg),
             forward_m=self.forward_m,

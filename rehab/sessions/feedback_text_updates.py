@@ -11,8 +11,8 @@ from typing import Any
 from asgiref.sync import async_to_sync
 from django.utils.translation import gettext as _
 
-from rehab.feedback.models import FeedbackType, words_edited
-from rehab.feedback.valences import usual_valence
+from rehab.feedback.clinic_valences import default_valence
+from rehab.feedback.models import FeedbackType, feedback_text_edited
 from rehab.people.models import User
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.live import runtime
@@ -26,7 +26,7 @@ from rehab.training.valences import Valence, bands_to_json
 
 def connect_signals() -> None:
     """Connect the signal of edited texts, once, when the process starts."""
-    words_edited.connect(update_open_sessions)
+    feedback_text_edited.connect(update_open_sessions)
 
 
 def update_open_sessions(
@@ -39,7 +39,7 @@ def update_open_sessions(
     problems: list[str] = []
     for session in open_ones.select_related("patient").order_by("pk"):
         language = session.to_plan().language
-        valence = row.to_valence(language) if row is not None else usual_valence(slug, language)
+        valence = row.to_valence(language) if row is not None else default_valence(slug, language)
         try:
             async_to_sync(_update_session)(session.pk, valence, by)
         except (InvalidSetting, OwnedElsewhere, NotStored) as problem:

@@ -9,7 +9,7 @@ from asgiref.sync import async_to_sync
 from django.db import transaction
 from django.utils.translation import gettext
 
-from rehab.feedback.valences import valences_of
+from rehab.feedback.clinic_valences import valences_of
 from rehab.people.consent.services import is_care_allowed
 from rehab.people.models import Patient, User
 from rehab.sessions.live import runtime

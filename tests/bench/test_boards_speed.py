@@ -120,13 +120,13 @@ def fill(count: int) -> None:
 
 
 def measure(count: int) -> dict[str, float]:
-    """Give what a look takes, in ms, and the rest in s."""
+    """Return what a look at the board takes [ms], and filling and building it [s]."""
     from django.utils import timezone
 
-    from rehab.boards import entries
+    from rehab.boards.building import entries
     from rehab.boards.models import BoardEntry, Leaderboard
-    from rehab.boards.showing import Viewer
-    from rehab.boards.standings import Stored
+    from rehab.boards.panels.viewer import BoardViewer
+    from rehab.boards.ranking.standings import StoredStandings
     from rehab.people.models import Patient
 
     began = time.perf_counter()
@@ -134,7 +134,7 @@ def measure(count: int) -> dict[str, float]:
     filled = time.perf_counter()
     board = Leaderboard.everywhere.get()
     entries.refresh(board, now=timezone.now())
-    entries.tidy()
+    entries.analyze_tables()
     built = time.perf_counter()
     assert BoardEntry.everywhere.count() == count
     draw = random.Random(7)
@@ -142,7 +142,7 @@ def measure(count: int) -> dict[str, float]:
     found = {"rows": count, "fill_s": filled - began, "build_s": built - filled}
 
     def timed(name: str, look: Callable[[int], object]) -> None:
-        """Look as each patient some times; the best look is what the board takes, all of them what
+        """Look as each patient some times: the best look is what the board takes, all of them what
         it took beside whatever else ran on this machine.
         """
         best, every = [], []
@@ -158,8 +158,8 @@ def measure(count: int) -> dict[str, float]:
             found[f"{name}_p{part}_ms"] = sorted(best)[len(best) * part // 100]
         found[f"{name}_p99_of_all_ms"] = sorted(every)[len(every) * 99 // 100]
 
-    standings = Stored(board, "")
-    timed("count", lambda _: Stored(board, ""))
+    standings = StoredStandings(board, "")
+    timed("count", lambda _: StoredStandings(board, ""))
     timed("top20", lambda _: standings.top(20))
     for ties in ("earlier", "dense", "standard"):
         board.ties = ties
@@ -168,7 +168,7 @@ def measure(count: int) -> dict[str, float]:
     timed("neighbors", lambda patient: standings.around(placed[patient], 2))
     walkers = Patient.everywhere.select_related("clinic").in_bulk(patients)
     now = timezone.now()
-    timed("whole_view", lambda patient: Viewer(board, now, walkers[patient]).show())
+    timed("whole_view", lambda patient: BoardViewer(board, now, walkers[patient]).make_panel())
     timed("one_more_session", lambda patient: entries.refresh(board, {patient}, now=now))
     found |= walk_while_one_is_built(patients=BESIDE)
     return {name: round(value, 3) for name, value in found.items()}
@@ -178,8 +178,8 @@ def walk_while_one_is_built(patients: int) -> dict[str, float]:
     """Build another board beside a session that is walked; give what its steps' commits take."""
     from datetime import UTC, datetime
 
-    from rehab.boards import entries
-    from rehab.boards.building import Builder
+    from rehab.boards.building import entries
+    from rehab.boards.building.scheduler import Builder
     from rehab.boards.models import BoardEntry, Leaderboard
     from rehab.people.models import Clinic, Patient
     from rehab.sessions.live.aggregate import SessionAggregate
@@ -218,7 +218,7 @@ def walk_while_one_is_built(patients: int) -> dict[str, float]:
     board = Leaderboard(clinic=other, name="Other", among="clinic", entry="best")
     board.period, board.min_valid_strides, board.types = "all", 1, "all"
     Leaderboard.everywhere.bulk_create([board])
-    entries.begin(board)
+    entries.start_rebuild(board)
     builder = Builder()
     began = time.perf_counter()
     builder.wake()

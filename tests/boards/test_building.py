@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import threading
 from datetime import timedelta
-from importlib import import_module
 
 import pytest
-from django.apps import apps
 from django.core.management import call_command
 from django.db.models import Sum
 from django.test import Client
 from django.urls import reverse
 
-from rehab.boards import building, entries
-from rehab.boards.building import Builder
+from rehab.boards.building import entries, scheduler
+from rehab.boards.building.scheduler import Builder
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
-from rehab.boards.showing import show_after, show_waiting
+from rehab.boards.panels.viewer import make_session_panels, make_waiting_panels
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
@@ -28,10 +26,10 @@ PEOPLE = 9
 
 @pytest.fixture
 def woken(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
-    """Let more than four patients be many, and note who wakes the builder."""
+    """Leave more than four patients to the thread, and record who wakes it."""
     calls: list[bool] = []
-    monkeypatch.setattr(building, "FEW", 4)
-    monkeypatch.setattr(building.builder, "wake", lambda: calls.append(True))
+    monkeypatch.setattr(scheduler, "MAX_INLINE", 4)
+    monkeypatch.setattr(scheduler.board_builder, "wake", lambda: calls.append(True))
     return calls
 
 
@@ -68,7 +66,7 @@ def stored() -> tuple[list[tuple[object, ...]], list[tuple[object, ...]]]:
 
 def build(board: Leaderboard, most: int = 2) -> int:
     batches = 1
-    while entries.advance(board.pk, most, NOW):
+    while entries.build_next(board.pk, most, NOW):
         batches += 1
     return batches
 
@@ -77,11 +75,11 @@ def test_a_board_of_many_is_not_built_in_the_request_and_not_shown_until_it_is(s
     board = make_board(sessions[0])
     assert Leaderboard.everywhere.get().is_being_built
     assert not BoardEntry.everywhere.exists()
-    (shown,) = show_after(sessions[1], NOW)
+    (shown,) = make_session_panels(sessions[1], NOW)
     assert shown.note == "This board is being built. These are your own sessions."
     assert [row.you for row in shown.rows] == [True]
     assert build(board) == PEOPLE // 2 + 1
-    (shown,) = show_after(sessions[1], NOW)
+    (shown,) = make_session_panels(sessions[1], NOW)
     assert shown.shared
     assert not shown.note
     kept = stored()
@@ -91,27 +89,27 @@ def test_a_board_of_many_is_not_built_in_the_request_and_not_shown_until_it_is(s
 
 
 def test_a_waiting_tablet_shows_none_that_is_being_built(sessions):
-    board = make_board(sessions[0], moment="waiting", display="top", types="all")
-    assert show_waiting(board.clinic, NOW) == []
+    board = make_board(sessions[0], occasion="waiting", display="top", types="all")
+    assert make_waiting_panels(board.clinic, NOW) == []
     build(board)
-    assert len(show_waiting(board.clinic, NOW)) == 1
+    assert len(make_waiting_panels(board.clinic, NOW)) == 1
 
 
 def test_a_look_wakes_a_builder_that_was_stopped(sessions, woken):
     make_board(sessions[0])
     assert not woken  # nothing is built before the commit
-    show_after(sessions[1], NOW)
+    make_session_panels(sessions[1], NOW)
     assert woken
 
 
 def test_what_fails_half_way_goes_on_where_it_was(sessions, monkeypatch):
     board = make_board(sessions[0])
-    entries.advance(board.pk, 4, NOW)
+    entries.build_next(board.pk, 4, NOW)
     kept = stored()
     with monkeypatch.context() as patch:
         patch.setattr(entries, "_count", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
-            entries.advance(board.pk, 4, NOW)
+            entries.build_next(board.pk, 4, NOW)
     assert stored() == kept
     assert build(board) == (PEOPLE - 4) // 2 + 1
     built = stored()
@@ -121,7 +119,7 @@ def test_what_fails_half_way_goes_on_where_it_was(sessions, monkeypatch):
 
 def test_what_happens_to_patients_meanwhile_is_kept_up(sessions):
     board = make_board(sessions[0])
-    entries.advance(board.pk, 4, NOW)
+    entries.build_next(board.pk, 4, NOW)
     for session in (sessions[1], sessions[7]):  # one behind and one ahead
         walk(session.patient, "positive", strides(1, 30), days_ago=-1)
         session.patient.boards = "own"
@@ -153,35 +151,11 @@ def test_another_measure_or_group_is_another_board(sessions):
     assert stored() == ([], [])
 
 
-def test_what_broke_ties_by_points_of_several_types_is_settled_when_garry_is_updated(sessions):
-    boards = {
-        (types, tie): make_board(sessions[0], name=f"{types} {tie}", types=types)
-        for types in ("all", "same")
-        for tie in ("", "score")
-    }
-    for (_types, tie), board in boards.items():
-        build(board)
-        Leaderboard.everywhere.filter(pk=board.pk).update(tie_breaker=tie)
-    import_module("rehab.migrations.0005_settle_tie_breakers").settle(apps, None)
-    now = {key: Leaderboard.everywhere.get(pk=board.pk) for key, board in boards.items()}
-    assert {key for key, board in now.items() if board.is_being_built} == {
-        ("all", "score"),
-        ("same", "score"),
-    }
-    assert {key for key, board in now.items() if board.tie_breaker} == {("same", "score")}
-    for board in now.values():
-        board.full_clean()
-        build(board)
-        kept = stored()
-        entries.refresh(board, now=NOW)
-        assert stored() == kept
-
-
 def test_how_a_board_is_shown_alters_no_row_and_hides_nothing(sessions, woken):
     board = make_board(sessions[0], types="all")
     first = Leaderboard.everywhere.get()  # as a form read it, before anything was built
-    entries.advance(board.pk, 4, NOW)
-    first.name, first.top_n, first.moment, first.display = "Renamed", 3, "waiting", "top"
+    entries.build_next(board.pk, 4, NOW)
+    first.name, first.top_n, first.occasion, first.display = "Renamed", 3, "waiting", "top"
     first.save()
     build(board)
     built = stored()
@@ -253,7 +227,7 @@ def test_many_rows_of_another_day_are_made_beside_and_not_shown_meanwhile(sessio
     build(board)
     for person in people[:6]:
         walk(person, "positive", strides(9, 1), days_ago=-20)
-    (shown,) = show_after(sessions[1], later)
+    (shown,) = make_session_panels(sessions[1], later)
     assert shown.note == "This board is being built. These are your own sessions."
     assert woken
     assert len(entries.find_stale(board, later, 99)) == 6  # of three the best session is new
@@ -262,7 +236,7 @@ def test_many_rows_of_another_day_are_made_beside_and_not_shown_meanwhile(sessio
         pass
     kept = stored()
     assert len(kept[0]) == 6
-    assert show_after(sessions[1], later)[0].shared
+    assert make_session_panels(sessions[1], later)[0].shared
     entries.refresh(board, now=later)
     assert stored() == kept
 
@@ -274,7 +248,7 @@ def test_a_few_rows_of_another_day_are_made_in_the_look(sessions, woken):
         session.patient.boards = "own"
         session.patient.save()
     woken.clear()
-    show_after(sessions[8], NOW + timedelta(days=30))
+    make_session_panels(sessions[8], NOW + timedelta(days=30))
     assert stored() == ([], [])
     assert not woken
 
@@ -304,15 +278,15 @@ def test_counts_that_went_wrong_are_mended(sessions):
 
 def test_a_board_that_is_deleted_while_it_is_built(sessions):
     board = make_board(sessions[0])
-    entries.advance(board.pk, 4, NOW)
+    entries.build_next(board.pk, 4, NOW)
     Leaderboard.everywhere.all().delete()
-    assert not entries.advance(board.pk, 4, NOW)
+    assert not entries.build_next(board.pk, 4, NOW)
     assert entries.find_unbuilt() is None
 
 
 def test_the_form_says_how_far_it_is(sessions):
     board = make_board(sessions[0])
-    entries.advance(board.pk, 3, NOW)
+    entries.build_next(board.pk, 3, NOW)
     browser = Client()
     lead = User.everywhere.create_user("lead", role=Role.LEAD, clinic=board.clinic)
     browser.force_login(lead)
@@ -348,7 +322,7 @@ def test_trouble_ends_the_thread_and_the_next_look_begins_again(sessions, monkey
     make_board(sessions[0])
     builder = Builder()
     with monkeypatch.context() as patch:
-        patch.setattr(entries, "advance", lambda *_: 1 / 0)
+        patch.setattr(entries, "build_next", lambda *_: 1 / 0)
         builder.wake()
         while (thread := builder._thread) is not None:
             thread.join(20)

@@ -8,9 +8,10 @@ import pytest
 from django.core.exceptions import ValidationError
 from django.urls import reverse, reverse_lazy
 
-from rehab.boards import admin, figures
+from rehab.boards import admin
 from rehab.boards.models import BoardEntry, Leaderboard
-from rehab.boards.rules import FIRST_DAY, LAST_DAY
+from rehab.boards.ranking import results
+from rehab.boards.validation import FIRST_DAY, LAST_DAY
 from rehab.people.aliases import MANNERS, draw_alias, split_list
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
@@ -40,7 +41,7 @@ def test_the_defaults_are_safe():
         "show_ranks": True,
         "names": "pseudonym",
         "min_participants": 5,
-        "moment": "after_session",
+        "occasion": "after_session",
         "frozen_on": None,
         "higher_is_better": True,
     }
@@ -87,10 +88,10 @@ def test_the_defaults_are_safe():
         ({"among": "clinic", "entry": "sum"}, "cannot be added up"),
         ({"among": "clinic", "entry": "best", "metric": "target_met"}, "Choose the sum"),
         ({"among": "clinic", "entry": "best", "display": "total"}, "Choose the sum"),
-        ({"moment": "waiting"}, "belongs to nobody yet"),
-        ({"moment": "waiting", "among": "clinic", "entry": "best"}, "belongs to nobody yet"),
+        ({"occasion": "waiting"}, "belongs to nobody yet"),
+        ({"occasion": "waiting", "among": "clinic", "entry": "best"}, "belongs to nobody yet"),
         (
-            {"moment": "waiting", "among": "clinic", "entry": "best", "display": "top"},
+            {"occasion": "waiting", "among": "clinic", "entry": "best", "display": "top"},
             "no session at hand",
         ),
         ({"among": "across", "entry": "best"}, "the host's"),
@@ -195,11 +196,11 @@ def test_a_saved_board_is_previewed_as_it_is_stored_until_its_rows_would_be_othe
     group = [patient.pk for patient in people]
     read: list[bool] = []
 
-    def read_figures(*given: Any) -> Any:
+    def read_results(*given: Any) -> Any:
         read.append(True)
-        return figures.read_figures(*given)
+        return results.read_results(*given)
 
-    monkeypatch.setattr(admin, "read_figures", read_figures)
+    monkeypatch.setattr(admin, "read_results", read_results)
     shown: tuple[dict[str, Any], ...] = ({}, {"top_n": 3}, {"ties": "dense", "name": "Renamed"})
     for other in shown:
         page = client.get(PREVIEW, fields | {"group": group} | other).content.decode()

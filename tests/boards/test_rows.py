@@ -11,12 +11,12 @@ from django.test.utils import CaptureQueriesContext
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rehab.boards import building, entries
-from rehab.boards.choosing import choose
-from rehab.boards.choosing import place as place_of
+from rehab.boards.building import entries, scheduler
+from rehab.boards.choices import DisplayMode, TieRule
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
-from rehab.boards.showing import show_after
-from rehab.boards.standings import Listed, Stored
+from rehab.boards.panels.viewer import make_session_panels
+from rehab.boards.ranking.standings import ComputedStandings, StoredStandings
+from rehab.boards.ranking.visibility import cutoff_rank, find_visible_rows
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
@@ -61,7 +61,7 @@ def test_rows_that_were_kept_up_are_those_that_are_made_anew(clinic):
 def test_trouble_with_boards_loses_no_step(clinic, monkeypatch, caplog):
     board_of(clinic)
     person = patient_of(clinic, "A")
-    monkeypatch.setattr(entries, "read_figures", lambda *_: 1 / 0)
+    monkeypatch.setattr(entries, "read_results", lambda *_: 1 / 0)
     session = walk(person, "positive", strides(3, 1))
     assert session.state == "finished"
     assert session.steps.count() == 4
@@ -78,16 +78,16 @@ def test_boards_that_did_not_follow_heal_by_themselves(
     frozen = board_of(clinic, name="Frozen", frozen_on=NOW.date() - timedelta(days=5))
     people = people_of(clinic, 6)
     sessions = walk_down(people)
-    monkeypatch.setattr(building.builder, "wake", lambda: None)
+    monkeypatch.setattr(scheduler.board_builder, "wake", lambda: None)
     with monkeypatch.context() as patch, django_capture_on_commit_callbacks(execute=True):
-        patch.setattr(entries, "read_figures", lambda *_: 1 / 0)
+        patch.setattr(entries, "read_results", lambda *_: 1 / 0)
         walk(people[5], "positive", strides(20, 0), days_ago=1)
     assert "Boards did not follow" in caplog.text
     assert entries.find_unbuilt() == board.pk
     assert not Leaderboard.everywhere.get(pk=frozen.pk).is_being_built
-    told = {shown.title: shown.note for shown in show_after(sessions[0], NOW)}
+    told = {shown.title: shown.note for shown in make_session_panels(sessions[0], NOW)}
     assert told["Board"] == "This board is being built. These are your own sessions."
-    while entries.advance(board.pk, 50, NOW):
+    while entries.build_next(board.pk, 50, NOW):
         pass
     assert BoardEntry.everywhere.get(board=board, patient=people[5]).figure == 100
     assert sum(BoardCount.everywhere.values_list("rows", flat=True)) == 6
@@ -145,7 +145,7 @@ def test_everyone_locks_boards_in_one_order_and_each_once(clinic, monkeypatch):
 
 
 @settings(deadline=None, max_examples=40)
-@given(st.lists(st.integers(0, 6), min_size=1, max_size=14), st.sampled_from(Leaderboard.Ties))
+@given(st.lists(st.integers(0, 6), min_size=1, max_size=14), st.sampled_from(TieRule))
 def test_stored_and_counted_standings_are_the_same(figures, ties):
     clinic = Clinic.everywhere.get_or_create(name="Ash")[0]
     board = Leaderboard.everywhere.get_or_create(clinic=clinic, name="B", defaults=COMMON)[0]
@@ -163,7 +163,7 @@ def test_stored_and_counted_standings_are_the_same(figures, ties):
     BoardCount.everywhere.bulk_create(
         BoardCount(board=board, valence="", figure=f, rows=figures.count(f)) for f in set(figures)
     )
-    listed, stored = Listed(board, made), Stored(board, "")
+    listed, stored = ComputedStandings(board, made), StoredStandings(board, "")
     assert (listed.count, listed.total) == (stored.count, stored.total) == (len(made), sum(figures))
     assert plain(listed.top(5)) == plain(stored.top(5))
     for person in with_rows:
@@ -171,23 +171,23 @@ def test_stored_and_counted_standings_are_the_same(figures, ties):
         assert plain([mine]) == plain([same])
         assert plain(listed.around(mine, 2)) == plain(stored.around(same, 2))
         better = [figure for figure in figures if figure > mine.figure]
-        assert mine.shared == 1 + len(better)
+        assert mine.shared_rank == 1 + len(better)
         if ties == "dense":
             assert mine.rank == 1 + len(set(better))
-        for display in Leaderboard.Display:
+        for display in DisplayMode:
             board.display = display
-            chosen = choose(board, stored, same)
+            chosen = find_visible_rows(board, stored, same)
             half = (len(made) + 1) // 2
-            assert all(place_of(board, each.row) <= half or each.row == same for each in chosen)
-            assert not [c for c in chosen if c.ranked and place_of(board, c.row) > half]
+            assert all(cutoff_rank(board, each.row) <= half or each.row == same for each in chosen)
+            assert not [c for c in chosen if c.has_rank and cutoff_rank(board, c.row) > half]
 
 
 def make(person: Patient, figure: int):
-    from rehab.boards.figures import Figure, make_key
+    from rehab.boards.ranking.results import Result, make_key
 
     key = make_key(figure, 0, NOW, person.pk)
-    return Figure(person.pk, person.pk, "", figure, None, key, None)
+    return Result(person.pk, person.pk, "", figure, None, key, None)
 
 
 def plain(rows) -> list[tuple[int, int, int, int]]:
-    return [(row.patient_id, row.figure, row.shared, row.rank) for row in rows]
+    return [(row.patient_id, row.figure, row.shared_rank, row.rank) for row in rows]

@@ -13,8 +13,14 @@ from django.urls import reverse
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rehab.boards.choices import CountedTypes
 from rehab.boards.models import Leaderboard
-from rehab.boards.ranking import SHOWN, By, Figures, cut, rank, ranking_of
+from rehab.boards.panels.own_sessions import Scale, make_board, scale_of
+from rehab.boards.ranking.periods import period_of
+from rehab.boards.ranking.results import own_results
+from rehab.boards.ranking.sessions import CountedSession
+from rehab.boards.ranking.standings import ComputedStandings
+from rehab.boards.ranking.visibility import MAX_OWN, find_own_sessions
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionMetric
@@ -23,7 +29,7 @@ from rehab.training.changes import ChangeKind
 from rehab.training.phases import make_phase
 from rehab.training.valences import VALENCES
 from tests.support.walks import HIT, MISS, strides, walk
-from tests.support.world import World, build_world, client_of, signed_in
+from tests.support.world import NOW, World, build_world, client_of, signed_in
 
 pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
@@ -226,55 +232,74 @@ def test_nobody_else_opens_it(world, patient):
 # --- the rules alone ------------------------------------------------------------------------------
 
 
+def own_session(pk: int, valence: str = "", cost: int = 1, **values: float) -> CountedSession:
+    return CountedSession(pk, 1, valence, False, NOW, NOW.date(), values, cost)
+
+
+def rank(scale: Scale, sessions: list[CountedSession], **fields: str) -> ComputedStandings:
+    board = make_board(scale, CountedTypes.ALL)
+    vars(board).update(fields)
+    period = period_of(board, NOW)
+    return ComputedStandings(board, own_results(board, sessions, "", period))
+
+
 @given(st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)).filter(any), max_size=30))
 def test_every_place_is_one_more_than_the_better_ones(walked):
     figures = [
-        Figures(pk, "positive", hits / (hits + misses), hits, hits if not misses else 0)
+        own_session(
+            pk, "positive", hit_rate=hits / (hits + misses), score=hits, steps=hits + misses
+        )
         for pk, (hits, misses) in enumerate(walked)
     ]
     lost = [
-        Figures(pk, "negative", hits / (hits + misses), -misses, hits if not misses else 0)
+        own_session(
+            pk, "negative", hit_rate=hits / (hits + misses), score=-misses, steps=hits + misses
+        )
         for pk, (hits, misses) in enumerate(walked)
     ]
     percent = [round(100 * (hits / (hits + misses))) for hits, misses in walked]
     points = [hits for hits, _ in walked]
-    for by, given_figures, truth in (
-        (By.RATE, figures, percent),
-        (By.POINTS, figures, points),
-        (By.KEPT, lost, points),
+    for scale, given_figures, truth in (
+        (Scale.RATE, figures, percent),
+        (Scale.POINTS, figures, points),
+        (Scale.KEPT, lost, points),
     ):
-        entries = rank(given_figures, by)
+        entries = rank(scale, given_figures).top(len(walked))
+        places = rank(scale, given_figures, ties="earlier").top(len(walked))
         assert sorted(entry.session_id for entry in entries) == list(range(len(walked)))
-        assert [entry.place for entry in entries] == list(range(1, len(walked) + 1))
+        assert [entry.rank for entry in places] == list(range(1, len(walked) + 1))
         assert [entry.rank for entry in entries] == sorted(entry.rank for entry in entries)
         for entry in entries:
-            assert entry.value == truth[entry.session_id]
-            assert entry.rank == 1 + sum(other > entry.value for other in truth)
-            if by is By.KEPT:
-                assert entry.stake == sum(walked[entry.session_id])
+            assert entry.figure == truth[entry.session_id]
+            assert entry.rank == 1 + sum(other > entry.figure for other in truth)
+            if scale is Scale.KEPT:
+                assert entry.points_at_stake == sum(walked[entry.session_id])
 
 
 def test_what_could_be_lost_follows_the_price_of_a_miss():
-    assert Figures(1, "negative", 0.96, -36, 9).stake(3) == 900
-    assert Figures(1, "negative", 1.0, 0, 50).stake(3) == 150
-    assert Figures(1, "negative", 0.0, -30, 0).stake(3) == 30
+    for steps, lost, at_stake in ((300, 36, 900), (50, 0, 150), (10, 30, 30)):
+        session = own_session(1, "negative", cost=3, score=-lost, steps=steps)
+        assert session.points_at_stake("score") == at_stake
+        assert session.figure("score") == at_stake - lost
 
 
 def test_a_valence_is_ranked_by_what_it_pays():
-    ways = {slug: ranking_of(valence) for slug, valence in VALENCES.items()}
+    ways = {slug: scale_of(valence) for slug, valence in VALENCES.items()}
     assert ways == {
-        "positive": By.POINTS,
-        "negative": By.KEPT,
-        "binary": By.POINTS,
-        "explicit": By.RATE,
+        "positive": Scale.POINTS,
+        "negative": Scale.KEPT,
+        "binary": Scale.POINTS,
+        "explicit": Scale.RATE,
     }
 
 
 @pytest.mark.parametrize("mine", [0, 5, 12, 40, 190, 199])
 def test_a_long_board_keeps_the_best_and_those_around(mine):
-    entries = rank([Figures(pk, "", (200 - pk) / 200, 200 - pk, 0) for pk in range(200)], By.POINTS)
-    shown = [entry.session_id for entry in cut(entries, mine)]
-    assert len(shown) <= SHOWN
+    sessions = [own_session(pk, hit_rate=(200 - pk) / 200, score=200 - pk) for pk in range(200)]
+    standings = rank(Scale.POINTS, sessions)
+    visible = find_own_sessions(standings, standings.find_session(mine))
+    shown = [each.row.session_id for each in visible]
+    assert len(shown) <= MAX_OWN
     assert shown == sorted(set(shown))
     assert set(range(10)) | set(range(max(0, mine - 15), min(200, mine + 16))) == set(shown) | set(
         range(10)
@@ -321,7 +346,7 @@ def test_among_ten_thousand_sessions_only_the_patients_rows_are_read(client, cro
     # browser session, account, session, boards of the clinic, figures, facts of what is shown
     assert len(asked) == 6
     rows = read(page, "same")
-    assert len(rows) <= SHOWN
+    assert len(rows) <= MAX_OWN
     assert [row.session for row in rows if row.you] == [crowd.pk]
     better = TrainingSession.everywhere.filter(
         patient=crowd.patient, metrics__slug="score", metrics__value__gt=30

@@ -8,9 +8,9 @@ import pytest
 from django.core.management import call_command
 from django.utils import timezone
 
-from rehab.boards import entries
+from rehab.boards.building import entries
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
-from rehab.boards.showing import show_after
+from rehab.boards.panels.viewer import make_session_panels
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
@@ -180,7 +180,7 @@ def test_what_left_the_period_before_the_freeze_is_not_in_it(clinic):
     assert BoardEntry.everywhere.count() == 6
     Leaderboard.everywhere.update(frozen_on=day + timedelta(days=12))
     after = now + timedelta(days=40)  # nobody looked meanwhile
-    assert not show_after(old[0], after)[0].shared
+    assert not make_session_panels(old[0], after)[0].shared
     assert set(BoardEntry.everywhere.values_list("patient", flat=True)) == {
         one.pk for one in people[3:]
     }

@@ -9,10 +9,10 @@ import pytest
 from django.test import Client
 from django.urls import reverse
 
-from rehab.boards import entries
-from rehab.boards.figures import read_figures
+from rehab.boards.building import entries
 from rehab.boards.models import BoardEntry, Leaderboard
-from rehab.boards.showing import Viewer, show_after, show_waiting
+from rehab.boards.panels.viewer import BoardViewer, make_session_panels, make_waiting_panels
+from rehab.boards.ranking.results import read_results
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
@@ -90,7 +90,7 @@ def test_neighbors_with_pseudonyms_after_a_session(clinic):
         (5, "80%", False),
         (6, "75%", False),
     ]
-    assert shown.rows[0].skips
+    assert shown.rows[0].follows_gap
     names = [row.title for row in shown.rows]
     assert names == [person.alias for person in people[1:6]]
     assert len(set(names)) == 5
@@ -102,7 +102,7 @@ def test_neighbors_with_pseudonyms_after_a_session(clinic):
 def test_no_sessions_and_the_first_ever(clinic):
     board = board_of(clinic)
     person = patient_of(clinic, "A")
-    assert Viewer(board, NOW, person).show().rows == []
+    assert BoardViewer(board, NOW, person).make_panel().rows == []
     session = walk(person, "positive", strides(3, 1))
     shown = see(session)
     assert not shown.shared
@@ -117,7 +117,7 @@ def test_the_newest_session_is_the_worst_of_a_hundred_own_ones(clinic):
         walk(person, "positive", strides(2, 1), days_ago=number + 1)
     shown = see(walk(person, "positive", strides(1, 9)))
     assert told(shown) == [(1, "67%", False), (1, "67%", False), (100, "10%", True)]
-    assert shown.rows[0].skips
+    assert shown.rows[0].follows_gap
 
 
 def test_four_participants_see_their_own_sessions_and_why_five_see_the_board(clinic):
@@ -139,20 +139,20 @@ def test_simulated_patients_hide_no_person(clinic):
     sessions = [walk(one, "positive", strides(8, 2), simulated=True) for one in simulated]
     tried = see(sessions[0])  # alone they are shown: whoever tries GARRY sees a board
     assert tried.shared
-    assert tried.facts == "5 patients on it now."
+    assert tried.summary == "5 patients on it now."
     people = people_of(clinic, 5)
     walk(people[0], "positive", strides(9, 1))
-    for viewer in (Viewer(board, NOW, simulated[0]), Viewer(board, NOW, people[0])):
-        for made in (None, list(read_figures(board, NOW))):
-            shown = replace(viewer, made=made).show()
+    for viewer in (BoardViewer(board, NOW, simulated[0]), BoardViewer(board, NOW, people[0])):
+        for made in (None, list(read_results(board, NOW))):
+            shown = replace(viewer, results=made).make_panel()
             assert not shown.shared
             assert "C-0" not in [row.title for row in shown.rows]
-            assert shown.facts.startswith("1 patient on it now. Under 5")
+            assert shown.summary.startswith("1 patient on it now. Under 5")
     walk_down(people[1:])
-    for made in (None, list(read_figures(board, NOW))):
-        shown = Viewer(board, NOW, people[0], made=made).show()
+    for made in (None, list(read_results(board, NOW))):
+        shown = BoardViewer(board, NOW, people[0], results=made).make_panel()
         assert shown.shared
-        assert shown.facts == "10 patients on it now."
+        assert shown.summary == "10 patients on it now."
 
 
 def test_nobody_is_shown_in_the_last_half_and_who_is_there_sees_the_own_sessions(clinic):
@@ -166,7 +166,7 @@ def test_nobody_is_shown_in_the_last_half_and_who_is_there_sees_the_own_sessions
     board.save()
     last = see(sessions[8])
     assert told(last)[-1] == (None, "60%", True)
-    assert last.rows[-1].skips
+    assert last.rows[-1].follows_gap
     assert [row.rank for row in last.rows[:-1]] == [1, 2, 3, 4, 5]
 
 
@@ -252,7 +252,7 @@ def test_a_patient_with_mixed_types_has_a_row_on_each_list(clinic):
     assert told(see(binary[1]))[1] == (2, "18", True)
     kept = see(negative[1])
     assert kept.kept
-    assert [(row.rank, row.value, row.stake) for row in kept.rows] == [
+    assert [(row.rank, row.value, row.points_at_stake) for row in kept.rows] == [
         (None, "20", "20"),
         (None, "19", "20"),
         (None, "18", "20"),
@@ -344,7 +344,7 @@ def test_in_a_blinded_study_there_is_no_board_and_no_score(clinic):
     people[0].blinded = True
     people[0].save()
     sessions[0].refresh_from_db()
-    assert show_after(sessions[0], NOW) == []
+    assert make_session_panels(sessions[0], NOW) == []
     page = page_of(sessions[0])
     assert "This walk is over." in page
     assert 'class="value"' not in page
@@ -395,7 +395,9 @@ def test_across_clinics_stand_those_who_agreed_of_clinics_that_take_part(clinic)
     assert BoardEntry.everywhere.filter(board=board).count() == 6
     session = TrainingSession.everywhere.filter(clinic=oak).first()
     assert see(session).shared
-    assert show_after(TrainingSession.everywhere.filter(clinic=elsewhere).first(), NOW) == []
+    assert (
+        make_session_panels(TrainingSession.everywhere.filter(clinic=elsewhere).first(), NOW) == []
+    )
     oak.boards_across = False
     oak.save()
     assert BoardEntry.everywhere.filter(board=board).count() == 3
@@ -477,7 +479,7 @@ def test_lower_may_be_better(clinic):
 
 
 def test_a_waiting_tablet_shows_the_clinics_board_once_there_are_enough(clinic):
-    board_of(clinic, moment="waiting", display="top", types="all")
+    board_of(clinic, occasion="waiting", display="top", types="all")
     people = people_of(clinic, 6)
     walk_down(people[:4])
     tablet = tablet_at(Station.everywhere.create(clinic=clinic, name="East"))
@@ -487,5 +489,5 @@ def test_a_waiting_tablet_shows_the_clinics_board_once_there_are_enough(clinic):
     page = tablet.get(url).content.decode()
     assert re.findall(r"</b> |<span class=\"day\">(\w+ \w+)", page)[0] in {p.alias for p in people}
     assert "You" not in page
-    assert show_waiting(clinic, NOW)
+    assert make_waiting_panels(clinic, NOW)
     assert Client().get(url).status_code == 302

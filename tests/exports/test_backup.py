@@ -24,7 +24,7 @@ from django.core.management import CommandError, call_command
 from django.db import connection
 
 from rehab.exports import backup
-from rehab.exports.backup import LEFT_OUT, backed_up, read_lines, write_backup
+from rehab.exports.backup import EXCLUDED_MODELS, backup_models, read_lines, write_backup
 from rehab.exports.encryption import generate_key, read_identities, read_recipients
 from rehab.people.models import Clinic, Patient, User
 from rehab.sessions.log import Step
@@ -63,7 +63,7 @@ def fill() -> None:
 
 
 def rows() -> dict[str, list[dict[str, Any]]]:
-    """Give everything there is, as it is stored."""
+    """Return everything there is, as it is stored."""
     return {
         model._meta.label_lower: [
             json.loads(line)
@@ -73,7 +73,7 @@ def rows() -> dict[str, list[dict[str, Any]]]:
                 fields=[field.name for field in model._meta.concrete_fields],
             ).splitlines()
         ]
-        for model in backed_up()
+        for model in backup_models()
     }
 
 
@@ -98,10 +98,10 @@ def test_every_row_comes_back(file, key):
 
 
 def test_nothing_is_left_out_but_what_a_server_makes_anew():
-    kept = {model._meta.label_lower for model in backed_up()}
+    kept = {model._meta.label_lower for model in backup_models()}
     every = {model._meta.label_lower for model in apps.get_app_config("rehab").get_models()}
     assert every - kept == {"rehab.pairing"}
-    assert not kept & LEFT_OUT
+    assert not kept & EXCLUDED_MODELS
 
 
 @pytest.mark.django_db(transaction=True)

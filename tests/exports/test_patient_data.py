@@ -22,7 +22,8 @@ from hypothesis import strategies as st
 
 from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.exports.archive import ZipResponse, write_csv, write_zip
-from rehab.exports.tables import PAGE, STEPS, TABLES, Selection, to_cell
+from rehab.exports.selection import PAGE, Selection
+from rehab.exports.tables import STEPS, TABLES, format_cell
 from rehab.patients.visits import plan_visit
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.consent.models import Purpose
@@ -269,7 +270,7 @@ def test_therapists_and_strangers_do_not_take_all_sessions_along(world):
 @pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r", "\n", "'"])
 def test_no_text_is_a_formula_and_all_can_be_told_back(start):
     text = f'{start}HYPERLINK("http://example.org")'
-    cell = to_cell(text)
+    cell = format_cell(text)
     assert cell == f"'{text}"
     assert cell[1:] == text
 

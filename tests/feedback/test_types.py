@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from django.urls import reverse
 
+from rehab.feedback.clinic_valences import valences_of
 from rehab.feedback.models import FeedbackBand, FeedbackType
-from rehab.feedback.picture import show_bands
-from rehab.feedback.valences import valences_of
-from rehab.feedback.wording import words_in
+from rehab.feedback.preview import preview_bands
+from rehab.feedback.translation import pick_words
 from rehab.people.roles import Role
 from rehab.training.valences import VALENCES, CueGestures
 from tests.support.forms import feedback_form
@@ -108,7 +108,7 @@ def test_the_preview_shows_each_band_and_stores_nothing(world):
 
 
 def test_the_preview_of_a_band_over_the_goal_shows_both_sides():
-    below, above = show_bands(VALENCES["explicit"])
+    below, above = preview_bands(VALENCES["explicit"])
     assert (below.is_hit, above.is_hit) == (False, True)
     assert below.level < 1 / 1.5 < above.level
     assert {below.emblem, above.emblem} == {"neutral"}
@@ -118,14 +118,14 @@ def test_the_preview_of_a_band_over_the_goal_shows_both_sides():
 def test_words_fall_back_to_the_usual_ones_of_their_language(monkeypatch):
     spanish = {"Nearly there.": "Ya casi."}
     monkeypatch.setattr(
-        "rehab.feedback.wording.translate",
+        "rehab.feedback.translation.translate",
         lambda words, language: spanish.get(words, words) if language == "es" else words,
     )
-    assert words_in("es", {"es": "Siga."}, "Nearly there.") == "Siga."
-    assert words_in("es", {"en": "Almost!"}, "Nearly there.") == "Ya casi."
-    assert words_in("es", {"en": "Almost!"}, "Go.") == "Almost!"
-    assert words_in("es", {}, "Go.") == "Go."
-    assert words_in("en", {}, "Nearly there.") == "Nearly there."
+    assert pick_words("es", {"es": "Siga."}, "Nearly there.") == "Siga."
+    assert pick_words("es", {"en": "Almost!"}, "Nearly there.") == "Ya casi."
+    assert pick_words("es", {"en": "Almost!"}, "Go.") == "Almost!"
+    assert pick_words("es", {}, "Go.") == "Go."
+    assert pick_words("en", {}, "Nearly there.") == "Nearly there."
 
 
 def test_bands_are_those_of_the_clinic_in_order(world):

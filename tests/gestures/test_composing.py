@@ -25,7 +25,7 @@ def pt(world: World) -> Client:
 
 
 def complaints(page: Any) -> list[str]:
-    """Give what the page complains of."""
+    """Return the errors that the page shows."""
     lists = re.findall(r'<ul class="errorlist.*?</ul>', page.content.decode(), re.DOTALL)
     return [text for one in lists for text in re.findall(r"<li>(.*?)</li>", one)]
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-
 import pytest
-from django.apps import apps
 from django.core.exceptions import ValidationError
 from django.test import Client
 from django.urls import reverse
@@ -328,29 +325,3 @@ def test_a_clinic_may_do_without_and_simulated_patients_need_none(world):
     world.clinic.save()
     Patient.everywhere.filter(pk=world.patient.pk).update(simulated=True)
     assert seen(world) == {True}
-
-
-def test_what_exists_when_garry_is_updated_goes_on(world):
-    Consent.everywhere.all().delete()
-    quiet = Patient.everywhere.create(clinic=world.clinic, code="q", nickname="Q")
-    import_module("rehab.migrations.0003_carry_over_consent").carry_over(apps, None)
-    world.clinic.refresh_from_db()
-    assert not world.clinic.research_needs_consent
-    assert [(row.patient, row.text) for row in Consent.everywhere.all()] == [(world.patient, None)]
-    world.patient.full_clean()
-    assert not active_consents(quiet)
-
-
-def test_an_update_lets_boards_and_consent_say_the_same(world):
-    board = BoardEntry.everywhere.get(patient=world.patient).board
-    left = Patient.everywhere.create(clinic=world.clinic, code="l", nickname="L", boards="across")
-    kept = Patient.everywhere.create(clinic=world.clinic, code="k", nickname="K")
-    record_consent(kept, Purpose.BOARDS, None, NOW)
-    Consent.everywhere.update(level="")
-    import_module("rehab.migrations.0004_what_was_agreed_to").tell_levels(apps, None)
-    assert active_consents(world.patient)["boards"].level == "clinic"
-    assert "boards" not in active_consents(kept)
-    left.refresh_from_db()
-    assert left.boards == Boards.OWN
-    board.refresh_from_db()
-    assert board.built_to == 0  # made anew, without whoever no longer agrees

@@ -11,7 +11,7 @@ from django.db import connections
 from django.test import Client
 from django.urls import reverse
 
-from rehab.boards import entries
+from rehab.boards.building import entries
 from rehab.boards.models import BoardEntry
 from rehab.patients.erasure import erase
 from rehab.people.consent.models import Consent, Purpose

@@ -14,10 +14,10 @@ from django.http import HttpRequest, HttpResponse
 from django.urls import URLPattern, get_resolver, path, reverse
 
 from garry_site import urls as site_urls
-from rehab.boards import rows, showing
 from rehab.boards.admin import LeaderboardAdmin
 from rehab.boards.models import BoardEntry, Leaderboard
-from rehab.boards.standings import Stored
+from rehab.boards.panels import rows, viewer
+from rehab.boards.ranking.standings import StoredStandings
 from rehab.people import api as people_api
 from rehab.people.access import for_roles, public
 from rehab.people.models import Patient
@@ -251,8 +251,8 @@ def test_a_public_page_with_patients_is_caught(worlds, settings, monkeypatch):
 
 
 def test_rows_of_another_clinics_board_are_caught(worlds, monkeypatch):
-    monkeypatch.setattr(Stored, "find_rows", lambda self: BoardEntry.everywhere.all())
-    monkeypatch.setattr(rows, "standing_on", lambda board: Patient.everywhere.all())
+    monkeypatch.setattr(StoredStandings, "find_rows", lambda self: BoardEntry.everywhere.all())
+    monkeypatch.setattr(rows, "eligible_patients", lambda board: Patient.everywhere.all())
     leaks, _ = find_leaks(worlds, all_actors(*worlds), under="/sessions/")
     url = reverse("scores", kwargs={"session_id": worlds[0].session.pk})
     assert f"pt of amber: {url} shows Patient of birch" in leaks
@@ -260,7 +260,7 @@ def test_rows_of_another_clinics_board_are_caught(worlds, monkeypatch):
 
 def test_a_board_of_another_clinic_is_caught(worlds, monkeypatch):
     monkeypatch.setattr(
-        showing, "boards_at", lambda moment, clinic: list(Leaderboard.everywhere.all())
+        viewer, "boards_on", lambda occasion, clinic: list(Leaderboard.everywhere.all())
     )
     leaks, _ = find_leaks(worlds, all_actors(*worlds), under="/sessions/")
     url = reverse("scores", kwargs={"session_id": worlds[0].session.pk})

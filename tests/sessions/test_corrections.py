@@ -10,7 +10,7 @@ import pytest
 from django.core.exceptions import ValidationError
 from django.urls import reverse
 
-from rehab.boards import entries
+from rehab.boards.building import entries
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.patients.erasure import erase
 from rehab.people.consent.models import Purpose
@@ -102,7 +102,7 @@ def agrees_with_a_rebuild(board: Leaderboard) -> None:
     """Fail where the rows kept up differ from rows made anew."""
 
     def told() -> list[object]:
-        fields = ("patient_id", "valence", "figure", "stake", "key", "stale_on")
+        fields = ("patient_id", "valence", "figure", "points_at_stake", "key", "stale_on")
         kept = BoardEntry.everywhere.filter(board=board).order_by("key").values_list(*fields)
         counts = BoardCount.everywhere.filter(board=board).order_by("valence", "figure")
         return [list(kept), list(counts.values_list("valence", "figure", "rows"))]

@@ -1,4 +1,4 @@
-"""Reads the archives that pages give out."""
+"""Reads the archives that pages export."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from typing import Any
 
 
 def body_of(response: Any) -> bytes:
-    """Give an answer's whole body, also of one that comes bit by bit."""
+    """Return the whole body of a response, streamed or not."""
     return b"".join(response.streaming_content) if response.streaming else response.content
 
 
 def open_archive(data: bytes) -> dict[str, str]:
-    """Give the files of an archive by their names."""
+    """Return the files of an archive by name."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         assert archive.testzip() is None
         return {name: archive.read(name).decode() for name in archive.namelist()}
 
 
 def words_of(response: Any) -> str:
-    """Give all that an answer says, also in the files of an archive."""
+    """Return all text of a response, also in the files of an archive."""
     data = body_of(response)
     if data.startswith(b"PK"):
         return "\n".join(open_archive(data).values())
@@ -29,5 +29,5 @@ def words_of(response: Any) -> str:
 
 
 def rows_of(text: str) -> list[dict[str, str]]:
-    """Give a table's rows by column."""
+    """Return the rows of a table by column."""
     return list(csv.DictReader(io.StringIO(text, newline="")))

@@ -1,9 +1,9 @@
-"""Patients, boards and walks for tests of boards."""
+"""Patients, boards and sessions for tests of boards."""
 
 from __future__ import annotations
 
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
-from rehab.boards.showing import show_after
+from rehab.boards.panels.viewer import make_session_panels
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.models import TrainingSession
 from tests.support.walks import strides, walk
@@ -36,13 +36,13 @@ def board_of(clinic: Clinic | None, **fields) -> Leaderboard:
 
 
 def walk_down(people: list[Patient], valence: str = "positive", **how) -> list[TrainingSession]:
-    """Let each patient hit a little less often than the one before: 20 of 20, 19 of 20, …"""
+    """Walk a session of each patient, each with one hit less: 20 of 20, 19 of 20, …"""
     return [walk(one, valence, strides(20 - n, n), **how) for n, one in enumerate(people)]
 
 
 def see(session: TrainingSession, now=NOW):
-    """Look at the only board after a session, with what is stored and with what is counted anew."""
-    (shown,) = show_after(session, now)
+    """Return the only board that is shown after a session."""
+    (shown,) = make_session_panels(session, now)
     return shown
 
 
@@ -51,7 +51,7 @@ def told(shown) -> list[tuple[int | None, str, bool]]:
 
 
 def everything() -> tuple[list[str], list[tuple[int, str, int, int]]]:
-    fields = ("board", "patient", "valence", "figure", "stake", "key", "stale_on")
+    fields = ("board", "patient", "valence", "figure", "points_at_stake", "key", "stale_on")
     rows = sorted(map(str, BoardEntry.everywhere.values_list(*fields)))
     counts = sorted(BoardCount.everywhere.values_list("board", "valence", "figure", "rows"))
     return rows, counts

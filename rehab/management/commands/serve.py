@@ -12,7 +12,7 @@ from channels.routing import get_default_application
 from django.conf import settings
 from django.core.management import BaseCommand, CommandError
 
-from rehab.boards.building import builder
+from rehab.boards.building.scheduler import board_builder
 from rehab.people.sign_in.first_start import (
     FIRST_USERNAME,
     first_clinic,
@@ -79,7 +79,7 @@ class Command(BaseCommand):
             current().supervisor.start("robot", robot, {"GARRY_ROBOT_TOKEN": token})
         for number, command in enumerate(commands, start=1):
             current().supervisor.start(f"child {number}", shlex.split(command))
-        builder.wake()  # for boards that the last run has left unbuilt
+        board_builder.wake()  # for boards that the last run has left unbuilt
         self.stdout.write("Ready. Ctrl-C stops the server.")
         self.stdout.flush()
 

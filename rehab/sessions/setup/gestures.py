@@ -8,7 +8,7 @@ from typing import Any
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.feedback.valences import valences_of
+from rehab.feedback.clinic_valences import valences_of
 from rehab.gestures.choices import gesture_choices
 from rehab.gestures.models import Gesture
 from rehab.people.models import Patient, User

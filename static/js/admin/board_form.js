@@ -46,7 +46,7 @@ function build() {
       else if (value("entry") === "each") set("entry", "best");
       if (own && total) set("display", "neighbors");
     }
-    if (changed === "moment" && value("moment") === "waiting") {
+    if (changed === "occasion" && value("occasion") === "waiting") {
       if (value("among") === "self") set("among", "clinic");
       if (value("entry") === "each") set("entry", "best");
       if (!["top", "total"].includes(value("display"))) set("display", "top");

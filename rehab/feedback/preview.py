@@ -1,4 +1,4 @@
-"""What a patient sees in each band, as the preview draws it."""
+"""The steps that the preview of a feedback type draws: one or two for each band."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ AMOUNTS = {Confetti.NONE: 0, Confetti.LITTLE: 6, Confetti.MUCH: 14, Confetti.MOS
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """A step of a band: where the level stands (of the scale, 0 to 1) and all that goes with it."""
+class PreviewStep:
+    """A step as a patient would see it. ``level`` is its share of the scale, 0 to 1."""
 
     begins: str
     level: float
@@ -29,37 +29,37 @@ class Seen:
 
     @property
     def y(self) -> float:
-        """Give where the level stands in the drawing."""
+        """The height of the level in the drawing."""
         return round(BOTTOM_Y - (BOTTOM_Y - TOP_Y) * self.level, 1)
 
     @property
     def pieces(self) -> list[tuple[float, float, int]]:
-        """Give place and color of each piece of confetti."""
+        """The place and color of each piece of confetti."""
         return [
             (round(20 + 360 * (n * SPREAD[0] % 1)), round(8 + 70 * (n * SPREAD[1] % 1)), n % 3)
             for n in range(1, AMOUNTS[self.confetti] + 1)
         ]
 
 
-def show_bands(valence: Valence) -> Iterator[Seen]:
-    """Give a typical step of each band; two of one that lies on both sides of the goal."""
+def preview_bands(valence: Valence) -> Iterator[PreviewStep]:
+    """Yield a typical step of each band; two of a band that has the goal in it."""
     ends = [band.from_performance for band in valence.bands[1:]]
     for band, end in zip(valence.bands, [*ends, None], strict=True):
         start = band.from_performance
         last = end if end is not None else max(start + 0.2, 1.2)
-        for low, high in _sides(start, last):
-            yield _show(valence, band, (low + high) / 2)
+        for low, high in _split_at_goal(start, last):
+            yield _make_step(valence, band, (low + high) / 2)
 
 
-def _sides(start: float, end: float) -> Iterator[tuple[float, float]]:
+def _split_at_goal(start: float, end: float) -> Iterator[tuple[float, float]]:
     marks = [start, 1.0, end] if start < 1 < end else [start, end]
     yield from pairwise(marks)
 
 
-def _show(valence: Valence, band: Band, performance: float) -> Seen:
+def _make_step(valence: Valence, band: Band, performance: float) -> PreviewStep:
     hit = performance >= 1
     points = valence.points(hit) or 0
-    return Seen(
+    return PreviewStep(
         begins=f"{100 * band.from_performance:.0f}",
         level=min(performance / SCALE, 1),
         is_hit=hit,

@@ -1,4 +1,4 @@
-"""Which days a board looks at, by the clinic's own calendar."""
+"""The days whose sessions count on a board, by the clinic's calendar."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, date, datetime, time, timedelta, tzinfo
 from zoneinfo import ZoneInfo
 
+from rehab.boards.choices import PeriodKind
 from rehab.boards.models import Leaderboard
 
 LAST_DAYS = 30
@@ -13,13 +14,17 @@ LAST_DAYS = 30
 
 @dataclass(frozen=True, slots=True)
 class Period:
-    """From the first day to the last one, both included; None where it has no bound."""
+    """From the first day to the last one, both included; None where it has no bound.
+
+    ``renews_on`` is the day on which a new week or month begins; ``keeps_for`` is how long a
+    session stays in a sliding period.
+    """
 
     first: date | None
     last: date | None
     zone: tzinfo
-    rolls_on: date | None = None  # the day on which a new week or month begins
-    lasts: timedelta | None = None  # how long a session stays in a period that glides
+    renews_on: date | None = None
+    keeps_for: timedelta | None = None
 
     @property
     def began(self) -> datetime | None:
@@ -34,18 +39,18 @@ class Period:
         return datetime.combine(self.last + timedelta(days=1), time(), self.zone)
 
     def day_of(self, moment: datetime) -> date:
-        """Give the day that a moment falls on."""
+        """Return the day that a moment falls on."""
         return moment.astimezone(self.zone).date()
 
-    def leaves(self, day: date) -> date | None:
-        """Say when a session of this day no longer counts; None for never."""
-        return self.rolls_on if self.lasts is None else day + self.lasts
+    def stale_on(self, day: date) -> date | None:
+        """Return the day on which a session of ``day`` no longer counts; None for never."""
+        return self.renews_on if self.keeps_for is None else day + self.keeps_for
 
 
 def period_of(board: Leaderboard, now: datetime) -> Period:
-    """Give the days that count now; on a frozen board, those that counted on its last day."""
+    """Return the period that counts now; of a frozen board, the one that did on its last day."""
     zone, as_of = zone_of(board), last_day_of(board, now)
-    period = _reach(board, as_of, zone)
+    period = _unfrozen_period(board, as_of, zone)
     if not is_over(board, now):
         return period
     last = as_of if period.last is None else min(period.last, as_of)
@@ -53,12 +58,12 @@ def period_of(board: Leaderboard, now: datetime) -> Period:
 
 
 def zone_of(board: Leaderboard) -> tzinfo:
-    """Give the clock that a board goes by."""
+    """Return the time zone of a board: its clinic's, or UTC across clinics."""
     return UTC if board.clinic is None else ZoneInfo(board.clinic.time_zone)
 
 
 def last_day_of(board: Leaderboard, now: datetime) -> date:
-    """Give the day as of which a board is: today, or the one on which it was frozen."""
+    """Return the day as of which a board is shown: today, or the one on which it was frozen."""
     today = now.astimezone(zone_of(board)).date()
     return today if board.frozen_on is None else min(board.frozen_on, today)
 
@@ -71,18 +76,18 @@ def is_over(board: Leaderboard, now: datetime) -> bool:
     )
 
 
-def _reach(board: Leaderboard, today: date, zone: tzinfo) -> Period:
+def _unfrozen_period(board: Leaderboard, today: date, zone: tzinfo) -> Period:
     match board.period:
-        case Leaderboard.Period.DAYS_30:
+        case PeriodKind.DAYS_30:
             days = timedelta(days=LAST_DAYS)
-            return Period(today - days + timedelta(days=1), None, zone, lasts=days)
-        case Leaderboard.Period.WEEK:
+            return Period(today - days + timedelta(days=1), None, zone, keeps_for=days)
+        case PeriodKind.WEEK:
             first = today - timedelta(days=today.weekday())
-            return Period(first, None, zone, rolls_on=first + timedelta(days=7))
-        case Leaderboard.Period.MONTH:
+            return Period(first, None, zone, renews_on=first + timedelta(days=7))
+        case PeriodKind.MONTH:
             first = today.replace(day=1)
             after = (first + timedelta(days=32)).replace(day=1)
-            return Period(first, None, zone, rolls_on=after)
-        case Leaderboard.Period.DATES:
+            return Period(first, None, zone, renews_on=after)
+        case PeriodKind.DATES:
             return Period(board.period_from, board.period_to, zone)
     return Period(None, None, zone)

@@ -1,38 +1,64 @@
-"""What a board may be: combinations that would mislead or expose somebody, each with its cure."""
+"""Which settings of a board are refused: those that would mislead or expose somebody."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import date
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 from django.utils.formats import date_format
 from django.utils.translation import gettext as _
 
+from rehab.boards.choices import (
+    Aggregation,
+    CountedTypes,
+    DisplayMode,
+    NameStyle,
+    Occasion,
+    Participants,
+)
 from rehab.training.valences import VALENCES
 
-if TYPE_CHECKING:
-    from rehab.boards.models import Leaderboard
-
-# Metrics whose range depends on the feedback type: one board must not mix types by them.
-TYPED = frozenset({"score", "points_per_100_steps"})
-# What can be added up over sessions; a sum of shares would mean nothing.
-SUMMABLE = frozenset({"score", "steps", "active_minutes", "attended", "target_met"})
-# What says nothing of a single session.
-COUNTED = frozenset({"attended", "target_met"})
-# Days that every time zone and both databases can reckon with.
+# Metrics whose range depends on the valence: boards that mix valences must not rank by them.
+POINT_METRICS = frozenset({"score", "points_per_100_steps"})
+# Metrics that add up over sessions; a sum of shares would mean nothing.
+SUMMABLE_METRICS = frozenset({"score", "steps", "active_minutes", "attended", "target_met"})
+# Metrics that count sessions and say nothing of a single one.
+COUNTING_METRICS = frozenset({"attended", "target_met"})
+# Days that every time zone and both databases can represent.
 FIRST_DAY, LAST_DAY = date(1970, 1, 1), date(2199, 12, 31)
 
 
-def find_faults(board: Leaderboard) -> Iterator[tuple[str, str]]:
-    """Give what is wrong with a board: the field, and what to do."""
-    yield from _faults_of_types(board)
-    yield from _faults_of_days(board)
-    yield from _faults_of_rows(board)
-    yield from _faults_of_places(board)
+class BoardSettings(Protocol):
+    """The fields of a leaderboard that can contradict each other."""
+
+    among: str
+    types: str
+    valences: Any
+    metric: str
+    tie_breaker: str
+    entry: str
+    display: str
+    names: str
+    occasion: str
+    period_from: date | None
+    period_to: date | None
+    frozen_on: date | None
+
+    @property
+    def is_own(self) -> bool:
+        """Whether the board compares a patient's own sessions only."""
 
 
-def _faults_of_types(board: Leaderboard) -> Iterator[tuple[str, str]]:
+def find_invalid_settings(board: BoardSettings) -> Iterator[tuple[str, str]]:
+    """Yield the fields whose settings are refused, each with what to do about it."""
+    yield from _check_valences(board)
+    yield from _check_days(board)
+    yield from _check_rows(board)
+    yield from _check_display(board)
+
+
+def _check_valences(board: BoardSettings) -> Iterator[tuple[str, str]]:
     chosen = board.valences
     if not isinstance(chosen, list) or not all(slug in VALENCES for slug in chosen):
         yield (
@@ -40,13 +66,13 @@ def _faults_of_types(board: Leaderboard) -> Iterator[tuple[str, str]]:
             _("Give a list of these types: %(types)s.") % {"types": ", ".join(VALENCES)},
         )
         return
-    if board.types == board.Types.CHOSEN and not chosen:
+    if board.types == CountedTypes.CHOSEN and not chosen:
         yield "valences", _("Choose at least one type.")
-    if board.types == board.Types.SAME:
+    if board.types == CountedTypes.SAME:
         return
-    mixed = board.types == board.Types.ALL or len(set(chosen)) > 1
+    mixed = board.types == CountedTypes.ALL or len(set(chosen)) > 1
     for field in ("metric", "tie_breaker"):
-        if getattr(board, field) not in TYPED:
+        if getattr(board, field) not in POINT_METRICS:
             continue
         if mixed:
             yield (
@@ -60,7 +86,7 @@ def _faults_of_types(board: Leaderboard) -> Iterator[tuple[str, str]]:
             yield field, _("Explicit feedback has no points. Choose the steps at the goal.")
 
 
-def _faults_of_days(board: Leaderboard) -> Iterator[tuple[str, str]]:
+def _check_days(board: BoardSettings) -> Iterator[tuple[str, str]]:
     for field in ("period_from", "period_to", "frozen_on"):
         day = getattr(board, field)
         if isinstance(day, date) and not FIRST_DAY <= day <= LAST_DAY:
@@ -74,31 +100,31 @@ def _faults_of_days(board: Leaderboard) -> Iterator[tuple[str, str]]:
             )
 
 
-def _faults_of_rows(board: Leaderboard) -> Iterator[tuple[str, str]]:
+def _check_rows(board: BoardSettings) -> Iterator[tuple[str, str]]:
     if board.is_own:
-        if board.entry != board.Entry.EACH:
+        if board.entry != Aggregation.EACH:
             yield "entry", _("A board of own sessions shows each of them. Choose “Each session”.")
-        if board.metric in COUNTED:
+        if board.metric in COUNTING_METRICS:
             yield "metric", _("This says nothing of a single session. Compare with other patients.")
-        if board.display == board.Display.TOTAL:
+        if board.display == DisplayMode.TOTAL:
             yield "display", _("A total is reached together. Compare with other patients.")
         return
-    if board.entry == board.Entry.EACH:
+    if board.entry == Aggregation.EACH:
         yield "entry", _("A board of several patients shows one row for each of them.")
-    elif board.entry == board.Entry.SUM:
-        if board.metric not in SUMMABLE:
+    elif board.entry == Aggregation.SUM:
+        if board.metric not in SUMMABLE_METRICS:
             yield "entry", _("This cannot be added up. Choose best, latest or mean.")
-    elif board.metric in COUNTED:
+    elif board.metric in COUNTING_METRICS:
         yield "entry", _("This is counted over the period. Choose the sum.")
-    elif board.display == board.Display.TOTAL:
+    elif board.display == DisplayMode.TOTAL:
         yield "entry", _("A total adds up what all have reached. Choose the sum.")
 
 
-def _faults_of_places(board: Leaderboard) -> Iterator[tuple[str, str]]:
-    if board.among == board.Among.ACROSS and board.names != board.Names.PSEUDONYM:
+def _check_display(board: BoardSettings) -> Iterator[tuple[str, str]]:
+    if board.among == Participants.ACROSS and board.names != NameStyle.PSEUDONYM:
         yield "names", _("Across clinics there are animal names only.")
-    if board.moment == board.Moment.WAITING:
-        if board.is_own or board.display not in {board.Display.TOP, board.Display.TOTAL}:
+    if board.occasion == Occasion.WAITING:
+        if board.is_own or board.display not in {DisplayMode.TOP, DisplayMode.TOTAL}:
             yield (
                 "display",
                 _(
@@ -106,5 +132,5 @@ def _faults_of_places(board: Leaderboard) -> Iterator[tuple[str, str]]:
                     "their total."
                 ),
             )
-        elif board.types == board.Types.SAME:
+        elif board.types == CountedTypes.SAME:
             yield "types", _("A waiting tablet has no session at hand. Choose types, or all.")

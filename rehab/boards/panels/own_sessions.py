@@ -1,0 +1,110 @@
+"""The boards that are always there: a patient's own sessions of one feedback type, and of all.
+
+Points rank sessions of one type, hit rates those of all. Sessions that were simulated and those
+that a person walked never share a board. Only finished sessions with judged steps are on one:
+others have no hit rate.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime
+from enum import StrEnum
+
+from django.utils.translation import gettext_lazy as _
+from django.utils.translation import pgettext
+
+from rehab.boards.choices import Aggregation, CountedTypes, Participants, PeriodKind
+from rehab.boards.models import Leaderboard
+from rehab.boards.panels.panel import BoardPanel
+from rehab.boards.panels.rows import date_rows, format_rows
+from rehab.boards.ranking.periods import period_of
+from rehab.boards.ranking.results import own_results
+from rehab.boards.ranking.sessions import read_sessions
+from rehab.boards.ranking.standings import ComputedStandings
+from rehab.boards.ranking.visibility import find_own_sessions
+from rehab.sessions.formatting import clinic_time
+from rehab.sessions.log import SessionMetric
+from rehab.sessions.models import TrainingSession
+from rehab.training.valences import Valence
+
+
+class Scale(StrEnum):
+    """What own sessions are ranked by."""
+
+    POINTS = "points"
+    KEPT = "kept"  # points that were not lost, where points can only be lost
+    RATE = "rate"
+
+    @property
+    def metric(self) -> str:
+        """The metric of its boards."""
+        return "hit_rate" if self is Scale.RATE else "score"
+
+
+TITLES = {
+    Scale.POINTS: _("Your points"),
+    Scale.KEPT: _("Points you kept"),
+    Scale.RATE: _("Your steps at the goal"),
+}
+
+
+def scale_of(valence: Valence) -> Scale:
+    """Return what sessions of one valence are ranked by."""
+    if not valence.has_points:
+        return Scale.RATE
+    return Scale.POINTS if valence.rewards else Scale.KEPT
+
+
+def make_board(scale: Scale, types: CountedTypes) -> Leaderboard:
+    """Return an unsaved board of all own sessions, however short or long ago."""
+    return Leaderboard(
+        among=Participants.SELF,
+        metric=scale.metric,
+        entry=Aggregation.EACH,
+        types=types,
+        min_valid_strides=0,
+        include_simulated=True,
+        period=PeriodKind.ALL,
+    )
+
+
+def make_own_panels(session: TrainingSession, now: datetime) -> list[BoardPanel]:
+    """Return the panels of own sessions: those of this session's type, and of all types.
+
+    A session whose feedback type was changed while it was walked is of no type, and is on the
+    second alone. The caller has checked that the session may be seen.
+    """
+    by_rate = make_board(Scale.RATE, CountedTypes.ALL)
+    boards = [("all", pgettext("board", "All types"), Scale.RATE, by_rate)]
+    if not session.changed_to:
+        scale = scale_of(session.to_plan().valence)
+        board = make_board(scale, CountedTypes.SAME)
+        boards.insert(0, ("same", pgettext("board", "This type"), scale, board))
+    period = period_of(by_rate, now)
+    # By the patient's index and the metrics' own: no other patient's rows are read.
+    rows = SessionMetric.everywhere.filter(
+        session__patient=session.patient_id,
+        session__simulated=session.simulated,
+        slug__in=("hit_rate", "score", "steps"),
+    )
+    sessions = list(read_sessions(by_rate, rows, period, frozenset({"score"})))
+    visible = []
+    for _slug, _label, _scale, board in boards:
+        standings = ComputedStandings(board, own_results(board, sessions, session.valence, period))
+        visible.append(find_own_sessions(standings, standings.find_session(session.pk)))
+    walked = (
+        TrainingSession.everywhere.only("created_at", "started_at", "active_s")
+        .order_by()  # by key; the model's own order would lead through the clinic's other rows
+        .in_bulk({each.row.session_id for rows in visible for each in rows})
+    )
+    local = clinic_time(now, session.clinic)
+    return [
+        BoardPanel(
+            slug=slug,
+            title=str(TITLES[scale]),
+            label=label,
+            rows=date_rows(format_rows(board, rows), walked, session, local),
+            kept=scale is Scale.KEPT,
+        )
+        for (slug, label, scale, board), rows in zip(boards, visible, strict=True)
+    ]

@@ -1,0 +1,203 @@
+"""Makes the panel of a board: the others, all together, or the own sessions and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+
+from django.utils.translation import gettext as _
+from django.utils.translation import gettext_noop, ngettext
+
+from rehab.boards.building.scheduler import board_builder, catch_up
+from rehab.boards.choices import Aggregation, DisplayMode, Occasion, Participants
+from rehab.boards.models import Leaderboard
+from rehab.boards.panels.panel import BoardPanel, Total
+from rehab.boards.panels.rows import (
+    PanelRow,
+    date_rows,
+    format_figure,
+    format_rows,
+    name_rows,
+    to_percent,
+)
+from rehab.boards.ranking.eligibility import eligible_patients
+from rehab.boards.ranking.periods import period_of
+from rehab.boards.ranking.results import Result, own_results
+from rehab.boards.ranking.sessions import is_kept, read_sessions
+from rehab.boards.ranking.standings import (
+    ComputedStandings,
+    RankedRow,
+    Standings,
+    StoredStandings,
+)
+from rehab.boards.ranking.visibility import find_visible_rows
+from rehab.people.models import Clinic, Patient
+from rehab.sessions.formatting import clinic_time
+from rehab.sessions.log import SessionMetric
+from rehab.sessions.models import TrainingSession
+
+OWN = gettext_noop("These are your own sessions.")
+BUILT = gettext_noop("This board is being built.")
+
+
+def boards_on(occasion: Occasion, clinic: Clinic) -> list[Leaderboard]:
+    """Return the boards that a clinic's tablets show on an occasion."""
+    boards = Leaderboard.everywhere.filter(active=True, occasion=occasion).select_related("clinic")
+    of_clinic = boards.filter(clinic=clinic)
+    return list(of_clinic | boards.filter(clinic=None) if clinic.boards_across else of_clinic)
+
+
+def make_session_panels(session: TrainingSession, now: datetime) -> list[BoardPanel]:
+    """Return the boards that are shown after a session; none in a blinded study."""
+    if session.patient.blinded:
+        return []
+    boards = boards_on(Occasion.AFTER_SESSION, session.clinic)
+    return [BoardViewer(board, now, session.patient, session).make_panel() for board in boards]
+
+
+def make_waiting_panels(clinic: Clinic, now: datetime) -> list[BoardPanel]:
+    """Return the boards that a waiting tablet shows: those with enough patients."""
+    boards = boards_on(Occasion.WAITING, clinic)
+    panels = [BoardViewer(board, now).make_panel() for board in boards]
+    return [panel for panel in panels if panel.shared]
+
+
+def count_participants(standings: Standings, fewest: int) -> int:
+    """Return how many patients a board compares, for the check that there are ``fewest``.
+
+    Among fewer people than that, simulated patients do not count, since they make nobody anonymous.
+    Where there are no people they do, as in a clinic that tries GARRY.
+    """
+    people = standings.count_people(fewest)
+    return people if 0 < people < fewest else standings.count
+
+
+@dataclass(frozen=True)
+class BoardViewer:
+    """Whoever looks at a board: a patient, with or without a session at hand, or anybody.
+
+    ``results`` are those of a board that is not stored as it is here, computed from the sessions.
+    """
+
+    board: Leaderboard
+    now: datetime
+    patient: Patient | None = None
+    session: TrainingSession | None = None
+    results: Sequence[Result] | None = None
+
+    @property
+    def valence(self) -> str:
+        """The valence of the session at hand, or ""."""
+        return self.session.valence if self.session else ""
+
+    def make_panel(self) -> BoardPanel:
+        """Return the board, or the own sessions and why."""
+        board, patient = self.board, self.patient
+        if board.is_own:
+            return self._own_panel("")
+        if self.results is None and not self._is_up_to_date():
+            return self._own_panel(f"{_(BUILT)} {_(OWN)}" if patient else _(BUILT))
+        standings = self._standings()
+        count = count_participants(standings, board.min_participants)
+        people = ngettext("%(count)d patient on it now.", "%(count)d patients on it now.", count)
+        people %= {"count": count}
+        if count < board.min_participants:
+            fewest = {"fewest": board.min_participants}
+            why = _("Under %(fewest)d, all see their own sessions.") % fewest
+            few = _("Fewer than %(fewest)d people so far.") % fewest
+            return self._own_panel(f"{few} {_(OWN)}", f"{people} {why}")
+        if patient is not None and not eligible_patients(board).filter(pk=patient.pk).exists():
+            why = _("%(patient)s has not agreed to be on it.") % {"patient": patient.nickname}
+            return self._own_panel(_(OWN), f"{people} {why}")
+        me = standings.find(patient.pk) if patient else None
+        if board.display == DisplayMode.TOTAL:
+            return self._panel(total=self._total(standings, me), shared=True, summary=people)
+        rows = name_rows(
+            board, find_visible_rows(board, standings, me), patient.pk if patient else None
+        )
+        if rows:
+            return self._panel(rows=rows, shared=True, summary=people)
+        why = _("Outside its first half, own sessions are shown.")
+        return self._own_panel(_(OWN), f"{people} {why}")
+
+    def _is_up_to_date(self) -> bool:
+        if self.board.is_being_built:
+            board_builder.wake()  # the process that was building it may have been stopped
+            return False
+        return catch_up(self.board, self.now)
+
+    def find_typical(self) -> int | None:
+        """Return the patient in the middle of the first half; None on a board of own sessions."""
+        if self.board.is_own:
+            return None
+        standings = self._standings()
+        ahead = standings.top((standings.count + 1) // 2)
+        return ahead[len(ahead) // 2].patient_id if ahead else None
+
+    def _standings(self) -> Standings:
+        key = self.board.list_key(self.valence)
+        if self.results is None:
+            return StoredStandings(self.board, key)
+        return ComputedStandings(self.board, (row for row in self.results if row.valence == key))
+
+    def _total(self, standings: Standings, me: RankedRow | None) -> Total:
+        metric, goal = self.board.metric, self.board.total_goal
+        return Total(
+            value=format_figure(metric, standings.total),
+            goal=format_figure(metric, goal) if goal else "",
+            bar=to_percent(standings.total, goal) if goal else 0,
+            people=standings.count,
+            mine=format_figure(metric, me.figure) if me else "",
+        )
+
+    def _own_panel(self, note: str, summary: str = "") -> BoardPanel:
+        """Return the patient's own sessions or their sum; without a patient, no rows."""
+        board, patient = self.board, self.patient
+        if patient is None:
+            return self._panel(note=note, summary=summary)
+        period = period_of(board, self.now)
+        metrics = SessionMetric.everywhere.filter(session__patient=patient)
+        sessions = read_sessions(board, metrics, period)
+        standings = ComputedStandings(board, own_results(board, sessions, self.valence, period))
+        if board.entry == Aggregation.SUM:
+            mine = format_rows(board, find_visible_rows(self._own_board(), standings, None))
+            rows = [replace(row, title="", rank=None, you=True) for row in mine]
+            return self._panel(rows=rows, note=note, summary=summary)
+        me = standings.find_session(self.session.pk) if self.session else None
+        shown_as = board if board.is_own else self._own_board()
+        rows = format_rows(board, find_visible_rows(shown_as, standings, me))
+        walked = TrainingSession.everywhere.only("created_at", "started_at", "active_s")
+        found = walked.in_bulk([row.session_id for row in rows])
+        now = clinic_time(self.now, patient.clinic)
+        dated = date_rows(rows, found, self.session, now)
+        return self._panel(rows=dated, note=note, summary=summary)
+
+    def _own_board(self) -> Leaderboard:
+        """Return a board that shows own sessions as one of several patients falls back to."""
+        return Leaderboard(among=Participants.SELF, display=DisplayMode.NEIGHBORS)
+
+    def _panel(
+        self,
+        *,
+        rows: Sequence[PanelRow] = (),
+        total: Total | None = None,
+        note: str = "",
+        shared: bool = False,
+        summary: str = "",
+    ) -> BoardPanel:
+        board = self.board
+        valence = (
+            self.valence if board.list_key(self.valence) else next(iter(board.counted_valences), "")
+        )
+        return BoardPanel(
+            slug=f"{board.pk or 'new'}",
+            title=board.name,
+            label=board.name,
+            rows=rows,
+            total=total,
+            note=note,
+            kept=is_kept(board.metric, valence),
+            shared=shared,
+            summary=summary,
+        )

@@ -1,0 +1,152 @@
+"""What a patient's sessions come to on a board: one row's figure, and what it is ordered by."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import date, datetime
+from itertools import groupby
+
+from rehab.boards.choices import Aggregation
+from rehab.boards.models import Leaderboard
+from rehab.boards.ranking.eligibility import eligible_patients
+from rehab.boards.ranking.periods import Period, period_of
+from rehab.boards.ranking.sessions import CountedSession, is_kept, read_sessions
+from rehab.sessions.log import SessionMetric
+
+# The most that one day adds to a sum: no board may tempt anyone to walk on and on.
+MAX_PER_DAY = {"active_minutes": 60.0, "target_met": 1.0}
+MAX_FIGURE = 10**9  # larger figures are cut to it, so that all keys have as many digits
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """A patient's row before it is ranked.
+
+    Attributes
+    ----------
+    figure
+        As it is shown: a whole number.
+    points_at_stake
+        The points that could be kept; None where points are not only lost.
+    key
+        What rows are ordered by: the greater, the better.
+    stale_on
+        The day from which it is out of date though nobody walked; None for never.
+    """
+
+    patient_id: int
+    session_id: int
+    valence: str
+    figure: int
+    points_at_stake: int | None
+    key: str
+    stale_on: date | None
+
+
+def read_results(
+    board: Leaderboard, now: datetime, patients: Collection[int] | None = None
+) -> Iterator[Result]:
+    """Yield the results on a board of several patients: one for each patient and list.
+
+    ``patients`` narrows the eligible ones to these.
+    """
+    eligible = eligible_patients(board)
+    if patients is not None:
+        eligible = eligible.filter(pk__in=patients)
+    period = period_of(board, now)
+    rows = SessionMetric.everywhere.filter(session__patient__in=eligible)
+    sessions = read_sessions(board, rows, period)
+    for _, group in groupby(sessions, key=lambda session: session.patient_id):
+        lists: dict[str, list[CountedSession]] = defaultdict(list)
+        for session in group:
+            lists[board.list_key(session.valence)].append(session)
+        for valence, own in lists.items():
+            yield aggregate(board, valence, own, period)
+
+
+def own_results(
+    board: Leaderboard, sessions: Iterable[CountedSession], valence: str, period: Period
+) -> list[Result]:
+    """Return the results of one patient's own sessions, in no order.
+
+    One for each session in the list of a valence; on a board that adds up, their sum.
+    """
+    own = [
+        session
+        for session in sessions
+        if board.list_key(session.valence) == board.list_key(valence) and session.counts_for(board)
+    ]
+    if board.entry == Aggregation.SUM:
+        return [aggregate(board, valence, own, period)] if own else []
+    return [make_result(board, valence, [session], period) for session in own]
+
+
+def aggregate(
+    board: Leaderboard, valence: str, sessions: list[CountedSession], period: Period
+) -> Result:
+    """Return the result of a patient's sessions: their best, latest, mean or sum."""
+    match board.entry:
+        case Aggregation.BEST:
+            results = [make_result(board, valence, [session], period) for session in sessions]
+            return max(results, key=lambda result: result.key)
+        case Aggregation.MEAN:
+            sessions = sessions[-board.mean_of :]
+        case Aggregation.LATEST:
+            sessions = sessions[-1:]
+    return make_result(board, valence, sessions, period)
+
+
+def make_result(
+    board: Leaderboard, valence: str, sessions: Sequence[CountedSession], period: Period
+) -> Result:
+    """Return the result of some sessions, by their sum or their mean."""
+    add = board.entry == Aggregation.SUM
+    figures = ((session.day, session.figure(board.metric)) for session in sessions)
+    figure = combine(figures, board.metric, add)
+    stakes = ((session.day, session.points_at_stake(board.metric)) for session in sessions)
+    points_at_stake = combine(stakes, board.metric, add)
+    tie = 0
+    if board.tie_breaker:
+        ties = ((session.day, session.figure(board.tie_breaker)) for session in sessions)
+        tie = combine(ties, board.tie_breaker, add)
+    last = sessions[-1]
+    merit = figure if board.higher_is_better else -figure
+    return Result(
+        patient_id=last.patient_id,
+        session_id=last.session_id,
+        valence=board.list_key(valence),
+        figure=figure,
+        points_at_stake=points_at_stake if is_kept(board.metric, last.valence) else None,
+        key=make_key(merit, tie, last.at, last.session_id),
+        stale_on=period.stale_on(min(session.day for session in sessions)),
+    )
+
+
+def combine(parts: Iterable[tuple[date, float]], slug: str, add: bool) -> int:
+    """Return the mean of the figures of some days or (``add``) their sum, as a whole number.
+
+    In a sum no day counts more than ``MAX_PER_DAY``.
+    """
+    days: dict[date, float] = defaultdict(float)
+    count = 0
+    for day, value in parts:
+        days[day] += value
+        count += 1
+    if add:
+        total = sum(min(value, MAX_PER_DAY.get(slug, value)) for value in days.values())
+    else:
+        total = sum(days.values()) / count
+    return max(-MAX_FIGURE, min(MAX_FIGURE, round(total)))
+
+
+def make_key(merit: int, tie: int, at: datetime, session_id: int) -> str:
+    """Return what a row is ordered by, as digits: merit, tie-breaker, the earlier date.
+
+    The session's key at the end makes every key unique, so that no order is by chance.
+    """
+    earlier = 10**10 - int(at.timestamp())
+    return (
+        f"{merit + MAX_FIGURE:010d}{tie + MAX_FIGURE:010d}{earlier:011d}{10**12 - session_id:013d}"
+    )

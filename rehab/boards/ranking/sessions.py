@@ -1,0 +1,163 @@
+"""The sessions that count on a board, with the metrics that it ranks by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import date, datetime
+from itertools import groupby
+from typing import Any
+
+from django.db.models import CharField, QuerySet
+from django.db.models.functions import Cast
+
+from rehab.boards.choices import CountedTypes
+from rehab.boards.models import Leaderboard
+from rehab.boards.ranking.periods import Period
+from rehab.boards.validation import POINT_METRICS
+from rehab.sessions.log import SessionMetric
+from rehab.training.changes import State
+from rehab.training.valences import VALENCES
+
+# Ratios that are shown in percent.
+SHARES = frozenset({"hit_rate", "mean_performance"})
+
+
+@dataclass(frozen=True, slots=True)
+class CountedSession:
+    """A finished session that is long enough for a board.
+
+    Attributes
+    ----------
+    values
+        Its metrics by slug: those that the board uses, and those that say how long it was.
+    miss_cost
+        The points that a miss takes, at least 0; 0 where no metric of points was asked for.
+    is_mixed
+        Whether its feedback type was changed while it was walked.
+    """
+
+    session_id: int
+    patient_id: int
+    valence: str
+    is_mixed: bool
+    at: datetime
+    day: date
+    values: dict[str, float]
+    miss_cost: int
+
+    def figure(self, slug: str) -> float:
+        """Return a metric in the unit that is shown; points that can only be lost as those kept.
+
+        Where it is not known how many points were at stake, 0: imported sessions have points and
+        may have no steps.
+        """
+        value = self.values.get(slug, 0.0) * (100 if slug in SHARES else 1)
+        if not is_kept(slug, self.valence):
+            return value
+        at_stake = self.points_at_stake(slug)
+        return at_stake + value if at_stake else 0.0
+
+    def points_at_stake(self, slug: str) -> float:
+        """Return the most points that could be kept: all steps at the cost of a miss. Else 0."""
+        if not is_kept(slug, self.valence):
+            return 0.0
+        steps = 100 if slug == "points_per_100_steps" else self.values.get("steps", 0)
+        return self.miss_cost * steps
+
+    def counts_for(self, board: Leaderboard) -> bool:
+        """Whether it has what a board ranks by, and is long enough for it."""
+        return (
+            board.metric in self.values
+            and not (self.is_mixed and needs_one_valence(board))
+            and is_long_enough(board, self.values)
+            and (not is_kept(board.metric, self.valence) or self.points_at_stake(board.metric) > 0)
+        )
+
+
+def read_sessions(
+    board: Leaderboard,
+    rows: QuerySet[SessionMetric],
+    period: Period,
+    more_metrics: frozenset[str] = frozenset(),
+) -> Iterator[CountedSession]:
+    """Yield the sessions that count on a board, patient by patient, each in the order of time.
+
+    Parameters
+    ----------
+    rows
+        The metrics of the patients in question.
+    more_metrics
+        What to read besides the board's own metrics.
+    """
+    wanted = {board.metric, board.tie_breaker, "steps", "active_minutes", *more_metrics} - {""}
+    columns = [
+        *("session_id", "session__patient_id", "session__valence", "session__changed_to"),
+        *("session__started_at", "slug", "value"),
+    ]
+    if wanted & POINT_METRICS:
+        columns.append("session__plan__valence__miss_points")
+    # Valences and slugs are cast so that SQLite does not use their indexes, which would lead
+    # through the sessions and metrics of all patients.
+    ordered = (
+        _narrow(board, rows, period)
+        .alias(slug_text=Cast("slug", CharField()))
+        .filter(slug_text__in=wanted)
+        .order_by("session__patient_id", "session__started_at", "session_id")
+        .values_list(*columns)
+    )
+    for (session_id, patient_id, valence, changed_to, at), group in groupby(
+        ordered.iterator(10_000), key=lambda row: row[:5]
+    ):
+        metrics: list[Any] = list(group)
+        session = CountedSession(
+            session_id=session_id,
+            patient_id=patient_id,
+            valence=valence,
+            is_mixed=bool(changed_to),
+            at=at,
+            day=period.day_of(at),
+            values={row[5]: row[6] for row in metrics},
+            miss_cost=-(metrics[0][7] or 0) if len(columns) > 7 else 0,
+        )
+        if session.counts_for(board):
+            yield session
+
+
+def _narrow(
+    board: Leaderboard, rows: QuerySet[SessionMetric], period: Period
+) -> QuerySet[SessionMetric]:
+    """Leave the metrics of sessions that a board's settings admit."""
+    rows = rows.filter(session__state=State.FINISHED.value, session__started_at__isnull=False)
+    rows = rows.filter(session__excluded=False)
+    if not board.include_simulated:
+        rows = rows.filter(session__simulated=False)
+    if needs_one_valence(board):
+        rows = rows.filter(session__changed_to="")
+    if board.counted_valences:
+        rows = rows.alias(valence_text=Cast("session__valence", CharField()))
+        rows = rows.filter(valence_text__in=board.counted_valences)
+    if period.began is not None:
+        rows = rows.filter(session__started_at__gte=period.began)
+    if period.ended is not None:
+        rows = rows.filter(session__started_at__lt=period.ended)
+    return rows
+
+
+def needs_one_valence(board: Leaderboard) -> bool:
+    """Whether a session whose feedback type was changed has no place on a board."""
+    by_points = {board.metric, board.tie_breaker} & POINT_METRICS
+    return board.types != CountedTypes.ALL or bool(by_points)
+
+
+def is_long_enough(board: Leaderboard, values: dict[str, float]) -> bool:
+    """Whether a session with these metrics has the steps, or the minutes, that a board asks for."""
+    if values.get("steps", 0) >= board.min_valid_strides:
+        return True
+    return board.min_minutes is not None and values.get("active_minutes", 0) >= board.min_minutes
+
+
+def is_kept(slug: str, valence: str) -> bool:
+    """Whether a metric is shown as points kept: in this valence points can only be lost."""
+    known = VALENCES.get(valence)
+    return slug in POINT_METRICS and known is not None and known.has_points and not known.rewards

@@ -1,0 +1,163 @@
+"""The rows of exported tables, read page by page.
+
+Rows are read in pages by key, so that neither memory nor the database holds more than a page while
+a browser is slow. `visible_to` decides which rows a user may see; ``named`` says whether they may
+hold anything but pseudonyms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any
+
+from django.db.models import QuerySet
+
+from rehab.exports.tables import CORRECTIONS, EVENTS, SESSIONS, STEPS, Table
+from rehab.people.models import User
+from rehab.sessions.corrections import SessionCorrection
+from rehab.sessions.log import SessionEvent, SessionMetric, Step
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.replay import fold_log
+from rehab.training.fold import SessionFold
+from rehab.training.metrics import METRICS
+
+PAGE = 2_000  # rows held in memory
+SESSIONS_PAGE = 200
+STEP_FIELDS = (
+    *("number", "time_s", "received_at", "side", "value", "gain", "shown", "goal", "performance"),
+    *("hit", "points", "valid", "reasons", "phase", "rules_version", "extra"),
+)
+NUMBER, SIDE, REASONS, PHASE = (
+    STEP_FIELDS.index(name) for name in ("number", "side", "reasons", "phase")
+)
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Sessions that a user may see. ``named``: therapists and sources may be named."""
+
+    user: User
+    sessions: QuerySet[TrainingSession]
+    named: bool
+    keys: list[int] = field(init=False)
+
+    def __post_init__(self) -> None:
+        keys = self.sessions.order_by("pk").values_list("pk", flat=True)
+        object.__setattr__(self, "keys", list(keys))
+
+    def read_sessions(self) -> Iterator[TrainingSession]:
+        """Yield the sessions, oldest first."""
+        related = ("patient", "measure", "protocol")
+        for first in range(0, len(self.keys), SESSIONS_PAGE):
+            page = self.keys[first : first + SESSIONS_PAGE]
+            yield from self.sessions.filter(pk__in=page).select_related(*related).order_by("pk")
+
+    def _with_metrics(self) -> Iterator[tuple[TrainingSession, dict[str, float]]]:
+        """Yield the sessions with their metrics, which are read a page at a time."""
+        sessions = self.read_sessions()
+        while page := list(islice(sessions, SESSIONS_PAGE)):
+            metrics: dict[int, dict[str, float]] = {session.pk: {} for session in page}
+            found = SessionMetric.objects.visible_to(self.user).filter(session__in=list(metrics))
+            for key, slug, value in found.values_list("session_id", "slug", "value"):
+                metrics[key][slug] = value
+            yield from ((session, metrics[session.pk]) for session in page)
+
+    def session_rows(self) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of ``SESSIONS``."""
+        for session, metrics in self._with_metrics():
+            target = session.plan["target"]
+            yield (
+                session.pk,
+                session.patient.pseudonym,
+                session.created_at,
+                session.started_at,
+                session.ended_at,
+                session.state,
+                session.valence,
+                session.changed_to,
+                session.excluded,
+                session.measure.slug,
+                session.measure.unit,
+                session.trained_side,
+                session.goal,
+                target["hit_rate"],
+                target["duration_s"],
+                session.active_s,
+                session.protocol and session.protocol.name,
+                session.plan["activation_threshold"],
+                session.simulated,
+                session.legacy_id is not None,
+                session.source if self.named else "",
+                *(metrics.get(slug) for slug in METRICS),
+            )
+
+    def step_rows(self) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of ``STEPS``."""
+        steps = Step.objects.visible_to(self.user).order_by("number")
+        for session in self.read_sessions():
+            known = [
+                (phase["kind"], phase["name"], phase["feedback"])
+                for phase in session.plan["phases"]
+            ]
+            head = (session.pk, session.patient.pseudonym)
+            switches = _valence_switches(session)
+            for step in _read_pages(steps.filter(session=session), STEP_FIELDS, "number"):
+                *row, version, extra = step
+                trained = row[SIDE] == session.trained_side
+                row[REASONS] = " ".join(row[REASONS])
+                row.insert(SIDE + 1, trained)
+                phase = known[step[PHASE]]
+                *_, feedback = phase
+                kind = next(slug for after, slug in switches if after < step[NUMBER])
+                yield (*head, *row, *phase, kind if feedback else "", version, extra or None)
+
+    def event_rows(self) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of ``EVENTS``."""
+        names = ("pk", "at", "after_number", "kind", "old", "value", "by__username", "data")
+        events = SessionEvent.objects.visible_to(self.user).order_by("pk")
+        for session in self.read_sessions():
+            head = (session.pk, session.patient.pseudonym)
+            for _, *row, by, data in _read_pages(events.filter(session=session), names, "pk"):
+                who = by if self.named or not by else "person"
+                yield (*head, *row, who, data or None)
+
+    def correction_rows(self) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of ``CORRECTIONS``."""
+        names = ("pk", "at", "field", "old", "new", "reason", "by__username")
+        corrections = SessionCorrection.objects.visible_to(self.user).order_by("pk")
+        for session in self.read_sessions():
+            head = (session.pk, session.patient.pseudonym)
+            for _, *row, by in _read_pages(corrections.filter(session=session), names, "pk"):
+                yield (*head, *row, by if self.named or not by else "person")
+
+    def read(self, table: Table) -> Iterator[tuple[Any, ...]]:
+        """Return the rows of a table."""
+        rows = {
+            SESSIONS.file: self.session_rows,
+            STEPS.file: self.step_rows,
+            EVENTS.file: self.event_rows,
+            CORRECTIONS.file: self.correction_rows,
+        }
+        return rows[table.file]()
+
+
+def _valence_switches(session: TrainingSession) -> list[tuple[int, str]]:
+    """Return after which step which valence was in force, the last one first."""
+    if not session.changed_to:
+        return [(-1, session.valence)]
+    switches = fold_log(SessionFold(session.to_plan()), session).switches
+    return [*reversed(switches), (-1, session.valence)]
+
+
+def _read_pages(rows: QuerySet[Any], names: Sequence[str], key: str) -> Iterator[tuple[Any, ...]]:
+    """Yield values of rows that are ordered by a unique key."""
+    place, after = names.index(key), None
+    while True:
+        rest = rows if after is None else rows.filter(**{f"{key}__gt": after})
+        page = list(rest.values_list(*names)[:PAGE])
+        yield from page
+        if len(page) < PAGE:
+            return
+        after = page[-1][place]

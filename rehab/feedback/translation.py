@@ -1,0 +1,39 @@
+"""Which words a patient reads: the clinic's, or else the default ones, in a language."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from django.utils.translation import gettext, override
+
+SOURCE_LANGUAGE = "en"  # of the words in `rehab.training.valences`
+
+
+def pick_words(language: str, own: Mapping[str, str], default: str) -> str:
+    """Return the words for patients who read a language.
+
+    Parameters
+    ----------
+    own
+        The clinic's words by language; a language may be missing or empty.
+    default
+        The default words, in English.
+
+    Returns
+    -------
+    str
+        The clinic's words, or else the default ones in that language; where these are not
+        translated, the clinic's English words or else the default ones in English.
+    """
+    if own.get(language):
+        return own[language]
+    translated = translate(default, language)
+    if translated != default or language == SOURCE_LANGUAGE:
+        return translated
+    return own.get(SOURCE_LANGUAGE) or default
+
+
+def translate(words: str, language: str) -> str:
+    """Return default words in a language; untranslated where it has none for them."""
+    with override(language):
+        return gettext(words)
