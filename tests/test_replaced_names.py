@@ -61,6 +61,44 @@ REPLACED = {
     "rehab.people.web.language": "chosen_language speak_to FOR_PROGRAMS",
     "rehab.people.web.refusals": "in_words",
     "rehab.sessions.models": "TrainingSession.original_id TrainingSession.original",
+    "rehab.sessions.events": "Told report_event",
+    "rehab.sessions.live.audit_queue": "Note Notes AuditQueue.settled",
+    "rehab.sessions.live.auth": (
+        "find_actor find_device_by token_of headers_of cookies_of session_key_of is_own_page "
+        "find_unwelcome keep_signed_in address_of open_session_of"
+    ),
+    "rehab.sessions.live.backlog": "read_steps is_stored PAGE MOVES",
+    "rehab.sessions.live.consumers.base": (
+        "Closing NowhereConsumer Socket.opened Socket.heard Socket.left Socket.say Socket.end "
+        "Socket.shut Socket.send_off Socket.see_through Socket.refuse_silence"
+    ),
+    "rehab.sessions.live.consumers.device": (
+        "DeviceSocket.asked DeviceSocket.attached DeviceSocket.greet DeviceSocket.send_away "
+        "DeviceSocket.said_hello DeviceSocket.session_opened"
+    ),
+    "rehab.sessions.live.consumers.screens": (
+        "ScreenConsumer.is_welcome ScreenConsumer.pauses_as MonitorConsumer.changes"
+    ),
+    "rehab.sessions.live.hub": (
+        "Channel Viewer Unseen EventFeed.since Subscriber.beat Subscriber.seen "
+        "Subscriber.send_past MAX_UNSEEN MAX_UNSEEN_PAST UNSEEN_S ABSENT_S"
+    ),
+    "rehab.sessions.live.lateness": "Lateness.slacken",
+    "rehab.sessions.live.loading": "Loaded RECENT",
+    "rehab.sessions.live.messages": "NAMED ROBOT_STATES GESTURE_PHASES",
+    "rehab.sessions.live.owners": "my_name find_left_running PROCESSES",
+    "rehab.sessions.live.runtime": "Runtime.admitted Runtime.at_station_of Stop",
+    "rehab.sessions.live.session": (
+        "LiveSession.take LiveSession.join LiveSession.admission LiveSession.settled "
+        "LiveSession.heard_robot Stop LOGGED UNTOLD RECENT source_phase"
+    ),
+    "rehab.sessions.live.aggregate": (
+        "SessionActor SessionAggregate.take SessionAggregate.note MARKED"
+    ),
+    "rehab.sessions.live.supervisor": "Children LONGEST_PAUSE_S FIRST_PAUSE_S STEADY_S",
+    "rehab.sessions.live.writer": "Refolded",
+    "rehab.sessions.payloads": "MARKED_CHANGES",
+    "rehab.training.changes": "TRANSITIONS CHANGE_LABELS REQUESTABLE next_state Told",
     "rehab.stations.builtin": "builtin_token",
     "rehab.stations.models": "LeaveTries PinAttempts.who PinAttempts.wrong PinAttempts.open_at",
     "rehab.stations.pairing": (
@@ -82,6 +120,14 @@ GONE = (
         "rehab.people.lockout",
         "rehab.people.history",
         "rehab.people.views",
+    ),
+    *(
+        "rehab.sessions.live.actor",
+        "rehab.sessions.live.admission",
+        "rehab.sessions.live.children",
+        "rehab.sessions.live.notes",
+        "rehab.sessions.live.past",
+        "rehab.sessions.facts",
     ),
 )
 
