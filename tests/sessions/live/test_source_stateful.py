@@ -15,7 +15,7 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import writer as writers
 from rehab.sessions.live.aggregate import SessionAggregate
 from rehab.sessions.live.consumers import source as source_consumers
-from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live.session import LiveSession, NotStored
 from rehab.sessions.live.writer import Writer
 from rehab.training.steps import Measurement
 from tests.support import callers
@@ -120,6 +120,7 @@ def test_a_seeded_fault_is_found(
 ) -> None:
     fault(monkeypatch)
     monkeypatch.setattr(callers, "PATIENCE_S", 1.0)  # it will wait for an answer in vain
-    with pytest.raises((AssertionError, TimeoutError)) as found:  # HungUp is an assertion, too
+    # HungUp is an assertion, too; a double number may show when the log refuses it.
+    with pytest.raises((AssertionError, TimeoutError, NotStored)) as found:
         walk(max_examples=400, phases=[Phase.generate], report_multiple_bugs=False)
     assert places & {entry.name for entry in found.traceback}
