@@ -9,7 +9,7 @@ from django.shortcuts import get_object_or_404
 from ninja import Field, Path, Query, Router, Schema, Status
 
 from rehab.people.access import clinic_of, for_roles
-from rehab.people.api import Short, patients_of, store
+from rehab.people.api import ShortText, patients_of, store
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.people.web.api_base import (
@@ -30,7 +30,7 @@ router = Router(tags=["The paper's calls"])
 class PaperUserGiven(RequestBody):
     """A new user in the paper's words."""
 
-    name: Short = Field(description="A nickname. The original kept real names; GARRY does not.")
+    name: ShortText = Field(description="A nickname. The original kept real names; GARRY does not.")
 
 
 class PaperUser(Schema):
@@ -63,14 +63,14 @@ class PaperFilter(Paging):
 
 @router.get("/users/{code}", response=responses(PaperUser, 404))
 @for_roles(Role.LEAD, Role.PT)
-def show_user(request: HttpRequest, code: Path[Short]) -> Patient:
+def show_user(request: HttpRequest, code: Path[ShortText]) -> Patient:
     """Return a user by the ID that a PT would type."""
     return get_object_or_404(patients_of(caller(request)), code=code)
 
 
 @router.post("/users/{code}", response=responses(PaperUser, 409, code=201))
 @for_roles(Role.LEAD, Role.PT)
-def add_user(request: HttpRequest, code: Path[Short], given: PaperUserGiven) -> Status[Patient]:
+def add_user(request: HttpRequest, code: Path[ShortText], given: PaperUserGiven) -> Status[Patient]:
     """Create a user with this ID."""
     patient = Patient(clinic=clinic_of(caller(request)))
     return Status(201, store(patient, {"code": code, "nickname": given.name}))
@@ -79,7 +79,7 @@ def add_user(request: HttpRequest, code: Path[Short], given: PaperUserGiven) -> 
 @router.get("/users/{code}/sessions", response=responses(Page[PaperSession], 404))
 @for_roles(Role.LEAD, Role.PT)
 def list_user_sessions(
-    request: HttpRequest, code: Path[Short], wanted: Query[PaperFilter]
+    request: HttpRequest, code: Path[ShortText], wanted: Query[PaperFilter]
 ) -> dict[str, Any]:
     """List a user's sessions by non-ascending score; those without a score come last."""
     user = caller(request)

@@ -61,7 +61,7 @@ def erase(patient: Patient, because: ErasureReason, by: User | None, now: dateti
         audit_log.record(
             Act.ERASE,
             by,
-            clinic=patient.clinic_id,
+            clinic_id=patient.clinic_id,
             about=str(ErasureReason(because).label),
             now=now,
         )

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from ninja import Field, Schema
 from pydantic import AfterValidator
 
-from rehab.people.api import PatientName, Short
+from rehab.people.api import PatientName, ShortText
 from rehab.people.web.api_base import (
     AwareDatetime,
     Key,
@@ -100,7 +100,7 @@ class SessionFilter(Paging):
     """Which sessions are wanted, and in which order."""
 
     patient: Key | None = None
-    pseudonym: Short | None = None
+    pseudonym: ShortText | None = None
     feedback_type: FeedbackType | None = None
     state: State | None = None
     since: AwareDatetime | None = Field(None, description="Created at this moment or later.")

@@ -82,7 +82,7 @@ class PhaseFormSet(LabeledFormSet):
             phase.position = position
 
 
-class PhaseRows(ScopedOptions, admin.TabularInline):
+class PhaseInline(ScopedOptions, admin.TabularInline):
     """A protocol's phases on its page."""
 
     model = ProtocolPhase
@@ -103,7 +103,7 @@ class ProtocolAdmin(SharedAdmin):
     change_form_template = "sessions/protocol_form.html"
     list_display = ("named", "whose", "phase_count", "length", "about")
     search_fields = ("name", "description", "phases__name")
-    inlines = (PhaseRows,)
+    inlines = (PhaseInline,)
     actions = row_actions = viewer_actions = ("copy_to_clinic",)
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Protocol]:

@@ -38,17 +38,19 @@ class ImportTombstone(ScopedModel):
         return self.id_hash[:8]
 
 
-def block_reimport(clinic: int, legacy_id: int) -> None:
+def block_reimport(clinic_id: int, legacy_id: int) -> None:
     """Block a participant from being imported again."""
-    ImportTombstone.everywhere.get_or_create(clinic_id=clinic, id_hash=_hash_id(clinic, legacy_id))
+    ImportTombstone.everywhere.get_or_create(
+        clinic_id=clinic_id, id_hash=_hash_id(clinic_id, legacy_id)
+    )
 
 
-def is_reimport_blocked(clinic: int, legacy_id: int) -> bool:
+def is_reimport_blocked(clinic_id: int, legacy_id: int) -> bool:
     """Return whether a participant was erased here."""
-    id_hash = _hash_id(clinic, legacy_id)
-    return ImportTombstone.everywhere.filter(clinic=clinic, id_hash=id_hash).exists()
+    id_hash = _hash_id(clinic_id, legacy_id)
+    return ImportTombstone.everywhere.filter(clinic=clinic_id, id_hash=id_hash).exists()
 
 
-def _hash_id(clinic: int, legacy_id: int) -> str:
-    hashed = salted_hmac("garry.import_tombstones", f"{clinic} {legacy_id}", algorithm="sha256")
+def _hash_id(clinic_id: int, legacy_id: int) -> str:
+    hashed = salted_hmac("garry.import_tombstones", f"{clinic_id} {legacy_id}", algorithm="sha256")
     return hashed.hexdigest()

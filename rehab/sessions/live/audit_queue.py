@@ -75,7 +75,7 @@ def _store(notes: list[Note]) -> None:
     audit_log.record_after_the_fact(
         [
             audit_log.build_entry(
-                note.act, note.actor, patient=patients[note.session_id], **note.facts
+                note.act, note.actor, patient_id=patients[note.session_id], **note.facts
             )
             for note in notes
             if note.session_id in patients
