@@ -30,7 +30,7 @@ from rehab.training.valences import BANDS_MAX, VALENCES
 READ = ("from_percent", "words", "confetti")
 
 
-class BandRows(ScopedOptions, admin.TabularInline):
+class BandInline(ScopedOptions, admin.TabularInline):
     """A type's bands on its page."""
 
     model = FeedbackBand
@@ -58,7 +58,7 @@ class FeedbackTypeAdmin(PreviewAdmin):
     change_list_template = "feedback/admin_list.html"
     change_form_template = "feedback/admin_form.html"
     delete_confirmation_template = "feedback/admin_reset.html"
-    inlines = (BandRows,)
+    inlines = (BandInline,)
     fields = ("slug", "hit_points", "miss_points", "cue_above", "cue_below")
 
     def get_fields(self, request: HttpRequest, obj: Any = None) -> Any:

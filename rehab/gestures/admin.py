@@ -57,7 +57,7 @@ class StepForm(forms.ModelForm):
                 field.widget.attrs["class"] = "vIntegerField"
 
 
-class StepRows(ScopedOptions, admin.TabularInline):
+class StepInline(ScopedOptions, admin.TabularInline):
     """A gesture's steps on its page."""
 
     model = GestureStep
@@ -90,7 +90,7 @@ class GestureAdmin(ScopedAdmin):
     search_fields = ("name",)
     fields = ("name", "picture")
     readonly_fields = ("picture",)
-    inlines = (StepRows,)
+    inlines = (StepInline,)
 
     @admin.display(description=_("simulated"))
     def simulated(self, gesture: Gesture) -> str:

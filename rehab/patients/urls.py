@@ -1,4 +1,4 @@
-"""Addresses of the start list and of a patient's pages."""
+"""URLs of the start list and of a patient's pages."""
 
 from django.urls import path
 
