@@ -1,4 +1,4 @@
-"""Updates boards when rows change that they depend on: signal receivers."""
+"""Signal receivers that update boards when rows change that they depend on."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def connect_receivers() -> None:
 
 
 def unless_restored(receiver: Callable[..., None]) -> Callable[..., None]:
-    """Ignore rows that a backup restores: the rows of their boards are restored too."""
+    """Skip a receiver while a backup is restored, since boards are restored with it."""
 
     @wraps(receiver)
     def receive(instance: Model, raw: bool = False, **signal: Any) -> None:

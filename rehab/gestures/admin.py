@@ -1,4 +1,4 @@
-"""Admin of gestures: a PT composes steps, and sees their path or what is wrong with them."""
+"""Admin of gestures: a form of steps, with a drawing of their path or their errors."""
 
 from __future__ import annotations
 

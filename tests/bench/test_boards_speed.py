@@ -109,7 +109,7 @@ def fill(count: int) -> None:
                 clinic=clinic,
                 name="Large",
                 among="clinic",
-                entry="best",
+                aggregation="best",
                 period="all",
                 min_valid_strides=1,
                 types="all",
@@ -179,7 +179,7 @@ def walk_while_one_is_built(patients: int) -> dict[str, float]:
     from datetime import UTC, datetime
 
     from rehab.boards.building import entries
-    from rehab.boards.building.scheduler import Builder
+    from rehab.boards.building.scheduler import BoardBuilder
     from rehab.boards.models import BoardEntry, Leaderboard
     from rehab.people.models import Clinic, Patient
     from rehab.sessions.live.actor import SessionActor
@@ -215,11 +215,11 @@ def walk_while_one_is_built(patients: int) -> dict[str, float]:
     moved = list(Patient.everywhere.order_by("-pk").values_list("pk", flat=True)[:patients])
     Patient.everywhere.filter(pk__gte=moved[-1]).update(clinic=other)
     TrainingSession.everywhere.filter(patient__gte=moved[-1]).update(clinic=other)
-    board = Leaderboard(clinic=other, name="Other", among="clinic", entry="best")
+    board = Leaderboard(clinic=other, name="Other", among="clinic", aggregation="best")
     board.period, board.min_valid_strides, board.types = "all", 1, "all"
     Leaderboard.everywhere.bulk_create([board])
     entries.start_rebuild(board)
-    builder = Builder()
+    builder = BoardBuilder()
     began = time.perf_counter()
     builder.wake()
     beside = commits(lambda: entries.find_unbuilt() is not None)

@@ -31,9 +31,9 @@ def test_rows_that_were_kept_up_are_those_that_are_made_anew(clinic):
     for number, fields in enumerate(
         (
             {},
-            {"types": "all", "metric": "best_streak", "entry": "latest"},
-            {"metric": "score", "entry": "mean"},
-            {"types": "all", "metric": "active_minutes", "entry": "sum", "period": "days_30"},
+            {"types": "all", "metric": "best_streak", "aggregation": "latest"},
+            {"metric": "score", "aggregation": "mean"},
+            {"types": "all", "metric": "active_minutes", "aggregation": "sum", "period": "days_30"},
         )
     ):
         board_of(clinic, **{"name": f"Board {number}"} | fields)

@@ -170,7 +170,7 @@ def build_world(name: str) -> World:
         clinic=clinic,
         name=mark(name, Leaderboard),
         among="clinic",
-        entry="best",
+        aggregation="best",
         display="top",
         names="code",
         period="all",

@@ -34,36 +34,36 @@ function build() {
     const total = value("display") === "total";
     if (changed === "metric" && COUNTED.includes(value("metric"))) {
       if (own) set("among", "clinic");
-      set("entry", "sum");
+      set("aggregation", "sum");
     }
     if (changed === "display" && total && own) set("among", "clinic");
     if (changed === "display" && total) {
-      set("entry", "sum");
+      set("aggregation", "sum");
       if (!SUMS.includes(value("metric"))) set("metric", "active_minutes");
     }
     if (changed === "among") {
-      if (own) set("entry", "each");
-      else if (value("entry") === "each") set("entry", "best");
+      if (own) set("aggregation", "each");
+      else if (value("aggregation") === "each") set("aggregation", "best");
       if (own && total) set("display", "neighbors");
     }
     if (changed === "occasion" && value("occasion") === "waiting") {
       if (value("among") === "self") set("among", "clinic");
-      if (value("entry") === "each") set("entry", "best");
+      if (value("aggregation") === "each") set("aggregation", "best");
       if (!["top", "total"].includes(value("display"))) set("display", "top");
       if (value("types") === "same") set("types", "all");
     }
-    if (changed === "metric" && value("entry") === "sum" && !SUMS.includes(value("metric"))) {
-      set("entry", value("among") === "self" ? "each" : "best");
+    if (changed === "metric" && value("aggregation") === "sum" && !SUMS.includes(value("metric"))) {
+      set("aggregation", value("among") === "self" ? "each" : "best");
       if (total) set("display", "neighbors");
     }
   }
 
   function hide() {
     const own = value("among") === "self";
-    const [display, entry] = [value("display"), value("entry")];
+    const [display, aggregation] = [value("display"), value("aggregation")];
     show("group", value("among") === "group");
-    show("entry", !own);
-    show("mean_of", entry === "mean");
+    show("aggregation", !own);
+    show("mean_of", aggregation === "mean");
     show("valences", value("types") === "chosen");
     show("period_from", value("period") === "dates"); // a row of both dates
     show("top_n", display === "top" || display === "top_and_me");
