@@ -1,4 +1,4 @@
-"""The API routes of the paper: users by ID, their sessions with the paper's ten attributes."""
+"""The API routes of the paper: users by ID, and sessions with the paper's ten attributes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from rehab.sessions.schemas import FeedbackType
 router = Router(tags=["The paper's calls"])
 
 
-class PaperUserGiven(RequestBody):
+class PaperUserBody(RequestBody):
     """A new user in the paper's words."""
 
     name: ShortText = Field(description="A nickname. The original kept real names; GARRY does not.")
@@ -56,7 +56,7 @@ class PaperSession(Schema):
 
 
 class PaperFilter(Paging):
-    """Which sessions of a user are wanted."""
+    """Filters of a user's sessions."""
 
     feedback_type: FeedbackType | None = None
 
@@ -70,24 +70,24 @@ def show_user(request: HttpRequest, code: Path[ShortText]) -> Patient:
 
 @router.post("/users/{code}", response=responses(PaperUser, 409, code=201))
 @for_roles(Role.LEAD, Role.PT)
-def add_user(request: HttpRequest, code: Path[ShortText], given: PaperUserGiven) -> Status[Patient]:
+def add_user(request: HttpRequest, code: Path[ShortText], body: PaperUserBody) -> Status[Patient]:
     """Create a user with this ID."""
     patient = Patient(clinic=clinic_of(caller(request)))
-    return Status(201, store(patient, {"code": code, "nickname": given.name}))
+    return Status(201, store(patient, {"code": code, "nickname": body.name}))
 
 
 @router.get("/users/{code}/sessions", response=responses(Page[PaperSession], 404))
 @for_roles(Role.LEAD, Role.PT)
 def list_user_sessions(
-    request: HttpRequest, code: Path[ShortText], wanted: Query[PaperFilter]
+    request: HttpRequest, code: Path[ShortText], filters: Query[PaperFilter]
 ) -> dict[str, Any]:
     """List a user's sessions by non-ascending score; those without a score come last."""
     user = caller(request)
     patient = get_object_or_404(Patient.objects.visible_to(user), code=code)
     sessions = visible_sessions(user).filter(patient=patient).select_related("clinic")
-    if wanted.feedback_type:
-        sessions = sessions.filter(valence=wanted.feedback_type)
-    page = paginate(sessions.order_by(*ORDERS["best"]), wanted)
+    if filters.feedback_type:
+        sessions = sessions.filter(valence=filters.feedback_type)
+    page = paginate(sessions.order_by(*ORDERS["best"]), filters)
     return page | {"items": [to_paper_session(session) for session in page["items"]]}
 
 

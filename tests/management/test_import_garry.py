@@ -345,6 +345,7 @@ def test_pages_and_api_tell_an_imported_session_without_strides(file, clinic):
     pt = User.everywhere.create_user("pt", role=Role.PT, clinic=clinic)
     client = signed_in(pt)
     session = TrainingSession.everywhere.filter(valence="positive").first()
+    assert session.source == "Original GARRY"
     score = SessionMetric.everywhere.get(session=session).value
     page = client.get(f"/sessions/{session.pk}/details/").content.decode()
     assert "No strides recorded: imported from the original GARRY" in page
