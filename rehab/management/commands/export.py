@@ -38,10 +38,10 @@ class Command(BaseCommand):
         now, patient_id = timezone.now(), None
         files = session_files(user, now)
         if patient is not None:
-            whose = Patient.objects.visible_to(user).filter(code=patient).first()
-            if whose is None:
+            row = Patient.objects.visible_to(user).filter(code=patient).first()
+            if row is None:
                 raise CommandError(f"{username} sees no patient with the code {patient!r}.")
-            files, patient_id = patient_files(user, whose, now), whose.pk
+            files, patient_id = patient_files(user, row, now), row.pk
         audit_log.record(
             Act.EXPORT,
             None,

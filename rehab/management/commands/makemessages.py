@@ -1,4 +1,4 @@
-"""Django's `makemessages`, extended by the keywords of our scripts (static/js/language.js)."""
+"""Django's `makemessages` with the keywords of our scripts (static/js/shared/language.js)."""
 
 from pathlib import Path
 
