@@ -8,9 +8,9 @@ const COUNTED = ["attended", "target_met"];
 
 const form = document.querySelector("#leaderboard_form");
 const preview = document.querySelector(".preview");
-if (form && preview) build();
+if (form && preview) start();
 
-function build() {
+function start() {
   const facts = preview.querySelector(".facts");
 
   function value(name) {
@@ -28,8 +28,8 @@ function build() {
     if (field) field.hidden = !wanted;
   }
 
-  // What was just chosen stays; what no longer goes with it follows.
-  function follow(changed) {
+  // Keep what was just chosen, and adjust the settings that contradict it.
+  function adjustOthers(changed) {
     const own = value("among") === "self";
     const total = value("display") === "total";
     if (changed === "metric" && COUNTED.includes(value("metric"))) {
@@ -58,14 +58,14 @@ function build() {
     }
   }
 
-  function hide() {
+  function updateVisibility() {
     const own = value("among") === "self";
     const [display, aggregation] = [value("display"), value("aggregation")];
     show("group", value("among") === "group");
     show("aggregation", !own);
     show("mean_of", aggregation === "mean");
     show("valences", value("types") === "chosen");
-    show("period_from", value("period") === "dates"); // a row of both dates
+    show("period_from", value("period") === "dates"); // the row of both dates
     show("top_n", display === "top" || display === "top_and_me");
     show("total_goal", display === "total");
     show("show_ranks", display !== "total");
@@ -74,10 +74,10 @@ function build() {
   }
 
   form.addEventListener("change", ({ target }) => {
-    follow(target.name);
-    hide();
+    adjustOthers(target.name);
+    updateVisibility();
   });
-  hide();
+  updateVisibility();
   showPreview(form, preview, (drawn) => {
     facts.textContent = drawn.body?.dataset.facts ?? "";
   });
