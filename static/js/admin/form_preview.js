@@ -1,7 +1,7 @@
 // The preview of a form in the admin: a frame with what the form would make, drawn again after each change.
 
 const PAUSE_MS = 250; // after the last key, before the frame is drawn again
-const CHANGES = ["input", "change", "formset:added", "formset:removed"]; // the last two are Django's, for rows of inlines
+const CHANGES = ["input", "change", "formset:added", "formset:removed"]; // and those of Django's inlines
 
 // `preview` holds the frame, the URL that draws it, and a select of the viewer; `onDrawn` gets the document drawn.
 export function showPreview(form, preview, onDrawn = () => {}) {

@@ -31,7 +31,7 @@ export function createFeedbackType({ state, show, change }) {
       choice.replaceChildren(...session.types.map(({ slug }) => new Option(label(session, slug), slug)));
     }
     const wanted = session.next_valence || session.valence;
-    if (choice.dataset.of !== wanted) choice.value = choice.dataset.of = wanted; // only when it changed, so that an open select is left alone
+    if (choice.dataset.of !== wanted) choice.value = choice.dataset.of = wanted; // leaves an open select alone
     const nextPhase = session.phases.slice(session.phase.index + 1).find(({ feedback }) => feedback);
     choice.disabled = session.types.length < 2 || !nextPhase;
     show("type-when", describeNext(session, nextPhase));
