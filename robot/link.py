@@ -50,8 +50,8 @@ REFUSALS: dict[int, str] = {
     CloseCode.BUSY: "The session has another source or robot. Stop that one first.",
     CloseCode.ENDED: "The session has ended.",
 }
-# After these the pause is not reset to the shortest: the server, or what we send, has a fault that a
-# quick reconnection would make worse.
+# After these the pause is not reset to the shortest: the server, or what we send, is at fault, and
+# a quick reconnection would make it worse.
 _TROUBLE = frozenset({CloseCode.NOT_STORED, CloseCode.TOO_MANY, 1002, 1003, 1007, 1009})
 
 # Handshakes that are refused by a status instead of a close code.
