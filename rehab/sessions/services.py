@@ -27,7 +27,7 @@ from rehab.training.valences import CueGestures, Valence, find_valence
 
 
 class StationTaken(InvalidSetting):
-    """A session is open at this station: its tablet shows one, and its sensor feeds one."""
+    """A session is open at this station, whose tablet and sensor serve one at a time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,7 +175,7 @@ def change_session(
     """Start, pause, steer or end a session from a page; committed when this returns.
 
     Raises InvalidSetting where the change is refused (nothing has happened then), NotStored where
-    it could not be committed, and OwnedElsewhere where another process source_args the session.
+    it could not be committed, and OwnedElsewhere where another process runs the session.
     """
     if kind is ChangeKind.PAUSE and by is not None:
         value = PauseReason.THERAPIST.value
