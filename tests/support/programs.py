@@ -15,7 +15,7 @@ from tests.support.world import World
 ROOT = "/api/v1"
 
 
-def token_of(user: User, role: str) -> str:
+def bearer_token(user: User, role: str) -> str:
     """Give an account a new API token."""
     row = ApiToken(clinic=user.clinic, user=user, name="program", role=role)
     token = row.new_token()
@@ -52,4 +52,4 @@ class Program:
 
 def program_of(world: World, role: Role) -> Program:
     """Give a program of somebody of this role."""
-    return Program(token_of(world.people[role], role))
+    return Program(bearer_token(world.people[role], role))

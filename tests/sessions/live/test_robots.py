@@ -12,7 +12,7 @@ from rehab.gestures.models import Gesture
 from rehab.people.models import Clinic
 from rehab.sessions.live import hub
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.actor import SessionActor
+from rehab.sessions.live.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.valences import CueGestures
@@ -46,7 +46,7 @@ ARM = {"type": "robot", "order": "arm"}
 
 
 async def log_of(session: TrainingSession) -> list[Message]:
-    """Give what the log has of the session's robot."""
+    """Return what the log has of the session's robot."""
     events = SessionEvent.everywhere.filter(session=session, kind__startswith="robot_")
     fields = ("kind", "by", "data", "after_number")
     return [row async for row in events.order_by("pk").values(*fields)]
@@ -86,13 +86,13 @@ async def test_reports_are_shown_and_decisions_and_gestures_kept(place, begun):
     assert "robot" not in [event["kind"] for event in tablet.events]
 
     live = await runtimes.current().session(session.pk)
-    loaded = await sync_to_async(SessionActor.load)(live.actor.session)
-    assert loaded.fold.score == live.actor.fold.score == 1
+    loaded = await sync_to_async(SessionAggregate.load)(live.aggregate.session)
+    assert loaded.fold.score == live.aggregate.fold.score == 1
     assert loaded.fold.last_number == 3
 
 
 def spoiled(report: Message, *path: str, value: Any) -> Message:
-    """Give a report with one part replaced."""
+    """Return a report with one part replaced."""
     report = copy.deepcopy(report)
     part = report
     for name in path[:-1]:
@@ -181,7 +181,7 @@ async def test_a_robot_is_told_whether_a_pt_looks_on(place, begun, monkeypatch):
 
 
 async def test_a_page_that_confirms_nothing_is_nobody_looking_on(place, begun, monkeypatch):
-    monkeypatch.setattr(hub, "ABSENT_S", 0.2)
+    monkeypatch.setattr(hub, "INATTENTIVE_S", 0.2)
     session = await begun(place)
     monitor = place.monitor(session)
     await monitor.watch()
