@@ -19,7 +19,7 @@ from rehab.people.web.refusals import format_refusal
 from robot.motion.dry_run import DryRun, dry_run, validate_gesture
 from robot.motion.gesture import TETHER_M
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gesture_spec import MOVES_MAX, to_data
+from robot.motion.gesture_spec import MAX_MOVES, to_data
 
 WINDOW_S = 5.0  # of the robot's decisions; a longer gesture still runs at the next one
 
@@ -63,7 +63,7 @@ class StepInline(ScopedOptions, admin.TabularInline):
     model = GestureStep
     form = StepForm
     formset = StepFormSet
-    max_num = MOVES_MAX
+    max_num = MAX_MOVES
     ordering = ("position",)
 
     def get_extra(self, request: HttpRequest, obj: Any = None, **options: Any) -> int:

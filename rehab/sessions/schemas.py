@@ -123,7 +123,7 @@ class SessionRequestBody(RequestBody):
     station: Key = optional()
     source: TextLine = optional(description="`live`, `synthetic good`, `recording walk.csv`, …")
     trained_side: Side = optional(strict=False)
-    robot: TextLine = optional(description="As in the set-up: `off`, `quiet`, `normal`, …")
+    robot: TextLine = optional(description="As in the set-up: `off`, `gentle`, `normal`.")
     robot_above: TextLine = optional(description="Gesture after a window above the threshold.")
     robot_below: TextLine = optional(description="Gesture after a window below it.")
 

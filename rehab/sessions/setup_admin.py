@@ -23,7 +23,9 @@ from rehab.sessions.setup.gestures import robot_gesture_choices
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase, display_name
 
-TEMPORARY_OFFSET = 10_000  # of positions while phases change places; no protocol has as many
+TEMPORARY_OFFSET = (
+    10_000  # of positions while phases change places; no protocol has this many phases
+)
 
 
 class SharedAdmin(ScopedAdmin):

@@ -147,7 +147,7 @@ def live_through(chance: random.Random, frames: int) -> Life:
         life.mutated += was_damaged
         for heard in reader.feed(sent):
             life.fooled_checksum += heard not in said
-            seen = frame_filter.take(heard, number * FRAME_S)
+            seen = frame_filter.update(heard, number * FRAME_S)
             if seen is not None and number > 2:
                 for fault in _faults(seen, frame_filter, number):
                     life.wrong.append(f"frame {number}: {fault} {seen}")
@@ -168,7 +168,7 @@ def _faults(seen: Estimate, frame_filter: FrameFilter, number: int) -> Iterator[
         or frame_filter.hardware
     ):
         yield "button, charger or version"
-    if seen.began_anew:
+    if seen.restarted:
         yield "began anew"
     ticks = (DRIVE_TICKS * (number - back) for back in range(LAG))
     if min(abs(seen.left_m - tick * TICK_M) for tick in ticks) > ROLL_BOUND_M:

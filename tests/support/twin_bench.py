@@ -119,12 +119,12 @@ class Bench:
     def live_bytes(self, for_s):
         for _ in range(round(for_s / FRAME_S)):
             self.now_s += FRAME_S
-            self.twin.live(self.now_s)
+            self.twin.step(self.now_s)
         sent, self.wire.sent = self.wire.sent, b""
         return sent
 
     def do(self, what, **more):
-        return self.twin.do({"do": what, **more}, self.now_s)
+        return self.twin.execute({"do": what, **more}, self.now_s)
 
     @property
     def pose(self):

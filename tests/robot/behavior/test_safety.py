@@ -266,7 +266,7 @@ OPEN = Abilities(simulated=False, moves=True, closed_loop=False)
 def test_an_open_loop_refuses_long_gestures_and_halves_the_others(gesture):
     closed, opened = Safety(REAL), Safety(OPEN)
     assert (closed.rejection_reason(gesture), closed.share) == ("", 1.0)
-    assert opened.rejection_reason(gesture) == ("open_loop" if gesture.least_s > 4.0 else "")
+    assert opened.rejection_reason(gesture) == ("open_loop" if gesture.min_duration_s > 4.0 else "")
     assert opened.share == 0.5
 
 
