@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,12 +39,21 @@ from tests.support.world import (
 pytestmark = pytest.mark.django_db
 
 
-@pytest.fixture
-def worlds() -> tuple[World, World]:
+def build_worlds() -> tuple[World, World]:
     both = build_world("amber"), build_world("birch")
     for world in both:
         fill_board(world)
     return both
+
+
+@pytest.fixture(scope="class")
+def kept_worlds(keep) -> Callable[[], tuple[World, World]]:
+    return keep(build_worlds)
+
+
+@pytest.fixture
+def worlds(kept_worlds, db) -> tuple[World, World]:
+    return kept_worlds()
 
 
 # --- models -------------------------------------------------------------------------------------
