@@ -38,12 +38,21 @@ from tests.support.world import (
 pytestmark = pytest.mark.django_db
 
 
-@pytest.fixture
-def worlds() -> tuple[World, World]:
+def build_worlds() -> tuple[World, World]:
     both = build_world("amber"), build_world("birch")
     for world in both:
         fill_board(world)
     return both
+
+
+@pytest.fixture(scope="class")
+def kept_worlds(keep):
+    return keep(build_worlds)
+
+
+@pytest.fixture
+def worlds(kept_worlds, db):
+    return kept_worlds()
 
 
 # --- models -------------------------------------------------------------------------------------
