@@ -70,7 +70,7 @@ async def live_path(
 
 @pytest.fixture
 def stall(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stall]:
-    """Give the hand on the writer."""
+    """Return the hand on the writer."""
     hold, commit = Stall(), writers.commit
 
     def commit_when_open(jobs: Any) -> None:
@@ -84,13 +84,13 @@ def stall(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stall]:
 
 @pytest.fixture
 async def place(live_path: None) -> Place:
-    """Give a station in a clinic."""
+    """Return a station in a clinic."""
     return await sync_to_async(build_place)("elm", spares=1)
 
 
 @pytest.fixture
 async def elsewhere(place: Place) -> Place:
-    """Give a station in another clinic."""
+    """Return a station in another clinic."""
     return await sync_to_async(build_place)("oak")
 
 
@@ -99,13 +99,13 @@ OpenSession = Callable[..., Awaitable[TrainingSession]]
 
 @pytest.fixture
 def ready(live_path: None) -> OpenSession:
-    """Give a function that makes a session that is ready."""
+    """Return a function that makes a session that is ready."""
     return sync_to_async(open_session)
 
 
 @pytest.fixture
 def begun(ready: OpenSession) -> OpenSession:
-    """Give a function that makes a session that runs."""
+    """Return a function that makes a session that runs."""
 
     async def begin(*args: Any, **options: Any) -> TrainingSession:
         session = await ready(*args, **options)

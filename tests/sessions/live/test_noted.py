@@ -26,7 +26,7 @@ def nothing_noted_yet(monkeypatch):
 
 
 async def noted(count: int) -> list[tuple[Any, ...]]:
-    """Give the entries once there are so many."""
+    """Return the entries once there are so many."""
     names = ("act", "by", "through", "patient", "about")
     for _ in range(500):
         rows = await sync_to_async(

@@ -43,7 +43,7 @@ ARM = {"type": "robot", "order": "arm"}
 
 
 async def log_of(session: TrainingSession) -> list[Message]:
-    """Give what the log has of the session's robot."""
+    """Return what the log has of the session's robot."""
     events = SessionEvent.everywhere.filter(session=session, kind__startswith="robot_")
     fields = ("kind", "by", "data", "after_number")
     return [row async for row in events.order_by("pk").values(*fields)]

@@ -46,7 +46,7 @@ ARM = {"type": "robot", "order": "arm"}
 
 
 async def log_of(session: TrainingSession) -> list[Message]:
-    """Give what the log has of the session's robot."""
+    """Return what the log has of the session's robot."""
     events = SessionEvent.everywhere.filter(session=session, kind__startswith="robot_")
     fields = ("kind", "by", "data", "after_number")
     return [row async for row in events.order_by("pk").values(*fields)]
@@ -92,7 +92,7 @@ async def test_reports_are_shown_and_decisions_and_gestures_kept(place, begun):
 
 
 def spoiled(report: Message, *path: str, value: Any) -> Message:
-    """Give a report with one part replaced."""
+    """Return a report with one part replaced."""
     report = copy.deepcopy(report)
     part = report
     for name in path[:-1]:
@@ -272,7 +272,7 @@ async def test_composed_gestures_travel_in_the_cue(place, ready):
 
 
 def compose(clinic: Clinic) -> Message:
-    """Make a gesture; give it as it travels."""
+    """Make a gesture; return it as it travels."""
     gesture = Gesture.everywhere.create(clinic=clinic, name="wave")
     for position, degrees in enumerate((30, -60, 30), start=1):
         gesture.steps.create(position=position, turn_deg=degrees)

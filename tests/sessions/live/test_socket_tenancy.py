@@ -72,7 +72,7 @@ class Everyone:
         )
 
     def headers(self, actor: Actor) -> list[tuple[bytes, bytes]]:
-        """Give what this actor's client sends along."""
+        """Return what this actor's client sends along."""
         if isinstance(actor.subject, Device):
             return [(b"authorization", f"Bearer {self.tokens[actor.subject.pk]}".encode())]
         cookie = self.cookies.get(actor.label)
@@ -89,7 +89,7 @@ def kind_of(actor: Actor) -> str:
 
 
 def address(route: str, session: TrainingSession) -> str:
-    """Give a route's address for one session. Fails for a parameter that it does not know."""
+    """Return a route's address for one session. Fails for a parameter that it does not know."""
     path = re.sub(r"<int:session_id>", str(session.pk), route)
     if "<" in path:
         pytest.fail(f"{route}: tell tests/sessions/live/test_socket_tenancy.py what it stands for")

@@ -32,7 +32,7 @@ TOTALS = [
 
 
 def apply(page: Page) -> Message:
-    """Give a page's totals: its first snapshot and all events after it."""
+    """Return a page's totals: its first snapshot and all events after it."""
     totals = dict(page.heard[0])
     for event in page.events:
         match event["kind"]:

@@ -17,7 +17,7 @@ pytest.importorskip("pybullet")
 
 
 def read_png(data):
-    """Give width, height and the rows' bytes of a PNG of ours."""
+    """Return width, height and the rows' bytes of a PNG of ours."""
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     chunks, rest = {}, data[8:]
     while rest:
@@ -32,7 +32,7 @@ def read_png(data):
 
 
 def dark(data):
-    """Give the columns' mean of the dark pixels: where the robot is from left to right."""
+    """Return the columns' mean of the dark pixels: where the robot is from left to right."""
     width, height, rows = read_png(data)
     columns = []
     for row in range(height):
