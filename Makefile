@@ -163,7 +163,7 @@ $(VENV)/.server $(VENV)/.dev: $(VENV)/.%: $(PYTHON) $(INSTALLED)
 
 # Only ever a wheel: building pybullet takes a compiler and minutes.
 $(VENV)/.twin: $(PYTHON) $(INSTALLED)
-	$(PYTHON) $(PIP_INSTALL) --only-binary :all: pybullet 2>/dev/null || printf '%s\n' \
+	$(PYTHON) $(PIP_INSTALL) --only-binary :all: pillow pybullet 2>/dev/null || printf '%s\n' \
 	    "pybullet has no wheel for $$($(PYTHON) -V) on $$(uname -sm): set-up goes on without it." \
 	    'The kinematic simulation stands in for the physical twin; all else is the same.' \
 	    'For the twin: CPython 3.11 on Linux x86_64.'

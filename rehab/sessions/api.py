@@ -43,7 +43,7 @@ from rehab.sessions.services import change_session
 from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Station
-from rehab.training.changes import ChangeKind, NotAllowed
+from rehab.training.changes import NotAllowed
 from rehab.training.measures import InvalidSetting
 
 router = Router(tags=["Sessions"])
@@ -138,7 +138,7 @@ def change(
     user = caller(request)
     session = get_session(user, session_id)
     try:
-        change_session(session, ChangeKind(given.kind), given.value, by=user)
+        change_session(session, given.kind, given.value, by=user)
     except (NotAllowed, OwnedElsewhere) as problem:
         raise HttpError(409, str(problem)) from problem
     except InvalidSetting as problem:

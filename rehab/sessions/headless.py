@@ -57,7 +57,7 @@ async def run_session(
     runtime = runtimes.current()
     try:
         live = await runtime.session(session_id)
-        fold = live.actor.fold
+        fold = live.aggregate.fold
         await runtime.change(session_id, ChangeKind.START, None, None)
         try:
             await _send_strides(live, strides(fold), pace)
@@ -76,10 +76,10 @@ async def _send_strides(live: LiveSession, strides: Iterator[Measurement], pace:
         if pace.speed is not None:
             began = pace.clock() - stride.time_s / pace.speed if began is None else began
             await pace.sleep(max(0.0, began + stride.time_s / pace.speed - pace.clock()))
-        live.take(stride, timezone.now())
+        live.record_step(stride, timezone.now())
         if count % BATCH == 0:
-            await live.settled()
-    await live.settled()
+            await live.wait_until_committed()
+    await live.wait_until_committed()
 
 
 def robot_steps(session: TrainingSession, fold: SessionFold) -> Iterator[tuple[float, float]]:

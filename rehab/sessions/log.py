@@ -14,7 +14,7 @@ from rehab.people.consent.models import PatientScope
 from rehab.people.models import SIDES, User
 from rehab.people.scope import ScopedModel
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import ChangeKind
+from rehab.training.controls import CONTROLS
 from rehab.training.metrics import METRICS
 
 
@@ -82,20 +82,7 @@ class Remark(StrEnum):
 
 
 EVENTS = {
-    ChangeKind.START: _("start"),
-    ChangeKind.PAUSE: _("pause"),
-    ChangeKind.RESUME: _("resume"),
-    ChangeKind.FINISH: _("finish"),
-    ChangeKind.ABORT: _("abort"),
-    ChangeKind.GOAL: _("goal"),
-    ChangeKind.GAIN: _("gain"),
-    ChangeKind.PHASE: _("phase"),
-    ChangeKind.ACTIVATION_THRESHOLD: _("activation threshold"),
-    ChangeKind.ROBOT_INTENSITY: _("robot intensity"),
-    ChangeKind.VALENCE: _("feedback type"),
-    ChangeKind.FEEDBACK_TEXT: _("words"),
-    ChangeKind.WORDS_SHOWN: _("words shown"),
-    ChangeKind.CHART_STYLE: _("chart style"),
+    **{kind: _(control.log_label) for kind, control in CONTROLS.items()},
     RobotEntry.STOP: _("robot stop"),
     RobotEntry.ARM: _("robot arm"),
     RobotEntry.DECISION: _("robot decision"),
@@ -130,7 +117,7 @@ class SessionEvent(ScopedModel):
         _("after number"), help_text=_("The last step before it; 0 for none.")
     )
     kind = models.CharField(
-        _("kind"), max_length=32, choices=[(kind.value, label) for kind, label in EVENTS.items()]
+        _("kind"), max_length=32, choices=[(str(kind), label) for kind, label in EVENTS.items()]
     )
     old = models.FloatField(_("old"), null=True)
     value = models.FloatField(_("value"), null=True)

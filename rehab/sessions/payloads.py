@@ -1,13 +1,13 @@
-"""What is told of a session, as plain data: state, phase, types, its robot's order, marks."""
+"""Parts of messages about a session: state, phase, types, its robot's cue, marks."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from django.utils.translation import gettext, override
 
-from rehab.training.changes import ChangeKind, ChangeValue, State
+from rehab.training.changes import ChangeValue, State
+from rehab.training.controls import CONTROLS
 from rehab.training.fold import SessionFold
 from rehab.training.phases import find_phase_kind
 from rehab.training.plans import SessionPlan
@@ -15,17 +15,9 @@ from rehab.training.valences import VALENCES, Valence
 
 Message = dict[str, Any]
 
-# Changes that a PT's chart points out; a phase it shows by itself.
-MARKED_CHANGES = frozenset(ChangeKind) - {
-    ChangeKind.START,
-    ChangeKind.FINISH,
-    ChangeKind.ABORT,
-    ChangeKind.PHASE,
-}
-
 
 def describe_walked(fold: SessionFold) -> Message:
-    """Give how far the session and its phase have come."""
+    """Return how far the session and its phase have come."""
     return {
         "active_s": round(fold.active_s, 2),
         "phase_s": round(fold.phase_s, 2),
@@ -34,7 +26,7 @@ def describe_walked(fold: SessionFold) -> Message:
 
 
 def describe_phase(plan: SessionPlan, index: int, valence: Valence) -> Message:
-    """Give a phase as pages show it, with the feedback type that is in force there."""
+    """Return a phase as pages show it, with the feedback type that is in force there."""
     phase = plan.phases[index]
     calm_words = ""
     if not phase.feedback:
@@ -54,7 +46,7 @@ def describe_phase(plan: SessionPlan, index: int, valence: Valence) -> Message:
 
 
 def describe_now(fold: SessionFold) -> Message:
-    """Give the phase that the next step falls in, and how its points stand."""
+    """Return the phase that the next step falls in, and how its points stand."""
     return {
         "phase": describe_phase(fold.plan, fold.phase_index, fold.valence),
         "has_points": fold.valence.has_points,
@@ -63,8 +55,19 @@ def describe_now(fold: SessionFold) -> Message:
     }
 
 
+def describe_source_phase(fold: SessionFold) -> Message:
+    """Return the phase as a simulated patient needs to know it."""
+    phase = fold.phase
+    return {
+        "kind": phase.kind,
+        "name": phase.name,
+        "feedback": phase.feedback,
+        "gain": phase.gain,
+    }
+
+
 def describe_types(fold: SessionFold) -> Message:
-    """Give which feedback type is in force and which comes next, and which it may be."""
+    """Return which feedback type is in force and which comes next, and which it may be."""
     return {
         "began": fold.plan.valence.slug,
         "changed_to": list(fold.changed_to),
@@ -75,7 +78,7 @@ def describe_types(fold: SessionFold) -> Message:
 
 
 def describe_cue(fold: SessionFold) -> Message:
-    """Give the robot's order for this session, as of now."""
+    """Return the robot's order for this session, as of now."""
     cue = fold.valence.cue
     named = {cue.above, cue.below}
     return {
@@ -90,7 +93,7 @@ def describe_cue(fold: SessionFold) -> Message:
 
 
 def describe_state(fold: SessionFold) -> Message:
-    """Give where the session stands, and who paused it."""
+    """Return where the session stands, and who paused it."""
     paused = fold.state is State.PAUSED and fold.pause_reason is not None
     return {
         "state": fold.state.value,
@@ -98,15 +101,11 @@ def describe_state(fold: SessionFold) -> Message:
     }
 
 
-def change_mark(after: int, kind: ChangeKind, value: ChangeValue) -> Message:
-    """Give a change as a PT's chart points it out; of edited words only whose they are."""
-    return {
-        "after": after,
-        "kind": kind.value,
-        "value": value.get("valence") if isinstance(value, Mapping) else value,
-    }
+def change_mark(after: int, kind: str, value: ChangeValue) -> Message:
+    """Return a change as a PT's chart points it out; of edited words only whose they are."""
+    return {"after": after, "kind": str(kind), "value": CONTROLS[kind].part_shown(value)}
 
 
 def type_mark(after: int, slug: str) -> Message:
-    """Give the moment from which another feedback type was in force, for a PT's chart."""
+    """Return the moment from which another feedback type was in force, for a PT's chart."""
     return {"after": after, "kind": "type", "value": VALENCES[slug].label}

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import Change, ChangeKind
+from rehab.training.changes import Change
+from rehab.training.controls import CONTROLS
 from rehab.training.fold import SessionFold
 from rehab.training.measures import InvalidSetting
 from rehab.training.steps import InvalidMeasurement, Measurement, Side
@@ -42,7 +43,7 @@ def fold_log(fold: SessionFold, session: TrainingSession) -> SessionFold:
 
 def log_entries(session: TrainingSession) -> Iterator[Measurement | Change]:
     """Return a session's committed steps and changes in the order in which they took effect."""
-    changes = SessionEvent.everywhere.filter(session=session, kind__in=list(ChangeKind))
+    changes = SessionEvent.everywhere.filter(session=session, kind__in=list(CONTROLS))
     events = list(changes.order_by("pk"))
     events.reverse()
     number = 0
@@ -56,7 +57,7 @@ def log_entries(session: TrainingSession) -> Iterator[Measurement | Change]:
 
 
 def _to_change(event: SessionEvent) -> Change:
-    return Change(ChangeKind(event.kind), event.data.get("value", event.value))
+    return Change(event.kind, event.data.get("value", event.value))
 
 
 def to_measurement(step: Step) -> Measurement:

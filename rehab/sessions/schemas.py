@@ -21,7 +21,8 @@ from rehab.people.web.api_base import (
 )
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
-from rehab.training.changes import REQUESTABLE, ChangeKind, State
+from rehab.training.changes import State
+from rehab.training.controls import requestable_kinds
 from rehab.training.metrics import METRICS
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES, find_valence
@@ -34,15 +35,16 @@ FeedbackType = Annotated[
 ]
 
 
-def parse_change_kind(kind: str) -> ChangeKind:
-    """Return the change of that name. Raises ValueError for one that a client cannot request."""
-    if kind not in REQUESTABLE:
-        raise ValueError(f"A change is one of: {', '.join(REQUESTABLE)}.")
-    return ChangeKind(kind)
+def parse_change_kind(kind: str) -> str:
+    """Return the kind of change. Raises ValueError for one that a client cannot request."""
+    known = requestable_kinds()
+    if kind not in known:
+        raise ValueError(f"A change is one of: {', '.join(known)}.")
+    return kind
 
 
 RequestedChangeKind = Annotated[
-    str, AfterValidator(parse_change_kind), Field(json_schema_extra={"enum": list(REQUESTABLE)})
+    str, AfterValidator(parse_change_kind), Field(json_schema_extra={"enum": requestable_kinds()})
 ]
 
 

@@ -170,19 +170,19 @@ def _check_patient_may_train(patient: Patient) -> None:
 
 
 def change_session(
-    session: TrainingSession, kind: ChangeKind, value: ChangeValue = None, by: User | None = None
+    session: TrainingSession, kind: str, value: ChangeValue = None, by: User | None = None
 ) -> None:
     """Start, pause, steer or end a session from a page; committed when this returns.
 
     Raises InvalidSetting where the change is refused (nothing has happened then), NotStored where
-    it could not be committed, and OwnedElsewhere where another process source_args the session.
+    it could not be committed, and OwnedElsewhere where another process runs the session.
     """
-    if kind is ChangeKind.PAUSE and by is not None:
+    if kind == ChangeKind.PAUSE and by is not None:
         value = PauseReason.THERAPIST.value
     async_to_sync(_change)(session.pk, kind, value, by)
 
 
-async def _change(session_id: int, kind: ChangeKind, value: ChangeValue, by: User | None) -> None:
+async def _change(session_id: int, kind: str, value: ChangeValue, by: User | None) -> None:
     in_server = runtime.peek() is not None  # else a command, which must not leave anything running
     live = runtime.current()
     try:

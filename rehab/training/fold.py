@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 from rehab.training.changes import (
     STATE_LABELS,
@@ -12,18 +13,12 @@ from rehab.training.changes import (
     NotAllowed,
     PauseReason,
     State,
-    next_state,
 )
+from rehab.training.controls import CONTROLS
 from rehab.training.goals import MIN_BASELINE_STRIDES
 from rehab.training.marking import Marked
-from rehab.training.measures import InvalidSetting, check_gain
-from rehab.training.plans import (
-    ChartStyle,
-    SessionPlan,
-    check_activation_threshold,
-    check_chart_style,
-    check_robot_intensity,
-)
+from rehab.training.measures import InvalidSetting
+from rehab.training.plans import ChartStyle, SessionPlan
 from rehab.training.scoring import score_measurement
 from rehab.training.steps import (
     InvalidMeasurement,
@@ -61,8 +56,11 @@ class SessionFold:
         self.last_time_s: float | None = None
         self.active_s = 0.0
         self.goal: float | None = plan.goal.resolve(plan.measure, None)
-        self.activation_threshold = plan.activation_threshold
-        self.robot_intensity = plan.robot_intensity
+        self.settings: dict[str, Any] = {
+            kind: control.initial(plan)
+            for kind, control in CONTROLS.items()
+            if control.initial is not None
+        }
         self.trained = Tally()  # every step of the trained leg
         self.feedback = Tally()  # those in feedback phases: what score and hit rate count
         self.phases = tuple(Tally() for _ in plan.phases)
@@ -73,8 +71,6 @@ class SessionFold:
         self.valence: Valence = plan.valence
         self.next_valence = ""
         self.switches: list[tuple[int, str]] = []
-        self.words_shown = True
-        self.chart_style = ChartStyle.POINTS
         self.pause_reason: PauseReason | None = None
         self._was_walking = False  # whether the time since the last step was walked
         self._begin_phase(0)
@@ -95,6 +91,30 @@ class SessionFold:
             else:
                 fold.step(entry)
         return fold
+
+    @property
+    def activation_threshold(self) -> float:
+        """Mean performance of a window from which on the robot celebrates."""
+        threshold: float = self.settings[ChangeKind.ACTIVATION_THRESHOLD]
+        return threshold
+
+    @property
+    def robot_intensity(self) -> float:
+        """Share of its gestures' size that the robot moves with; 0 for none."""
+        intensity: float = self.settings[ChangeKind.ROBOT_INTENSITY]
+        return intensity
+
+    @property
+    def words_shown(self) -> bool:
+        """Whether the patient's page shows words."""
+        shown: bool = self.settings[ChangeKind.WORDS_SHOWN]
+        return shown
+
+    @property
+    def chart_style(self) -> ChartStyle:
+        """How the patient's page draws the latest strides."""
+        style: ChartStyle = self.settings[ChangeKind.CHART_STYLE]
+        return style
 
     @property
     def score(self) -> int | None:
@@ -194,11 +214,11 @@ class SessionFold:
             self.completed = True
             return
         try:
-            self._enter_phase(self.phase_index + 1)
+            self.enter_phase(self.phase_index + 1)
         except InvalidSetting as problem:
             self.obstacle = str(problem)
 
-    def _enter_phase(self, index: int) -> None:
+    def enter_phase(self, index: int) -> None:
         """Begin a phase. Raises InvalidSetting where its goal should be known and cannot be."""
         kinds = [phase.kind for phase in self.plan.phases]
         if self.goal is None and kinds[index] != "baseline" and "baseline" in kinds[:index]:
@@ -238,36 +258,21 @@ class SessionFold:
         InvalidSetting
             For a value out of bounds; likewise.
         """
-        state = next_state(self.state, change.kind)
-        match change.kind:
-            case ChangeKind.GOAL:
-                self.goal = self.plan.measure.check_goal(change.number)
-                self.obstacle = ""
-            case ChangeKind.GAIN:
-                self.gain = check_gain(change.number)
-            case ChangeKind.ACTIVATION_THRESHOLD:
-                self.activation_threshold = check_activation_threshold(change.number)
-            case ChangeKind.ROBOT_INTENSITY:
-                self.robot_intensity = check_robot_intensity(change.number)
-            case ChangeKind.PHASE:
-                self._enter_phase(self.plan.check_phase(change.number))
-            case ChangeKind.PAUSE:
-                self._was_walking = False
-                known = [reason for reason in PauseReason if reason == change.value]
-                self.pause_reason = known[0] if known else None
-            case ChangeKind.RESUME:
-                self.pause_reason = None
-            case ChangeKind.VALENCE:
-                self._schedule_valence(change.value)
-            case ChangeKind.FEEDBACK_TEXT:
-                self._edit_feedback_text(change.value)
-            case ChangeKind.WORDS_SHOWN:
-                self.words_shown = change.switch
-            case ChangeKind.CHART_STYLE:
-                self.chart_style = check_chart_style(change.value)
+        control = CONTROLS[change.kind]
+        state = control.next_state(self.state)
+        control.put_into_force(self, change.value)
         self.state = state
 
-    def _schedule_valence(self, slug: object) -> None:
+    def pause(self, reason: PauseReason | None) -> None:
+        """Note that the time from here on is not walked, and why; None where nobody knows."""
+        self._was_walking = False
+        self.pause_reason = reason
+
+    def resume(self) -> None:
+        """Forget why the session was paused."""
+        self.pause_reason = None
+
+    def schedule_valence(self, slug: object) -> None:
         """Schedule the valence of the next phase with feedback; the current one cancels that."""
         if not isinstance(slug, str) or slug not in self.valences:
             known = ", ".join(self.valences)
@@ -285,7 +290,7 @@ class SessionFold:
                 "End this session and set up another one."
             )
 
-    def _edit_feedback_text(self, value: object) -> None:
+    def edit_feedback_text(self, value: object) -> None:
         """Replace the bands of a valence. What a step earns stays as it was planned."""
         given = value if isinstance(value, Mapping) else {}
         slug = given.get("valence")

@@ -11,7 +11,7 @@ from rehab.people.access import UndeclaredView
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.people.web import api_base
-from tests.support.programs import ROOT, Program, program_of, token_of
+from tests.support.programs import ROOT, Program, bearer_token, program_of
 from tests.support.world import build_world, client_of
 
 pytestmark = pytest.mark.django_db
@@ -66,7 +66,7 @@ def test_a_token_dies_with_its_account_and_with_its_right(world):
 
 
 def test_a_call_never_changes_the_role_of_the_account(world):
-    program = Program(token_of(world.people[Role.LEAD], Role.PT))
+    program = Program(bearer_token(world.people[Role.LEAD], Role.PT))
     program.post("/patients", code="K1", nickname="Rosa")
     world.people[Role.LEAD].refresh_from_db()
     assert world.people[Role.LEAD].role == Role.LEAD

@@ -157,7 +157,7 @@ def walk_while_one_is_built(patients: int) -> dict[str, float]:
     from rehab.boards.building.scheduler import Builder
     from rehab.boards.models import BoardEntry, Leaderboard
     from rehab.people.models import Clinic, Patient
-    from rehab.sessions.live.actor import SessionActor
+    from rehab.sessions.live.aggregate import SessionAggregate
     from rehab.sessions.models import TrainingSession
     from rehab.sessions.services import SessionRequest, create_session
     from rehab.training.changes import Change, ChangeKind
@@ -171,21 +171,21 @@ def walk_while_one_is_built(patients: int) -> dict[str, float]:
     session = create_session(
         SessionRequest(patient=walker, valence="binary", goal=GoalRule(value=1.0), phases=phases)
     )
-    actor, now = SessionActor(session), datetime.now(UTC)
-    store(actor, actor.change(Change(ChangeKind.START), None, now))
+    aggregate, now = SessionAggregate(session), datetime.now(UTC)
+    store(aggregate, aggregate.change(Change(ChangeKind.START), None, now))
 
     def commits(goes_on: Callable[[], bool]) -> list[float]:
         took: list[float] = []
         while goes_on():
-            number = actor.fold.last_number + 1
-            row = actor.take(Measurement(number, number * 1.1, Side.LEFT, 1.5), now)
+            number = aggregate.fold.last_number + 1
+            row = aggregate.record_step(Measurement(number, number * 1.1, Side.LEFT, 1.5), now)
             start = time.perf_counter()
-            store(actor, [row])
+            store(aggregate, [row])
             took.append(1000 * (time.perf_counter() - start))
             time.sleep(0.01)
         return sorted(took)
 
-    alone = commits(lambda: actor.fold.last_number < 300)
+    alone = commits(lambda: aggregate.fold.last_number < 300)
     other = Clinic.everywhere.create(name="Other")
     moved = list(Patient.everywhere.order_by("-pk").values_list("pk", flat=True)[:patients])
     Patient.everywhere.filter(pk__gte=moved[-1]).update(clinic=other)

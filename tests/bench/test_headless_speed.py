@@ -29,7 +29,7 @@ original = headless.LiveSession.settled
 async def counting(live):
     global taken
     await original(live)
-    before, taken = taken, live.actor.fold.last_number
+    before, taken = taken, live.aggregate.fold.last_number
     if tracemalloc.is_tracing() and taken * 10 // count > before * 10 // count:
         sizes.append(tracemalloc.get_traced_memory()[0])
 headless.LiveSession.settled = counting

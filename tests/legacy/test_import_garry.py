@@ -20,7 +20,7 @@ from rehab.people.models import Clinic, ErasureReason, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
-from tests.support.programs import Program, token_of
+from tests.support.programs import Program, bearer_token
 from tests.support.world import NOW, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -366,7 +366,7 @@ def test_pages_and_api_tell_an_imported_session_without_strides(file, clinic):
     history = client.get(f"/patients/{session.patient_id}/sessions/").content.decode()
     assert "imported" in history
     assert client.get(f"/patients/{session.patient_id}/").status_code == 200
-    status, told = Program(token_of(pt, Role.PT)).get(f"/sessions/{session.pk}")
+    status, told = Program(bearer_token(pt, Role.PT)).get(f"/sessions/{session.pk}")
     assert (status, told["imported"], told["score"], told["trained_side"]) == (
         200,
         True,
@@ -379,7 +379,9 @@ def test_pages_and_api_tell_an_imported_session_without_strides(file, clinic):
 def test_an_imported_session_is_over_and_takes_no_change(file):
     run(file)
     clinic = Clinic.everywhere.get()
-    program = Program(token_of(User.everywhere.create_user("pt", role="pt", clinic=clinic), "pt"))
+    program = Program(
+        bearer_token(User.everywhere.create_user("pt", role="pt", clinic=clinic), "pt")
+    )
     session = TrainingSession.everywhere.first()
     for kind in ("start", "goal", "finish", "abort"):
         status, problem = program.post(f"/sessions/{session.pk}/changes", kind=kind, value=3.0)

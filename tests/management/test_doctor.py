@@ -49,7 +49,7 @@ def test_sessions_that_a_dead_process_left_are_named():
 
 
 def test_a_failing_child_is_named_with_its_last_words(tmp_path):
-    child = {"name": "robot", "state": "failed", "restarts": 4, "last_words": ["no port"]}
+    child = {"name": "robot", "state": "failed", "restarts": 4, "last_output": ["no port"]}
     (tmp_path / "children.json").write_text(json.dumps({"server": 1, "children": [child]}))
     status, said = ask()
     assert status == 1

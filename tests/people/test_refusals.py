@@ -19,7 +19,8 @@ from rehab.people.roles import Role
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Station
-from rehab.training.changes import ChangeKind, NotAllowed, State, next_state
+from rehab.training.changes import ChangeKind, NotAllowed, State
+from rehab.training.controls import CONTROLS
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
@@ -55,7 +56,7 @@ def said(act: Callable[[], object], language: str = "es") -> str:
         (lambda: Phase("training", "Bloque", True, strides=0), "La fase 'Bloque' necesita"),
         (GoalRule, "Dé el objetivo como valor o como porcentaje"),
         (
-            lambda: next_state(State.READY, ChangeKind.FINISH),
+            lambda: CONTROLS[ChangeKind.FINISH].next_state(State.READY),
             "Una sesión lista no admite el cambio «fin»; debe estar en pausa o en marcha.",
         ),
         (
@@ -85,7 +86,7 @@ def test_a_refusal_is_said_in_spanish_with_its_values(act, words):
 
 def test_the_message_itself_stays_english():
     with override("es"), pytest.raises(NotAllowed) as refused:
-        next_state(State.READY, ChangeKind.FINISH)
+        CONTROLS[ChangeKind.FINISH].next_state(State.READY)
     assert str(refused.value) == (
         "A session that is ready cannot take the change 'finish'; it must be paused or running."
     )

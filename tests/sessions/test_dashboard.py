@@ -148,7 +148,7 @@ def test_the_hit_rate_of_who_walks_is_told_as_it_stands(world, rosa, monkeypatch
     assert sessions_today(pt, world.clinic, NOW)[0].hit_rate == ""  # another process runs it
     fold = SimpleNamespace(feedback=Tally(judged=4, hits=3))
     running = SimpleNamespace(
-        actor=SimpleNamespace(fold=fold),
+        aggregate=SimpleNamespace(fold=fold),
         presence=lambda _now: {"source": True, "tablets": 0, "robot": False},
     )
     live = SimpleNamespace(sessions={session.pk: running})

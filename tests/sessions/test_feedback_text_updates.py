@@ -11,7 +11,7 @@ from django.urls import reverse
 from rehab.feedback.models import FeedbackType
 from rehab.people.roles import Role
 from rehab.sessions.live import owners
-from rehab.sessions.live.actor import SessionActor
+from rehab.sessions.live.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.training.goals import GoalRule
@@ -63,7 +63,7 @@ LIST = reverse("admin:rehab_feedbacktype_changelist")
 
 
 def words_now(session, performance=1.2):
-    valence = SessionActor.load(session).fold.valences["positive"]
+    valence = SessionAggregate.load(session).fold.valences["positive"]
     return valence.band(performance).words
 
 
@@ -73,10 +73,10 @@ def test_edited_words_reach_open_sessions_and_points_do_not(world, pt):
     before = SessionEvent.everywhere.filter(session=ended).count()
     answer = pt.post(f"{ADD}?slug=positive", form())
     assert answer.headers["Location"] == LIST
-    fold = SessionActor.load(session).fold
+    fold = SessionAggregate.load(session).fold
     assert (fold.valence.band(0.5).words, fold.valence.band(1.2).words) == ("Go on.", "There!")
     assert (fold.valence.hit_points, fold.valence.cue.above) == (1, "celebrate")
-    other = SessionActor.load(spanish).fold
+    other = SessionAggregate.load(spanish).fold
     assert other.valences["positive"].band(0.5).words == "Siga."  # should it be changed to that
     event = SessionEvent.everywhere.get(session=session, kind="feedback_text")
     assert event.by == world.people[Role.PT]
@@ -117,7 +117,7 @@ def test_another_clinic_keeps_its_words(world, pt):
 
 def test_a_session_of_another_process_keeps_its_words_and_the_admin_says_so(world, pt):
     session = begin(world)
-    other = f"{socket.gethostname()}|{os.getppid()}|{owners._started(os.getppid())}"
+    other = f"{socket.gethostname()}|{os.getppid()}|{owners._start_time(os.getppid())}"
     type(session).everywhere.filter(pk=session.pk).update(owner=other)
     page = pt.post(f"{ADD}?slug=positive", form(), follow=True).content.decode()
     assert "keeps its words" in page

@@ -232,7 +232,7 @@ def test_the_chart_holds_every_stride_of_the_trained_leg(client, patient):
 
 
 def test_strides_before_the_goal_is_known_are_drawn_unjudged(client, world, patient):
-    from rehab.sessions.live.actor import SessionActor
+    from rehab.sessions.live.aggregate import SessionAggregate
     from rehab.sessions.services import SessionRequest, create_session
     from rehab.training.goals import GoalRule
     from rehab.training.steps import Measurement, Side
@@ -246,10 +246,10 @@ def test_strides_before_the_goal_is_known_are_drawn_unjudged(client, world, pati
             phases=(make_phase("baseline", strides=60), make_phase("training")),
         )
     )
-    actor = SessionActor(session)
-    rows = [*actor.change(Change(ChangeKind.START), None, NOW)]
-    rows += [actor.take(Measurement(n, n, Side.LEFT, 2.0), NOW) for n in range(1, 63)]
-    store(actor, rows)
+    aggregate = SessionAggregate(session)
+    rows = [*aggregate.change(Change(ChangeKind.START), None, NOW)]
+    rows += [aggregate.record_step(Measurement(n, n, Side.LEFT, 2.0), NOW) for n in range(1, 63)]
+    store(aggregate, rows)
     columns = read_json(detail(client, session), "session")["strides"]
     assert columns["hit"] == [None] * 60 + [True] * 2
     assert columns["shown"] == [2.0] * 62

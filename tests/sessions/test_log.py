@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from rehab.people.models import Clinic, Patient
 from rehab.people.scope import CrossClinicReference
-from rehab.sessions.live.actor import SessionActor, StepRow
+from rehab.sessions.live.aggregate import SessionAggregate, StepRow
 from rehab.sessions.live.writer import STEP_COLUMNS
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
@@ -38,42 +38,42 @@ def patient() -> Patient:
     return Patient.everywhere.create(clinic=clinic, code="7", nickname="Rosa", paretic_side="left")
 
 
-def begin(patient: Patient, valence: str = "binary", **settings: Any) -> SessionActor:
+def begin(patient: Patient, valence: str = "binary", **settings: Any) -> SessionAggregate:
     defaults: dict[str, Any] = {"goal": GoalRule(value=3.0), "phases": TRAINING}
-    actor = SessionActor(
+    aggregate = SessionAggregate(
         create_session(SessionRequest(patient=patient, valence=valence, **defaults | settings))
     )
-    change(actor, ChangeKind.START)
-    return actor
+    change(aggregate, ChangeKind.START)
+    return aggregate
 
 
 def change(
-    actor: SessionActor, kind: ChangeKind, value: float | None = None, at: datetime = NOW
+    aggregate: SessionAggregate, kind: ChangeKind, value: float | None = None, at: datetime = NOW
 ) -> None:
-    store(actor, actor.change(Change(kind, value), None, at))
+    store(aggregate, aggregate.change(Change(kind, value), None, at))
 
 
-def walk(actor: SessionActor, *values: float | None, reasons: tuple[str, ...] = ()) -> None:
-    first = actor.fold.last_number + 1
+def walk(aggregate: SessionAggregate, *values: float | None, reasons: tuple[str, ...] = ()) -> None:
+    first = aggregate.fold.last_number + 1
     strides = [
         Measurement(first + i, (first + i) * 1.1, Side.LEFT, value, reasons, {"step_length_m": 0.5})
         for i, value in enumerate(values)
     ]
-    store(actor, [actor.take(stride, NOW) for stride in strides])
+    store(aggregate, [aggregate.record_step(stride, NOW) for stride in strides])
 
 
-def reread(actor: SessionActor) -> TrainingSession:
-    return TrainingSession.everywhere.get(pk=actor.session.pk)
+def reread(aggregate: SessionAggregate) -> TrainingSession:
+    return TrainingSession.everywhere.get(pk=aggregate.session.pk)
 
 
 def test_every_field_of_a_step_is_kept(patient):
-    actor = begin(patient, phases=(make_phase("training", gain=0.85),))
-    walk(actor, 4.0)
+    aggregate = begin(patient, phases=(make_phase("training", gain=0.85),))
+    walk(aggregate, 4.0)
     step = Step.everywhere.get()
     kept = {field.name: getattr(step, field.name) for field in Step._meta.concrete_fields}
     del kept["id"]
     assert kept == {
-        "session": actor.session,
+        "session": aggregate.session,
         "number": 1,
         "time_s": 1.1,
         "received_at": NOW,
@@ -99,10 +99,10 @@ def test_the_writer_writes_every_column_of_a_step():
 
 
 def test_date_start_duration_score_type_and_goal_are_there_to_read(patient):
-    actor = begin(patient, "positive")
-    walk(actor, 4.0, 2.0, 3.0, None)
-    change(actor, ChangeKind.FINISH, at=NOW + timedelta(minutes=1))
-    session = reread(actor)
+    aggregate = begin(patient, "positive")
+    walk(aggregate, 4.0, 2.0, 3.0, None)
+    change(aggregate, ChangeKind.FINISH, at=NOW + timedelta(minutes=1))
+    session = reread(aggregate)
     assert session.started_at == NOW
     assert session.ended_at == NOW + timedelta(minutes=1)
     assert session.active_s == pytest.approx(3.3)
@@ -113,18 +113,18 @@ def test_date_start_duration_score_type_and_goal_are_there_to_read(patient):
 
 
 def test_explicit_feedback_has_no_score(patient):
-    actor = begin(patient, "explicit")
-    walk(actor, 4.0, 2.0)
-    change(actor, ChangeKind.FINISH)
+    aggregate = begin(patient, "explicit")
+    walk(aggregate, 4.0, 2.0)
+    change(aggregate, ChangeKind.FINISH)
     assert not SessionMetric.everywhere.filter(slug="score").exists()
     assert SessionMetric.everywhere.get(slug="hit_rate").value == 0.5
 
 
 def test_events_say_who_changed_what_after_which_step(patient):
-    actor = begin(patient)
-    walk(actor, 4.0, 4.0)
-    change(actor, ChangeKind.GOAL, 3.5)
-    walk(actor, 3.2)
+    aggregate = begin(patient)
+    walk(aggregate, 4.0, 4.0)
+    change(aggregate, ChangeKind.GOAL, 3.5)
+    walk(aggregate, 3.2)
     event = SessionEvent.everywhere.get(kind="goal")
     assert (event.after_number, event.old, event.value) == (2, 3.0, 3.5)
     assert list(Step.everywhere.order_by("number").values_list("goal", "hit")) == [
@@ -135,26 +135,26 @@ def test_events_say_who_changed_what_after_which_step(patient):
 
 
 def test_a_refused_change_leaves_no_trace(patient):
-    actor = begin(patient)
+    aggregate = begin(patient)
     with pytest.raises(InvalidSetting, match="15"):
-        change(actor, ChangeKind.GOAL, 99.0)
+        change(aggregate, ChangeKind.GOAL, 99.0)
     with pytest.raises(NotAllowed):
-        change(actor, ChangeKind.RESUME)
+        change(aggregate, ChangeKind.RESUME)
     assert list(SessionEvent.everywhere.values_list("kind", flat=True)) == ["start"]
 
 
 def test_a_number_that_is_taken_writes_nothing_of_its_batch(patient):
-    actor = begin(patient)
-    walk(actor, 4.0)
-    again = actor.take(Measurement(2, 2.2, Side.LEFT, 4.0), NOW)
+    aggregate = begin(patient)
+    walk(aggregate, 4.0)
+    again = aggregate.record_step(Measurement(2, 2.2, Side.LEFT, 4.0), NOW)
     taken = again._replace(step=dataclasses.replace(again.step, number=1))
     with pytest.raises(IntegrityError):
-        store(actor, [again, taken])
+        store(aggregate, [again, taken])
     assert Step.everywhere.count() == 1
 
 
-def fold_state(actor: SessionActor) -> dict[str, Any]:
-    state: dict[str, Any] = dict(vars(actor.fold))
+def fold_state(aggregate: SessionAggregate) -> dict[str, Any]:
+    state: dict[str, Any] = dict(vars(aggregate.fold))
     for name in ("trained", "feedback"):
         state[name] = dataclasses.asdict(state[name])
     state["phases"] = [dataclasses.asdict(tally) for tally in state["phases"]]
@@ -194,58 +194,58 @@ def test_folding_the_log_rebuilds_the_actor_exactly(patient, actions):
         make_phase("catch", seconds=4.0),
         make_phase("training", gain=0.9),
     )
-    actor = begin(patient, phases=phases)
+    aggregate = begin(patient, phases=phases)
     for action in actions:
         if isinstance(action, list):
-            walk(actor, *action, reasons=("flagged",) if len(action) == 3 else ())
+            walk(aggregate, *action, reasons=("flagged",) if len(action) == 3 else ())
         else:
             try:
-                change(actor, *action)
+                change(aggregate, *action)
             except InvalidSetting:
                 continue
-    rebuilt = SessionActor.load(reread(actor))
-    assert fold_state(rebuilt) == fold_state(actor)
-    assert compute_metrics(rebuilt.fold) == compute_metrics(actor.fold)
-    session = reread(actor)
-    assert (session.state, session.goal) == (actor.fold.state, actor.fold.goal)
+    rebuilt = SessionAggregate.load(reread(aggregate))
+    assert fold_state(rebuilt) == fold_state(aggregate)
+    assert compute_metrics(rebuilt.fold) == compute_metrics(aggregate.fold)
+    session = reread(aggregate)
+    assert (session.state, session.goal) == (aggregate.fold.state, aggregate.fold.goal)
     stored = Step.everywhere.filter(session=session)
     points = sum(step.points or 0 for step in stored)
-    assert points == (actor.fold.score or 0)
+    assert points == (aggregate.fold.score or 0)
 
 
 def test_what_could_not_have_been_is_passed_over_and_nothing_else_is_lost(patient, caplog):
     def slip_in(kind: str, value: float | None = None) -> None:
-        after = actor.fold.last_number
+        after = aggregate.fold.last_number
         SessionEvent.everywhere.create(
-            session=actor.session, after_number=after, kind=kind, value=value, at=NOW
+            session=aggregate.session, after_number=after, kind=kind, value=value, at=NOW
         )
 
-    actor = begin(patient)
-    walk(actor, 4.0)
-    change(actor, ChangeKind.PAUSE)
+    aggregate = begin(patient)
+    walk(aggregate, 4.0)
+    change(aggregate, ChangeKind.PAUSE)
     slip_in("pause")  # by another process that believed that the session was its own
-    walk(actor, 4.0)
-    change(actor, ChangeKind.RESUME)
+    walk(aggregate, 4.0)
+    change(aggregate, ChangeKind.RESUME)
     slip_in("start")
-    walk(actor, 4.0, 2.0)
+    walk(aggregate, 4.0, 2.0)
     slip_in("goal", -1.0)
-    change(actor, ChangeKind.GOAL, 3.5)
-    rebuilt = SessionActor.load(reread(actor))
-    assert fold_state(rebuilt) == fold_state(actor)
+    change(aggregate, ChangeKind.GOAL, 3.5)
+    rebuilt = SessionAggregate.load(reread(aggregate))
+    assert fold_state(rebuilt) == fold_state(aggregate)
     (warning,) = caplog.messages
     assert "Skipped 3 impossible entries" in warning
     assert "a session that is paused" in warning.lower()
     walk(rebuilt, 4.0)
-    assert SessionActor.load(reread(actor)).fold.last_number == 5
+    assert SessionAggregate.load(reread(aggregate)).fold.last_number == 5
 
 
 def test_strides_after_the_end_hide_no_session(patient, caplog):
-    actor = begin(patient)
-    walk(actor, 4.0, 4.0)
-    other = SessionActor.load(reread(actor))
-    change(actor, ChangeKind.FINISH)
+    aggregate = begin(patient)
+    walk(aggregate, 4.0, 4.0)
+    other = SessionAggregate.load(reread(aggregate))
+    change(aggregate, ChangeKind.FINISH)
     walk(other, 4.0)
-    loaded = SessionActor.load(reread(actor))
+    loaded = SessionAggregate.load(reread(aggregate))
     assert (loaded.fold.state, loaded.fold.score) == ("finished", 2)
     assert "Skipped 1 impossible entries" in caplog.text
 
@@ -287,12 +287,12 @@ def test_a_session_stays_within_one_clinic(patient):
 
 
 def test_steps_without_values_come_back_from_the_log_as_they_were(patient):
-    actor = begin(patient)
-    walk(actor, float("nan"), None, 99.0)
+    aggregate = begin(patient)
+    walk(aggregate, float("nan"), None, 99.0)
     assert [step.reasons for step in Step.everywhere.order_by("number")] == [
         ["not_finite"],
         ["missing"],
         ["out_of_bounds"],
     ]
     assert Step.everywhere.get(number=1).value is None
-    assert isinstance(actor.take(Measurement(4, 9.0, Side.RIGHT, 3.0), NOW), StepRow)
+    assert isinstance(aggregate.record_step(Measurement(4, 9.0, Side.RIGHT, 3.0), NOW), StepRow)

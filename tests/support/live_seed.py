@@ -23,7 +23,7 @@ def seed(count: int) -> list[dict[str, Any]]:
     from rehab.people.roles import Role
     from rehab.people.sign_in.first_start import first_clinic, prepare_database
     from rehab.people.sign_in.flow import BACKEND
-    from rehab.sessions.live.actor import SessionActor
+    from rehab.sessions.live.aggregate import SessionAggregate
     from rehab.sessions.services import SessionRequest, create_session
     from rehab.stations.models import Device, Station
     from rehab.training.changes import Change, ChangeKind
@@ -61,8 +61,8 @@ def seed(count: int) -> list[dict[str, Any]]:
                     station=station,
                 )
             )
-            actor = SessionActor(session)
-            store(actor, actor.change(Change(ChangeKind.START), None, timezone.now()))
+            aggregate = SessionAggregate(session)
+            store(aggregate, aggregate.change(Change(ChangeKind.START), None, timezone.now()))
             made.append({"session": session.pk, "cookie": cookies.session_key, **tokens})
     return made
 

@@ -15,8 +15,8 @@ from tests.support.world import World
 ROOT = "/api/v1"
 
 
-def token_of(user: User, role: str) -> str:
-    """Return an account a new API token."""
+def bearer_token(user: User, role: str) -> str:
+    """Make an account a new API token."""
     row = ApiToken(clinic=user.clinic, user=user, name="program", role=role)
     token = row.new_token()
     row.save()
@@ -52,4 +52,4 @@ class Program:
 
 def program_of(world: World, role: Role) -> Program:
     """Return a program of somebody of this role."""
-    return Program(token_of(world.people[role], role))
+    return Program(bearer_token(world.people[role], role))

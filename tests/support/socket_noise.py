@@ -204,10 +204,10 @@ class Ward:
 
     async def _live(self) -> Any:
         live = await runtimes.current().session(self.session.pk)
-        if live.actor.fold.state in ENDED_STATES:  # some noise is a valid change
+        if live.aggregate.fold.state in ENDED_STATES:  # some noise is a valid change
             self.session = await begin(self.noisy)
             live = await runtimes.current().session(self.session.pk)
-        elif live.actor.fold.state is State.PAUSED:
+        elif live.aggregate.fold.state is State.PAUSED:
             await change(self.session, "resume")
         return live
 
@@ -246,8 +246,8 @@ class Ward:
             while len(runtime.sockets) > 2:  # noqa: ASYNC110 (the source and the page that stay)
                 await asyncio.sleep(0)
         noisy = runtime.sessions.get(self.session.pk)
-        assert noisy is None or not (noisy.channel.viewers or noisy.source or noisy.robot)
-        assert not runtime.waiting[self.noisy.station.pk]
+        assert noisy is None or not (noisy.feed.subscribers or noisy.source or noisy.robot)
+        assert not runtime.waiting_devices[self.noisy.station.pk]
 
 
 async def begin(place: Place) -> TrainingSession:

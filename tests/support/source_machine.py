@@ -20,7 +20,7 @@ from hypothesis.stateful import (
 )
 
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.actor import SessionActor
+from rehab.sessions.live.aggregate import SessionAggregate
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
@@ -282,7 +282,7 @@ class Sources(RuleBasedStateMachine):
             async with asyncio.timeout(callers.PATIENCE_S):
                 while live.next_number <= self.sent:  # noqa: ASYNC110
                     await asyncio.sleep(0)
-                await live.settled()
+                await live.wait_until_committed()
 
     async def _crash(self) -> None:
         runtime = runtimes.current()
@@ -311,7 +311,7 @@ class Sources(RuleBasedStateMachine):
 
     async def _end(self, runtime: runtimes.Runtime) -> None:
         await runtime.loop.run_in_executor(None, runtime.writer.close)
-        for routine in runtime.routines:
+        for routine in runtime.background_tasks:
             routine.cancel()
         for caller in list(Caller.open_ones):
             await caller.hang_up()
@@ -357,18 +357,18 @@ class Sources(RuleBasedStateMachine):
         async with asyncio.timeout(callers.PATIENCE_S):
             while live.next_number <= len(self.made):  # noqa: ASYNC110
                 await asyncio.sleep(0)
-            await live.settled()
+            await live.wait_until_committed()
         assert self.sent == len(self.made)
-        await sync_to_async(self._compare)(live.actor)
+        await sync_to_async(self._compare)(live.aggregate)
 
-    def _compare(self, actor: SessionActor) -> None:
+    def _compare(self, actor: SessionAggregate) -> None:
         session = TrainingSession.everywhere.get(pk=self.session.pk)
         numbers = Step.everywhere.filter(session=session).order_by("number")
         assert list(numbers.values_list("number", flat=True)) == list(range(1, self.sent + 1))
         # The log in its order, but for what the server found wrong with a step.
         assert [plain(entry) for entry in log_entries(session)] == [plain(e) for e in self.log]
         oracle = SessionFold.replay(session.to_plan(), self.log)
-        rebuilt = SessionActor.load(session).fold
+        rebuilt = SessionAggregate.load(session).fold
         for fold in (rebuilt, actor.fold):
             assert figures(fold) == figures(oracle)
         assert sum(step.points or 0 for step in numbers) == (oracle.score or 0)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta
 
 from rehab.people.models import Patient
-from rehab.sessions.live.actor import SessionActor
+from rehab.sessions.live.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sources.synthetic import PROFILES, SyntheticWalker
@@ -51,19 +51,19 @@ def walk(
     )
     TrainingSession.everywhere.filter(pk=session.pk).update(created_at=began)
     session.created_at = began
-    actor = SessionActor(session)
-    rows = list(actor.change(Change(ChangeKind.START), None, began))
+    aggregate = SessionAggregate(session)
+    rows = list(aggregate.change(Change(ChangeKind.START), None, began))
     for each in walked:
-        at = began + timedelta(seconds=actor.fold.last_number)
+        at = began + timedelta(seconds=aggregate.fold.last_number)
         if isinstance(each, Change):
-            rows += actor.change(each, None, at)
+            rows += aggregate.change(each, None, at)
             continue
         side, value = each if isinstance(each, tuple) else (LEFT, each)
-        number = actor.fold.last_number + 1
-        rows.append(actor.take(Measurement(number, float(number), side, value), at))
+        number = aggregate.fold.last_number + 1
+        rows.append(aggregate.record_step(Measurement(number, float(number), side, value), at))
     if end is not None:
-        rows += actor.change(Change(end), None, at_end(began, actor))
-    store(actor, rows)
+        rows += aggregate.change(Change(end), None, at_end(began, aggregate))
+    store(aggregate, rows)
     session.refresh_from_db()
     return session
 
@@ -93,26 +93,26 @@ def visit(
     TrainingSession.everywhere.filter(pk=session.pk).update(created_at=began)
     session.created_at = began
     walker = SyntheticWalker(PROFILES["good"], seed, LEFT)
-    actor = SessionActor(session)
-    rows = list(actor.change(Change(ChangeKind.START), None, began))
+    aggregate = SessionAggregate(session)
+    rows = list(aggregate.change(Change(ChangeKind.START), None, began))
     for number in range(1, count + 1):
         at = began + timedelta(seconds=1.1 * number)
         if number in {count // 2, 3 * count // 4}:
-            goal = round(1.05 * (actor.fold.goal or GOAL), 2)
-            rows += actor.change(Change(ChangeKind.GOAL, goal), None, at)
+            goal = round(1.05 * (aggregate.fold.goal or GOAL), 2)
+            rows += aggregate.change(Change(ChangeKind.GOAL, goal), None, at)
         if number == 2 * count // 3:
-            rows += actor.change(Change(ChangeKind.PAUSE), None, at)
-            rows += actor.change(Change(ChangeKind.RESUME), None, at + timedelta(seconds=30))
-        rows.append(actor.take(walker.next_stride(actor.fold.phase), at))
-    rows += actor.change(Change(ChangeKind.FINISH), None, now - timedelta(days=days_ago))
-    store(actor, rows)
+            rows += aggregate.change(Change(ChangeKind.PAUSE), None, at)
+            rows += aggregate.change(Change(ChangeKind.RESUME), None, at + timedelta(seconds=30))
+        rows.append(aggregate.record_step(walker.next_stride(aggregate.fold.phase), at))
+    rows += aggregate.change(Change(ChangeKind.FINISH), None, now - timedelta(days=days_ago))
+    store(aggregate, rows)
     session.refresh_from_db()
     return session
 
 
-def at_end(began: datetime, actor: SessionActor) -> datetime:
+def at_end(began: datetime, aggregate: SessionAggregate) -> datetime:
     """Return the moment after the last stride."""
-    return began + timedelta(seconds=actor.fold.last_number + 1)
+    return began + timedelta(seconds=aggregate.fold.last_number + 1)
 
 
 def strides(hits: int, misses: int) -> list[Walked]:

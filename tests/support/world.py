@@ -24,7 +24,7 @@ from rehab.people.roles import Role
 from rehab.people.sign_in.factors import Authenticator, RecoveryCode
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.corrections import SessionCorrection
-from rehab.sessions.live.actor import Row, SessionActor
+from rehab.sessions.live.aggregate import Row, SessionAggregate
 from rehab.sessions.live.writer import Job, commit
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
@@ -81,10 +81,19 @@ def agreeing(patient: Patient) -> Patient:
     return patient
 
 
-def store(actor: SessionActor, rows: list[Row]) -> None:
+def store(aggregate: SessionAggregate, rows: list[Row]) -> None:
     """Commit rows of a session here and now, without the live path's threads."""
     commit(
-        [Job(actor, actor.session.pk, actor.session.epoch, rows, actor.summary(), lambda _: None)]
+        [
+            Job(
+                aggregate,
+                aggregate.session.pk,
+                aggregate.session.epoch,
+                rows,
+                aggregate.summary(),
+                lambda _: None,
+            )
+        ]
     )
 
 
@@ -158,14 +167,14 @@ def build_world(name: str) -> World:
             source=mark(name, TrainingSession),
         )
     )
-    actor = SessionActor(session)
-    store(actor, actor.change(Change(ChangeKind.START), people[Role.PT], NOW))
+    aggregate = SessionAggregate(session)
+    store(aggregate, aggregate.change(Change(ChangeKind.START), people[Role.PT], NOW))
     for number in range(1, 11):
         reasons = (mark(name, Step),) if number == 3 else ()
         value = 0.5 + number / 10
         stride = Measurement(number, number * 1.1, Side.LEFT, value, reasons)
-        store(actor, [actor.take(stride, NOW)])
-    store(actor, actor.change(Change(ChangeKind.FINISH), people[Role.PT], NOW))
+        store(aggregate, [aggregate.record_step(stride, NOW)])
+    store(aggregate, aggregate.change(Change(ChangeKind.FINISH), people[Role.PT], NOW))
     board = Leaderboard.everywhere.create(
         clinic=clinic,
         name=mark(name, Leaderboard),

@@ -15,8 +15,8 @@ from rehab.training.changes import (
     NotAllowed,
     PauseReason,
     State,
-    next_state,
 )
+from rehab.training.controls import CONTROLS
 from rehab.training.fold import SessionFold
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import make_phase
@@ -75,7 +75,7 @@ def test_a_change_leads_on_or_is_refused_in_words(kind: ChangeKind, state: State
     change = Change(kind, VALUES.get(kind))
     if (kind, state) in LEADS_TO:
         fold.change(change)
-        assert fold.state is LEADS_TO[kind, state] is next_state(state, kind)
+        assert fold.state is LEADS_TO[kind, state] is CONTROLS[kind].next_state(state)
     else:
         with pytest.raises(NotAllowed, match=f"that is {state} cannot .* '{kind}'; it must be "):
             fold.change(change)

@@ -76,9 +76,9 @@ class Command(BaseCommand):
         current().address = address
         if token is not None:
             robot = [sys.executable, "-m", "robot", "--base", base, "--server", address, "--child"]
-            current().children.start("robot", robot, {"GARRY_ROBOT_TOKEN": token})
+            current().supervisor.start("robot", robot, {"GARRY_ROBOT_TOKEN": token})
         for number, command in enumerate(commands, start=1):
-            current().children.start(f"child {number}", shlex.split(command))
+            current().supervisor.start(f"child {number}", shlex.split(command))
         board_builder.wake()  # for boards that the last run has left unbuilt
         self.stdout.write("Ready. Ctrl-C stops the server.")
         self.stdout.flush()

@@ -1,5 +1,7 @@
-"""What sockets tell the audit log. Whatever waits is written together: thousands of pages that come
-back after a restart cost the disk a few commits, and no step waits for them.
+"""Queues the audit entries of sockets.
+
+All pending entries are written together, so that thousands of pages that reconnect after a restart
+cost a few commits and no step waits for them.
 """
 
 from __future__ import annotations
@@ -16,68 +18,68 @@ from django.db import DatabaseError
 
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
-from rehab.sessions.live.auth import Actor, address_of
+from rehab.sessions.live.auth import Actor, socket_address
 from rehab.sessions.models import TrainingSession
 
 log = logging.getLogger(__name__)
 
 
-class Note(NamedTuple):
-    """Something to be noted, with all but whose session it is."""
+class PendingEntry(NamedTuple):
+    """An audit entry that still lacks its patient."""
 
     session_id: int
     act: Act
     actor: Actor
-    facts: dict[str, Any]
+    details: dict[str, Any]
 
 
-class Notes:
-    """Keeps what is to be noted until it is written, beside everything else."""
+class AuditQueue:
+    """Collects audit entries and writes them in the background."""
 
     def __init__(self) -> None:
-        self._waiting: list[Note] = []
-        self._writing: asyncio.Task[None] | None = None
+        self._pending: list[PendingEntry] = []
+        self._write_task: asyncio.Task[None] | None = None
 
     def add(
         self, act: Act, actor: Actor, session_id: int, scope: Mapping[str, Any], now: datetime
     ) -> None:
-        """Note what was seen or ordered by a socket; what is only seen once in some minutes."""
+        """Queue what a socket saw or ordered; of what it sees, one entry in some minutes."""
         path = scope["path"]
         key = (type(actor).__name__, getattr(actor, "pk", None), path)
         if act is Act.VIEW and not audit_log.recent_views.is_new(key, now):
             return
-        facts = {"about": path, "address": address_of(scope), "now": now}
-        self._waiting.append(Note(session_id, act, actor, facts))
-        if self._writing is None:
+        details = {"about": path, "address": socket_address(scope), "now": now}
+        self._pending.append(PendingEntry(session_id, act, actor, details))
+        if self._write_task is None:
             loop = asyncio.get_running_loop()
-            self._writing = loop.create_task(self._write(), context=contextvars.Context())
+            self._write_task = loop.create_task(self._write(), context=contextvars.Context())
 
     async def _write(self) -> None:
-        notes: list[Note] = []
+        entries: list[PendingEntry] = []
         try:
-            while self._waiting:
-                notes, self._waiting = self._waiting, []
-                await database_sync_to_async(_store)(notes)
-        except DatabaseError:  # care goes on, and later notes are tried again
-            log.exception("The audit log missed what sockets told it: %s", notes)
+            while self._pending:
+                entries, self._pending = self._pending, []
+                await database_sync_to_async(_store)(entries)
+        except DatabaseError:  # the training goes on; later entries are tried again
+            log.exception("The audit log missed what sockets told it: %s", entries)
         finally:
-            self._writing = None
+            self._write_task = None
 
-    async def settled(self) -> None:
-        """Wait until all is written."""
-        if self._writing is not None:
-            await self._writing
+    async def join(self) -> None:
+        """Wait until all entries are written."""
+        if self._write_task is not None:
+            await self._write_task
 
 
-def _store(notes: list[Note]) -> None:
-    sessions = TrainingSession.everywhere.filter(pk__in={note.session_id for note in notes})
+def _store(entries: list[PendingEntry]) -> None:
+    sessions = TrainingSession.everywhere.filter(pk__in={entry.session_id for entry in entries})
     patients = dict(sessions.values_list("pk", "patient_id"))
     audit_log.record_after_the_fact(
         [
             audit_log.build_entry(
-                note.act, note.actor, patient=patients[note.session_id], **note.facts
+                entry.act, entry.actor, patient=patients[entry.session_id], **entry.details
             )
-            for note in notes
-            if note.session_id in patients
+            for entry in entries
+            if entry.session_id in patients
         ]
     )

@@ -1,4 +1,4 @@
-"""Who is at the other end of a socket, and what they may open."""
+"""Authentication of sockets, and what each client may open."""
 
 from __future__ import annotations
 
@@ -30,23 +30,23 @@ from rehab.training.changes import OPEN_STATES
 Actor = User | Device | None
 
 
-def headers_of(scope: Mapping[str, Any]) -> dict[str, str]:
-    """Give a socket's headers by their lower-case names."""
+def socket_headers(scope: Mapping[str, Any]) -> dict[str, str]:
+    """Return a socket's headers by their lower-case names."""
     return {
         name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]
     }
 
 
-def token_of(scope: Mapping[str, Any]) -> str | None:
-    """Give the device token in the Authorization header."""
-    kind, _, token = headers_of(scope).get("authorization", "").partition(" ")
+def bearer_token(scope: Mapping[str, Any]) -> str | None:
+    """Return the device token in the Authorization header."""
+    kind, _, token = socket_headers(scope).get("authorization", "").partition(" ")
     return token.strip() if kind.lower() == "bearer" and token else None
 
 
-def is_own_page(scope: Mapping[str, Any]) -> bool:
-    """Say whether a page of ours opened this socket: only then do its cookies count."""
+def is_own_origin(scope: Mapping[str, Any]) -> bool:
+    """Return whether a page of this server opened the socket; else its cookies are ignored."""
     try:
-        place = urlsplit(headers_of(scope).get("origin", "")).netloc
+        place = urlsplit(socket_headers(scope).get("origin", "")).netloc
     except ValueError:
         return False
     host, _ = split_domain_port(place)
@@ -54,35 +54,37 @@ def is_own_page(scope: Mapping[str, Any]) -> bool:
 
 
 @database_sync_to_async
-def find_actor(scope: Mapping[str, Any]) -> Actor:
-    """Give the device or person at the other end; None for a stranger."""
-    token = token_of(scope)
+def authenticate(scope: Mapping[str, Any]) -> Actor:
+    """Return the device or person that a socket belongs to; None for a stranger."""
+    token = bearer_token(scope)
     if token is not None:
         return find_device(token, timezone.now())
-    if not is_own_page(scope):
+    if not is_own_origin(scope):
         return None
-    return _signed_in(scope) or find_tablet(cookies_of(scope).get(tablets.COOKIE), timezone.now())
+    return _signed_in(scope) or find_tablet(
+        socket_cookies(scope).get(tablets.COOKIE), timezone.now()
+    )
 
 
 @database_sync_to_async
-def find_device_by(token: str) -> Device | None:
-    """Give the device that a token in a first frame belongs to."""
+def authenticate_token(token: str) -> Device | None:
+    """Return the device of a token from a first frame; None for an unknown one."""
     return find_device(token, timezone.now()) if token.isascii() else None
 
 
-def cookies_of(scope: Mapping[str, Any]) -> dict[str, str]:
-    """Give a socket's cookies."""
-    return parse_cookie(headers_of(scope).get("cookie", ""))
+def socket_cookies(scope: Mapping[str, Any]) -> dict[str, str]:
+    """Return a socket's cookies."""
+    return parse_cookie(socket_headers(scope).get("cookie", ""))
 
 
-def session_key_of(scope: Mapping[str, Any]) -> str | None:
-    """Give the key of the browser session that a socket's cookies name."""
-    return cookies_of(scope).get(settings.SESSION_COOKIE_NAME)
+def browser_session_key(scope: Mapping[str, Any]) -> str | None:
+    """Return the key of the browser session that a socket's cookies name."""
+    return socket_cookies(scope).get(settings.SESSION_COOKIE_NAME)
 
 
 def _signed_in(scope: Mapping[str, Any]) -> User | None:
     request = HttpRequest()
-    key = session_key_of(scope)
+    key = browser_session_key(scope)
     if key is None:
         return None
     store = import_string(f"{settings.SESSION_ENGINE}.SessionStore")
@@ -92,61 +94,64 @@ def _signed_in(scope: Mapping[str, Any]) -> User | None:
 
 
 @database_sync_to_async
-def find_unwelcome(admitted: Sequence[tuple[Actor, Mapping[str, Any]]], now: datetime) -> list[int]:
-    """Say which of these actors, each with its socket's scope, would no longer be let in: devices
-    whose token was revoked or renewed, people whose sign-in has ended or no longer holds.
+def find_unauthorized(
+    clients: Sequence[tuple[Actor, Mapping[str, Any]]], now: datetime
+) -> list[int]:
+    """Return the indexes of clients, given with their scopes, that are no longer authorized.
+
+    These are devices whose token was revoked or renewed, and people whose sign-in has ended.
     """
-    devices = {actor.pk for actor, _ in admitted if isinstance(actor, Device)}
-    people = {actor.pk for actor, _ in admitted if isinstance(actor, User)}
-    keys = {session_key_of(scope) for actor, scope in admitted if isinstance(actor, User)}
+    devices = {actor.pk for actor, _ in clients if isinstance(actor, Device)}
+    people = {actor.pk for actor, _ in clients if isinstance(actor, User)}
+    keys = {browser_session_key(scope) for actor, scope in clients if isinstance(actor, User)}
     valid = Device.everywhere.filter(pk__in=devices, revoked_at__isnull=True)
     hashes = dict(valid.values_list("pk", "token_hash"))
     accounts = User.everywhere.select_related("clinic").in_bulk(people)
     live = Session.objects.filter(session_key__in=keys, expire_date__gt=now)
     signed_in = {row.session_key: row.get_decoded() for row in live}
 
-    def is_welcome(actor: Actor, scope: Mapping[str, Any]) -> bool:
+    def is_allowed(actor: Actor, scope: Mapping[str, Any]) -> bool:
         if isinstance(actor, Device):
             return hashes.get(actor.pk) == actor.token_hash
         if actor is None:
             return True
-        account, data = accounts.get(actor.pk), signed_in.get(session_key_of(scope) or "")
+        account, data = accounts.get(actor.pk), signed_in.get(browser_session_key(scope) or "")
         return account is not None and data is not None and is_session_valid(data, account)
 
-    return [index for index, one in enumerate(admitted) if not is_welcome(*one)]
+    return [index for index, one in enumerate(clients) if not is_allowed(*one)]
 
 
 @database_sync_to_async
-def keep_signed_in(scopes: Sequence[Mapping[str, Any]], now: datetime) -> None:
-    """Put off the end of the sign-ins by which these sockets came in: a training runs there."""
-    keys = {key for scope in scopes if (key := session_key_of(scope))}
+def extend_sign_ins(scopes: Sequence[Mapping[str, Any]], now: datetime) -> None:
+    """Extend the sign-ins of these sockets, whose pages show a running session."""
+    keys = {key for scope in scopes if (key := browser_session_key(scope))}
     browser_sessions.extend_sessions(keys, now)
 
 
 @database_sync_to_async
 def may_open(actor: Actor, session_id: int) -> bool:
-    """Say whether the session is one that this actor sees."""
+    """Return whether the actor may see the session."""
     return TrainingSession.objects.visible_to(actor).filter(pk=session_id).exists()
 
 
-def address_of(scope: Mapping[str, Any]) -> str:
-    """Give the address that a socket comes from."""
-    forwarded = headers_of(scope).get("x-forwarded-for", "")
+def socket_address(scope: Mapping[str, Any]) -> str:
+    """Return the address that a socket comes from."""
+    forwarded = socket_headers(scope).get("x-forwarded-for", "")
     return resolve_client_address(forwarded, (scope.get("client") or [""])[0])
 
 
 @database_sync_to_async
 def may_watch(actor: Actor, session_id: int, scope: Mapping[str, Any]) -> bool:
-    """Say whether a person may watch from there; a device stands where it stands."""
+    """Return whether a person may watch from a socket's address; a device always may."""
     if not isinstance(actor, User):
         return True
     patients = Patient.everywhere.filter(sessions=session_id).select_related("clinic")
-    return is_remote_view_allowed(patients.get(), address_of(scope))
+    return is_remote_view_allowed(patients.get(), socket_address(scope))
 
 
 @database_sync_to_async
-def open_session_of(device: Device, session_id: int | None) -> int | None:
-    """Give the station's open session (the newest one, or the one that is named)."""
+def find_open_session(device: Device, session_id: int | None) -> int | None:
+    """Return the open session of a device's station: the newest, or the given one if open."""
     sessions = TrainingSession.objects.visible_to(device).filter(
         state__in=[state.value for state in OPEN_STATES]
     )

@@ -1,28 +1,28 @@
-"""Past steps of a session that somebody was already let into, read from its log."""
+"""Past steps of a session, read from its log for clients that are authorized already."""
 
 from __future__ import annotations
 
 from channels.db import database_sync_to_async
 
 from rehab.sessions.log import SessionEvent, Step
-from rehab.training.changes import ChangeKind
+from rehab.training.changes import ChangeKind, State
+from rehab.training.controls import CONTROLS
 from rehab.training.measures import Measure
 from rehab.training.steps import InvalidReason, Measurement, add_reason, find_invalid_reasons
 
-PAGE = 256  # past steps at a time
-MOVES = (ChangeKind.START, ChangeKind.PAUSE, ChangeKind.RESUME)
+PAGE_STEPS = 256  # steps of one query
 
 
 @database_sync_to_async
-def read_steps(session_id: int, after: int, until: int) -> list[Step]:
-    """Give the next steps after one number up to another, oldest first."""
+def read_backlog(session_id: int, after: int, until: int) -> list[Step]:
+    """Return the next page of steps after one number up to another, oldest first."""
     steps = Step.everywhere.filter(session_id=session_id, number__gt=after, number__lte=until)
-    return list(steps.order_by("number")[:PAGE])
+    return list(steps.order_by("number")[:PAGE_STEPS])
 
 
 @database_sync_to_async
-def is_stored(session_id: int, measurement: Measurement, measure: Measure) -> bool:
-    """Say whether the step of this number is stored as it was measured, doubts included."""
+def is_duplicate(session_id: int, measurement: Measurement, measure: Measure) -> bool:
+    """Return whether the stored step of that number has the same content, reasons included."""
     stored = Step.everywhere.get(session_id=session_id, number=measurement.number)
     same = (
         stored.time_s == measurement.time_s
@@ -36,13 +36,16 @@ def is_stored(session_id: int, measurement: Measurement, measure: Measure) -> bo
 
 
 def _find_reasons(session_id: int, measurement: Measurement, measure: Measure) -> tuple[str, ...]:
-    """Give the reasons that a measurement was stored with: the source's, then the fold's."""
+    """Return the reasons that a measurement is stored with: the source's, then the fold's."""
     reasons, number = find_invalid_reasons(measurement, measure), measurement.number
     before = Step.everywhere.filter(session_id=session_id, number=number - 1).first()
     if before is not None and measurement.time_s < before.time_s:
         reasons = add_reason(reasons, InvalidReason.TIME_BACKWARDS)
+    moving = [
+        kind for kind, one in CONTROLS.items() if one.leads_to in (State.RUNNING, State.PAUSED)
+    ]
     moves = SessionEvent.everywhere.filter(
-        session_id=session_id, after_number__lt=number, kind__in=MOVES
+        session_id=session_id, after_number__lt=number, kind__in=moving
     )
     if moves.order_by("-pk").values_list("kind", flat=True).first() == ChangeKind.PAUSE:
         reasons = add_reason(reasons, InvalidReason.PAUSED)

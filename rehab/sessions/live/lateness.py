@@ -1,4 +1,4 @@
-"""Tells a fresh step from one that was held up on its way."""
+"""Distinguishes steps that arrive in time from delayed ones."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from rehab.training.clocks import RemoteClock
 
 
 class Lateness:
-    """Relates the clock of one run of a source to ours; kept with the session over reconnections.
+    """Relates the clock of one run of a source to ours; the session keeps it over reconnections.
 
     A source's hello gives its clock and speed; what it then sends is as late as our clock has run
     on past the step's own time. Without a clock in hello the quickest step of the run so far stands
@@ -22,13 +22,14 @@ class Lateness:
         """Whether anything is known of the source's clock."""
         return self._clock is not None and self._clock.is_known
 
-    def slacken(self, now_s: float) -> None:
-        """Allow that the source's clock stood still, with a session that now goes on, for as long
-        as nothing of it was heard. The next steps tell.
+    def allow_standstill(self, now_s: float) -> None:
+        """Allow for a source whose clock stood still while its session was paused.
+
+        The next steps show for how long.
         """
         if self._clock is not None:
             self._clock.allow_standstill(now_s)
 
     def is_late(self, time_s: float, now_s: float) -> bool:
-        """Say whether a step of this source time, arriving now, is too late to be shown."""
+        """Return whether a step of this source time, arriving now, is too late to be shown."""
         return self._clock is not None and self._clock.observe(time_s, now_s)

@@ -1,4 +1,4 @@
-"""Which process writes a session: it puts its name there, and shuts out the one before."""
+"""Ownership of sessions: which process writes one. Each claim raises the epoch, a fencing token."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from django.conf import settings
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
 
-PROCESSES = Path("/proc")
-# What the one before may have written since the session was read.
-FOLLOWING = ("state", "started_at", "ended_at")
+PROC_DIR = Path("/proc")
+# The previous owner may have written these since the session was read.
+WRITTEN_BY_OWNER = ("state", "started_at", "ended_at")
 
 
 class OwnedElsewhere(RuntimeError):
     """Another process on this machine is running the session; the message says which."""
 
 
-def _started(pid: int) -> str:
-    """Give a process's start time, so that a number used again is not taken for the old one."""
+def _start_time(pid: int) -> str:
+    """Return a process's start time, which tells it from a later one with the same id."""
     try:
-        if PROCESSES.is_dir():
-            return (PROCESSES / str(pid) / "stat").read_text().rpartition(")")[2].split()[19]
-        # macOS has no such folder. The same words for whoever asks, wherever that is.
+        if PROC_DIR.is_dir():
+            return (PROC_DIR / str(pid) / "stat").read_text().rpartition(")")[2].split()[19]
+        # macOS has no /proc. The output must not depend on who asks, or where.
         variables = os.environ | {"LC_ALL": "C", "TZ": "UTC"}
         command = ["ps", "-o", "lstart=", "-p", str(pid)]
         said = subprocess.run(command, env=variables, capture_output=True, text=True, check=False)
@@ -37,23 +37,23 @@ def _started(pid: int) -> str:
 
 
 @cache
-def _my_start(pid: int) -> str:
-    return _started(pid)
+def _own_start_time(pid: int) -> str:
+    return _start_time(pid)
 
 
-def my_name() -> str:
-    """Give this process's name among owners."""
-    return f"{socket.gethostname()}|{os.getpid()}|{_my_start(os.getpid())}"
+def own_name() -> str:
+    """Return the name that this process writes as owner."""
+    return f"{socket.gethostname()}|{os.getpid()}|{_own_start_time(os.getpid())}"
 
 
 def is_alive(owner: str) -> bool:
-    """Say whether an owner still runs. Those on other hosted machines are taken to."""
+    """Return whether an owner's process runs. Hosted, those of other machines are assumed to."""
     try:
         host, pid, started = owner.split("|")
     except ValueError:
         return False
     if host != socket.gethostname():
-        # One machine may have been given another name; only hosted servers share a database.
+        # Only hosted servers share a database; else the machine was renamed.
         return bool(settings.HOSTED)
     try:
         os.kill(int(pid), 0)
@@ -61,41 +61,41 @@ def is_alive(owner: str) -> bool:
         return False
     except PermissionError:
         pass
-    return _started(int(pid)) == started
+    return _start_time(int(pid)) == started
 
 
 def claim(session: TrainingSession) -> str:
-    """Make this process the session's writer; give the owner before, if any.
+    """Make this process the session's writer; return the previous owner, if any.
 
-    Of several that try at once one succeeds. Raises OwnedElsewhere while another one has it.
+    Of several that try at once one succeeds. Raises OwnedElsewhere while another process runs it.
     """
     while True:
-        before = session.owner
-        if before and before != my_name() and is_alive(before):
+        previous = session.owner
+        if previous and previous != own_name() and is_alive(previous):
             raise OwnedElsewhere(
-                f"Session {session.pk} is run by another process ({before.split('|')[1]}). "
+                f"Session {session.pk} is run by another process ({previous.split('|')[1]}). "
                 "Wait until it has ended, or stop that process."
             )
         still = TrainingSession.everywhere.filter(pk=session.pk, epoch=session.epoch)
-        if still.update(epoch=session.epoch + 1, owner=my_name()):
-            session.epoch, session.owner = session.epoch + 1, my_name()
-            session.refresh_from_db(fields=FOLLOWING)
-            return before
-        session.refresh_from_db(fields=["epoch", "owner"])  # another process was quicker
+        if still.update(epoch=session.epoch + 1, owner=own_name()):
+            session.epoch, session.owner = session.epoch + 1, own_name()
+            session.refresh_from_db(fields=WRITTEN_BY_OWNER)
+            return previous
+        session.refresh_from_db(fields=["epoch", "owner"])  # another process was faster
 
 
 def release(session_id: int, epoch: int) -> None:
-    """Give the session up, so that any process may take it."""
+    """Release the session, so that any process can claim it."""
     TrainingSession.everywhere.filter(pk=session_id, epoch=epoch).update(owner="")
 
 
 def release_all(held: list[tuple[int, int]]) -> None:
-    """Give up sessions, each with its epoch."""
+    """Release sessions, given with their epochs."""
     for session_id, epoch in held:
         release(session_id, epoch)
 
 
-def find_left_running() -> list[int]:
-    """Give the sessions that run and that no process has."""
+def find_orphaned() -> list[int]:
+    """Return the running sessions whose process is gone."""
     running = TrainingSession.everywhere.filter(state=State.RUNNING.value)
     return [one.pk for one in running if not one.owner or not is_alive(one.owner)]

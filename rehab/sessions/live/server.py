@@ -1,4 +1,4 @@
-"""Daphne with the live path inside: recovery at the start, a clean drain at the end.
+"""Daphne with the live path: recovery at the start, a clean drain at the end.
 
 Importing this module installs Twisted's asyncio reactor, so only the commands that serve do it.
 """
@@ -23,28 +23,28 @@ from robot.wire.limits import MAX_FRAME_BYTES
 
 log = logging.getLogger(__name__)
 
-CLOSE_S = 2.0  # how long clients get to answer our closing
+CLOSE_S = 2.0  # how long clients have to answer our close frame
 
 
 def _plain(*_: object, **__: object) -> str:
     return ""
 
 
-# Autobahn colors the words of a debug line for each frame, whether or not anyone reads it: a tenth
-# of the event loop's time in a profile of 700 sessions.
+# Autobahn formats a colored debug line for each frame even if none is logged: a tenth of the event
+# loop's time in a profile of 700 sessions.
 for module in (websocket_protocol, twisted_websocket):
     vars(module).update(hltype=_plain, hlval=_plain)
 
 
 class EagerProtocol(WebSocketProtocol):  # type: ignore[misc]
-    """Hands a frame to the kernel at once.
+    """Writes frames to the kernel at once.
 
     Twisted would ask its event loop to do so on the next turn. At 1,000 sessions on a full core
     that halved the median delay (383 → 164 ms, one run each), at the same processor time.
     """
 
     def sendData(self, data: bytes, sync: bool = False, chopsize: int | None = None) -> None:  # noqa: N802
-        """Send bytes; what the kernel does not take now goes the usual way."""
+        """Send bytes; what the kernel does not accept now takes the usual way."""
         out = self.transport
         idle = not (sync or chopsize or self.send_queue or out.dataBuffer or out._tempDataLen)  # noqa: SLF001
         if idle and out.connected and not out.disconnecting:
@@ -59,7 +59,7 @@ WebSocketFactory.protocol = EagerProtocol
 
 
 class BoundedRequest(http_protocol.WebRequest):  # type: ignore[misc]
-    """Hangs up on a body that is longer than any page takes.
+    """Closes the connection of a request whose body is longer than any page accepts.
 
     Twisted would write all of it to the disk before Django could refuse it.
     """
@@ -67,7 +67,7 @@ class BoundedRequest(http_protocol.WebRequest):  # type: ignore[misc]
     too_long = False
 
     def handleContentChunk(self, data: bytes) -> None:  # noqa: N802
-        """Take a part of the body."""
+        """Receive a part of the body."""
         if self.too_long:
             return
         if self.content.tell() + len(data) > settings.DATA_UPLOAD_MAX_MEMORY_SIZE:
@@ -78,7 +78,7 @@ class BoundedRequest(http_protocol.WebRequest):  # type: ignore[misc]
         super().handleContentChunk(data)
 
     def process(self) -> None:
-        """Answer the request, unless it was cut short here."""
+        """Answer the request, unless its body was too long."""
         if not self.too_long:
             super().process()
 
@@ -111,7 +111,7 @@ class LiveServer(Server):  # type: ignore[misc]
         loop.call_soon(lambda: self._keep(loop.create_task(self._start())))
 
     def _keep(self, task: asyncio.Task[None]) -> None:
-        self._starting = task  # a task that nobody holds may be collected
+        self._starting = task  # tasks without a reference may be collected
 
     async def _start(self) -> None:
         paused = await runtimes.current().recover()
@@ -140,7 +140,7 @@ class LiveServer(Server):  # type: ignore[misc]
         await asyncio.gather(*open_tasks, return_exceptions=True)
 
     async def _until_closed(self) -> None:
-        """Wait for the clients' answers: stopping with a socket open can crash.
+        """Wait until the sockets are closed: stopping with an open one can crash.
 
         Source: docs/reference/stack.md#ending.
         """

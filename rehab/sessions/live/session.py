@@ -1,73 +1,67 @@
-"""A session that is live in this process: its fold, its viewers, its source and its robot."""
+"""A live session: its aggregate, its subscribers, its source and its robot."""
 
 from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from datetime import datetime
 from typing import NamedTuple, Protocol
 
 from rehab.people.models import User
 from rehab.sessions.events import (
-    Audience,
     LiveEvent,
-    Told,
+    StepContext,
     change_event,
     phase_event,
     presence_event,
     remark_event,
-    report_event,
+    robot_report_event,
     robot_stopped_event,
     snapshot,
+    source_message,
     step_event,
 )
-from rehab.sessions.live.actor import Row, SessionActor
-from rehab.sessions.live.hub import Channel, Viewer
+from rehab.sessions.live.aggregate import Row, SessionAggregate
+from rehab.sessions.live.hub import EventFeed, Subscriber
 from rehab.sessions.live.lateness import Lateness
 from rehab.sessions.live.writer import Job, Writer
 from rehab.sessions.log import Remark, RobotEntry, Step
 from rehab.sessions.payloads import Message, type_mark
 from rehab.training.changes import Change, ChangeKind, State
+from rehab.training.controls import Audience
 from rehab.training.steps import Measurement, ScoredStep
 
-RECENT = 60  # strides that a page's chart may begin with
-LOGGED = {"decision": RobotEntry.DECISION, "gesture": RobotEntry.GESTURE}  # of a robot's reports
-# What a source hears nothing of.
-UNTOLD = {
-    ChangeKind.GAIN,
-    ChangeKind.ACTIVATION_THRESHOLD,
-    ChangeKind.ROBOT_INTENSITY,
-    ChangeKind.VALENCE,
-    ChangeKind.FEEDBACK_TEXT,
-    ChangeKind.WORDS_SHOWN,
-    ChangeKind.CHART_STYLE,
-}
+RECENT_STEPS = 60  # strides that a page's chart may begin with
+LOGGED_REPORTS = {
+    "decision": RobotEntry.DECISION,
+    "gesture": RobotEntry.GESTURE,
+}  # of a robot's reports
 
 
 class NotStored(RuntimeError):
-    """A change or step that could not be committed; the session is rebuilt from its log."""
+    """A change or step could not be committed; the session is rebuilt from its log."""
 
 
 class Peer(Protocol):
-    """A source or robot, as its session knows it."""
+    """A connected source or robot."""
 
     @property
     def device_id(self) -> int | None:
-        """Which device it is."""
+        """The device's key."""
 
     def tell(self, message: Message) -> None:
-        """Send it a message soon."""
+        """Queue a message."""
 
     def acknowledge(self, number: int) -> None:
-        """Tell it that steps up to this one are stored."""
+        """Queue the acknowledgment of the steps up to this one."""
 
-    def send_away(self, code: int, error: str, message: str) -> None:
-        """Send it away."""
+    def evict(self, code: int, error: str, message: str) -> None:
+        """Close its connection with an error."""
 
 
-class Stop(NamedTuple):
-    """A stop of the robot: by whom, when, and which device did it where that was no person."""
+class RobotStop(NamedTuple):
+    """A stop of the robot: who stopped it, when, and which device if it was no person."""
 
     by: User | None
     at: datetime
@@ -75,41 +69,41 @@ class Stop(NamedTuple):
 
 
 class LiveSession:
-    """Takes steps and changes in order; what is committed goes to everyone who listens.
+    """Applies steps and changes in order, and publishes what is committed.
 
-    All methods run on the event loop. Nothing here waits: writing is the writer's.
+    All methods run on the event loop; the writer's thread does what waits for the disk.
     """
 
     def __init__(
         self,
-        actor: SessionActor,
+        aggregate: SessionAggregate,
         writer: Writer,
         recent: list[Step],
         on_failure: Callable[[LiveSession, Exception], None],
         *,
         robot_stopped: bool = False,
     ) -> None:
-        session = actor.session
+        session = aggregate.session
         self.id = session.pk
         self.station_id = session.station_id
-        # Where its robot is: sessions of one station share it.
+        # Sessions of one location share its robot.
         here = f"session {self.id}" if self.station_id is None else f"station {self.station_id}"
-        self.place = here
-        self.actor = actor
-        self.channel = Channel()
-        self.recent: deque[Step | ScoredStep] = deque(recent, maxlen=RECENT)
+        self.location = here
+        self.aggregate = aggregate
+        self.feed = EventFeed()
+        self.recent: deque[Step | ScoredStep] = deque(recent, maxlen=RECENT_STEPS)
         self.source: Peer | None = None
         self.source_clock: Lateness | None = None  # of its latest run
         self.robot: Peer | None = None
         self.robot_stopped = robot_stopped  # until a person arms it again
-        self.unlogged_stop: Stop | None = None  # holds, though it is not committed yet
+        self.unlogged_stop: RobotStop | None = None  # in force, not committed yet
         self.robot_reports: Message = {"status": None, "decision": None}  # the latest
         self.tablets = 0
         self.tablet_heard_at: datetime | None = None
         self.stride_at: datetime | None = recent[-1].received_at if recent else None
-        self.committed = actor.fold.last_number
-        self.asked_for = True  # since the last sweep of idle sessions
-        self.unwritten = 0
+        self.committed = aggregate.fold.last_number
+        self.recently_used = True  # since the last sweep of idle sessions
+        self.uncommitted = 0
         self.about: Message = {
             "session": session.pk,
             "nickname": session.patient.nickname,
@@ -118,97 +112,97 @@ class LiveSession:
         }
         self._writer = writer
         self._on_failure = on_failure
-        self._joining = 0
-        self._admits = asyncio.Event()
-        self._queue = asyncio.Lock()  # fair: who asks for it first has it first
+        self._subscribing = 0
+        self._nobody_subscribes = asyncio.Event()
+        self._turn = asyncio.Lock()  # first come, first served
 
     @property
     def next_number(self) -> int:
         """The number that the next step must have."""
-        return self.actor.fold.last_number + 1
+        return self.aggregate.fold.last_number + 1
 
     @property
     def is_idle(self) -> bool:
-        """Whether nobody and nothing needs it in memory."""
-        return not (self.channel.viewers or self.source or self.robot or self.unwritten)
+        """Whether nothing needs it in memory."""
+        return not (self.feed.subscribers or self.source or self.robot or self.uncommitted)
 
     @property
     def is_running(self) -> bool:
-        """Whether somebody walks."""
-        return self.actor.fold.state is State.RUNNING
+        """Whether its state is running."""
+        return self.aggregate.fold.state is State.RUNNING
 
     @property
     def is_watched(self) -> bool:
         """Whether a PT's page is open: a real robot begins no gesture while none is."""
-        viewers = self.channel.viewers
-        return any(one.audience is Audience.MONITOR and one.is_attentive for one in viewers)
+        subscribers = self.feed.subscribers
+        return any(one.audience is Audience.MONITOR and one.is_attentive for one in subscribers)
 
-    def take(self, measurement: Measurement, received_at: datetime, *, late: bool = False) -> None:
-        """Score a stride and queue it for the log. Raises what ``SessionFold.step`` raises."""
-        fold = self.actor.fold
+    def record_step(
+        self, measurement: Measurement, received_at: datetime, *, late: bool = False
+    ) -> None:
+        """Score a step and queue it for the log. Raises what ``SessionFold.step`` raises."""
+        fold = self.aggregate.fold
         index, goal, had_obstacle = fold.phase_index, fold.goal, fold.obstacle
-        told_by, switches = Told.now(fold), len(fold.switches)
-        row = self.actor.take(measurement, received_at)
+        context, switches = StepContext.of(fold), len(fold.switches)
+        row = self.aggregate.record_step(measurement, received_at)
         self.stride_at = received_at
-        events = [step_event(fold, told_by, row.step, live=not late)]
+        events = [step_event(fold, context, row.step, live=not late)]
         moved = (fold.phase_index, fold.goal, fold.obstacle) != (index, goal, had_obstacle)
         if moved:
             events.append(phase_event(fold, switched=len(fold.switches) > switches))
-        told: list[Message] = []
+        changed: list[str] = []
         if fold.phase_index != index:
-            told.append(self._source_change(ChangeKind.PHASE))
+            changed.append(ChangeKind.PHASE)
         if fold.goal != goal:
             events.append(change_event(fold, ChangeKind.GOAL))
-            told.append(self._source_change(ChangeKind.GOAL))
-        self._submit([row], events, told, summarize=moved, step=row.step)
+            changed.append(ChangeKind.GOAL)
+        self._submit([row], events, changed, summarize=moved, step=row.step)
 
     def change(self, change: Change, by: User | None, at: datetime) -> asyncio.Future[None]:
-        """Apply a change from the next step on; done when the future is.
+        """Apply a change from the next step on; the future is done when it is committed.
 
-        Raises InvalidSetting where it is refused; nothing has then happened.
+        Raises InvalidSetting if it is refused; the session is then as it was.
         """
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        fold = self.actor.fold
+        fold = self.aggregate.fold
         goal, switches = fold.goal, len(fold.switches)
-        rows = self.actor.change(change, by, at)
+        rows = self.aggregate.change(change, by, at)
         if len(fold.switches) > switches:
             events = [phase_event(fold, switched=True)]
         else:
             events = [change_event(fold, change.kind, change.value)]
-        told = []
-        if change.kind not in UNTOLD:
-            told.append(self._source_change(change.kind))
-        if change.kind is ChangeKind.PHASE and fold.goal != goal:
-            told.append(self._source_change(ChangeKind.GOAL))
-        self._submit(rows, events, told, summarize=True, stored=stored)
+        changed = [change.kind]
+        if change.kind == ChangeKind.PHASE and fold.goal != goal:
+            changed.append(ChangeKind.GOAL)
+        self._submit(rows, events, changed, summarize=True, stored=stored)
         return stored
 
     def remark(
         self, what: Remark, value: float | None, by: User, at: datetime
     ) -> asyncio.Future[None]:
-        """Note something of the session as it is now; done when the future is."""
+        """Log a remark; the future is done when it is committed."""
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        row = self.actor.note(what, by, at, {}, value)
-        event = remark_event(self.actor.fold, what.value, value)
+        row = self.aggregate.log_event(what, by, at, {}, value)
+        event = remark_event(self.aggregate.fold, what.value, value)
         self._submit([row], [event], [], summarize=False, stored=stored)
         return stored
 
     def stop_robot(self, by: User | None, at: datetime, data: Message) -> None:
-        """Stop the robot, before anything else; it stays so until a person arms it.
+        """Stop the robot at once, until a person arms it.
 
-        ``data`` says which device stopped it, where it was no person.
+        ``data``: which device stopped it, if it was no person.
         """
         if self.robot is not None:
             self.robot.tell({"type": "stop"})
         if not self.robot_stopped:
             self.robot_stopped = True
-            self.unlogged_stop = stop = Stop(by, at, data)
-            row = self.actor.note(RobotEntry.STOP, by, at, data)
-            event = robot_stopped_event(self.actor.fold, True)
+            self.unlogged_stop = stop = RobotStop(by, at, data)
+            row = self.aggregate.log_event(RobotEntry.STOP, by, at, data)
+            event = robot_stopped_event(self.aggregate.fold, True)
             self._submit([row], [event], [], summarize=False, stop=stop)
 
     def arm_robot(self, by: User, at: datetime) -> asyncio.Future[None]:
-        """Let the robot move again once that is in the log; done when the future is."""
+        """Let the robot move again once that is committed; then the future is done."""
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.robot_stopped = False
 
@@ -218,37 +212,44 @@ class LiveSession:
                 self.robot.tell({"type": "arm"})
 
         stored.add_done_callback(tell)
-        row = self.actor.note(RobotEntry.ARM, by, at, {})
-        event = robot_stopped_event(self.actor.fold, False)
+        row = self.aggregate.log_event(RobotEntry.ARM, by, at, {})
+        event = robot_stopped_event(self.aggregate.fold, False)
         self._submit([row], [event], [], summarize=False, stored=stored)
         return stored
 
-    def heard_robot(self, report: Message, at: datetime) -> None:
-        """Tell the PT what the robot reports; decisions and gestures go into the log first."""
-        event = report_event(self.actor.fold, report)
+    def record_robot_report(self, report: Message, at: datetime) -> None:
+        """Publish a report of the robot; decisions and gestures are logged first."""
+        event = robot_report_event(self.aggregate.fold, report)
         kind = report.get("kind")
         if kind in self.robot_reports:
             self.robot_reports[kind] = report
-        if kind in LOGGED:
+        if kind in LOGGED_REPORTS:
             data = {name: value for name, value in report.items() if name != "kind"}
-            row = self.actor.note(LOGGED[kind], None, at, data)
+            row = self.aggregate.log_event(LOGGED_REPORTS[kind], None, at, data)
             self._submit([row], [event], [], summarize=False)
         else:
-            self.channel.publish(event)
+            self.feed.publish(event)
 
     def _submit(
         self,
         rows: list[Row],
         events: list[LiveEvent],
-        told: list[Message],
+        changed: Sequence[str],
         *,
         summarize: bool,
         step: ScoredStep | None = None,
         stored: asyncio.Future[None] | None = None,
-        stop: Stop | None = None,
+        stop: RobotStop | None = None,
     ) -> None:
+        """Queue rows; after their commit, send the source what changed and publish the events."""
+        for_source = [
+            message
+            for kind in changed
+            if (message := source_message(self.aggregate.fold, kind)) is not None
+        ]
+
         def done(problem: Exception | None) -> None:
-            self.unwritten -= 1
+            self.uncommitted -= 1
             if problem is not None:
                 if stored is not None and not stored.done():
                     stored.set_exception(NotStored("It could not be stored. Try again."))
@@ -257,7 +258,7 @@ class LiveSession:
             if stop is not None and self.unlogged_stop is stop:
                 self.unlogged_stop = None
             if self.source is not None:
-                for message in told:  # before the ack: a simulated patient waits for that
+                for message in for_source:  # before the ack, which a simulated patient waits for
                     self.source.tell(message)
                 if step is not None:
                     self.source.acknowledge(step.number)
@@ -265,35 +266,24 @@ class LiveSession:
                 self.recent.append(step)
                 self.committed = step.number
             for event in events:
-                self.channel.publish(event)
+                self.feed.publish(event)
             if stored is not None and not stored.done():
                 stored.set_result(None)
 
-        self.unwritten += 1
+        self.uncommitted += 1
         self._writer.submit(
             Job(
-                owner=self.actor,
+                owner=self.aggregate,
                 session_id=self.id,
-                epoch=self.actor.session.epoch,
+                epoch=self.aggregate.session.epoch,
                 rows=rows,
-                summary=self.actor.summary() if summarize else None,
+                summary=self.aggregate.summary() if summarize else None,
                 done=done,
             )
         )
 
-    def _source_change(self, kind: ChangeKind) -> Message:
-        """Say to the source what has changed, as of now."""
-        match kind:
-            case ChangeKind.GOAL:
-                return {"type": "goal", "goal": self.actor.fold.goal}
-            case ChangeKind.PHASE:
-                return {"type": "phase", "phase": source_phase(self)}
-            case ChangeKind.FINISH | ChangeKind.ABORT:
-                return {"type": "stop"}
-        return {"type": kind.value}
-
     def presence(self, now: datetime) -> Message:
-        """Say who is there, and how long ago the sensor and a tablet were last heard."""
+        """Return who is connected, and how long ago source and tablet were last heard."""
         return {
             "source": self.source is not None,
             "robot": self.robot is not None,
@@ -303,26 +293,26 @@ class LiveSession:
         }
 
     def announce_presence(self, now: datetime) -> None:
-        """Tell the viewers who is there."""
-        self.channel.publish(presence_event(self.actor.fold, self.presence(now)))
+        """Publish who is connected."""
+        self.feed.publish(presence_event(self.aggregate.fold, self.presence(now)))
 
-    async def join(
+    async def subscribe(
         self, audience: Audience, send: Callable[[str], Awaitable[None]], now: datetime
-    ) -> tuple[Message, Viewer]:
-        """Add a viewer. Give all that its page shows as of now; events follow from there.
+    ) -> tuple[Message, Subscriber]:
+        """Add a subscriber; return it with the snapshot that its events continue.
 
-        New steps wait for the few milliseconds until what is under way has been committed, so that
-        a page is never shown what may not have happened, and nothing twice.
+        New steps wait some milliseconds until everything queued is committed, so that a page sees
+        nothing uncommitted and nothing twice.
         """
-        self._joining += 1
-        self._admits.clear()
+        self._subscribing += 1
+        self._nobody_subscribes.clear()
         try:
-            while self.unwritten:
-                await self.settled()
+            while self.uncommitted:
+                await self.wait_until_committed()
             about = self.about if audience is Audience.MONITOR else _for_patient(self.about)
             shown = snapshot(
                 audience,
-                self.actor.fold,
+                self.aggregate.fold,
                 about,
                 self.presence(now),
                 self.recent,
@@ -330,44 +320,33 @@ class LiveSession:
                 robot_stopped=self.robot_stopped,
                 marks=self._marks(),
             )
-            viewer = Viewer(self.channel, audience, send)
-            self.channel.viewers.add(viewer)
-            return shown, viewer
+            subscriber = Subscriber(self.feed, audience, send)
+            self.feed.subscribers.add(subscriber)
+            return shown, subscriber
         finally:
-            self._joining -= 1
-            if not self._joining:
-                self._admits.set()
+            self._subscribing -= 1
+            if not self._subscribing:
+                self._nobody_subscribes.set()
 
     def _marks(self) -> list[Message]:
-        """Give what a PT's chart points out, in the order of the steps."""
-        switches = [type_mark(after, slug) for after, slug in self.actor.fold.switches]
-        return sorted([*self.actor.marks, *switches], key=lambda mark: mark["after"])
+        """Return the marks of a PT's chart, in the order of the steps."""
+        switches = [type_mark(after, slug) for after, slug in self.aggregate.fold.switches]
+        return sorted([*self.aggregate.marks, *switches], key=lambda mark: mark["after"])
 
-    async def admission(self) -> None:
-        """Wait while a viewer joins. Whoever takes steps or changes asks first.
+    async def wait_for_subscriptions(self) -> None:
+        """Wait while somebody subscribes; to be called before recording steps or changes.
 
-        Those who wait go on in the order in which they came.
+        Waiting callers continue in the order in which they came.
         """
-        async with self._queue:
-            while self._joining:
-                await self._admits.wait()
+        async with self._turn:
+            while self._subscribing:
+                await self._nobody_subscribes.wait()
 
-    async def settled(self) -> None:
-        """Wait until everything taken so far is committed. Raises NotStored."""
+    async def wait_until_committed(self) -> None:
+        """Wait until everything queued so far is committed. Raises NotStored."""
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._submit([], [], [], summarize=False, stored=stored)
         await stored
-
-
-def source_phase(live: LiveSession) -> Message:
-    """Give the phase as a simulated patient needs to know it."""
-    phase = live.actor.fold.phase
-    return {
-        "kind": phase.kind,
-        "name": phase.name,
-        "feedback": phase.feedback,
-        "gain": phase.gain,
-    }
 
 
 def _ago_s(moment: datetime | None, now: datetime) -> float | None:

@@ -1,4 +1,4 @@
-"""Processes that run beside the server and end with it: simulated patients, recordings, robots.
+"""Supervises child processes that end with the server: simulated patients, recordings, robots.
 
 A child's standard input is a pipe that nobody writes to. When the server ends, however it ends, the
 pipe closes; children that GARRY brings along take that as their end.
@@ -19,13 +19,13 @@ from typing import Any
 
 log = logging.getLogger(__name__)
 
-FIRST_PAUSE_S = 0.5
-LONGEST_PAUSE_S = 30.0
-STEADY_S = 60.0  # a child that ran so long failed for a new reason: its pauses begin anew
+FIRST_BACKOFF_S = 0.5
+MAX_BACKOFF_S = 30.0
+STABLE_S = 60.0  # after so long without a failure the backoff starts again
 STOP_S = 5.0
 CHUNK = 64 * 1024
-LONGEST_LINE = 1200  # bytes of a line that are kept until it ends
-LONGEST_WORDS = 300  # characters of it
+MAX_LINE_BYTES = 1200  # kept of a line
+MAX_LINE_CHARS = 300  # kept of a line in the report
 
 
 @dataclass
@@ -37,33 +37,33 @@ class Child:
     state: str = "starting"
     pid: int | None = None
     restarts: int = 0
-    last_words: deque[str] = field(default_factory=lambda: deque(maxlen=20))
+    last_output: deque[str] = field(default_factory=lambda: deque(maxlen=20))
     task: asyncio.Task[None] | None = None
 
     def describe(self) -> dict[str, Any]:
-        """Give what an operator wants to know."""
+        """Return the child as the report has it."""
         return {
             "name": self.name,
             "command": list(self.command),
             "state": self.state,
             "pid": self.pid,
             "restarts": self.restarts,
-            "last_words": list(self.last_words)[-3:],
+            "last_output": list(self.last_output)[-3:],
         }
 
 
-class Children:
-    """Starts children again when they fail, and leaves none behind.
+class Supervisor:
+    """Restarts child processes that fail, with backoff, and ends all with the server.
 
-    ``report`` is a file that always says how they are, for `manage.py doctor`.
+    ``report``: a file with their current state, for `manage.py doctor`.
     """
 
-    def __init__(self, report: Path, first_pause_s: float = FIRST_PAUSE_S) -> None:
+    def __init__(self, report: Path, first_backoff_s: float = FIRST_BACKOFF_S) -> None:
         self.report = report
-        self.first_pause_s = first_pause_s
-        self.all: dict[str, Child] = {}
-        self._is_told = True
-        self._telling: asyncio.Task[None] | None = None
+        self.first_backoff_s = first_backoff_s
+        self.children: dict[str, Child] = {}
+        self._report_is_current = True
+        self._report_task: asyncio.Task[None] | None = None
 
     def start(
         self,
@@ -73,63 +73,65 @@ class Children:
         *,
         once: bool = False,
     ) -> Child:
-        """Start a child; one of the same name must have been stopped before.
+        """Start a child process. Raises ValueError if one of that name exists.
 
-        ``once`` forgets it as soon as it has done its work.
+        ``once``: forget it when it has ended without an error.
         """
-        if name in self.all:
+        if name in self.children:
             raise ValueError(f"There is a child {name!r} already. Stop it first.")
-        child = self.all[name] = Child(name, command)
+        child = self.children[name] = Child(name, command)
         environment = os.environ | dict(variables or {})
-        child.task = asyncio.get_running_loop().create_task(self._keep_up(child, environment, once))
+        child.task = asyncio.get_running_loop().create_task(
+            self._supervise(child, environment, once)
+        )
         return child
 
     async def stop(self, name: str) -> None:
-        """End a child: politely, then for certain."""
-        child = self.all.pop(name, None)
+        """End a child: by SIGTERM, then by SIGKILL."""
+        child = self.children.pop(name, None)
         if child is None:
             return
         if child.task is not None:
             child.task.cancel()
             await asyncio.wait([child.task])
-        self._tell()
+        self._schedule_report()
 
     async def stop_all(self) -> None:
-        """End all children. Trouble with one keeps no other, nor the server, from ending."""
+        """End all children; errors are logged."""
         ended = await asyncio.gather(
-            *(self.stop(name) for name in list(self.all)), return_exceptions=True
+            *(self.stop(name) for name in list(self.children)), return_exceptions=True
         )
         for problem in ended:
             if isinstance(problem, Exception):
                 log.error("A child did not end cleanly", exc_info=problem)
-        if self._telling is not None:
-            await self._telling
+        if self._report_task is not None:
+            await self._report_task
 
-    async def _keep_up(self, child: Child, environment: Mapping[str, str], once: bool) -> None:
-        pause_s = self.first_pause_s
+    async def _supervise(self, child: Child, environment: Mapping[str, str], once: bool) -> None:
+        backoff_s = self.first_backoff_s
         loop = asyncio.get_running_loop()
         while True:
             began = loop.time()
             status: int | str
             try:
                 status = await self._run(child, environment)
-            except Exception as problem:  # of ours: it is supervised all the same
+            except Exception as problem:  # an error of ours: go on supervising
                 log.exception("%s could not be looked after", child.name)
                 status = repr(problem)
             if status == 0:
                 child.state = "done"
                 if once:
-                    self.all.pop(child.name, None)
-                self._tell()
+                    self.children.pop(child.name, None)
+                self._schedule_report()
                 return
-            if loop.time() - began > STEADY_S:
-                pause_s = self.first_pause_s
+            if loop.time() - began > STABLE_S:
+                backoff_s = self.first_backoff_s
             child.state = "failed"
             child.restarts += 1
-            log.warning("%s ended with %s; again in %.1f s", child.name, status, pause_s)
-            self._tell()
-            await asyncio.sleep(pause_s)
-            pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+            log.warning("%s ended with %s; again in %.1f s", child.name, status, backoff_s)
+            self._schedule_report()
+            await asyncio.sleep(backoff_s)
+            backoff_s = min(2 * backoff_s, MAX_BACKOFF_S)
 
     async def _run(self, child: Child, environment: Mapping[str, str]) -> int:
         try:
@@ -141,33 +143,33 @@ class Children:
                 stderr=asyncio.subprocess.STDOUT,
             )
         except OSError as problem:
-            child.last_words.append(str(problem))
+            child.last_output.append(str(problem))
             return 127
         child.state, child.pid = "running", process.pid
-        self._tell()
+        self._schedule_report()
         try:
             if process.stdout is not None:
-                await _listen(process.stdout, child.last_words)
+                await _read_output(process.stdout, child.last_output)
             return await process.wait()
         finally:
             child.pid = None
             if process.returncode is None:
                 await _end(process)
 
-    def _tell(self) -> None:
-        """Have the report written; the event loop waits for no disk."""
-        self._is_told = False
-        if self._telling is None or self._telling.done():
-            self._telling = asyncio.get_running_loop().create_task(self._write_report())
+    def _schedule_report(self) -> None:
+        """Write the report in a thread; the event loop never waits for the disk."""
+        self._report_is_current = False
+        if self._report_task is None or self._report_task.done():
+            self._report_task = asyncio.get_running_loop().create_task(self._write_report())
 
     async def _write_report(self) -> None:
-        while not self._is_told:
-            self._is_told = True
-            children = [child.describe() for child in self.all.values()]
+        while not self._report_is_current:
+            self._report_is_current = True
+            children = [child.describe() for child in self.children.values()]
             text = json.dumps({"server": os.getpid(), "children": children})
             try:
                 await asyncio.to_thread(self._replace_report, text)
-            except OSError as problem:  # they live on; only `doctor` knows less
+            except OSError as problem:  # only `doctor` needs it
                 log.warning("%s could not be written: %s", self.report, problem)
 
     def _replace_report(self, text: str) -> None:
@@ -176,19 +178,19 @@ class Children:
         fresh.replace(self.report)
 
 
-async def _listen(output: asyncio.StreamReader, words: deque[str]) -> None:
-    """Keep the last lines of what a child says until it says no more, however long they are."""
+async def _read_output(output: asyncio.StreamReader, words: deque[str]) -> None:
+    """Read a child's output to its end and keep the beginnings of its last lines."""
     line = b""
     while chunk := await output.read(CHUNK):
         *ended, line = (line + chunk).split(b"\n")
         words.extend(_decode(one) for one in ended)
-        line = line[:LONGEST_LINE]
+        line = line[:MAX_LINE_BYTES]
     if line:
         words.append(_decode(line))
 
 
 def _decode(line: bytes) -> str:
-    return line.decode(errors="replace").rstrip()[:LONGEST_WORDS]
+    return line.decode(errors="replace").rstrip()[:MAX_LINE_CHARS]
 
 
 async def _end(process: asyncio.subprocess.Process) -> None:

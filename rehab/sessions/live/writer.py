@@ -1,8 +1,8 @@
-"""Writes the log: what was committed here has happened, and nothing else has.
+"""Writes the log, with group commits.
 
-One thread writes for all sessions of the process. It commits whatever is queued the moment that the
-last commit is done: no timer, so that a fast disk answers at once and a slow one takes larger
-batches (measured against a timer: docs/reference/stack.md#durability).
+One thread writes for all sessions of the process. As soon as a commit is done it commits all that
+is queued by then: no timer, so that a fast disk answers at once and a slow one gets larger batches
+(measured against a timer: docs/reference/stack.md#durability).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 
 from django.db import close_old_connections, connection, transaction
 
-from rehab.sessions.live.actor import Row, StepRow, Summary
+from rehab.sessions.live.aggregate import Row, StepRow, Summary
 from rehab.sessions.log import SessionEvent, SessionMetric, figures_stored
 from rehab.sessions.models import TrainingSession
 
@@ -52,7 +52,7 @@ STEPS_A_STATEMENT = 500
 
 
 def _step_values(rows: Sequence[StepRow]) -> list[Any]:
-    """Give the values of rows, one after the other, in the order of ``STEP_COLUMNS``."""
+    """Return the values of rows as one flat list, each row in the order of ``STEP_COLUMNS``."""
     to_time = connection.ops.adapt_datetimefield_value
     to_json = connection.ops.adapt_json_value
     values: list[Any] = []
@@ -87,19 +87,19 @@ def _insert_statement(count: int, mark: str) -> str:
 
 
 class Fenced(RuntimeError):
-    """Another process has taken the session over; this one may write nothing more to it."""
+    """Another process has claimed the session; this one must not write to it."""
 
 
-class Refolded(RuntimeError):
-    """An earlier write of the same session failed, so that this one would leave a gap."""
+class EarlierWriteFailed(RuntimeError):
+    """An earlier write of the session failed, so this one would leave a gap."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Job:
-    """Rows of one session that belong together.
+    """Rows of one session, committed together.
 
-    ``owner`` is the object whose rows these are: once a job of it has failed, none of its later
-    ones is written. ``done`` is called on the event loop, with the error or None.
+    ``owner``: the object whose rows these are; after a failed job none of its later ones is
+    written. ``done`` is called on the event loop with the error, or None.
     """
 
     owner: object
@@ -113,8 +113,8 @@ class Job:
 def commit(jobs: Sequence[Job]) -> None:
     """Write jobs, in their order, in one transaction.
 
-    Raises Fenced where one of the sessions has another owner, and what the database raises, for
-    example IntegrityError for a step number that is taken; then nothing of it is written.
+    Raises Fenced if a session has another owner, and the database's errors, for example
+    IntegrityError for a duplicate step number; nothing is written then.
     """
     with transaction.atomic():
         _check_epochs({job.session_id: job.epoch for job in jobs})
@@ -129,11 +129,11 @@ def commit(jobs: Sequence[Job]) -> None:
             if job.summary is not None:
                 TrainingSession.everywhere.filter(pk=job.session_id).update(**job.summary)
         if metrics:
-            _tell({row.session_id for row in metrics})
+            _announce_figures({row.session_id for row in metrics})
 
 
-def _tell(sessions: set[int]) -> None:
-    """Let those who live by sessions' figures follow. Their trouble is theirs: steps are kept."""
+def _announce_figures(sessions: set[int]) -> None:
+    """Send ``figures_stored``; errors of its receivers are logged, the steps are kept."""
     try:
         with transaction.atomic():
             figures_stored.send(TrainingSession, sessions=sessions)
@@ -143,7 +143,7 @@ def _tell(sessions: set[int]) -> None:
 
 def _check_epochs(expected: dict[int, int]) -> None:
     marks = ", ".join(["%s"] * len(expected))
-    # SQLite's transaction is alone already; elsewhere nobody may take a session over meanwhile.
+    # Elsewhere than in SQLite, other transactions run at the same time: they must not claim it now.
     lock = "" if connection.vendor == "sqlite" else " FOR SHARE"
     with connection.cursor() as cursor:
         cursor.execute(
@@ -157,8 +157,8 @@ def _check_epochs(expected: dict[int, int]) -> None:
 def _insert_steps(rows: Sequence[StepRow]) -> None:
     """Insert rows, many in a statement.
 
-    One statement a row (``executemany``) gives the interpreter's lock away at each of them and
-    waits for the event loop to hand it back: at 1,000 sessions that took seconds.
+    One statement for each row (``executemany``) releases the interpreter's lock each time and waits
+    for the event loop to return it: seconds at 1,000 sessions.
     """
     if not rows:
         return
@@ -170,31 +170,31 @@ def _insert_steps(rows: Sequence[StepRow]) -> None:
 
 
 class Writer:
-    """The thread that commits. ``call`` hands a function to the event loop, thread-safely."""
+    """The thread that commits. ``call`` schedules a function on the event loop, thread-safely."""
 
     def __init__(self, call: Callable[[Callable[[], None]], object]) -> None:
         self._call = call
         self._queue: SimpleQueue[Job | None] = SimpleQueue()
-        self._failed: set[int] = set()  # id() of owners; they stay referenced in `_keep`
-        self._keep: list[object] = []
+        self._failed: set[int] = set()  # id() of owners; they stay referenced in `_failed_owners`
+        self._failed_owners: list[object] = []
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="garry-writer")
         self._thread.start()
 
     @property
     def backlog(self) -> int:
-        """How many jobs wait."""
+        """Number of jobs in the queue."""
         return self._queue.qsize()
 
     def submit(self, job: Job) -> None:
-        """Queue a job; never waits. After ``close`` it fails at once."""
+        """Queue a job without waiting. After ``close`` it fails at once."""
         if self._closed:
-            self._call(lambda: job.done(Refolded("The server is stopping.")))
+            self._call(lambda: job.done(EarlierWriteFailed("The server is stopping.")))
         else:
             self._queue.put(job)
 
     def close(self) -> None:
-        """Commit what is queued, then end the thread. Waits for it."""
+        """Commit what is queued, then end the thread and wait for that."""
         self._closed = True
         self._queue.put(None)
         self._thread.join()
@@ -210,7 +210,7 @@ class Writer:
             connection.close()
 
     def _next_jobs(self) -> tuple[list[Job], bool]:
-        """Wait for a job and take along what else is there."""
+        """Wait for a job; return all that are queued, and whether the thread goes on."""
         job = self._queue.get()
         jobs: list[Job] = []
         rows = 0
@@ -226,28 +226,28 @@ class Writer:
         return jobs, False
 
     def _write(self, jobs: list[Job]) -> None:
-        sound = [job for job in jobs if id(job.owner) not in self._failed]
+        writable = [job for job in jobs if id(job.owner) not in self._failed]
         results: list[tuple[Job, Exception | None]]
         try:
-            if len(sound) < len(jobs):
-                raise Refolded
+            if len(writable) < len(jobs):
+                raise EarlierWriteFailed
             commit(jobs)
             results = [(job, None) for job in jobs]
-        except Exception:  # whatever it is, the thread goes on: all sessions depend on it
+        except Exception:  # any: all sessions depend on this thread
             close_old_connections()
             results = [(job, self._write_alone(job)) for job in jobs]
         self._call(lambda: _report(results))
 
     def _write_alone(self, job: Job) -> Exception | None:
-        """Write one job, so that one bad session harms no other. Give the error."""
+        """Write one job alone, so that its failure affects no other session. Return the error."""
         if id(job.owner) in self._failed:
-            return Refolded("An earlier write of this session failed.")
+            return EarlierWriteFailed("An earlier write of this session failed.")
         try:
             commit([job])
         except Exception as problem:
             log.exception("Session %s could not be written", job.session_id)
             self._failed.add(id(job.owner))
-            self._keep.append(job.owner)
+            self._failed_owners.append(job.owner)
             return problem
         return None
 

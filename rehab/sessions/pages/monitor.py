@@ -14,6 +14,7 @@ from rehab.people.consent.services import is_remote_view_allowed
 from rehab.people.models import Patient
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
+from rehab.sessions.control_text import chart_marks
 from rehab.sessions.formatting import ROBOT_LEVEL_LABELS
 from rehab.sessions.live.messages import BORG_MAX
 from rehab.sessions.log import EVENTS, Remark
@@ -54,6 +55,7 @@ def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
     if not is_remote_view_allowed(session.patient, client_address(request)):
         return redirect_to_consent(request, session.patient)
     context = {
+        "chart_marks": chart_marks(),
         "session": session,
         "remarks": [
             {"slug": what.value, "label": capfirst(EVENTS[what]), "icon": icon}

@@ -102,7 +102,7 @@ def _format_hit_rate(row: Any) -> str:
     if State(row.state) not in OPEN_STATES:
         return format_rate(row.metric_hit_rate)
     live = find_live_session(row)
-    rate = live.actor.fold.feedback.hit_rate if live else None
+    rate = live.aggregate.fold.feedback.hit_rate if live else None
     return "" if rate is None else format_rate(rate)
 
 

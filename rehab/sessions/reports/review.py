@@ -12,47 +12,25 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
+from rehab.sessions.control_text import describe_change
 from rehab.sessions.formatting import (
-    ROBOT_LEVEL_LABELS,
     clinic_time,
     format_number,
-    format_quantity,
-    format_rate,
 )
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.payloads import MARKED_CHANGES
 from rehab.sessions.replay import fold_log
 from rehab.sessions.reports.trend import metrics_by_session
-from rehab.training.changes import ChangeKind, PauseReason
+from rehab.training.controls import CONTROLS, marked_kinds
 from rehab.training.fold import SessionFold
-from rehab.training.plans import SessionPlan, name_robot_level
+from rehab.training.plans import SessionPlan
 from rehab.training.summary import summarize_session
 from rehab.training.valences import VALENCES
 
 # Counted only: listed, they would hide what people did.
 ROBOT_ACTIVITY = (RobotEntry.DECISION.value, RobotEntry.GESTURE.value)
-CHART_STYLES = {"points": _("points"), "line": _("line")}
-PAUSE_REASONS = {
-    PauseReason.THERAPIST.value: _("by the therapist"),
-    PauseReason.PATIENT.value: _("on the patient’s page"),
-    PauseReason.RESTART.value: _("by a restart of the server"),
-}
+# Of what is no change; those that are not here have the log's own label.
 EVENT_LABELS = {
-    ChangeKind.START: _("Started"),
-    ChangeKind.PAUSE: _("Paused"),
-    ChangeKind.RESUME: _("Resumed"),
-    ChangeKind.FINISH: _("Finished"),
-    ChangeKind.ABORT: _("Ended early"),
-    ChangeKind.GOAL: _("Goal"),
-    ChangeKind.GAIN: _("Gain"),
-    ChangeKind.PHASE: _("Phase"),
-    ChangeKind.ACTIVATION_THRESHOLD: _("Robot threshold"),
-    ChangeKind.ROBOT_INTENSITY: _("Robot"),
-    ChangeKind.VALENCE: _("Next feedback type"),
-    ChangeKind.FEEDBACK_TEXT: _("Words edited"),
-    ChangeKind.WORDS_SHOWN: _("Words"),
-    ChangeKind.CHART_STYLE: _("Chart"),
     RobotEntry.STOP: _("Robot stopped"),
     RobotEntry.ARM: _("Robot armed"),
     Remark.BORG: _("Exertion (Borg)"),
@@ -119,35 +97,12 @@ def review_session(user: User, session: TrainingSession) -> SessionReview:
 
 def describe_event(event: SessionEvent, plan: SessionPlan) -> str:
     """Return an event as text: what it was, and from which value to which."""
-    name = EVENT_LABELS.get(event.kind, event.get_kind_display().capitalize())  # type: ignore[call-overload]
-    match event.kind:
-        case ChangeKind.GOAL:
-            old, new = event.old, format_quantity(event.value, plan.measure.unit)
-            return f"{name} {new}" if old is None else f"{name} {format_number(old)} → {new}"
-        case ChangeKind.GAIN:
-            return f"{name} {format_number(event.old)} → {format_number(event.value)}"
-        case ChangeKind.ACTIVATION_THRESHOLD:
-            return f"{name} {format_rate(event.old)} → {format_rate(event.value)}"
-        case ChangeKind.ROBOT_INTENSITY:
-            levels = [
-                ROBOT_LEVEL_LABELS[name_robot_level(each)] for each in (event.old, event.value)
-            ]
-            return f"{name} {levels[0]} → {levels[1]}"
-        case Remark.BORG:
-            return f"{name} {format_number(event.value, 0)}"
-        case ChangeKind.PHASE:
-            return f"{name}: {gettext(plan.phases[int(event.value or 0)].name)}"
-        case ChangeKind.VALENCE:
-            return f"{name}: {_valence_label(event.data.get('value'))}"
-        case ChangeKind.FEEDBACK_TEXT:
-            return f"{name}: {_valence_label(event.data.get('value', {}).get('valence'))}"
-        case ChangeKind.WORDS_SHOWN:
-            return f"{name}: {gettext('on') if event.value else gettext('off')}"
-        case ChangeKind.CHART_STYLE:
-            return f"{name}: {CHART_STYLES.get(event.data.get('value', ''), '')}"
-        case ChangeKind.PAUSE if event.data.get("value") in PAUSE_REASONS:
-            return f"{name} {PAUSE_REASONS[event.data['value']]}"
-    return str(name)
+    control = CONTROLS.get(event.kind)
+    if control is not None:
+        old, value = event.data.get("old", event.old), event.data.get("value", event.value)
+        return describe_change(control, old, value, plan)
+    label = str(EVENT_LABELS.get(event.kind) or event.get_kind_display().capitalize())  # type: ignore[call-overload]
+    return f"{label} {format_number(event.value, 0)}" if event.kind == Remark.BORG else label
 
 
 def _valence_label(slug: Any) -> str:
@@ -179,6 +134,7 @@ def stride_chart(
             column.append(entry)
     runs = groupby(zip(columns.pop("phase"), columns["number"], strict=True), lambda pair: pair[0])
     phases = [(plan.phases[index], [number for _, number in run]) for index, run in runs]
+    marked = marked_kinds()
     valences = _valences_by_run(fold, [run for _, run in phases])
     return {
         "unit": plan.measure.unit,
@@ -195,7 +151,7 @@ def stride_chart(
         "marks": [
             {"after": entry.event.after_number, "kind": entry.event.kind, "words": entry.text}
             for entry in events
-            if entry.event.kind in MARKED_CHANGES
+            if entry.event.kind in marked
         ],
     }
 

@@ -117,8 +117,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the twin of the command line until told to end, and return the exit status."""
     parser = make_parser()
     options = parser.parse_args(arguments)
-    if options.camera and not find_spec("pybullet"):
-        parser.error("--camera needs pybullet. Cure: pip install 'garry[twin]', or do without.")
+    if options.camera and not (find_spec("pybullet") and find_spec("PIL")):
+        parser.error(
+            "--camera needs pybullet and pillow. Cure: pip install 'garry[twin]', or do without."
+        )
     if options.camera and not options.camera.parent.is_dir():
         parser.error(f"--camera: there is no folder {options.camera.parent}. Make it first.")
     faults = Faults()

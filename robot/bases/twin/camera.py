@@ -7,18 +7,19 @@ itself; what it is told meanwhile is dropped but for the last.
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import os
-import struct
 import subprocess
 import sys
 import threading
-import zlib
 from collections.abc import Callable
 from importlib.resources import as_file, files
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+
+import numpy as np
 
 from robot.bases.twin.output import redirect_output
 from robot.motion.pose import Pose
@@ -85,7 +86,7 @@ class Camera:
 
 
 class Renderer:
-    """The twin's looks in a world without physics. Raises ImportError without pybullet."""
+    """The twin's looks in a world without physics. Raises ImportError without the twin extra."""
 
     def __init__(self) -> None:
         import pybullet
@@ -119,29 +120,12 @@ class Renderer:
             renderer=self._world.ER_TINY_RENDERER,
             flags=self._world.ER_NO_SEGMENTATION_MASK,
         )
-        return write_png(WIDTH, HEIGHT, bytes(bytearray(picture[2].ravel())))
+        from PIL import Image
 
-
-def write_png(width: int, height: int, rgba: bytes) -> bytes:
-    """Return a picture of RGBA rows, a byte each, as PNG (RFC 2083)."""
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return (
-            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-        )
-
-    rows = b"".join(
-        b"\0" + rgba[start : start + 4 * width] for start in range(0, len(rgba), 4 * width)
-    )
-    header = struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0)
-    return b"".join(
-        [
-            b"\x89PNG\r\n\x1a\n",
-            chunk(b"IHDR", header),
-            chunk(b"IDAT", zlib.compress(rows, 1)),
-            chunk(b"IEND", b""),
-        ]
-    )
+        rgba = np.asarray(picture[2], np.uint8).reshape(HEIGHT, WIDTH, 4)
+        png = io.BytesIO()
+        Image.fromarray(rgba).save(png, "PNG", compress_level=1)
+        return png.getvalue()
 
 
 def main(file: Path) -> None:

@@ -128,7 +128,7 @@ async def test_the_same_device_again_takes_over(place, begun, bystander, kind):
 async def test_a_session_of_another_process(place, ready):
     session = await ready(place)
     parent = os.getppid()
-    owner = f"{socket.gethostname()}|{parent}|{owners._started(parent)}"
+    owner = f"{socket.gethostname()}|{parent}|{owners._start_time(parent)}"
     await TrainingSession.everywhere.filter(pk=session.pk).aupdate(owner=owner)
     for caller in (place.source(), place.robot(), place.tablet(session), place.monitor(session)):
         await caller.dial()

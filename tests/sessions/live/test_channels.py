@@ -111,7 +111,7 @@ async def test_a_robot_hears_its_cue_states_and_steps(place, begun, ready, monke
     later = await ready(place)
     assert (await robot.hear("welcome"))["session"] == later.pk
     await turns()
-    assert len(old.channel.viewers) == 1  # the monitor's: the robot listens to the new one alone
+    assert len(old.feed.subscribers) == 1  # the monitor's: the robot listens to the new one alone
 
 
 async def test_a_robot_waits_for_a_session_at_its_station(place, ready):
@@ -143,7 +143,7 @@ async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch)
         waiting.add("release")
         assert disk.wait(10)
 
-    async def keep_signed_in(*_: Any) -> None:
+    async def extend_sign_ins(*_: Any) -> None:
         waiting.add("sign-ins")
         await database.wait()
 
@@ -152,7 +152,7 @@ async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch)
     await robot.hello()
     await tablet.watch()
     monkeypatch.setattr(runtimes, "_checkpoint", move_log)
-    monkeypatch.setattr(runtimes, "keep_signed_in", keep_signed_in)
+    monkeypatch.setattr(runtimes, "extend_sign_ins", extend_sign_ins)
     monkeypatch.setattr(owners, "release", release)
     await runtimes.current().session((await ready(place, at_station=False)).pk)  # soon idle
     while len(waiting) < 3:
@@ -182,7 +182,7 @@ async def test_heartbeats_and_housekeeping_go_on_whatever_fails(place, begun, mo
     session = await begun(place)
     robot = await place.robot().dial()
     await robot.hello()
-    for name in ("_checkpoint", "keep_signed_in"):
+    for name in ("_checkpoint", "extend_sign_ins"):
         monkeypatch.setattr(runtimes, name, fail(name))
     with monkeypatch.context() as patch:
         patch.setattr(LiveSession, "is_watched", property(fail("robots")))

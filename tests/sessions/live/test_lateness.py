@@ -49,14 +49,14 @@ def test_a_clock_that_was_told_late_is_corrected_by_a_quicker_step():
 def test_a_clock_that_stood_still_with_the_session_makes_nothing_late():
     lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0)
     assert not lateness.is_late(1.0, 1.0)
-    lateness.slacken(31.0)  # the session goes on after half a minute
+    lateness.allow_standstill(31.0)  # the session goes on after half a minute
     assert not lateness.is_late(2.0, 32.0)
     assert lateness.is_late(3.0, 38.1)  # and what is late from then on is late
 
 
 def test_a_pause_excuses_no_more_than_itself():
     lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0)
-    lateness.slacken(10.0)
+    lateness.allow_standstill(10.0)
     assert lateness.is_late(1.0, 80.0)
 
 

@@ -142,6 +142,6 @@ async def test_idle_sessions_leave_memory_but_not_while_someone_comes(place, rea
     await change(session, "start")
     await tablet.until(lambda event: event["kind"] == "state")
     await tablet.hang_up()
-    assert not runtime.sessions[session.pk].channel.viewers
+    assert not runtime.sessions[session.pk].feed.subscribers
     assert not runtime.sockets
-    assert not any(runtime.waiting.values())
+    assert not any(runtime.waiting_devices.values())

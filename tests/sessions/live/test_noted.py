@@ -106,7 +106,7 @@ async def test_after_a_log_that_could_not_be_written_it_goes_on(place, begun, mo
     with monkeypatch.context() as broken:
         broken.setattr(notes_module, "_store", fail)
         await place.monitor(session).watch()
-        await runtimes.current().notes.settled()
+        await runtimes.current().audit_queue.join()
     assert len(missed) == 1
     tablet = place.tablet(session)
     await tablet.watch()

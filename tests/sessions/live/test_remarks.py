@@ -5,7 +5,7 @@ from __future__ import annotations
 from asgiref.sync import ThreadSensitiveContext, sync_to_async
 
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.actor import SessionActor
+from rehab.sessions.live.aggregate import SessionAggregate
 from rehab.sessions.log import Remark, SessionEvent
 from rehab.sessions.services import SessionRequest, change_session, create_session
 from rehab.training.changes import ChangeKind
@@ -51,7 +51,7 @@ async def test_a_page_of_the_site_may_create_and_change_sessions(place, elsewher
     source.number = 0
     await source.walk(4.0)
     await robot.hear("step")
-    assert runtimes.current().sessions[session.pk].actor.fold.goal == 4.0
+    assert runtimes.current().sessions[session.pk].aggregate.fold.goal == 4.0
 
 
 async def test_remarks_are_kept_in_the_log_and_alter_no_score(place, begun):
@@ -76,7 +76,7 @@ async def test_remarks_are_kept_in_the_log_and_alter_no_score(place, begun):
     assert kept == [
         (what.value, 2, 7.0 if what is Remark.BORG else None, place.pt.pk) for what in Remark
     ]
-    rebuilt = await sync_to_async(SessionActor.load)(session)
+    rebuilt = await sync_to_async(SessionAggregate.load)(session)
     assert rebuilt.fold.score == 3
     marks = [
         {"after": 2, "kind": what.value, "value": 7.0 if what is Remark.BORG else None}

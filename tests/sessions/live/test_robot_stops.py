@@ -172,7 +172,7 @@ async def test_a_stop_waits_for_no_disk_and_overtakes_an_arming(place, begun, st
     stall.end()
     await tablet.until(is_stopped(False))
     await monitor.until(is_stopped(False))
-    await (await runtimes.current().session(session.pk)).settled()
+    await (await runtimes.current().session(session.pk)).wait_until_committed()
     assert "arm" not in [message["type"] for message in robot.heard]
     kinds = [row["kind"] for row in await log_of(session)]
     assert kinds == ["robot_stop", "robot_arm", "robot_stop"]
@@ -244,7 +244,7 @@ async def test_a_stop_holds_in_a_session_that_is_loaded_before_it_is_stored(
     live = await runtimes.current().session(second.pk)
     assert live.robot_stopped
     stall.end()
-    await live.settled()
+    await live.wait_until_committed()
     assert [row["kind"] for row in await log_of(second)] == ["robot_stop"]
 
 
@@ -261,10 +261,10 @@ async def test_a_stop_lost_in_one_session_holds_in_the_other_of_its_station(
         break_disk(patch, first.pk)
         live.stop_robot(None, NOW, {})  # as a page that has not heard yet that it is dropped
         with pytest.raises(NotStored):
-            await live.settled()
+            await live.wait_until_committed()
     other = await here.session(second.pk)
     assert other.robot_stopped
-    await other.settled()
+    await other.wait_until_committed()
     assert [row["kind"] for row in await log_of(second)] == ["robot_stop"]
     assert (await here.session(first.pk)).robot_stopped
 
@@ -300,7 +300,7 @@ async def test_a_stop_waits_for_no_source_that_ends_with_its_session(place, begu
     async def end_slowly(name: str) -> None:
         await ended.wait()
 
-    monkeypatch.setattr(runtimes.current().children, "stop", end_slowly)
+    monkeypatch.setattr(runtimes.current().supervisor, "stop", end_slowly)
     robot, monitor = await place.robot().dial(), place.monitor(session)
     await robot.hello()
     await monitor.watch()

@@ -12,7 +12,7 @@ from rehab.gestures.models import Gesture
 from rehab.people.models import Clinic
 from rehab.sessions.live import hub
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.actor import SessionActor
+from rehab.sessions.live.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.valences import CueGestures
@@ -86,8 +86,8 @@ async def test_reports_are_shown_and_decisions_and_gestures_kept(place, begun):
     assert "robot" not in [event["kind"] for event in tablet.events]
 
     live = await runtimes.current().session(session.pk)
-    loaded = await sync_to_async(SessionActor.load)(live.actor.session)
-    assert loaded.fold.score == live.actor.fold.score == 1
+    loaded = await sync_to_async(SessionAggregate.load)(live.aggregate.session)
+    assert loaded.fold.score == live.aggregate.fold.score == 1
     assert loaded.fold.last_number == 3
 
 
@@ -181,7 +181,7 @@ async def test_a_robot_is_told_whether_a_pt_looks_on(place, begun, monkeypatch):
 
 
 async def test_a_page_that_confirms_nothing_is_nobody_looking_on(place, begun, monkeypatch):
-    monkeypatch.setattr(hub, "ABSENT_S", 0.2)
+    monkeypatch.setattr(hub, "INATTENTIVE_S", 0.2)
     session = await begun(place)
     monitor = place.monitor(session)
     await monitor.watch()

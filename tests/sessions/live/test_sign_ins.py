@@ -42,7 +42,7 @@ async def test_a_running_training_keeps_its_therapist_signed_in(place, begun, se
         await monitor.hear("heartbeat")
     await monitor.change("pause")  # nobody walks: a page left open is nobody who is there
     await end_in(sign_in(place.pt), 1)
-    await runtimes.current()._look_after_sign_ins()
+    await runtimes.current()._check_sign_ins()
     assert await minutes_left(sign_in(place.pt)) <= 1
     await end_in(sign_in(place.pt), -1)
     assert (await monitor.sent_away())[0] == 4001
@@ -53,7 +53,7 @@ async def test_a_working_day_ends_though_a_training_runs(place, begun, settings)
     store = await sync_to_async(_signed_in_since)(sign_in(place.pt), 11.9, settings)
     monitor = place.monitor(session)
     await monitor.watch()
-    await runtimes.current()._look_after_sign_ins()
+    await runtimes.current()._check_sign_ins()
     assert await minutes_left(store) <= 6
 
 

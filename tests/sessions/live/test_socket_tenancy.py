@@ -167,10 +167,10 @@ async def test_a_leak_is_caught(everyone, monkeypatch):
 
 
 async def test_a_device_at_another_clinics_station_is_caught(everyone, monkeypatch):
-    async def open_session_of(device: Device, session_id: int | None) -> int | None:
+    async def find_open_session(device: Device, session_id: int | None) -> int | None:
         return session_id or everyone.sessions["amber"].pk
 
-    monkeypatch.setattr(devices, "open_session_of", open_session_of)
+    monkeypatch.setattr(devices, "find_open_session", find_open_session)
     leaks, _ = await find_leaks(everyone)
     assert "device of birch: ws/source/ of amber, None" in leaks
     assert "robot of birch: ws/robot/ of amber, None" in leaks
@@ -179,12 +179,12 @@ async def test_a_device_at_another_clinics_station_is_caught(everyone, monkeypat
 
 async def test_words_of_another_clinic_are_caught(everyone, monkeypatch):
     """Who may come in hears a name of another clinic beside the own session."""
-    told = screens.ScreenConsumer.say
+    told = screens.ScreenConsumer.send_message
 
     async def say(self: Any, message: Any) -> None:
         await told(self, message | {"nickname": everyone.worlds[0].patient.nickname})
 
-    monkeypatch.setattr(screens.ScreenConsumer, "say", say)
+    monkeypatch.setattr(screens.ScreenConsumer, "send_message", say)
     leaks, _ = await find_leaks(everyone)
     assert "pt of birch: ws/session/<int:session_id>/monitor/ shows amber" in leaks
 

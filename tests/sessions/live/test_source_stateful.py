@@ -11,7 +11,7 @@ from hypothesis.stateful import run_state_machine_as_test
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import writer as writers
-from rehab.sessions.live.actor import SessionActor
+from rehab.sessions.live.aggregate import SessionAggregate
 from rehab.sessions.live.consumers import source as source_consumers
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.live.writer import Writer
@@ -62,14 +62,14 @@ def test_the_log_is_what_a_plain_list_says(walk: Callable[..., None]) -> None:
 
 
 def acknowledge_before_the_commit(monkeypatch: pytest.MonkeyPatch) -> None:
-    take = LiveSession.take
+    take = LiveSession.record_step
 
     def take_and_acknowledge(self: LiveSession, measurement: Measurement, *args: Any, **more: Any):
         take(self, measurement, *args, **more)
         if self.source is not None:
             self.source.acknowledge(measurement.number)
 
-    monkeypatch.setattr(LiveSession, "take", take_and_acknowledge)
+    monkeypatch.setattr(LiveSession, "record_step", take_and_acknowledge)
 
 
 def check_no_epoch(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -80,18 +80,18 @@ def take_other_content_for_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     async def is_stored(*_: Any) -> bool:
         return True
 
-    monkeypatch.setattr(source_consumers, "is_stored", is_stored)
+    monkeypatch.setattr(source_consumers, "is_duplicate", is_stored)
 
 
 def forget_where_a_change_stood(monkeypatch: pytest.MonkeyPatch) -> None:
-    change = SessionActor.change
+    change = SessionAggregate.change
 
-    def change_from_the_start(self: SessionActor, *args: Any) -> list[Any]:
+    def change_from_the_start(self: SessionAggregate, *args: Any) -> list[Any]:
         rows: list[Any] = change(self, *args)
         rows[0].after_number = 0
         return rows
 
-    monkeypatch.setattr(SessionActor, "change", change_from_the_start)
+    monkeypatch.setattr(SessionAggregate, "change", change_from_the_start)
 
 
 # Each with the rules or checks of the machine that may trip over it.

@@ -8,11 +8,12 @@ import pytest
 from asgiref.sync import sync_to_async
 
 from rehab.people.models import Clinic, User
-from rehab.sessions.events import Audience, snapshot
+from rehab.sessions.events import snapshot
 from rehab.sessions.live import runtime
 from rehab.sessions.live import session as sessions
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
+from rehab.training.controls import Audience
 from rehab.training.phases import make_phase
 from rehab.training.valences import CueGestures
 from tests.support.callers import restart, turns
@@ -255,22 +256,22 @@ async def test_whoever_waits_for_a_viewer_is_not_overtaken(place, begun, monkeyp
     order, tasks = [], []
 
     async def ask(name):
-        await live.admission()
+        await live.wait_for_subscriptions()
         order.append(name)
 
     def snapshot_meanwhile(*args, **facts):
-        tasks.append(asyncio.create_task(ask("later")))  # not yet begun when the viewer is in
+        tasks.append(asyncio.create_task(ask("later")))  # not yet begun when the subscriber is in
         return snapshot(*args, **facts)
 
     monkeypatch.setattr(sessions, "snapshot", snapshot_meanwhile)
     settled = asyncio.Event()
-    monkeypatch.setattr(live, "settled", settled.wait)
-    monkeypatch.setattr(live, "unwritten", 1)
-    joining = asyncio.create_task(live.join(Audience.PATIENT, take_frame, NOW))
+    monkeypatch.setattr(live, "wait_until_committed", settled.wait)
+    monkeypatch.setattr(live, "uncommitted", 1)
+    joining = asyncio.create_task(live.subscribe(Audience.PATIENT, take_frame, NOW))
     await turns()
     tasks.append(asyncio.create_task(ask("earlier")))
     await turns()
-    monkeypatch.setattr(live, "unwritten", 0)
+    monkeypatch.setattr(live, "uncommitted", 0)
     settled.set()
     await joining
     await asyncio.gather(*tasks)

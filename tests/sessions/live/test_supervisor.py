@@ -1,4 +1,4 @@
-"""Children run beside the server, come back when they fail, and never outlive it."""
+"""Supervisor run beside the server, come back when they fail, and never outlive it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collections import deque
 
 import pytest
 
-from rehab.sessions.live.supervisor import Children, _listen
+from rehab.sessions.live.supervisor import Supervisor, _read_output
 
 
 async def until(condition, seconds: float = 5.0) -> None:
@@ -28,7 +28,7 @@ def python(code: str) -> list[str]:
 
 @pytest.fixture
 async def children(tmp_path):
-    made = Children(tmp_path / "children.json", first_pause_s=0.02)
+    made = Supervisor(tmp_path / "children.json", first_backoff_s=0.02)
     yield made
     await made.stop_all()
 
@@ -36,7 +36,7 @@ async def children(tmp_path):
 async def test_a_child_that_fails_comes_back_and_its_last_words_are_kept(children, tmp_path):
     child = children.start("robot", python("print('no port'); raise SystemExit(3)"))
     await until(lambda: child.restarts >= 2)
-    assert list(child.last_words)[-1] == "no port"
+    assert list(child.last_output)[-1] == "no port"
     await until((tmp_path / "children.json").exists)
     told = json.loads((tmp_path / "children.json").read_text())
     assert told["children"][0]["name"] == "robot"
@@ -52,7 +52,7 @@ async def test_a_stopped_child_is_gone_even_if_it_does_not_listen(children, monk
     monkeypatch.setattr("rehab.sessions.live.supervisor.STOP_S", 0.2)
     deaf = "import signal, time; signal.signal(15, signal.SIG_IGN); print('on'); time.sleep(60)"
     child = children.start("deaf", [sys.executable, "-u", "-c", deaf])
-    await until(lambda: "on" in child.last_words)
+    await until(lambda: "on" in child.last_output)
     pid = child.pid
     await children.stop("deaf")
     with pytest.raises(ProcessLookupError):
@@ -62,7 +62,7 @@ async def test_a_stopped_child_is_gone_even_if_it_does_not_listen(children, monk
 async def test_a_command_that_does_not_exist_is_told_and_not_raised(children):
     child = children.start("typo", ["/no/such/program"])
     await until(lambda: child.restarts >= 1)
-    assert "No such file" in child.last_words[0]
+    assert "No such file" in child.last_output[0]
 
 
 async def test_a_name_is_used_once(children):
@@ -75,7 +75,7 @@ async def test_a_child_may_print_without_end_and_without_a_line(children):
     chatty = "print('begins'); print('.' * 300_000, end='', flush=True); raise SystemExit(4)"
     child = children.start("chatty", python(chatty))
     await until(lambda: child.restarts >= 2)
-    assert list(child.last_words)[:3] == ["begins", "." * 300, "begins"]
+    assert list(child.last_output)[:3] == ["begins", "." * 300, "begins"]
 
 
 async def test_a_child_that_prints_without_end_still_runs_and_is_ended(children, tmp_path):
@@ -99,7 +99,7 @@ async def test_lines_are_kept_whole_however_they_come(cut):
     for first in range(0, len(said.encode()), cut):
         output.feed_data(said.encode()[first : first + cut])
     output.feed_eof()
-    await _listen(output, words)
+    await _read_output(output, words)
     assert list(words) == ["one", "", "two – three", "x" * 300, "last"]
 
 
@@ -114,7 +114,7 @@ async def test_a_fault_of_ours_leaves_a_child_supervised_and_no_stop_undone(
             raise RuntimeError("a fault")
         await asyncio.sleep(60)
 
-    monkeypatch.setattr("rehab.sessions.live.supervisor._listen", listen)
+    monkeypatch.setattr("rehab.sessions.live.supervisor._read_output", listen)
     child = children.start("robot", python("import time; time.sleep(60)"))
     await until(lambda: len(told) == 2)
     assert (child.state, child.restarts) == ("running", 1)
@@ -130,7 +130,7 @@ async def test_a_fault_of_ours_leaves_a_child_supervised_and_no_stop_undone(
 
 
 async def test_a_report_that_cannot_be_written_harms_no_child(tmp_path, caplog):
-    children = Children(tmp_path / "nowhere" / "children.json", first_pause_s=0.02)
+    children = Supervisor(tmp_path / "nowhere" / "children.json", first_backoff_s=0.02)
     child = children.start("recording", python("pass"))
     await until(lambda: child.state == "done")
     await children.stop("recording")
@@ -138,17 +138,17 @@ async def test_a_report_that_cannot_be_written_harms_no_child(tmp_path, caplog):
     assert "could not be written" in caplog.text
 
 
-async def test_the_loop_waits_for_no_disk_and_the_last_word_is_told(
+async def test_the_loop_waits_for_no_disk_and_the_last_word_report_is_current(
     children, tmp_path, monkeypatch
 ):
-    disk, written, replace = threading.Event(), [], Children._replace_report
+    disk, written, replace = threading.Event(), [], Supervisor._replace_report
 
     def replace_late(self, text):
         assert disk.wait(5)
         written.append(text)
         replace(self, text)
 
-    monkeypatch.setattr(Children, "_replace_report", replace_late)
+    monkeypatch.setattr(Supervisor, "_replace_report", replace_late)
     first = children.start("first", python("import time; time.sleep(60)"))
     await until(lambda: first.pid is not None)
     second = children.start("second", python("import time; time.sleep(60)"))

@@ -8,7 +8,7 @@ import pytest
 
 from rehab.sessions.live import hub
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.backlog import PAGE
+from rehab.sessions.live.backlog import PAGE_STEPS
 from rehab.training.phases import make_phase
 from tests.support.callers import (
     Caller,
@@ -139,14 +139,14 @@ async def test_a_long_past_is_fed_as_fast_as_it_is_read(place, begun):
     await beside.watch()
     slow = place.tablet(session, "?after=0")
     await slow.watch()
-    while len(frames_of_past(slow)) < hub.MAX_UNSEEN_PAST:
+    while len(frames_of_past(slow)) < hub.MAX_UNCONFIRMED_BACKLOG:
         await slow.hear("steps")
     await source.walk(*[4.0] * 20)
     await beside.until_step(count + 20)
     await Caller.overhear(slow)
     past = frames_of_past(slow)
-    assert len(past) == hub.MAX_UNSEEN_PAST  # not one more before it has read one
-    assert max(len(frame["steps"]) for frame in past) <= PAGE
+    assert len(past) == hub.MAX_UNCONFIRMED_BACKLOG  # not one more before it has read one
+    assert max(len(frame["steps"]) for frame in past) <= PAGE_STEPS
     while len(numbers_of(slow)) < count:
         await slow.say({"type": "seen", "frame": frames_of_past(slow)[-1]["frame"]})
         await slow.hear("steps")
@@ -155,7 +155,7 @@ async def test_a_long_past_is_fed_as_fast_as_it_is_read(place, begun):
 
 
 async def test_a_page_that_reads_none_of_its_past_is_let_go(place, begun, monkeypatch):
-    monkeypatch.setattr(hub, "UNSEEN_S", 0.05)
+    monkeypatch.setattr(hub, "CONFIRM_TIMEOUT_S", 0.05)
     session = await begun(place)
     source = await place.source().dial()
     await source.hello()
@@ -167,7 +167,7 @@ async def test_a_page_that_reads_none_of_its_past_is_let_go(place, begun, monkey
     code, error = await page.sent_away()
     assert (code, error["code"]) == (4008, "unseen")
     live = await runtimes.current().session(session.pk)
-    assert not live.channel.viewers
+    assert not live.feed.subscribers
 
 
 def frames_of_past(page: Page) -> list[Message]:
@@ -230,29 +230,29 @@ async def test_a_slow_page_gets_fewer_and_larger_frames(place, begun):
     slow.confirms = False
     await slow.watch()
     await quick.watch()
-    for _ in range(hub.MAX_UNSEEN + 30):
+    for _ in range(hub.MAX_UNCONFIRMED + 30):
         await source.walk(4.0)
         await quick.until_step(source.number)
     await slow.overhear()
     frames = [m for m in slow.heard if m["type"] == "events"]
-    assert len(frames) == hub.MAX_UNSEEN
+    assert len(frames) == hub.MAX_UNCONFIRMED
     await slow.say({"type": "seen", "frame": frames[-1]["frame"]})
     await slow.until_step(source.number)
     frames = [m for m in slow.heard if m["type"] == "events"]
-    assert len(frames) == hub.MAX_UNSEEN + 1
+    assert len(frames) == hub.MAX_UNCONFIRMED + 1
     assert len(frames[-1]["events"]) >= 28
     assert slow.steps == quick.steps == list(range(1, source.number + 1))
 
 
 async def test_a_page_that_confirms_nothing_is_sent_away_alone(place, begun, monkeypatch):
-    monkeypatch.setattr(hub, "UNSEEN_S", 0.02)
+    monkeypatch.setattr(hub, "CONFIRM_TIMEOUT_S", 0.02)
     session = await begun(place)
     source = await place.source().dial()
     await source.hello()
     deaf, quick = place.tablet(session), place.monitor(session)
     await deaf.watch()
     await quick.watch()
-    for _ in range(hub.MAX_UNSEEN + 2):
+    for _ in range(hub.MAX_UNCONFIRMED + 2):
         await source.walk(4.0)
         await quick.until_step(source.number)
     code, error = await deaf.sent_away()
@@ -261,7 +261,7 @@ async def test_a_page_that_confirms_nothing_is_sent_away_alone(place, begun, mon
     await source.walk(4.0)
     await quick.until_step(source.number)
     live = await runtimes.current().session(session.pk)
-    assert len(live.channel.viewers) == 1
+    assert len(live.feed.subscribers) == 1
 
 
 async def test_a_page_that_lags_beyond_the_ring_begins_anew(place, begun):
@@ -271,7 +271,7 @@ async def test_a_page_that_lags_beyond_the_ring_begins_anew(place, begun):
     slow = place.tablet(session)
     slow.confirms = False
     await slow.watch()
-    for _ in range(hub.MAX_UNSEEN):
+    for _ in range(hub.MAX_UNCONFIRMED):
         await source.walk(4.0)
     for first in range(source.number + 1, source.number + 600, 200):
         await source.say({"type": "steps", "steps": [a_step(first + i) for i in range(200)]})

@@ -20,8 +20,8 @@ from django.db import DatabaseError, connection
 from rehab.sessions.live import owners
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import writer as writers
-from rehab.sessions.live.actor import SessionActor
-from rehab.sessions.live.writer import Fenced, Job, Refolded, Writer
+from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.live.writer import EarlierWriteFailed, Fenced, Job, Writer
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import Change, ChangeKind
@@ -48,23 +48,23 @@ class Bench:
         monkeypatch.setattr(writers, "commit", counted)
         self.writer = Writer(lambda function: function())
 
-    def submit(self, actor: SessionActor, rows: list[Any]) -> None:
-        session = actor.session
+    def submit(self, aggregate: SessionAggregate, rows: list[Any]) -> None:
+        session = aggregate.session
         self.writer.submit(
             Job(
-                actor,
+                aggregate,
                 session.pk,
                 session.epoch,
                 rows,
-                actor.summary(),
+                aggregate.summary(),
                 lambda problem: self.done.append((session.pk, problem)),
             )
         )
 
-    def walk(self, actor: SessionActor, value: float = 4.0) -> None:
-        number = actor.fold.last_number + 1
+    def walk(self, aggregate: SessionAggregate, value: float = 4.0) -> None:
+        number = aggregate.fold.last_number + 1
         stride = Measurement(number, number * 1.1, Side.LEFT, value)
-        self.submit(actor, [actor.take(stride, NOW)])
+        self.submit(aggregate, [aggregate.record_step(stride, NOW)])
 
 
 @pytest.fixture
@@ -76,11 +76,11 @@ def bench(live_path, stall, monkeypatch):
 
 
 @pytest.fixture
-async def actors(place, ready, bench) -> list[SessionActor]:
-    actors = [SessionActor(await ready(place, at_station=False)) for _ in range(3)]
-    for actor in actors:
-        bench.submit(actor, actor.change(Change(ChangeKind.START), None, NOW))
-    return actors
+async def aggregates(place, ready, bench) -> list[SessionAggregate]:
+    aggregates = [SessionAggregate(await ready(place, at_station=False)) for _ in range(3)]
+    for aggregate in aggregates:
+        bench.submit(aggregate, aggregate.change(Change(ChangeKind.START), None, NOW))
+    return aggregates
 
 
 async def until_done(bench: Bench, count: int) -> None:
@@ -101,15 +101,15 @@ def fail_on(monkeypatch: pytest.MonkeyPatch, session_id: int, problem: Exception
     monkeypatch.setattr(writers, "_insert_steps", failing)
 
 
-async def test_what_is_queued_is_committed_in_one_transaction(bench, actors):
+async def test_what_is_queued_is_committed_in_one_transaction(bench, aggregates):
     await until_done(bench, 3)
     bench.batches.clear()
     bench.stall.begin()
-    bench.walk(actors[0])
+    bench.walk(aggregates[0])
     while not bench.batches:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
-    for actor in actors * 10:
-        bench.walk(actor)
+    for aggregate in aggregates * 10:
+        bench.walk(aggregate)
     bench.stall.end()
     await until_done(bench, 34)
     assert [len(batch) for batch in bench.batches] == [1, 30]
@@ -118,15 +118,15 @@ async def test_what_is_queued_is_committed_in_one_transaction(bench, actors):
 
 
 @pytest.mark.parametrize("problem", [DatabaseError("disk"), RuntimeError("bug"), OverflowError()])
-async def test_a_session_that_fails_harms_no_other(bench, actors, monkeypatch, problem):
+async def test_a_session_that_fails_harms_no_other(bench, aggregates, monkeypatch, problem):
     await until_done(bench, 3)
     bench.done.clear()
-    bad, good, other = actors
+    bad, good, other = aggregates
     bench.stall.begin()
     fail_on(monkeypatch, bad.session.pk, problem)
     for _ in range(5):
-        for actor in (bad, good, other):
-            bench.walk(actor)
+        for aggregate in (bad, good, other):
+            bench.walk(aggregate)
     bench.stall.end()
     await until_done(bench, 15)
     assert await Step.everywhere.filter(session=bad.session).acount() == 0
@@ -134,42 +134,44 @@ async def test_a_session_that_fails_harms_no_other(bench, actors, monkeypatch, p
     assert await Step.everywhere.filter(session=other.session).acount() == 5
     problems = [found for pk, found in bench.done if pk == bad.session.pk]
     assert problems[0] is problem
-    assert all(isinstance(found, Refolded) for found in problems[1:])
+    assert all(isinstance(found, EarlierWriteFailed) for found in problems[1:])
 
 
-async def test_nothing_is_written_after_a_failed_job_of_the_same_owner(bench, actors, monkeypatch):
-    actor = actors[0]
+async def test_nothing_is_written_after_a_failed_job_of_the_same_owner(
+    bench, aggregates, monkeypatch
+):
+    aggregate = aggregates[0]
     with monkeypatch.context() as patch:
-        fail_on(patch, actor.session.pk, DatabaseError("disk"))
-        bench.walk(actor)
+        fail_on(patch, aggregate.session.pk, DatabaseError("disk"))
+        bench.walk(aggregate)
         await until_done(bench, 4)
-    bench.walk(actor)  # the disk is well again, but step 1 is not there
+    bench.walk(aggregate)  # the disk is well again, but step 1 is not there
     await until_done(bench, 5)
-    assert isinstance(bench.done[-1][1], Refolded)
+    assert isinstance(bench.done[-1][1], EarlierWriteFailed)
     assert await Step.everywhere.acount() == 0
-    session = await TrainingSession.everywhere.aget(pk=actor.session.pk)
-    rebuilt = await sync_to_async(SessionActor.load)(session)
+    session = await TrainingSession.everywhere.aget(pk=aggregate.session.pk)
+    rebuilt = await sync_to_async(SessionAggregate.load)(session)
     bench.walk(rebuilt)
     await until_done(bench, 6)
     assert bench.done[-1][1] is None
     assert await Step.everywhere.acount() == 1
 
 
-async def test_a_session_that_was_taken_over_is_fenced(bench, actors):
+async def test_a_session_that_was_taken_over_is_fenced(bench, aggregates):
     await until_done(bench, 3)
     bench.done.clear()
-    lost, kept, _ = actors
+    lost, kept, _ = aggregates
     await TrainingSession.everywhere.filter(pk=lost.session.pk).aupdate(epoch=7)
     bench.stall.begin()
-    for actor in (lost, kept, lost):
-        bench.walk(actor)
+    for aggregate in (lost, kept, lost):
+        bench.walk(aggregate)
     bench.stall.end()
     await until_done(bench, 3)
     assert [(pk, type(problem)) for pk, problem in bench.done] in (
         [
             (lost.session.pk, Fenced),
             (kept.session.pk, type(None)),
-            (lost.session.pk, Refolded),
+            (lost.session.pk, EarlierWriteFailed),
         ],
         [
             (lost.session.pk, Fenced),
@@ -181,9 +183,9 @@ async def test_a_session_that_was_taken_over_is_fenced(bench, actors):
     assert await Step.everywhere.filter(session=lost.session).acount() == 0
 
 
-async def test_close_commits_everything_that_is_queued(bench, actors):
+async def test_close_commits_everything_that_is_queued(bench, aggregates):
     for _ in range(200):
-        bench.walk(actors[0])
+        bench.walk(aggregates[0])
     bench.writer.close()
     assert await Step.everywhere.acount() == 200
     assert len(bench.done) == 203
@@ -219,15 +221,15 @@ def test_which_owners_live(owner, alive):
 
 def test_a_process_that_has_ended_is_dead_and_this_one_lives():
     assert not owners.is_alive(f"{HOST}|{dead_pid()}|5")
-    assert owners.is_alive(owners.my_name())
+    assert owners.is_alive(owners.own_name())
     parent = os.getppid()
-    assert owners.is_alive(f"{HOST}|{parent}|{owners._started(parent)}")
+    assert owners.is_alive(f"{HOST}|{parent}|{owners._start_time(parent)}")
 
 
 def call_processes(monkeypatch: pytest.MonkeyPatch) -> threading.local:
     """Let threads stand for processes that all live; each says its name in what this gives."""
     process = threading.local()
-    monkeypatch.setattr(owners, "my_name", lambda: process.name)
+    monkeypatch.setattr(owners, "own_name", lambda: process.name)
     monkeypatch.setattr(owners, "is_alive", lambda owner: owner.startswith("process"))
     return process
 
@@ -304,25 +306,25 @@ def test_where_no_folder_tells_of_processes_ps_tells_when_they_started(tmp_path,
     ps = tmp_path / "ps"
     ps.write_text(FAKE_PS.format(pid=pid, when="Sat Nov  7 09:05:01 2026"))
     ps.chmod(0o755)
-    started = owners._started(pid)
+    started = owners._start_time(pid)
     assert started == "C UTC Sat Nov 7 09:05:01 2026"
     owner = f"{HOST}|{pid}|{started}"
     assert owners.is_alive(owner)
     # After a crash and a restart of the computer the number is another process's.
     ps.write_text(FAKE_PS.format(pid=pid, when="Sun Nov  8 08:00:00 2026"))
     assert not owners.is_alive(owner)
-    assert owners._started(1) == ""
+    assert owners._start_time(1) == ""
     ps.unlink()
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert owners._started(pid) == ""
+    assert owners._start_time(pid) == ""
 
 
 @pytest.mark.skipif(shutil.which("ps") is None, reason="this machine has no ps")
 def test_what_the_real_ps_tells(tmp_path, monkeypatch):
     monkeypatch.setattr(owners, "PROCESSES", tmp_path / "none")
-    started = owners._started(os.getpid())
+    started = owners._start_time(os.getpid())
     assert re.fullmatch(r"\w{3} \w{3} \d{1,2} [\d:]{8} \d{4}", started)
-    assert owners._started(dead_pid()) == ""
+    assert owners._start_time(dead_pid()) == ""
 
 
 async def own(session: TrainingSession, owner: str) -> None:
@@ -338,7 +340,7 @@ async def test_a_session_is_claimed_from_the_dead_and_given_up_at_the_drain(plac
     await own(session, f"{HOST}|{dead_pid()}|5")
     await runtimes.current().session(session.pk)
     claimed = await reread(session)
-    assert (claimed.owner, claimed.epoch) == (owners.my_name(), session.epoch + 1)
+    assert (claimed.owner, claimed.epoch) == (owners.own_name(), session.epoch + 1)
     await runtimes.current().drain()
     assert (await reread(session)).owner == ""
 
@@ -395,7 +397,7 @@ async def test_a_session_of_a_dead_server_is_paused_by_whoever_takes_it_over(
     await source.say({"type": "hello", "version": 1, "run": "r1", "last": 3})
     assert (await source.sent_away())[0] == 4011
     stall.problem = None
-    assert (await reread(session)).owner == owners.my_name()
+    assert (await reread(session)).owner == owners.own_name()
     source = await place.source().dial()
     welcome = await source.hello()
     assert (welcome["state"], welcome["next"]) == ("paused", 4)
@@ -410,7 +412,7 @@ async def test_a_session_that_runs_elsewhere_is_left_alone(place, begun, setting
     session = await left_running(place, begun, 1)
     parent = os.getppid()
     settings.HOSTED = True  # there, other machines share the database
-    for owner in (f"{HOST}|{parent}|{owners._started(parent)}", "elsewhere|1|1"):
+    for owner in (f"{HOST}|{parent}|{owners._start_time(parent)}", "elsewhere|1|1"):
         await own(session, owner)
         assert await runtimes.current().recover() == 0
     assert (await reread(session)).state == "running"

@@ -1,4 +1,4 @@
-"""What all sockets have in common: who is there, frames in, frames out, a clean end."""
+"""The base of all sockets: who is connected, frames in and out, a clean close."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ FRAMES_PER_S = 200.0
 FRAME_BURST = 1000.0
 
 
-class Closing(Exception):
-    """Ends a socket with a code, after telling why."""
+class CloseSocket(Exception):
+    """Closes a socket with a code, after an error message."""
 
     def __init__(self, code: int, error: str, message: str) -> None:
         super().__init__(message)
@@ -36,7 +36,7 @@ class Closing(Exception):
 
 
 class Outbox:
-    """Messages that others want sent: they never wait, one task sends."""
+    """Queued messages of one socket: callers never wait, one task sends."""
 
     def __init__(self, send: Callable[[str], Awaitable[None]]) -> None:
         self._send = send
@@ -51,7 +51,7 @@ class Outbox:
         self._awake.set()
 
     def acknowledge(self, number: int) -> None:
-        """Queue an ack; a newer one takes its place, for acks cover all that came before."""
+        """Queue an ack; a newer one replaces it, since an ack covers all steps before."""
         if self._ends_with_ack:
             self._texts.pop()
         self._texts.append(f'{{"type":"ack","number":{number}}}')
@@ -73,11 +73,12 @@ class Socket(AsyncWebsocketConsumer):
 
     It uses no channel layer (the hub is in this process) and, unlike Channels' own dispatch, hops
     to no database thread for each frame: half of what a step costs
-    (docs/reference/stack.md#one-process). Subclasses implement ``opened``, ``heard`` and ``left``.
+    (docs/reference/stack.md#one-process). Subclasses implement the
+    methods ``on_…``.
     """
 
     live: LiveSession | None = None
-    actor: Actor = None  # once admitted
+    actor: Actor = None  # once authenticated
     first_frame_s = FIRST_FRAME_S
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
@@ -100,7 +101,7 @@ class Socket(AsyncWebsocketConsumer):
             self.is_closed = True
             for task in self._tasks:
                 task.cancel()
-            self.left()
+            self.on_disconnect()
 
     async def _serve(self, receive: Any) -> None:
         while True:
@@ -109,43 +110,43 @@ class Socket(AsyncWebsocketConsumer):
                 case "websocket.connect":
                     await self.accept()
                     if self.runtime.draining:
-                        await self.shut(CloseCode.RESTARTING)
+                        await self.close_now(CloseCode.RESTARTING)
                     else:
                         self.start(self.outbox.run())
-                        await self._guard(self.opened())
+                        await self._guard(self.on_connect())
                 case "websocket.receive":
                     if not self.is_closed:
-                        await self._guard(self._heard(message))
+                        await self._guard(self._on_frame(message))
                 case "websocket.disconnect":
                     raise StopConsumer
 
-    async def _heard(self, message: dict[str, Any]) -> None:
+    async def _on_frame(self, message: dict[str, Any]) -> None:
         self._spend_budget()
-        await self.heard(message.get("text"))
+        await self.on_frame(message.get("text"))
 
     def _spend_budget(self) -> None:
-        """Count a frame. Raises Closing where they come faster than any honest client sends."""
+        """Count a frame. Raises CloseSocket if they come faster than any real client sends."""
         now = self.runtime.loop.time()
         elapsed, self._budget_at = now - self._budget_at, now
         self._budget = min(FRAME_BURST, self._budget + elapsed * FRAMES_PER_S) - 1
         if self._budget < 0:
-            raise Closing(
+            raise CloseSocket(
                 CloseCode.TOO_MANY, "flood", f"Send at most {FRAMES_PER_S:g} frames a second."
             )
 
     async def _guard(self, work: Awaitable[None]) -> None:
-        """Do the work; whatever is wrong with it is told to the sender and harms nobody else."""
+        """Await the work; send its error to the client, so that nobody else is affected."""
         try:
             await work
         except BadFrame as problem:
-            await self.end(CloseCode.NOT_PROTOCOL, problem.code, str(problem))
-        except Closing as problem:
-            await self.end(problem.code, problem.error, str(problem))
+            await self.close_with_error(CloseCode.NOT_PROTOCOL, problem.code, str(problem))
+        except CloseSocket as problem:
+            await self.close_with_error(problem.code, problem.error, str(problem))
         except NotStored as problem:
-            await self.end(CloseCode.NOT_STORED, "not_stored", str(problem))
+            await self.close_with_error(CloseCode.NOT_STORED, "not_stored", str(problem))
         except Exception:
             log.exception("A socket failed")
-            await self.end(
+            await self.close_with_error(
                 CloseCode.NOT_STORED, "server_error", "The server failed. Connect again."
             )
 
@@ -153,14 +154,14 @@ class Socket(AsyncWebsocketConsumer):
         """Run a task that lives as long as the socket."""
         return self._run(work, self._tasks)
 
-    def see_through(self, work: Coroutine[Any, Any, None]) -> None:
+    def run_to_end(self, work: Coroutine[Any, Any, None]) -> None:
         """Run a task to its end, even if the socket closes meanwhile."""
-        self._run(work, self.runtime.asked)
+        self._run(work, self.runtime.requests)
 
     def _run(
         self, work: Coroutine[Any, Any, None], among: set[asyncio.Task[None]]
     ) -> asyncio.Task[None]:
-        # The socket's own context: asgiref's marks of a page that caused this have no place here.
+        # The socket's own context, without asgiref's thread state of a page that caused this.
         task = self.runtime.loop.create_task(self._guard(work), context=self._context)
         among.add(task)
         task.add_done_callback(among.discard)
@@ -172,64 +173,66 @@ class Socket(AsyncWebsocketConsumer):
     ) -> None:
         """Send a text frame, unless the socket is closed."""
         if not self.is_closed and text_data is not None:
-            await self._pass_on({"type": "websocket.send", "text": text_data})
+            await self._send_raw({"type": "websocket.send", "text": text_data})
 
-    async def say(self, message: Message) -> None:
+    async def send_message(self, message: Message) -> None:
         """Send a message now."""
         await self.send(to_text(message))
 
-    async def end(self, code: int, error: str, message: str) -> None:
-        """Say what is wrong and close."""
-        await self.say({"type": "error", "code": error, "message": message})
-        await self.shut(code)
+    async def close_with_error(self, code: int, error: str, message: str) -> None:
+        """Send an error and close."""
+        await self.send_message({"type": "error", "code": error, "message": message})
+        await self.close_now(code)
 
-    def send_off(self) -> None:
-        """End a socket that would no longer be let in."""
+    def revoke(self) -> None:
+        """Close a socket that is no longer authorized."""
         self.start(
-            self.end(CloseCode.UNAUTHORIZED, "revoked", "The token or sign-in is no longer valid.")
+            self.close_with_error(
+                CloseCode.UNAUTHORIZED, "revoked", "The token or sign-in is no longer valid."
+            )
         )
 
-    async def shut(self, code: int) -> None:
+    async def close_now(self, code: int) -> None:
         """Close with a code."""
         if not self.is_closed:
             # autobahn, below daphne, takes no subclass of int
-            await self._pass_on({"type": "websocket.close", "code": int(code)})
+            await self._send_raw({"type": "websocket.close", "code": int(code)})
             self.is_closed = True
 
-    async def _pass_on(self, message: dict[str, Any]) -> None:
+    async def _send_raw(self, message: dict[str, Any]) -> None:
         try:
             await self.base_send(message)
-        except Exception as problem:  # each server has its own for a client that is gone
+        except Exception as problem:  # each server has its own exception for a client that is gone
             log.debug("A client was gone: %s", problem)
             self.is_closed = True
 
     def close_soon(self, code: int) -> None:
-        """Close from code that cannot wait."""
-        self.start(self.shut(code))
+        """Close soon; for callers that cannot await."""
+        self.start(self.close_now(code))
 
-    async def refuse_silence(self) -> None:
-        """Close a socket that says nothing. Cancelled by the first good frame."""
+    async def enforce_first_frame(self) -> None:
+        """Close a socket without a first frame in time. Cancelled by a valid one."""
         await asyncio.sleep(self.first_frame_s)
-        raise Closing(
+        raise CloseSocket(
             CloseCode.NOT_PROTOCOL, "silent", f"Send hello within {self.first_frame_s:g} s."
         )
 
-    async def opened(self) -> None:
-        """Deal with a new connection."""
+    async def on_connect(self) -> None:
+        """Handle a new connection."""
 
-    async def heard(self, text: str | None) -> None:
-        """Deal with a frame."""
+    async def on_frame(self, text: str | None) -> None:
+        """Handle a frame."""
         read_object(text)
 
-    def left(self) -> None:
-        """Undo what the socket stood for."""
+    def on_disconnect(self) -> None:
+        """Release what the socket holds."""
 
 
-class NowhereConsumer(Socket):
-    """What answers at an address that no socket has."""
+class NotFoundConsumer(Socket):
+    """Answers at addresses without a socket."""
 
-    async def opened(self) -> None:
-        """Say so."""
-        raise Closing(
+    async def on_connect(self) -> None:
+        """Close with an error."""
+        raise CloseSocket(
             CloseCode.NO_SESSION, "no_address", "No socket has this address; see docs/protocol.md."
         )

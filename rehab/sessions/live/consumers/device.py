@@ -1,4 +1,4 @@
-"""What sources and robots have in common: a token, a hello, a station and its sessions."""
+"""The base of sources and robots: a token, a hello, a station and its sessions."""
 
 from __future__ import annotations
 
@@ -7,8 +7,14 @@ from typing import ClassVar
 
 from django.utils import timezone
 
-from rehab.sessions.live.auth import find_actor, find_device_by, may_open, open_session_of, token_of
-from rehab.sessions.live.consumers.base import Closing, Socket
+from rehab.sessions.live.auth import (
+    authenticate,
+    authenticate_token,
+    bearer_token,
+    find_open_session,
+    may_open,
+)
+from rehab.sessions.live.consumers.base import CloseSocket, Socket
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import LiveSession, Peer
 from rehab.sessions.payloads import Message
@@ -21,37 +27,37 @@ from robot.wire.frames import BadFrame, read_object
 class DeviceSocket(Socket):
     """The ``Peer`` of one device in its station's session.
 
-    Subclasses say which ``kind`` of device they serve and which ``slot`` of a session it takes.
+    Subclasses set the ``kind`` of device and the attribute (``slot``) of the session it takes.
     """
 
     kind: ClassVar[Device.Kind]
     slot: ClassVar[str]
     device: Device | None = None
-    said_hello = False
+    hello_received = False
 
     @property
     def device_id(self) -> int | None:
-        """Which device this is."""
+        """The device's key."""
         return None if self.device is None else self.device.pk
 
-    async def opened(self) -> None:
-        """Look at the token in the header, if there is one; wait for the first frame."""
-        if token_of(self.scope) is not None:
-            self._admit(await find_actor(self.scope))
-        self._silence = self.start(self.refuse_silence())
+    async def on_connect(self) -> None:
+        """Authenticate by the header's token, if there is one; wait for the first frame."""
+        if bearer_token(self.scope) is not None:
+            self._authorize(await authenticate(self.scope))
+        self._first_frame_timer = self.start(self.enforce_first_frame())
 
-    async def heard(self, text: str | None) -> None:
-        """Deal with a frame; the first one brings the token where the header did not."""
+    async def on_frame(self, text: str | None) -> None:
+        """Handle a frame; without a token in the header the first one brings it."""
         message = read_object(text)
         if self.device is None:
             token = message.get("token")
-            self._admit(await find_device_by(token) if isinstance(token, str) else None)
-        self._silence.cancel()
-        await self.asked(message, text or "")
+            self._authorize(await authenticate_token(token) if isinstance(token, str) else None)
+        self._first_frame_timer.cancel()
+        await self.on_message(message, text or "")
 
-    def _admit(self, actor: object) -> Device:
+    def _authorize(self, actor: object) -> Device:
         if not isinstance(actor, Device) or actor.kind != self.kind:
-            raise Closing(
+            raise CloseSocket(
                 CloseCode.UNAUTHORIZED,
                 "token",
                 f"This opens no {self.kind.value}. Take the {self.kind.value}'s token from the "
@@ -62,77 +68,77 @@ class DeviceSocket(Socket):
         return actor
 
     @abstractmethod
-    async def asked(self, message: Message, text: str) -> None:
-        """Deal with a message of an admitted device."""
+    async def on_message(self, message: Message, text: str) -> None:
+        """Handle a message of an authenticated device."""
 
     @abstractmethod
-    async def attached(self, live: LiveSession) -> None:
-        """Welcome the device to a session."""
+    async def on_attach(self, live: LiveSession) -> None:
+        """Send the welcome to a session."""
 
-    async def greet(self, session_id: int | None) -> None:
-        """Take a hello: find the station's open session, or wait for one."""
-        if self.said_hello:
+    async def join_station(self, session_id: int | None) -> None:
+        """Attach the device to its station's open session, or wait for one."""
+        if self.hello_received:
             raise BadFrame("One hello a socket; connect again to begin anew.", "hello_again")
-        self.said_hello = True
-        self._silence.cancel()
-        device = self._admit(self.device)
-        self.runtime.waiting[device.station_id].add(self.session_opened)
-        found = await open_session_of(device, session_id)
+        self.hello_received = True
+        self._first_frame_timer.cancel()
+        device = self._authorize(self.device)
+        self.runtime.waiting_devices[device.station_id].add(self.on_session_opened)
+        found = await find_open_session(device, session_id)
         if found is not None:
             await self._attach(found)
         elif session_id is not None and await may_open(device, session_id):
-            raise Closing(
+            raise CloseSocket(
                 CloseCode.ENDED,
                 "ended",
                 f"Session {session_id} has ended. Create a new one for this station.",
             )
         elif session_id is not None:
-            raise Closing(
+            raise CloseSocket(
                 CloseCode.NO_SESSION,
                 "no_session",
                 f"This station has no open session {session_id}. Create it.",
             )
         else:
-            await self.say({"type": "welcome", "session": None})
+            await self.send_message({"type": "welcome", "session": None})
 
-    def session_opened(self, session_id: int) -> None:
-        """Take up a session that has just been made for this station."""
-        if self.live is None or self.live.actor.fold.state in ENDED_STATES:
+    def on_session_opened(self, session_id: int) -> None:
+        """Attach the device to a session that was just created for its station."""
+        if self.live is None or self.live.aggregate.fold.state in ENDED_STATES:
             self.start(self._attach(session_id))
 
     async def _attach(self, session_id: int) -> None:
         try:
-            # Admitted, too: from its place on until its welcome nothing may come between.
-            live = await self.runtime.admitted(session_id)
+            # Settled: nothing may come between taking the slot and the welcome.
+            live = await self.runtime.settled_session(session_id)
         except OwnedElsewhere as problem:
-            raise Closing(CloseCode.BUSY, "busy", str(problem)) from None
+            raise CloseSocket(CloseCode.BUSY, "busy", str(problem)) from None
         other: Peer | None = getattr(live, self.slot)
         if other is not None and other is not self:
             if other.device_id != self.device_id:
-                raise Closing(
+                raise CloseSocket(
                     CloseCode.BUSY,
                     "busy",
                     f"This session has another {self.kind.value}. Stop that one first, or use "
                     "another station.",
                 )
-            other.send_away(CloseCode.REPLACED, "replaced", "The same device connected again.")
+            other.evict(CloseCode.REPLACED, "replaced", "The same device connected again.")
         self._leave_session()
         self.live = live
         setattr(live, self.slot, self)
         live.announce_presence(timezone.now())
-        await self.attached(live)
+        await self.on_attach(live)
 
     def tell(self, message: Message) -> None:
-        """Send the device a message soon."""
+        """Queue a message for the device."""
         self.outbox.tell(message)
 
     def acknowledge(self, number: int) -> None:
-        """Tell the device that steps up to this one are on the disk."""
+        """Queue the acknowledgment of the steps up to this one."""
         self.outbox.acknowledge(number)
 
-    def send_away(self, code: int, error: str, message: str) -> None:
-        """Close soon, saying why."""
-        self.start(self.end(code, error, message))
+    def evict(self, code: int, error: str, message: str) -> None:
+        """Close soon, with an error."""
+        self.start(self.close_with_error(code, error, message))
 
     def _leave_session(self) -> None:
         live, self.live = self.live, None
@@ -140,8 +146,8 @@ class DeviceSocket(Socket):
             setattr(live, self.slot, None)
             live.announce_presence(timezone.now())
 
-    def left(self) -> None:
-        """Free the session for another device."""
-        if self.said_hello and self.device is not None:
-            self.runtime.waiting[self.device.station_id].discard(self.session_opened)
+    def on_disconnect(self) -> None:
+        """Free the session's slot."""
+        if self.hello_received and self.device is not None:
+            self.runtime.waiting_devices[self.device.station_id].discard(self.on_session_opened)
         self._leave_session()

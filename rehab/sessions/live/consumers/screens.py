@@ -18,11 +18,11 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.web.language import language_of
 from rehab.people.web.refusals import format_refusal
-from rehab.sessions.events import Audience, history_entry, to_text
-from rehab.sessions.live.auth import Actor, find_actor, may_open, may_watch
-from rehab.sessions.live.backlog import read_steps
-from rehab.sessions.live.consumers.base import Closing, Socket
-from rehab.sessions.live.hub import Lagged, Unseen, Viewer
+from rehab.sessions.events import history_entry, to_text
+from rehab.sessions.live.auth import Actor, authenticate, may_open, may_watch
+from rehab.sessions.live.backlog import read_backlog
+from rehab.sessions.live.consumers.base import CloseSocket, Socket
+from rehab.sessions.live.hub import Lagged, Stalled, Subscriber
 from rehab.sessions.live.messages import (
     read_change,
     read_order,
@@ -33,75 +33,76 @@ from rehab.sessions.live.session import LiveSession, NotStored
 from rehab.sessions.payloads import Message
 from rehab.stations.models import Device
 from rehab.training.changes import ChangeKind, PauseReason
+from rehab.training.controls import CONTROLS, Audience, Requester
 from rehab.training.measures import InvalidSetting
 from robot.wire.close_codes import CloseCode
 from robot.wire.frames import BadFrame, read_name, read_object, read_whole
 
 
 class ScreenConsumer(Socket):
-    """A page that watches a session. Subclasses say who may, and what they hear."""
+    """A page that subscribes to a session. Subclasses set who may, and what they get."""
 
     audience: ClassVar[Audience]
     people: ClassVar[frozenset[Role]] = frozenset({Role.LEAD, Role.PT})
     devices: ClassVar[frozenset[str]] = frozenset()
-    # What may be changed from such a page: by people, and by the station's tablet on its own.
-    changes: ClassVar[frozenset[ChangeKind]]
-    pauses_as: ClassVar[PauseReason]
+    requester: ClassVar[Requester]  # of changes, for people who are signed in
+    pause_reason: ClassVar[PauseReason]
     robot_orders: ClassVar[tuple[str, ...]] = ("stop",)
-    tablet_changes: ClassVar[frozenset[ChangeKind]] = frozenset()
-    viewer: Viewer | None = None
+    subscriber: Subscriber | None = None
     language = settings.LANGUAGE_CODE
 
-    async def opened(self) -> None:
-        """Let the right people in and begin to send."""
+    async def on_connect(self) -> None:
+        """Authorize the client and begin to send."""
         session_id = int(self.scope["url_route"]["kwargs"]["session_id"])
-        self.actor = await find_actor(self.scope)
+        self.actor = await authenticate(self.scope)
         if self.actor is None:
-            raise Closing(
+            raise CloseSocket(
                 CloseCode.UNAUTHORIZED, "sign_in", "Sign in again, or pair the tablet again."
             )
-        if not self.is_welcome(self.actor) or not await may_open(self.actor, session_id):
-            raise Closing(CloseCode.NO_SESSION, "no_session", "There is no such session for you.")
+        if not self.is_allowed(self.actor) or not await may_open(self.actor, session_id):
+            raise CloseSocket(
+                CloseCode.NO_SESSION, "no_session", "There is no such session for you."
+            )
         if not await may_watch(self.actor, session_id, self.scope):
-            raise Closing(
+            raise CloseSocket(
                 CloseCode.NO_SESSION, "elsewhere", "The patient has not agreed to remote view."
             )
         try:
             self.live = live = await self.runtime.session(session_id)
         except OwnedElsewhere as problem:
-            raise Closing(CloseCode.BUSY, "busy", str(problem)) from None
+            raise CloseSocket(CloseCode.BUSY, "busy", str(problem)) from None
         if isinstance(self.actor, Device):
             live.tablets += 1
             live.tablet_heard_at = timezone.now()
-        self.language = live.actor.fold.plan.language  # what the patient reads
+        self.language = live.aggregate.fold.plan.language  # what the patient reads
         if self.audience is Audience.MONITOR and isinstance(self.actor, User):
             theirs = await database_sync_to_async(language_of)(self.actor)
             self.language = theirs or settings.LANGUAGE_CODE
         self.start(self._pump(live, _after(self.scope["query_string"])))
-        self.runtime.notes.add(Act.VIEW, self.actor, session_id, self.scope, timezone.now())
+        self.runtime.audit_queue.add(Act.VIEW, self.actor, session_id, self.scope, timezone.now())
 
     @classmethod
-    def is_welcome(cls, actor: Actor) -> bool:
+    def is_allowed(cls, actor: Actor) -> bool:
         """Whether actors of this kind may open such a page at all."""
         if isinstance(actor, User):
             return actor.role in cls.people
         return isinstance(actor, Device) and actor.kind in cls.devices
 
     async def _pump(self, live: LiveSession, after: int | None) -> None:
-        """Send a snapshot, what was missed, then events; begin anew where the page lags."""
+        """Send a snapshot, missed steps, then events; start again if the page lags."""
         while True:
-            shown, viewer = await live.join(self.audience, self.send, timezone.now())
-            self.viewer = viewer
+            snapshot, subscriber = await live.subscribe(self.audience, self.send, timezone.now())
+            self.subscriber = subscriber
             if isinstance(self.actor, Device) or self.audience is Audience.MONITOR:
                 live.announce_presence(timezone.now())
             try:
-                await self.say(shown)
+                await self.send_message(snapshot)
                 if after is not None:
-                    await self._send_missed(live, viewer, after, shown["number"])
-                viewer.wake()
-                await viewer.pump()
-            except Unseen:
-                raise Closing(
+                    await self._send_missed(live, subscriber, after, snapshot["number"])
+                subscriber.wake()
+                await subscriber.pump()
+            except Stalled:
+                raise CloseSocket(
                     CloseCode.UNCONFIRMED,
                     "unseen",
                     "The page confirms nothing. Connect again with ?after=.",
@@ -109,31 +110,33 @@ class ScreenConsumer(Socket):
             except Lagged:
                 after = None
             finally:
-                live.channel.viewers.discard(viewer)
+                live.feed.subscribers.discard(subscriber)
 
-    async def _send_missed(self, live: LiveSession, viewer: Viewer, after: int, until: int) -> None:
+    async def _send_missed(
+        self, live: LiveSession, subscriber: Subscriber, after: int, until: int
+    ) -> None:
         """Send the steps after a number from the log, oldest first."""
-        plan = live.actor.fold.plan
+        plan = live.aggregate.fold.plan
         while after < until:
-            steps = await read_steps(live.id, after, until)
+            steps = await read_backlog(live.id, after, until)
             if not steps:
                 return
             entries = (history_entry(self.audience, plan, step) for step in steps)
             texts = [to_text(entry) for entry in entries if entry is not None]
             if texts:
-                await viewer.send_past(texts)
+                await subscriber.send_backlog(texts)
             after = steps[-1].number
 
-    async def heard(self, text: str | None) -> None:
-        """Deal with a confirmation."""
-        await self.asked(read_object(text))
+    async def on_frame(self, text: str | None) -> None:
+        """Handle a frame of a page."""
+        await self.on_message(read_object(text))
 
-    async def asked(self, message: Message) -> None:
-        """Deal with a confirmation or a change."""
+    async def on_message(self, message: Message) -> None:
+        """Handle a message of a page."""
         match message.get("type"):
             case "seen":
-                if self.viewer is not None:
-                    self.viewer.seen(read_whole(message, "frame", low=0))
+                if self.subscriber is not None:
+                    self.subscriber.confirm(read_whole(message, "frame", low=0))
                 if isinstance(self.actor, Device) and self.live is not None:
                     self.live.tablet_heard_at = timezone.now()
             case "change":
@@ -146,106 +149,107 @@ class ScreenConsumer(Socket):
                 raise BadFrame('A page sends "seen", "change", "remark" and "robot".')
 
     async def _change(self, message: Message) -> None:
-        mark = read_name(message, "id")
+        request_id = read_name(message, "id")
         kind, value = read_change(message)
-        if kind is ChangeKind.PAUSE:
-            value = self.pauses_as.value
+        if kind == ChangeKind.PAUSE:
+            value = self.pause_reason.value
         live, by = self.live, self.actor if isinstance(self.actor, User) else None
         if live is None:
-            raise Closing(
+            raise CloseSocket(
                 CloseCode.NO_SESSION, "not_open", "The session is not open. Connect again."
             )
-        if kind not in (self.changes if by else self.tablet_changes):
-            await self._refuse(mark, "refused", "That is changed on the therapist's page.")
+        if (self.requester if by else Requester.TABLET) not in CONTROLS[kind].requesters:
+            await self._refuse(request_id, "refused", "That is changed on the therapist's page.")
             return
-        self.see_through(self._answer(mark, self.runtime.change(live.id, kind, value, by)))
+        self.run_to_end(self._answer(request_id, self.runtime.change(live.id, kind, value, by)))
 
     async def _remark(self, message: Message) -> None:
-        mark = read_name(message, "id")
+        request_id = read_name(message, "id")
         what, value = read_remark(message)
         live, by = self.live, self.actor
         if live is None:
-            raise Closing(
+            raise CloseSocket(
                 CloseCode.NO_SESSION, "not_open", "The session is not open. Connect again."
             )
         if self.audience is not Audience.MONITOR or not isinstance(by, User):
-            await self._refuse(mark, "refused", "That is noted on the therapist's page.")
+            await self._refuse(request_id, "refused", "That is noted on the therapist's page.")
             return
-        self.see_through(self._answer(mark, self.runtime.remark(live.id, what, value, by)))
+        self.run_to_end(self._answer(request_id, self.runtime.remark(live.id, what, value, by)))
 
-    async def _answer(self, mark: str, work: Awaitable[None]) -> None:
-        """Say what became of something that was asked for, once it is stored or refused.
+    async def _answer(self, request_id: str, work: Awaitable[None]) -> None:
+        """Answer a request once it is stored or refused.
 
-        Beside the socket, whose next frame may be a stop; and to its end if the page goes.
+        Runs beside the socket, whose next frame may be a stop, and to its end if the page closes.
         """
         try:
             await work
         except InvalidSetting as problem:
-            await self._refuse(mark, "refused", self._in_words(problem))
+            await self._refuse(request_id, "refused", self._format_refusal(problem))
         except NotStored as problem:
-            await self._refuse(mark, "not_stored", str(problem))
+            await self._refuse(request_id, "not_stored", str(problem))
         else:
-            await self.say({"type": "done", "id": mark})
+            await self.send_message({"type": "done", "id": request_id})
 
-    def _in_words(self, problem: InvalidSetting) -> str:
-        """Say a refusal in the page's language."""
+    def _format_refusal(self, problem: InvalidSetting) -> str:
+        """Return a refusal in the page's language."""
         with override(self.language):
             return format_refusal(problem)
 
     async def _order_robot(self, message: Message) -> None:
-        """Stop the robot, whoever asks; let it move again where a person asks."""
+        """Stop the robot for anyone; let it move again for people only."""
         order = read_order(message, *self.robot_orders)
         live, by = self.live, self.actor if isinstance(self.actor, User) else None
         if live is None:
-            raise Closing(
+            raise CloseSocket(
                 CloseCode.NO_SESSION, "not_open", "The session is not open. Connect again."
             )
-        sessions = self.runtime.at_station_of(live)
+        sessions = self.runtime.sessions_at_station_of(live)
         if order == "stop":
             device = {"device": self.actor.pk} if isinstance(self.actor, Device) else {}
             for session in sessions:
                 session.stop_robot(by, timezone.now(), device)
         elif by is not None:
-            self.start(_until_stored([s.arm_robot(by, timezone.now()) for s in sessions]))
-        if by is not None or order == "stop":  # beside the socket: no robot waits for the log
+            self.start(_wait_for_all([s.arm_robot(by, timezone.now()) for s in sessions]))
+        if by is not None or order == "stop":  # queued: no robot waits for the audit log
             act = Act(f"robot_{order}")
-            self.runtime.notes.add(act, self.actor, live.id, self.scope, timezone.now())
+            self.runtime.audit_queue.add(act, self.actor, live.id, self.scope, timezone.now())
 
-    async def _refuse(self, mark: str, code: str, message: str) -> None:
-        await self.say({"type": "error", "code": code, "id": mark, "message": message})
+    async def _refuse(self, request_id: str, code: str, message: str) -> None:
+        await self.send_message(
+            {"type": "error", "code": code, "id": request_id, "message": message}
+        )
 
-    def left(self) -> None:
-        """Stop listening."""
+    def on_disconnect(self) -> None:
+        """Unsubscribe."""
         live, self.live = self.live, None
         if live is not None:
-            if self.viewer is not None:
-                live.channel.viewers.discard(self.viewer)
+            if self.subscriber is not None:
+                live.feed.subscribers.discard(self.subscriber)
             if isinstance(self.actor, Device):
                 live.tablets -= 1
                 live.announce_presence(timezone.now())
 
 
 class PatientConsumer(ScreenConsumer):
-    """The patient's page. Whoever walks may always rest; to go on is a person's decision."""
+    """The patient's page. The tablet alone can pause; to resume takes a signed-in person."""
 
     audience = Audience.PATIENT
     devices = frozenset({Device.Kind.TABLET.value})
-    changes = frozenset({ChangeKind.START, ChangeKind.PAUSE, ChangeKind.RESUME, ChangeKind.FINISH})
-    tablet_changes = frozenset({ChangeKind.PAUSE})
-    pauses_as = PauseReason.PATIENT
+    requester = Requester.PATIENT_PAGE
+    pause_reason = PauseReason.PATIENT
 
 
 class MonitorConsumer(ScreenConsumer):
-    """The PT's page: sees everything and steers."""
+    """The PT's page: gets every event and requests changes."""
 
     audience = Audience.MONITOR
-    changes = frozenset(ChangeKind)
-    pauses_as = PauseReason.THERAPIST
+    requester = Requester.MONITOR
+    pause_reason = PauseReason.THERAPIST
     robot_orders = ("stop", "arm")
 
 
-async def _until_stored(futures: list[asyncio.Future[None]]) -> None:
-    """Wait for commits beside the socket: a stop that is asked for meanwhile waits for none."""
+async def _wait_for_all(futures: list[asyncio.Future[None]]) -> None:
+    """Wait for commits in a task, so that a stop meanwhile does not wait."""
     await asyncio.gather(*futures)
 
 

@@ -7,8 +7,8 @@ import time
 from django.utils import timezone
 
 from rehab.sessions.events import source_goal_event
-from rehab.sessions.live.backlog import is_stored
-from rehab.sessions.live.consumers.base import Closing
+from rehab.sessions.live.backlog import is_duplicate
+from rehab.sessions.live.consumers.base import CloseSocket
 from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.lateness import Lateness
 from rehab.sessions.live.messages import (
@@ -17,8 +17,8 @@ from rehab.sessions.live.messages import (
     read_plain,
     read_steps,
 )
-from rehab.sessions.live.session import LiveSession, source_phase
-from rehab.sessions.payloads import Message
+from rehab.sessions.live.session import LiveSession
+from rehab.sessions.payloads import Message, describe_source_phase
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED_STATES, State
 from rehab.training.steps import Measurement, Side
@@ -30,42 +30,42 @@ PLAIN_HELLO = Hello(run="text", last=0, session=None, clock_s=None, speed=1.0, t
 
 
 class SourceConsumer(DeviceSocket):
-    """Takes the steps of one source."""
+    """Receives the steps of one source."""
 
     kind = Device.Kind.SOURCE
     slot = "source"
     lateness: Lateness
-    plain_s: float | None = None  # what plain text is timed by, when our clock shows 0
+    plain_s: float | None = None  # plain text's time when our clock shows 0
 
-    async def heard(self, text: str | None) -> None:
-        """Deal with a frame of the protocol, or with the original's plain text."""
+    async def on_frame(self, text: str | None) -> None:
+        """Handle a frame of the protocol, or with the original's plain text."""
         if text is not None and self.device is not None and (plain := read_plain(text)):
-            await self._heard_plain(*plain)
+            await self._handle_plain(*plain)
         else:
-            await super().heard(text)
+            await super().on_frame(text)
 
-    async def asked(self, message: Message, text: str) -> None:
-        """Deal with hello and steps."""
+    async def on_message(self, message: Message, text: str) -> None:
+        """Handle hello and steps."""
         kind = message.get("type")
         if kind == "hello":
-            await self._heard_hello(read_hello(message))
+            await self._handle_hello(read_hello(message))
         elif kind in ("step", "steps"):
-            await self._heard_steps(read_steps(message))
+            await self._handle_steps(read_steps(message))
         elif kind is not None or "token" not in message:
             raise BadFrame('A source sends "hello", "step" and "steps".')
 
-    async def _heard_hello(self, hello: Hello) -> None:
+    async def _handle_hello(self, hello: Hello) -> None:
         self.lateness = Lateness(hello.run, time.monotonic(), hello.clock_s, hello.speed)
-        await self.greet(hello.session)
+        await self.join_station(hello.session)
 
-    async def attached(self, live: LiveSession) -> None:
-        """Say where the session stands and which step is wanted next."""
+    async def on_attach(self, live: LiveSession) -> None:
+        """Send the session's state and the number of the next step."""
         clock = live.source_clock
         if clock is not None and clock.run == self.lateness.run and not self.lateness.is_known:
             self.lateness = clock
         live.source_clock = self.lateness
-        fold = live.actor.fold
-        await self.say(
+        fold = live.aggregate.fold
+        await self.send_message(
             {
                 "type": "welcome",
                 "session": live.id,
@@ -75,22 +75,22 @@ class SourceConsumer(DeviceSocket):
                 "trained_side": fold.plan.trained_side,
                 "measure": fold.plan.measure.slug,
                 "unit": fold.plan.measure.unit,
-                "phase": source_phase(live),
+                "phase": describe_source_phase(fold),
             }
         )
         if live.committed:
             self.acknowledge(live.committed)
 
-    async def _heard_steps(self, measurements: list[Measurement]) -> None:
-        if not self.said_hello:
+    async def _handle_steps(self, measurements: list[Measurement]) -> None:
+        if not self.hello_received:
             raise BadFrame("Say hello first.", "no_hello")
         live = self.live
         if live is None:
-            await self._complain(
+            await self._send_error(
                 "no_session", "This station has no open session. Wait for welcome."
             )
             return
-        await live.admission()
+        await live.wait_for_subscriptions()
         now, received_at = time.monotonic(), timezone.now()
         for measurement in measurements:
             if measurement.number < live.next_number:
@@ -99,28 +99,30 @@ class SourceConsumer(DeviceSocket):
                 raise BadFrame(
                     f"Step {measurement.number} leaves a gap: send {live.next_number} next.", "gap"
                 )
-            elif live.actor.fold.state in ENDED_STATES:
-                raise Closing(
+            elif live.aggregate.fold.state in ENDED_STATES:
+                raise CloseSocket(
                     CloseCode.ENDED, "ended", "The session has ended; it takes no more steps."
                 )
-            elif live.actor.fold.state is State.READY:
-                await self._complain("not_running", "The session has not started. Wait for start.")
+            elif live.aggregate.fold.state is State.READY:
+                await self._send_error(
+                    "not_running", "The session has not started. Wait for start."
+                )
                 return
             elif live.next_number - live.committed > MAX_STEPS:
-                raise Closing(
+                raise CloseSocket(
                     CloseCode.TOO_MANY,
                     "flood",
                     f"Wait for acks: at most {MAX_STEPS} steps may be open.",
                 )
             else:
                 late = self.lateness.is_late(measurement.time_s, now)
-                live.take(measurement, received_at, late=late)
+                live.record_step(measurement, received_at, late=late)
 
     async def _check_same(self, live: LiveSession, measurement: Measurement) -> None:
-        """Acknowledge a step that is there already; refuse another one under its number."""
+        """Acknowledge a step that is stored already; refuse other content under its number."""
         if measurement.number > live.committed:
-            await live.settled()
-        if not await is_stored(live.id, measurement, live.actor.fold.plan.measure):
+            await live.wait_until_committed()
+        if not await is_duplicate(live.id, measurement, live.aggregate.fold.plan.measure):
             raise BadFrame(
                 f"Step {measurement.number} is stored with other content. A source that begins "
                 f"anew takes a new run and counts from {live.next_number}.",
@@ -128,28 +130,28 @@ class SourceConsumer(DeviceSocket):
             )
         self.acknowledge(live.committed)
 
-    async def _heard_plain(self, value: float | None, goal: float | None) -> None:
-        """Take the original's text: the server numbers and times the step; the PT's goal wins."""
-        if not self.said_hello:
-            await self._heard_hello(PLAIN_HELLO)
+    async def _handle_plain(self, value: float | None, goal: float | None) -> None:
+        """Record a plain-text step: the server numbers and times it; the PT's goal counts."""
+        if not self.hello_received:
+            await self._handle_hello(PLAIN_HELLO)
         live = self.live
         if live is not None:
-            await live.admission()
-        if live is None or live.actor.fold.state in (State.READY, *ENDED_STATES):
-            await self._complain("not_running", "No session is running at this station.")
+            await live.wait_for_subscriptions()
+        if live is None or live.aggregate.fold.state in (State.READY, *ENDED_STATES):
+            await self._send_error("not_running", "No session is running at this station.")
             return
-        fold = live.actor.fold
+        fold = live.aggregate.fold
         if goal is not None and goal != fold.goal:
-            live.channel.publish(source_goal_event(fold, goal))
+            live.feed.publish(source_goal_event(fold, goal))
         side = Side(fold.plan.trained_side)
         time_s = self._time_plain(fold.last_time_s)
-        live.take(Measurement(live.next_number, time_s, side, value), timezone.now())
+        live.record_step(Measurement(live.next_number, time_s, side, value), timezone.now())
 
     def _time_plain(self, last_s: float | None) -> float:
-        """Time a text: in Unix time as it was with the first one, by a clock that nobody sets.
+        """Return a plain-text step's time: Unix time at the first one, then a monotonic clock.
 
-        Never before the last step of the log, which another run of this server or another source
-        may have timed: phases, windows and rest go on from there.
+        Never before the last step of the log, which another run of the server or another source
+        may have timed: phases, windows and rest continue from there.
         """
         now_s = time.monotonic()
         if self.plain_s is None:
@@ -158,5 +160,5 @@ class SourceConsumer(DeviceSocket):
             self.plain_s = max(self.plain_s, last_s - now_s)
         return self.plain_s + now_s
 
-    async def _complain(self, code: str, message: str) -> None:
-        await self.say({"type": "error", "code": code, "message": message})
+    async def _send_error(self, code: str, message: str) -> None:
+        await self.send_message({"type": "error", "code": code, "message": message})

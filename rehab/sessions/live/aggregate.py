@@ -1,4 +1,4 @@
-"""One session that runs in this process: turns measurements and changes into rows to be written."""
+"""One session as an aggregate: turns measurements and changes into rows of its log."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 from rehab.people.models import User
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent, SessionMetric
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.payloads import MARKED_CHANGES, change_mark
+from rehab.sessions.payloads import change_mark
 from rehab.sessions.replay import fold_log
 from rehab.training.changes import ENDED_STATES, Change, ChangeKind, ChangeValue, State
+from rehab.training.controls import CONTROLS, marked_kinds
 from rehab.training.fold import SessionFold
 from rehab.training.metrics import compute_metrics
 from rehab.training.steps import Measurement, ScoredStep
@@ -29,66 +30,66 @@ class StepRow(NamedTuple):
 
 
 Row = StepRow | SessionEvent | SessionMetric
-MARKED = frozenset({*MARKED_CHANGES, *(remark.value for remark in Remark)})
 MARKS = 100  # the newest; more would hide the strides
 Summary = dict[str, Any]
 
 
-class SessionActor:
+class SessionAggregate:
     """Folds one session. Its rows count only once a writer has committed them.
 
-    If a commit fails the actor is ahead of the log and must be dropped; ``load`` rebuilds it from
-    what was committed.
+    After a failed commit the aggregate is ahead of the log and must be dropped; ``load`` rebuilds
+    it from what was committed.
     """
 
     def __init__(self, session: TrainingSession) -> None:
         self.session = session
         self.fold = SessionFold(session.to_plan())
         if session.legacy_id is not None:
-            self.fold.state = State.FINISHED  # imported: it has no log, and takes none
+            self.fold.state = State.FINISHED  # imported, without a log
         self.marks: deque[dict[str, Any]] = deque(maxlen=MARKS)  # what a PT's chart points out
 
     @classmethod
-    def load(cls, session: TrainingSession) -> SessionActor:
-        """Rebuild the actor of a session from its log."""
-        actor = cls(session)
-        fold_log(actor.fold, session)
-        marked = SessionEvent.everywhere.filter(session=session, kind__in=MARKED).order_by("-pk")
+    def load(cls, session: TrainingSession) -> SessionAggregate:
+        """Return the aggregate of a session, rebuilt from its log."""
+        aggregate = cls(session)
+        fold_log(aggregate.fold, session)
+        marked = SessionEvent.everywhere.filter(
+            session=session, kind__in=[*marked_kinds(), *Remark]
+        ).order_by("-pk")
         for event in reversed(marked[:MARKS]):
-            actor.mark(event)
-        return actor
+            aggregate._keep_mark(event)
+        return aggregate
 
-    def mark(self, event: SessionEvent) -> None:
-        """Keep an event at hand for those who join later."""
+    def _keep_mark(self, event: SessionEvent) -> None:
+        """Keep an event for the snapshots of later subscribers, if charts point it out."""
         kind, value = event.kind, event.data.get("value", event.value)
-        if kind in MARKED_CHANGES:
-            self.marks.append(change_mark(event.after_number, ChangeKind(kind), value))
-        else:
+        if kind in marked_kinds():
+            self.marks.append(change_mark(event.after_number, kind, value))
+        elif kind in list(Remark):
             self.marks.append({"after": event.after_number, "kind": kind, "value": value})
 
-    def take(self, measurement: Measurement, received_at: datetime) -> StepRow:
-        """Score one stride and give its row. Raises what ``SessionFold.step`` raises."""
+    def record_step(self, measurement: Measurement, received_at: datetime) -> StepRow:
+        """Score one stride and return its row. Raises what ``SessionFold.step`` raises."""
         return StepRow(self.session.pk, self.fold.step(measurement), received_at)
 
     def change(self, change: Change, by: User | None, at: datetime) -> list[Row]:
-        """Apply a change from the next step on and give the rows that record it.
+        """Apply a change from the next step on and return the rows that record it.
 
-        Raises what ``SessionFold.change`` raises; nothing has then happened.
+        Raises what ``SessionFold.change`` raises; the session is then as it was.
         """
-        old = self._current(change.kind)
+        old = CONTROLS[change.kind].value_for_log(self.fold)
         self.fold.change(change)
         event = SessionEvent(
             session=self.session,
             after_number=self.fold.last_number,
-            kind=change.kind.value,
+            kind=str(change.kind),
             by=by,
             at=at,
             **_to_columns(old, change.value),
         )
-        if event.kind in MARKED:
-            self.mark(event)
+        self._keep_mark(event)
         rows: list[Row] = [event]
-        if change.kind is ChangeKind.START:
+        if change.kind == ChangeKind.START:
             self.session.started_at = at
         if self.fold.state in ENDED_STATES:
             self.session.ended_at = at
@@ -99,7 +100,7 @@ class SessionActor:
             ]
         return rows
 
-    def note(
+    def log_event(
         self,
         kind: RobotEntry | Remark,
         by: User | None,
@@ -107,7 +108,7 @@ class SessionActor:
         data: dict[str, Any],
         value: float | None = None,
     ) -> SessionEvent:
-        """Give the row that records a remark, or what became of the robot."""
+        """Return the row that records a remark, or what became of the robot."""
         event = SessionEvent(
             session=self.session,
             after_number=self.fold.last_number,
@@ -117,12 +118,11 @@ class SessionActor:
             at=at,
             data=data,
         )
-        if event.kind in MARKED:
-            self.mark(event)
+        self._keep_mark(event)
         return event
 
     def summary(self) -> Summary:
-        """Give the session's columns as they follow from the log, to be written with its rows."""
+        """Return the session's columns as they follow from the log, to be written with its rows."""
         return {
             "state": self.fold.state.value,
             "goal": self.fold.goal,
@@ -132,29 +132,9 @@ class SessionActor:
             "changed_to": ",".join(self.fold.changed_to),
         }
 
-    def _current(self, kind: ChangeKind) -> float | str | None:
-        match kind:
-            case ChangeKind.GOAL:
-                return self.fold.goal
-            case ChangeKind.GAIN:
-                return self.fold.gain
-            case ChangeKind.PHASE:
-                return self.fold.phase_index
-            case ChangeKind.ACTIVATION_THRESHOLD:
-                return self.fold.activation_threshold
-            case ChangeKind.ROBOT_INTENSITY:
-                return self.fold.robot_intensity
-            case ChangeKind.VALENCE:
-                return self.fold.next_valence or self.fold.valence.slug
-            case ChangeKind.WORDS_SHOWN:
-                return float(self.fold.words_shown)
-            case ChangeKind.CHART_STYLE:
-                return self.fold.chart_style.value
-        return None
-
 
 def _to_columns(old: ChangeValue, value: ChangeValue) -> dict[str, Any]:
-    """Give a change's values as the log keeps them: numbers in columns, all else in ``data``."""
+    """Return a change's values as the log keeps them: numbers in columns, all else in ``data``."""
     if value is None or isinstance(value, int | float):
         return {"old": old, "value": value}
     return {"data": {"value": value} if old is None else {"value": value, "old": old}}
