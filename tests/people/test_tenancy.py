@@ -39,6 +39,9 @@ from tests.support.world import (
 pytestmark = pytest.mark.django_db
 
 
+Worlds = Callable[[], tuple[World, World]]
+
+
 def build_worlds() -> tuple[World, World]:
     both = build_world("amber"), build_world("birch")
     for world in both:
@@ -47,12 +50,12 @@ def build_worlds() -> tuple[World, World]:
 
 
 @pytest.fixture(scope="class")
-def kept_worlds(keep) -> Callable[[], tuple[World, World]]:
+def kept_worlds(keep: Callable[..., Worlds]) -> Worlds:
     return keep(build_worlds)
 
 
 @pytest.fixture
-def worlds(kept_worlds, db) -> tuple[World, World]:
+def worlds(kept_worlds: Worlds, db: None) -> tuple[World, World]:
     return kept_worlds()
 
 
