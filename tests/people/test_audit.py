@@ -67,7 +67,7 @@ SILENT = {
 
 
 def is_silent(name: str) -> bool:
-    """Say, independently of the code under test, whether a route shows nothing of patients."""
+    """Return, apart from the code under test, whether a route shows nothing of patients."""
     bare = {
         *("clinic", "user", "apitoken", "station", "device", "measure", "protocol", "gesture"),
         *("feedbacktype", "preset"),

@@ -38,6 +38,9 @@ from tests.support.world import (
 pytestmark = pytest.mark.django_db
 
 
+Worlds = Callable[[], tuple[World, World]]
+
+
 def build_worlds() -> tuple[World, World]:
     both = build_world("amber"), build_world("birch")
     for world in both:
@@ -46,12 +49,12 @@ def build_worlds() -> tuple[World, World]:
 
 
 @pytest.fixture(scope="class")
-def kept_worlds(keep):
+def kept_worlds(keep: Callable[..., Worlds]) -> Worlds:
     return keep(build_worlds)
 
 
 @pytest.fixture
-def worlds(kept_worlds, db):
+def worlds(kept_worlds: Worlds, db: None) -> tuple[World, World]:
     return kept_worlds()
 
 

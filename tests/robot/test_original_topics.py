@@ -12,7 +12,7 @@ STEP = {"type": "step", "number": 1, "performance": 0.9, "shown": 0.99, "goal": 
 
 
 def begin(valence="positive", names=tuple(TOPICS)):
-    """Give a client on an open connection that knows its session, and all that it said."""
+    """Return a client on an open connection that knows its session, and all that it said."""
     client = OriginalTopicClient(names)
     opened = list(client.open(0.0))
     client.handle_message(WELCOME | {"valence": valence}, 0.0)

@@ -36,12 +36,12 @@ Damage = Callable[[bytes, random.Random], bytes]
 
 
 def is_bumped(number: int) -> bool:
-    """Say whether the bumper is pressed in this frame."""
+    """Return whether the bumper is pressed in this frame."""
     return number % BUMP_EVERY >= BUMP_EVERY - 50
 
 
 def drive(number: int, noise: random.Random) -> Feedback:
-    """Give the frame of a base that drives straight on at 0.2 m/s, and bumps now and then.
+    """Return the frame of a base that drives straight on at 0.2 m/s, and bumps now and then.
 
     Its raw gyro is noise, so that AA 55 stands in one frame of a few thousand.
     """
@@ -99,7 +99,7 @@ def mutate(data: bytes, chance: random.Random) -> bytes:
 
 
 def keep_share(chance: random.Random, frames: int, damage: Damage) -> float:
-    """Give the share of undamaged frames that a reader kept."""
+    """Return the share of undamaged frames that a reader kept."""
     reader, undamaged, kept = FrameReader(decode_feedback), 0, 0
     waiting: deque[Feedback] = deque(maxlen=8)  # sent whole, not yet heard
     for number in range(frames):

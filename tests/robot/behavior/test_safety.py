@@ -35,7 +35,7 @@ class Watch:
         self.safety.start_gesture(self.now_s, FINE)
 
     def look(self, state=FINE, ordered=STILL, *, performing=True, for_s=0.02):
-        """Give the first latch within a time, and when it came."""
+        """Return the first latch within a time, and when it came."""
         for tick in range(round(for_s / 0.02)):
             self.now_s += 0.02
             found = self.safety.check(self.now_s, state, ordered, performing=performing)

@@ -39,7 +39,7 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture
 def ros():
-    """Give a served bridge, with a base behind it."""
+    """Return a served bridge, with a base behind it."""
     bridge = FakeRosbridge()
     robot = FakeBase(bridge.graph, time.monotonic)
     with ServedRos(bridge) as served, Ticking(robot):

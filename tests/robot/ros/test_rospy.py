@@ -43,7 +43,7 @@ def master():
 
 @pytest.fixture(scope="module")
 def ros(master):
-    """Give a bridge of which the graph is a node of rospy, and a base that is another one."""
+    """Return a bridge of which the graph is a node of rospy, and a base that is another one."""
     node = master.node("base")
     bridge = FakeRosbridge(master.node("rosbridge"), has_rosapi=False)
     robot = FakeBase(node, time.monotonic)
