@@ -65,8 +65,8 @@ def on_figures(sessions: set[int], **_signal: Any) -> None:
             entries.refresh_patients(patients, now=now)
     except Exception:
         log.exception(
-            "Boards did not follow sessions %s. They are built anew; if they stay away, run "
-            "manage.py rebuildboards",
+            "Boards could not be updated after sessions %s. They are rebuilt in the background; if "
+            "that fails too, run manage.py rebuildboards",
             sessions,
         )
         transaction.on_commit(partial(scheduler.rebuild_after_failure, patients, now), robust=True)

@@ -67,7 +67,7 @@ def lockout_after(failures: int) -> timedelta:
 
 
 def _lockout_error(left: timedelta) -> PinRefused:
-    """Return the error that tells how long a screen is still locked."""
+    """Return the error that says how long a screen is still locked."""
     seconds = max(1, round(left.total_seconds()))
     if seconds < 60:
         words = _("Wrong PIN. Wait %(count)s seconds.") % {"count": seconds}

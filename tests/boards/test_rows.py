@@ -82,7 +82,7 @@ def test_boards_that_did_not_follow_heal_by_themselves(
     with monkeypatch.context() as patch, django_capture_on_commit_callbacks(execute=True):
         patch.setattr(entries, "read_results", lambda *_: 1 / 0)
         walk(people[5], "positive", strides(20, 0), days_ago=1)
-    assert "Boards did not follow" in caplog.text
+    assert "Boards could not be updated" in caplog.text
     assert entries.find_unbuilt() == board.pk
     assert not Leaderboard.everywhere.get(pk=frozen.pk).is_being_built
     told = {shown.title: shown.note for shown in make_session_panels(sessions[0], NOW)}

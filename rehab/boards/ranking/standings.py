@@ -186,25 +186,25 @@ class StoredStandings:
         figures = {me.figure, *(row[1] for row in (*above, *below))}
         sizes: dict[int, int] = {}
         if len(figures) > 1:  # on a large board neighbors are mostly equals
-            alike = self._counts.filter(figure__in=figures)
-            sizes = dict(alike.values_list("figure", "rows"))
+            counts = self._counts.filter(figure__in=figures)
+            sizes = dict(counts.values_list("figure", "rows"))
         up: list[RankedRow] = [me]
         for row in above:
-            up.append(self._next(row, up[-1], -sizes.get(row[1], 1), -1))
+            up.append(self._rank_neighbor(row, up[-1], -sizes.get(row[1], 1), -1))
         down: list[RankedRow] = [me]
         for row in below:
-            down.append(self._next(row, down[-1], sizes.get(down[-1].figure, 1), 1))
+            down.append(self._rank_neighbor(row, down[-1], sizes.get(down[-1].figure, 1), 1))
         return [*reversed(up), *down[1:]]
 
-    def _next(self, row: Columns, beside: RankedRow, size: int, step: int) -> RankedRow:
-        """Return the row beside a ranked one; another figure is ``size`` ranks off."""
-        other = row[1] != beside.figure
-        shared = beside.shared_rank + size if other else beside.shared_rank
+    def _rank_neighbor(self, row: Columns, neighbor: RankedRow, size: int, step: int) -> RankedRow:
+        """Return the row next to a ranked one; a different figure is ``size`` ranks off."""
+        other = row[1] != neighbor.figure
+        shared = neighbor.shared_rank + size if other else neighbor.shared_rank
         match self._board.ties:
             case TieRule.DENSE:
-                return make_row(row, shared, beside.rank + step if other else beside.rank)
+                return make_row(row, shared, neighbor.rank + step if other else neighbor.rank)
             case TieRule.EARLIER:
-                return make_row(row, shared, beside.rank + step)
+                return make_row(row, shared, neighbor.rank + step)
         return make_row(row, shared, shared)
 
     def _count_equals_before(self, key: str, ends: tuple[str, ...], size: int) -> int:

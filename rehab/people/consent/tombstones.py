@@ -1,7 +1,7 @@
 """Tombstones of erased patients, so that the import does not bring them back.
 
 The legacy database still has them as participants. A tombstone is a keyed hash of the clinic and
-the legacy id. It only tells, with the server's key, whether a given id was erased here, and refers
+the legacy id. With the server's key it shows whether a given id was erased here; it refers
 to no other row.
 """
 
