@@ -296,15 +296,15 @@ class Link:
     def _explain(self, closed: ConnectionClosed) -> str:
         """Return why a connection ended. Raises LinkRefused where trying again is useless."""
         code = 1006 if closed.rcvd is None else closed.rcvd.code
-        said = self._error or ("" if closed.rcvd is None else closed.rcvd.reason)
+        reason = self._error or ("" if closed.rcvd is None else closed.rcvd.reason)
         if code in REFUSALS:
-            raise LinkRefused(code, said or REFUSALS[code]) from closed
+            raise LinkRefused(code, reason or REFUSALS[code]) from closed
         if self._was_heard and code not in _TROUBLE:
             self._back_off.reset()
         if closed.rcvd is None:
             silent = closed.sent is not None and closed.sent.code == 1011
             return "The server does not answer" if silent else "The connection broke"
-        return f"The server closed the connection ({code}{': ' if said else ''}{said})"
+        return f"The server closed the connection ({code}{': ' if reason else ''}{reason})"
 
     def _explain_failure(self, problem: OSError | WebSocketException) -> str:
         """Return why there is no connection. Raises LinkRefused where trying again is useless."""

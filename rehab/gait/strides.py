@@ -15,7 +15,7 @@ class RejectionReason(StrEnum):
 
     TIME_BACKWARDS = "time_backwards"  # the clock stood still or jumped back
     GAP = "gap"  # samples are missing
-    RATE = "rate"  # samples come at another rate than was said
+    RATE = "rate"  # samples come at another rate than the given one
     FORCE_LOST = "force_lost"  # the vertical force vanished or was not finite
     FORCE_TOO_LARGE = "force_too_large"  # more than anybody's weight: unit, or mass
     SHORT_STANCE = "short_stance"

@@ -33,7 +33,7 @@ class RemoteClock:
 
     def __init__(self, speed: float = 1.0, time_s: float | None = None, now_s: float = 0.0) -> None:
         self._speed = speed
-        # That clock when ours shows 0, in its own seconds; and when something fresh was heard.
+        # That clock when ours shows 0, in its own seconds; and when the last fresh time arrived.
         self._offset = None if time_s is None else time_s - now_s * speed
         self._seen_s = now_s
         self._last_s: float | None = None  # the time that came last

@@ -88,7 +88,7 @@ class Performer:
 
     @property
     def is_linked(self) -> bool:
-        """Whether the server has welcomed it and is heard."""
+        """Whether the server has sent its welcome on this connection, which is not lost."""
         return self._is_welcome
 
     def handle(self, message: Message, now_s: float) -> None:
@@ -104,7 +104,7 @@ class Performer:
         self.last_bad_message = problem
 
     def disconnect(self, reason: str) -> None:
-        """Stand still at once: the server is not heard any more. A real base is disarmed."""
+        """Stand still at once: the connection to the server is lost. A real base is disarmed."""
         self._is_welcome = self._is_running = False
         self.status.reset()
         self.safety.disconnect()
@@ -184,7 +184,9 @@ class Performer:
             case "arm":
                 self._handle_arm(now_s)
             case _:
-                raise BadFrame("A robot hears welcome, step, state, cue, stop, arm, heartbeat.")
+                raise BadFrame(
+                    "A robot understands welcome, step, state, cue, stop, arm, heartbeat."
+                )
 
     def _handle_welcome(self, message: Message) -> None:
         session = message.get("session")

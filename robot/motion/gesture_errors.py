@@ -12,7 +12,7 @@ NOT_FINITE = gettext_noop("{part} {number} has a number that is not finite.")
 
 
 class Marked(str):
-    """A word within a message that is translated by itself."""
+    """A word within a message, translated separately."""
 
     __slots__ = ()
 

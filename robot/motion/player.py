@@ -128,7 +128,7 @@ class Player:
         return self.twist
 
     def _wanted_twist(self, time_s: float, pose: Pose) -> tuple[Limits, Twist]:
-        """Return the limits and the twist that the present waypoint asks for."""
+        """Return the limits and the wanted twist for the present waypoint."""
         here = replace(pose, heading_rad=pose.heading_rad - self._turns_rad)
         while self._waypoint is not None and not self._verdict:
             limits = self.limits.scaled(self._share(self._waypoint))

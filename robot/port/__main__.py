@@ -85,7 +85,7 @@ def open_serial(url: str, baud: int) -> SerialPort:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Own the port of the command line until standard input closes or we are told to end."""
+    """Own the port of the command line until standard input closes or a signal ends it."""
     parser = ArgumentParser(prog="python -m robot.port", description=__doc__)
     parser.add_argument("url", help="/dev/kobuki, COM3, a pty, or socket://host:port")
     parser.add_argument("--baud", type=int, default=115200)

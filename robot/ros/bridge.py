@@ -1,7 +1,7 @@
-"""The websocket to a rosbridge, on a thread of its own: it comes back by itself, and keeps nothing.
+"""The websocket to a rosbridge, on a thread of its own: it reconnects by itself and queues nothing.
 
-What is said is asked for at the moment when it can be sent. A connection that is lost takes all
-with it that was to be said; what is said after it is what holds then.
+The client is asked for frames only when they can be sent. What a lost connection could not send is
+dropped, so that the next one begins with the present state.
 """
 
 from __future__ import annotations

@@ -163,7 +163,7 @@ class ContactFinder:
 
     def _end(self, index: int, ended: list[Contact]) -> None:
         contact = self._current
-        assert contact is not None  # noqa: S101 (said for mypy)
+        assert contact is not None  # noqa: S101 (for mypy)
         contact.end_index = index
         contact.end_s = self._interpolate_crossing(index, self.offset_n + self._release_n)
         self._current = None

@@ -10,7 +10,7 @@ from robot.bases.kobuki_protocol.frames import frame, split, sub_payload, unpack
 
 
 class Extra(IntFlag):
-    """What ``RequestExtra`` asks for."""
+    """Flags of ``RequestExtra``: the parts that it requests."""
 
     HARDWARE = 0x01
     FIRMWARE = 0x02
