@@ -155,7 +155,17 @@ class Sources(RuleBasedStateMachine):
     def repeat(self, data: st.DataObject) -> None:
         first = data.draw(st.integers(0, len(self.made) - 1))
         last = data.draw(st.integers(first, min(first + 3, len(self.made) - 1)))
-        self.go(self._send(*self.made[first : last + 1]))
+
+        async def repeat() -> None:
+            live = await runtimes.current().session(self.session.pk)
+            await live.wait_until_committed()
+            await self.source.overhear()
+            known = max(0, min(last + 1, self.sent) - first)
+            await self._send(*self.made[first : last + 1])
+            for _ in range(known):  # each is compared in the database before the next frame is read
+                await self.source.hear("ack")
+
+        self.go(repeat())
 
     @precondition(lambda self: self.source)
     @rule(jump=st.integers(1, 3))

@@ -300,7 +300,7 @@ echo "$LC_ALL $TZ  {when}  "
 
 
 def test_where_no_folder_tells_of_processes_ps_tells_when_they_started(tmp_path, monkeypatch):
-    monkeypatch.setattr(owners, "PROCESSES", tmp_path / "none")
+    monkeypatch.setattr(owners, "PROC_DIR", tmp_path / "none")
     monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
     pid = os.getppid()
     ps = tmp_path / "ps"
@@ -321,7 +321,7 @@ def test_where_no_folder_tells_of_processes_ps_tells_when_they_started(tmp_path,
 
 @pytest.mark.skipif(shutil.which("ps") is None, reason="this machine has no ps")
 def test_what_the_real_ps_tells(tmp_path, monkeypatch):
-    monkeypatch.setattr(owners, "PROCESSES", tmp_path / "none")
+    monkeypatch.setattr(owners, "PROC_DIR", tmp_path / "none")
     started = owners._start_time(os.getpid())
     assert re.fullmatch(r"\w{3} \w{3} \d{1,2} [\d:]{8} \d{4}", started)
     assert owners._start_time(dead_pid()) == ""
