@@ -29,8 +29,8 @@ quiet = out=$$($(1) 2>&1) || { printf '%s\n' "$$out" >&2; exit 1; }
 
 # Tests share the cores: a worker that has none left takes half of what another still has. Those of
 # real time (a robot's 20 ms) then run alone, also after a failure. With ARGS there may be none (5).
-# With GARRY_TEST_ALL what is slow comes too, and properties are tried with more examples.
-some = $(1) -m pytest $(2) -m 'not (bench or screenshots$(if $(GARRY_TEST_ALL),, or slow)) $(3)' \
+# With GARRY_TEST_ALL properties are tried with more examples.
+some = $(1) -m pytest $(2) -m 'not (bench or screenshots) $(3)' \
 	$(ARGS) || [ $$? = 5 ]
 shared = { $(call some,$(1),$(2) -n auto --maxprocesses 4 --dist worksteal,and not realtime $(3)); }
 alone = { $(call some,$(1),$(2),and realtime $(3)); }

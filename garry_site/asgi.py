@@ -10,7 +10,7 @@ from django.core.asgi import get_asgi_application
 
 os.environ.setdefault("DJANGO_SETTINGS_MODULE", "garry_site.settings")
 pages: Any = get_asgi_application()
-if not settings.HOSTED:  # one machine serves its files as they lie; hosted, WhiteNoise does
+if not settings.HOSTED:  # hosted, WhiteNoise serves the static files
     pages = ASGIStaticFilesHandler(pages)
 
 from rehab.routing import websocket_urlpatterns  # noqa: E402  (models must be loaded first)

@@ -85,7 +85,7 @@ INSTALLED_APPS = [
     "rehab",  # before daphne: its own `runserver` takes precedence
     "daphne",
     "channels",
-    "rehab.site.GarryAdmin",  # django.contrib.admin with our front page
+    "rehab.site.GarryAdminConfig",  # django.contrib.admin with our front page
     "django.contrib.auth",
     "django.contrib.contenttypes",
     "django.contrib.sessions",
@@ -93,7 +93,7 @@ INSTALLED_APPS = [
     "django.contrib.staticfiles",
     "axes",
     "csp",
-    "ninja",  # so that the API's documentation draws with files of ours, not from elsewhere
+    "ninja",  # serves the files of the API's documentation, which would else come from a CDN
 ]
 MIDDLEWARE = [
     "django.middleware.security.SecurityMiddleware",
@@ -155,8 +155,8 @@ if DATABASES["default"]["ENGINE"].endswith("sqlite3"):
         "init_command": (
             "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA journal_size_limit=67108864; "
             "PRAGMA mmap_size=134217728; PRAGMA cache_size=-16000; "
-            # The live path moves the log into the database file beside its commits (runtime.py);
-            # left to SQLite, every fiftieth commit would wait for that.
+            # The live runtime checkpoints between commits (rehab/sessions/live/runtime.py); left
+            # to SQLite, every fiftieth commit would wait for a checkpoint.
             "PRAGMA wal_autocheckpoint=20000;"
         ),
     }
@@ -202,7 +202,7 @@ AUTHENTICATION_BACKENDS = [
 ]
 LOGIN_URL = "sign-in"
 SESSION_ENGINE = "rehab.people.sign_in.browser_sessions"
-SESSION_COOKIE_AGE = 12 * 3600  # one working day, however busy
+SESSION_COOKIE_AGE = 12 * 3600  # one working day, whatever the activity
 SESSION_COOKIE_SAMESITE = "Lax"
 SESSION_MINUTES = number(
     "GARRY_SESSION_MINUTES",
@@ -235,7 +235,7 @@ AXES_DISABLE_ACCESS_LOG = True
 AXES_ENABLE_ADMIN = False  # its rows belong to no clinic
 AXES_VERBOSE = False
 
-# --- words, time, files -------------------------------------------------------------------------
+# --- languages, time, files ---------------------------------------------------------------------
 
 LANGUAGE_CODE = "en"  # of programs and commands, and of browsers that know none of these
 LANGUAGES = [("en", "English"), ("es", "Español")]
@@ -265,9 +265,8 @@ STORAGES = {
     },
 }
 DATA_UPLOAD_MAX_MEMORY_SIZE = 2 * 1024 * 1024  # the server hangs up on anything longer
-DATA_UPLOAD_MAX_NUMBER_FIELDS = (
-    5000  # a leaderboard's form says itself how many patients are too many
-)
+# More patients than a leaderboard's form accepts, so that the form can refuse them itself.
+DATA_UPLOAD_MAX_NUMBER_FIELDS = 5000
 DATA_UPLOAD_MAX_NUMBER_FILES = 0  # no page takes any
 
 # --- browsers -----------------------------------------------------------------------------------
@@ -311,6 +310,6 @@ LOGGING = {
     "root": {"handlers": ["stderr"], "level": "WARNING"},
     "loggers": {
         "rehab": {"level": LOG_LEVEL},
-        "django.request": {"level": "ERROR"},  # a 404 is not news
+        "django.request": {"level": "ERROR"},  # no line for each 404
     },
 }

@@ -1,4 +1,4 @@
-"""Every address of the site: GARRY's own pages, and the admin."""
+"""The URLs of the site: the admin, and GARRY's own pages."""
 
 from django.contrib import admin
 from django.urls import include, path

@@ -5,7 +5,7 @@ from django.db.models.signals import post_migrate
 
 
 class RehabConfig(AppConfig):
-    """GARRY's one application."""
+    """The one application of GARRY."""
 
     name = "rehab"
     verbose_name = "GARRY"

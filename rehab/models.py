@@ -16,7 +16,7 @@ from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
-from rehab.stations.models import Device, PinAttempts, Station
+from rehab.stations.models import Device, Pairing, PinAttempts, Station
 
 # People and settings. Sessions and consents are logs themselves.
 TRACKED = (
@@ -56,6 +56,7 @@ __all__ = [
     "ImportTombstone",
     "Leaderboard",
     "Measure",
+    "Pairing",
     "Patient",
     "PinAttempts",
     "Preset",

@@ -63,7 +63,7 @@ HEADINGS = (
 MORE = _("More")
 
 
-class GarrySite(AdminSite):
+class GarryAdminSite(AdminSite):
     """Django's admin with a dashboard as front page."""
 
     index_template = "admin/dashboard.html"
@@ -114,7 +114,7 @@ class GarrySite(AdminSite):
         return redirect("admin:index")
 
 
-class GarryAdmin(AdminConfig):
-    """The admin application with our site."""
+class GarryAdminConfig(AdminConfig):
+    """Django's admin application with our site."""
 
-    default_site = "rehab.site.GarrySite"
+    default_site = "rehab.site.GarryAdminSite"

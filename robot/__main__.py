@@ -4,9 +4,9 @@
 `python -m robot doctor` finds a Kobuki's port and says what is wrong on the way to it;
 `python -m robot twin` is a simulated one at a port of its own.
 
-Exit status: 0 told to end (SIGTERM; --child: standard input closed); 1 the base does not answer
-any more; 2 the command line cannot be used; 3 the server will not have this robot; 130 stopped by
-Ctrl-C. However it ends, the base stands still.
+Exit status: 0 ended by SIGTERM (--child: standard input closed); 1 the base does not answer any
+more; 2 the command line cannot be used; 3 the server refuses this robot; 130 stopped by Ctrl-C.
+However it ends, the base stands still.
 """
 
 from __future__ import annotations
@@ -69,26 +69,26 @@ def print_notice(text: str) -> None:
 async def wait_for_end(is_child: bool) -> None:
     """Wait for SIGTERM, and for the end of standard input where a server supervises us."""
     loop = asyncio.get_running_loop()
-    told = asyncio.Event()
-    with contextlib.suppress(NotImplementedError):  # Windows ends a process without a word
-        loop.add_signal_handler(signal.SIGTERM, told.set)
+    ended = asyncio.Event()
+    with contextlib.suppress(NotImplementedError):  # Windows has no such signals
+        loop.add_signal_handler(signal.SIGTERM, ended.set)
 
     def read_to_the_end() -> None:
         with contextlib.suppress(OSError):
             while os.read(0, 1024):
                 pass
         with contextlib.suppress(RuntimeError):  # the loop has ended before
-            loop.call_soon_threadsafe(told.set)
+            loop.call_soon_threadsafe(ended.set)
 
     if is_child:
         threading.Thread(target=read_to_the_end, daemon=True).start()
-    await told.wait()
+    await ended.wait()
 
 
 async def run_worker(
     url: str, token: str, base: MobileBase, originals: OriginalTopics | None, is_child: bool
 ) -> None:
-    """Run a worker until told to end. Raises LinkRefused and BaseLost."""
+    """Run a worker until the process is to end. Raises LinkRefused and BaseLost."""
     worker = Worker(partial(Link, url, token), base, originals=originals, notice=print_notice)
     tasks = [asyncio.create_task(worker.run()), asyncio.create_task(wait_for_end(is_child))]
     try:

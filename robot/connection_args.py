@@ -9,7 +9,7 @@ from urllib.parse import urlsplit, urlunsplit
 
 
 class BadConnectionArgs(ValueError):
-    """An address or a token that cannot be one; the message names the cure."""
+    """An address or a token that cannot be used; the message names the cure."""
 
 
 def websocket_url(server: str, path: str) -> str:

@@ -12,14 +12,14 @@ from robot.behavior.safety import BASE_SILENT_S, BATTERY_LOW_V, BATTERY_WARN_V
 from robot.port.usb import Diagnosis, check_port, find_port, list_ports
 
 LISTEN_S = 0.5
-FRAMES_PER_S = 45.0  # a base says 50; fewer are lost on the way
+FRAMES_PER_S = 45.0  # a base sends 50; some may be lost
 
 CURES = {
     "bump": "Something presses its bumper. Make room around it.",
     "cliff": "Its floor sensors see no floor. Put it down; wipe the sensors below it.",
     "wheel_drop": "A wheel hangs in the air. Put it down.",
     "over_current": "A wheel is blocked. Switch it off and look at the wheels.",
-    "firmware_unknown": "It does not tell its firmware. Switch it off and on.",
+    "firmware_unknown": "It does not report its firmware. Switch it off and on.",
     "firmware_refused": "Its firmware is not of version 1. Update it (1.2.0) before it drives.",
 }
 

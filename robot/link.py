@@ -31,8 +31,8 @@ from robot.wire.limits import MAX_FRAME_BYTES
 
 Message = dict[str, Any]
 
-# Close code: what to do, for a server that does not say it itself. Dialing in again as it is would
-# not help; after 4009 it would throw the newer socket out, which would dial in again, and so on.
+# Close code: the cure, for a server that does not name one. Dialing in again unchanged would not
+# help; after 4009 it would close the newer socket, which would dial in again, and so on.
 REFUSALS: dict[int, str] = {
     CloseCode.UNAUTHORIZED: (
         "The token is missing, wrong or revoked. Make a new one for this device in the admin."
@@ -50,7 +50,8 @@ REFUSALS: dict[int, str] = {
     CloseCode.BUSY: "The session has another source or robot. Stop that one first.",
     CloseCode.ENDED: "The session has ended.",
 }
-# After these the server, or what we send, is in trouble that a quick return would make worse.
+# After these the pause is not reset to the shortest: the server, or what we send, is at fault, and
+# a quick reconnection would make it worse.
 _TROUBLE = frozenset({CloseCode.NOT_STORED, CloseCode.TOO_MANY, 1002, 1003, 1007, 1009})
 
 # Handshakes that are refused by a status instead of a close code.
@@ -63,7 +64,7 @@ _PASSING_STATUSES = frozenset({408, 425, 429})
 
 
 class LinkRefused(Exception):
-    """The server will not have this client as it is; the message says what to do.
+    """The server refuses this client; the message says what to do.
 
     ``code`` is a close code of docs/protocol.md.
     """
@@ -95,7 +96,7 @@ class Timing:
 class BackOff:
     """The pauses [s] between attempts: each twice as long as the one before, up to a longest.
 
-    ``jitter`` gives numbers in [0, 1) and shortens a pause by up to half of it, so that a thousand
+    ``jitter`` returns numbers in [0, 1) and shortens a pause by up to half, so that a thousand
     clients of a server that restarts do not come back at once.
     """
 
@@ -132,12 +133,12 @@ class Link:
         Returns the first message of each connection.
     on_lost
         Called with a reason and the pause before the next attempt [s], each time a connection is
-        lost and each time none comes about. A robot stops here.
+        lost or cannot be made. A robot stops here.
     timing, jitter, sleep
         How long to wait; where chance comes from, in [0, 1); how to pause between attempts.
 
-    Iterating raises ``LinkRefused`` where dialing in again as it is would not help, and ends after
-    ``close``. One task iterates; any may send.
+    Iterating raises ``LinkRefused`` where dialing in again unchanged would not help, and ends after
+    ``close``. One task iterates; any task may send.
     """
 
     def __init__(
@@ -160,7 +161,7 @@ class Link:
         self._back_off = BackOff(timing.retry_first_s, timing.retry_longest_s, jitter)
         self._socket: ClientConnection | None = None
         self._is_closed = False
-        self._was_welcome = False  # ever: a server that once was there is worth waiting for
+        self._was_welcome = False  # ever: then a failure is likely to pass
         self._was_heard = False  # on this connection
         self._error = ""  # the last one that the server sent on this connection
 
@@ -227,9 +228,9 @@ class Link:
         return False
 
     def hang_up(self) -> None:
-        """Abort the connection, with all that is still on its way; iterating connects again.
+        """Abort the connection, with what is still unsent; iterating connects again.
 
-        For callers that expect signs of life more often than pings.
+        For callers that expect messages more often than pings.
         """
         socket, self._socket = self._socket, None
         if socket is not None:
@@ -258,7 +259,7 @@ class Link:
             self.url,
             additional_headers={"Authorization": f"Bearer {self._token}"},
             user_agent_header="GARRY",
-            compression=None,  # frames are small; packing them would only cost time
+            compression=None,  # frames are small; compression would only cost time
             proxy=None if loopback else True,
             max_size=MAX_FRAME_BYTES,
             open_timeout=timing.connect_within_s,
@@ -267,7 +268,7 @@ class Link:
             close_timeout=timing.close_within_s,
         )
         self._error, self._was_heard = "", False
-        # A server that refuses us may have closed already: then its reason is still to be read.
+        # A server that refuses us may have closed already; iterating then reads its reason.
         with suppress(ConnectionClosed):
             await socket.send(json.dumps(self._greet(), allow_nan=False))
         if self._is_closed:
@@ -295,15 +296,15 @@ class Link:
     def _explain(self, closed: ConnectionClosed) -> str:
         """Return why a connection ended. Raises LinkRefused where trying again is useless."""
         code = 1006 if closed.rcvd is None else closed.rcvd.code
-        said = self._error or ("" if closed.rcvd is None else closed.rcvd.reason)
+        reason = self._error or ("" if closed.rcvd is None else closed.rcvd.reason)
         if code in REFUSALS:
-            raise LinkRefused(code, said or REFUSALS[code]) from closed
+            raise LinkRefused(code, reason or REFUSALS[code]) from closed
         if self._was_heard and code not in _TROUBLE:
             self._back_off.reset()
         if closed.rcvd is None:
             silent = closed.sent is not None and closed.sent.code == 1011
             return "The server does not answer" if silent else "The connection broke"
-        return f"The server closed the connection ({code}{': ' if said else ''}{said})"
+        return f"The server closed the connection ({code}{': ' if reason else ''}{reason})"
 
     def _explain_failure(self, problem: OSError | WebSocketException) -> str:
         """Return why there is no connection. Raises LinkRefused where trying again is useless."""
@@ -317,7 +318,7 @@ class Link:
             status = problem.response.status_code
             code = _STATUS_CODES.get(status, CloseCode.NOT_PROTOCOL)
             fatal = status < 500 and status not in _PASSING_STATUSES
-            # A proxy may answer 404 while the server behind it restarts, but nobody else gives 401.
+            # A proxy may answer 404 while the server restarts, but only the server answers 401.
             if fatal and (code == CloseCode.UNAUTHORIZED or not self._was_welcome):
                 cure = REFUSALS[code] if status in _STATUS_CODES else "Check the address."
                 raise LinkRefused(code, f"{self.url} answers with HTTP {status}. {cure}")

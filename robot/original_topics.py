@@ -1,7 +1,7 @@
 """The topics of the original GARRY, published beside any base, so that its ROS nodes keep working.
 
-Types and values are those that its nodes of 2024 expect (docs/reference/original.md#robot). What an
-event is, a step or a window, is published at once or never; the feedback type is what holds, and is
+Types and values are those that its nodes of 2024 expect (docs/reference/original.md#robot). Events,
+which are steps and windows, are published at once or never; the feedback type is a state, and is
 published again on every connection.
 """
 
@@ -36,7 +36,7 @@ GOOD_STEP = Topic("/garry/good_step", BOOL)
 DATA = Topic("/garry/data", "garry_ros/UserData")
 TOPICS = {"feedback_type": FEEDBACK_TYPE, "good_step": GOOD_STEP, "data": DATA}
 
-# Letter for letter: gesture_generation.py compares them so.
+# Exactly as gesture_generation.py compares them.
 FEEDBACK_TYPES = {
     "positive": "Positive",
     "negative": "Negative",
@@ -46,14 +46,14 @@ FEEDBACK_TYPES = {
 # data_processing.py sends no good_step in the others, and gesture_generation.py would celebrate it.
 WITH_GOOD_STEP = ("positive", "binary")
 
-FRESH_S = 1.0  # an event that could not be sent so long is past
+FRESH_S = 1.0  # an event that could not be sent for this long is dropped
 KEPT = 8
-LATE_S = 2.0  # what has not come back by then has not arrived
+LATE_S = 2.0  # a message without an echo by then has not arrived
 NUMBER_MAX = 1e6
 
 
 class OriginalTopicClient:
-    """What is published on the original's topics. Time is a parameter.
+    """Publishes on the original's topics. Time is a parameter.
 
     Parameters
     ----------
@@ -64,13 +64,13 @@ class OriginalTopicClient:
     def __init__(self, names: Collection[str]) -> None:
         self._topics = [TOPICS[name] for name in names]
         self._valence = ""
-        self._told = ""  # the feedback type, on this connection
+        self._published = ""  # the feedback type, on this connection
         self._events: deque[tuple[float, Topic, Mapping[str, Any]]] = deque(maxlen=KEPT)
-        self._out: dict[str, float] = {}  # topic: since when what was sent has not come back
+        self._unconfirmed: dict[str, float] = {}  # topic: since when its echo is missing
         self._is_open = False
 
-    def follow(self, message: Mapping[str, Any], now_s: float) -> None:
-        """Handle a message of the server; what it does not hold is not published."""
+    def handle_message(self, message: Mapping[str, Any], now_s: float) -> None:
+        """Handle a message of the server; a step without finite numbers is not published."""
         match message:
             case {"type": "welcome" | "cue", "valence": str(valence)}:
                 self._valence = valence
@@ -82,14 +82,14 @@ class OriginalTopicClient:
                     )
                     self._add(now_s, DATA, {"a2": a2, "goal": goal})
 
-    def decide(self, above: bool, now_s: float) -> None:
+    def publish_decision(self, above: bool, now_s: float) -> None:
         """Publish a decision: whether the window was above."""
         if self._valence in WITH_GOOD_STEP:
             self._add(now_s, GOOD_STEP, {"data": above})
 
     def open(self, now_s: float) -> Iterator[Frame]:
         """Yield the first frames of a new connection."""
-        self.lose(now_s)
+        self.disconnect(now_s)
         self._is_open = True
         for topic in self._topics:
             yield advertise(topic, latch=topic is FEEDBACK_TYPE)
@@ -97,25 +97,25 @@ class OriginalTopicClient:
 
     def due(self, now_s: float) -> Iterator[Frame]:
         """Yield the frames to send now."""
-        told = FEEDBACK_TYPES.get(self._valence, "")
-        if FEEDBACK_TYPE in self._topics and told and told != self._told:
-            self._told = told
-            yield self._publish(FEEDBACK_TYPE, {"data": told}, now_s)
+        feedback_type = FEEDBACK_TYPES.get(self._valence, "")
+        if FEEDBACK_TYPE in self._topics and feedback_type and feedback_type != self._published:
+            self._published = feedback_type
+            yield self._publish(FEEDBACK_TYPE, {"data": feedback_type}, now_s)
         while self._events:
             made_s, topic, message = self._events.popleft()
             if now_s - made_s <= FRESH_S:
                 yield self._publish(topic, message, now_s)
 
-    def hear(self, heard: Incoming, now_s: float) -> None:
-        """Store what has come back."""
-        if isinstance(heard, Publication):
-            self._out.pop(heard.topic, None)
+    def handle(self, incoming: Incoming, now_s: float) -> None:
+        """Confirm a message by its echo."""
+        if isinstance(incoming, Publication):
+            self._unconfirmed.pop(incoming.topic, None)
 
-    def lose(self, now_s: float) -> None:
-        """Drop what was to be sent: it is out of date when there is a connection again."""
-        self._is_open, self._told = False, ""
+    def disconnect(self, now_s: float) -> None:
+        """Drop what was to be sent: it would be out of date on the next connection."""
+        self._is_open, self._published = False, ""
         self._events.clear()
-        self._out.clear()
+        self._unconfirmed.clear()
 
     def end(self, now_s: float) -> Iterator[Frame]:
         """Yield the last frames."""
@@ -124,9 +124,9 @@ class OriginalTopicClient:
             yield unadvertise(topic)
 
     def problem(self, now_s: float) -> str:
-        """Return what does not arrive; empty where all does."""
+        """Return which topic does not arrive; empty where all do."""
         for topic in self._topics:
-            if now_s - self._out.get(topic.name, math.inf) > LATE_S:
+            if now_s - self._unconfirmed.get(topic.name, math.inf) > LATE_S:
                 cure = "; build the package garry_ros there" if topic is DATA else ""
                 return (
                     f"Nothing that is sent on {topic.name} comes back. Its type has to be "
@@ -139,12 +139,12 @@ class OriginalTopicClient:
             self._events.append((now_s, topic, message))
 
     def _publish(self, topic: Topic, message: Mapping[str, Any], now_s: float) -> Frame:
-        self._out.setdefault(topic.name, now_s)
+        self._unconfirmed.setdefault(topic.name, now_s)
         return publish(topic, message)
 
 
 class OriginalTopics:
-    """The same at a rosbridge, on its own connection, while it is open as a context manager."""
+    """An ``OriginalTopicClient`` with a connection of its own, while open as a context manager."""
 
     def __init__(
         self,
@@ -167,28 +167,28 @@ class OriginalTopics:
         problem: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Hang up."""
+        """Close the connection."""
         if self._bridge is not None:
             self._bridge.close()
 
     @property
     def problem(self) -> str:
-        """Return why nothing arrives; empty where all does."""
+        """Why messages do not arrive; empty where they do."""
         if self._bridge is None:
             return ""
         with self._lock:
             return self._bridge.problem or self._client.problem(self._monotonic())
 
-    def follow(self, message: Mapping[str, Any]) -> None:
-        """Publish what a message of the server tells."""
+    def handle_message(self, message: Mapping[str, Any]) -> None:
+        """Publish the data of a message of the server."""
         with self._lock:
-            self._client.follow(message, self._monotonic())
+            self._client.handle_message(message, self._monotonic())
         self._wake()
 
-    def decide(self, above: bool) -> None:
-        """Publish what a window came to."""
+    def publish_decision(self, above: bool) -> None:
+        """Publish a decision: whether the window was above."""
         with self._lock:
-            self._client.decide(above, self._monotonic())
+            self._client.publish_decision(above, self._monotonic())
         self._wake()
 
     def _wake(self) -> None:

@@ -25,11 +25,11 @@ from robot.motion.limits import TICK_S
 from robot.motion.player import DONE
 from robot.motion.pose import HOME
 
-REST_S = 0.3  # until wheels, odometry and truth have come to rest
+REST_S = 0.3  # until wheels, odometry and true pose have come to rest
 
 
 class VirtualClock:
-    """A clock that only sleeping moves."""
+    """A clock that only ``sleep`` advances."""
 
     def __init__(self) -> None:
         self.now_s = 0.0
@@ -39,7 +39,7 @@ class VirtualClock:
         return self.now_s
 
     def sleep(self, span_s: float) -> None:
-        """Let time pass [s]."""
+        """Advance the clock by a span [s]."""
         self.now_s += span_s
 
 

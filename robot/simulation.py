@@ -40,7 +40,7 @@ class Simulation:
     gestures
         Its gestures: name, start and end on the virtual clock [s], outcome.
 
-    Raises ValueError for a base that is not simulated, and for a cue that no robot would take.
+    Raises ValueError for a base that is not simulated, and for an invalid cue.
     """
 
     def __init__(self, base: str, cue: Mapping[str, Any], limits: Limits = DEFAULT_LIMITS) -> None:
@@ -50,7 +50,7 @@ class Simulation:
         if not robot.abilities.simulated or robot.abilities.real_time:
             raise ValueError(f"The base {base} is no simulation that keeps to a clock of ours.")
         self._performer = Performer(robot, limits)
-        self._hear({"type": "welcome", "session": 0, "state": "running", "cue": cue})
+        self._handle({"type": "welcome", "session": 0, "state": "running", "cue": cue})
         if not self._performer.is_linked:
             raise ValueError(self._performer.last_bad_message)
         self.decisions: list[dict[str, Any]] = []
@@ -66,18 +66,18 @@ class Simulation:
         for time_s, performance in steps:
             if self._source_s is None:
                 self._now_s = self._source_s = time_s
-            self._let_pass(max(0.0, time_s - self._source_s))
+            self._advance(max(0.0, time_s - self._source_s))
             self._source_s = time_s
-            self._hear({"type": "step", "time_s": time_s, "performance": performance})
+            self._handle({"type": "step", "time_s": time_s, "performance": performance})
             self._collect()
         while self._performer.player.is_busy:
-            self._let_pass(TICK_S)
+            self._advance(TICK_S)
 
-    def _hear(self, message: Mapping[str, Any]) -> None:
+    def _handle(self, message: Mapping[str, Any]) -> None:
         self._performer.handle(message, self._now_s)
 
-    def _let_pass(self, span_s: float) -> None:
-        """Let time go by [s]; while nothing moves, in one step."""
+    def _advance(self, span_s: float) -> None:
+        """Advance the clock by a span [s]; in one step while nothing moves."""
         until_s = self._now_s + span_s
         player = self._performer.player
         for pause_s in control_loop(
@@ -87,13 +87,13 @@ class Simulation:
         ):
             self._collect()
             self._now_s = min(self._now_s + pause_s, until_s)
-            self._hear({"type": "heartbeat"})
+            self._handle({"type": "heartbeat"})
         self._collect()
         self._now_s = max(self._now_s, until_s)
-        self._hear({"type": "heartbeat"})
+        self._handle({"type": "heartbeat"})
 
     def _collect(self) -> None:
-        """Sort the robot's new reports."""
+        """Store the robot's new decisions and gestures."""
         reports = self._performer.reports
         while reports:
             report = reports.popleft()

@@ -22,15 +22,15 @@ class Worker:
     Parameters
     ----------
     dial
-        Makes the link, given ``greet`` and ``on_lost`` by name.
+        Returns the link, given ``greet`` and ``on_lost`` by name.
     base
         An open base.
     limits
         Speeds and accelerations of every gesture.
     originals
-        What publishes on the original's topics; open.
+        Publishes on the original's topics; open.
     notice
-        Called with what people who watch should know.
+        Called with lines for people who watch.
     monotonic, sleep
         Our clock [s], and how to wait by it.
     """
@@ -47,7 +47,7 @@ class Worker:
         sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
     ) -> None:
         self.performer = Performer(base, limits)
-        self._link = dial(greet=self._greet, on_lost=self._lose)
+        self._link = dial(greet=self._greet, on_lost=self._handle_lost_link)
         self._base, self._originals = base, originals
         self._notice = notice
         self._monotonic = monotonic
@@ -57,7 +57,7 @@ class Worker:
     async def run(self) -> None:
         """Perform until cancelled. The base stands still afterwards, however it ends.
 
-        Raises LinkRefused where the server will not have this robot, and BaseLost.
+        Raises LinkRefused where the server refuses this robot, and BaseLost.
         """
         work: list[Coroutine[Any, Any, None]] = [self._listen(), self._drive(), self._report()]
         tasks = [asyncio.create_task(one) for one in work]
@@ -75,7 +75,7 @@ class Worker:
     def _greet(self) -> Message:
         return {"type": "hello", "version": 1, "base": self._base.name}
 
-    def _lose(self, reason: str, pause_s: float) -> None:
+    def _handle_lost_link(self, reason: str, pause_s: float) -> None:
         self.performer.disconnect(NO_LINK)
         self._notice(f"{reason}; standing still, dialing in again in {pause_s:.1f} s.")
 
@@ -83,26 +83,26 @@ class Worker:
         while True:
             try:
                 async for message in self._link:
-                    self._hear(message)
+                    self._handle_message(message)
                 return
             except LinkRefused as refusal:
-                # What a server that has welcomed us does not understand, or breaks, does not end
-                # the work. Where it hung up over that, the link is lost like any other.
+                # A server that has welcomed us and then breaks the protocol does not end the work.
+                # Where it closed the connection over that, the link is lost like any other.
                 if refusal.code != CloseCode.NOT_PROTOCOL or not self.performer.is_linked:
                     raise
                 self.performer.count_bad_message(str(refusal))
                 if not self._link.is_open:
                     await self._link.pause(str(refusal))
 
-    def _hear(self, message: Message) -> None:
+    def _handle_message(self, message: Message) -> None:
         was_linked, bad = self.performer.is_linked, self.performer.bad_messages
         decided = self.performer.decision
         self.performer.handle(message, self._monotonic())
         if self._originals is not None:
-            self._originals.follow(message)
+            self._originals.handle_message(message)
             decision = self.performer.decision
             if decision is not None and decision is not decided:
-                self._originals.decide(decision.above)
+                self._originals.publish_decision(decision.above)
         if self.performer.is_linked and not was_linked:
             self._notice(f"Joined session {message.get('session')}.")
         if self.performer.bad_messages > bad:
@@ -114,7 +114,7 @@ class Worker:
         was_linked = False
         for pause_s in control_loop(self.performer, self._monotonic):
             if was_linked and not self.performer.is_linked:
-                # What is still on its way would come too late.
+                # Messages that are still on their way would come too late.
                 self._notice("The server is silent; standing still, dialing in again.")
                 self._link.hang_up()
             if self.performer.reports:
@@ -136,7 +136,7 @@ class Worker:
             while reports:
                 report = reports[0]
                 sent = await self._link.send({"type": "report", "report": report})
-                # How a gesture ended is told as soon as the link is back; where the base was, not.
+                # A gesture's end is reported once the link is back; an old status is dropped.
                 if not sent and report["kind"] != "status":
                     break
                 if reports and reports[0] is report:

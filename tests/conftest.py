@@ -65,7 +65,7 @@ def pytest_unconfigure() -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
-    """Give a database test its clock, its module's fixtures too."""
+    """Return a database test its clock, its module's fixtures too."""
     with nullcontext() if clock.has_real_clock(item) else clock.started():
         return (yield)
 

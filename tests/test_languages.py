@@ -32,7 +32,7 @@ def entries() -> Iterator[polib.POEntry]:
 
 
 def forms(entry: polib.POEntry) -> list[str]:
-    """Give a translation; of a count, one for each number."""
+    """Return a translation; of a count, one for each number."""
     if not entry.msgid_plural:
         return [entry.msgstr]
     return [entry.msgstr_plural.get(index, "") for index in range(2)]

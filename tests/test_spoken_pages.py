@@ -60,7 +60,7 @@ class Pseudo(gettext.NullTranslations):
 
 
 def unmarked(text: str) -> str:
-    """Give what stands outside of brackets, which may stand in each other."""
+    """Return what stands outside of brackets, which may stand in each other."""
     while (shorter := re.sub(r"⟦[^⟦⟧]*⟧", "", text)) != text:
         text = shorter
     return AS_IT_IS.sub("", text)
@@ -135,7 +135,7 @@ def bracketed(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def paths(world: World, admin: bool) -> Iterator[tuple[str, str]]:
-    """Give the pages of one clinic, by name."""
+    """Return the pages of one clinic, by name."""
     keys = {"patient_id": [world.patient.pk]}
     keys["session_id"] = list(
         TrainingSession.everywhere.filter(patient=world.patient).values_list("pk", flat=True)

@@ -1,4 +1,4 @@
-"""Admin of leaderboards: one form, and beside it the board as a patient would see it."""
+"""Admin of leaderboards: a form with a preview of the board as a patient would see it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
 
-MAX_SEEN_AS = 60  # patients as whom a preview can be seen, those who walked last first
+MAX_SEEN_AS = 60  # patients that the preview offers as viewers, the latest to walk first
 
 
 @admin.register(Leaderboard)
@@ -42,7 +42,7 @@ class LeaderboardAdmin(PreviewAdmin):
     list_filter = ("active", "occasion", "among", "metric")
     search_fields = ("name",)
     radio_fields = dict.fromkeys(
-        ("among", "types", "entry", "period", "occasion", "display", "names", "ties"),
+        ("among", "types", "aggregation", "period", "occasion", "display", "names", "ties"),
         admin.HORIZONTAL,
     )
     fieldsets = (
@@ -54,7 +54,7 @@ class LeaderboardAdmin(PreviewAdmin):
                     "among",
                     "group",
                     "metric",
-                    "entry",
+                    "aggregation",
                     "mean_of",
                     "types",
                     "valences",
@@ -116,36 +116,36 @@ class LeaderboardAdmin(PreviewAdmin):
     def get_changeform_initial_data(self, request: HttpRequest) -> dict[str, Any]:
         """Return initial values that can be saved as they are."""
         if user_of(request).role == Role.HOST:
-            return {"among": Participants.ACROSS, "entry": Aggregation.BEST}
+            return {"among": Participants.ACROSS, "aggregation": Aggregation.BEST}
         return {}
 
     def render_change_form(
         self, request: HttpRequest, context: dict[str, Any], *args: Any, **kwargs: Any
     ) -> HttpResponse:
-        """Show the form, and beside it the patients as whom the preview can be seen."""
-        context["seen_as"] = self._walkers(request)[:MAX_SEEN_AS]
+        """Show the form, with the patients that the preview offers as viewers."""
+        context["seen_as"] = self._patients_who_walked(request)[:MAX_SEEN_AS]
         board: Leaderboard | None = kwargs.get("obj")
         context["built"] = None if board is None else entries.measure_progress(board)
         return super().render_change_form(request, context, *args, **kwargs)
 
     def render_preview(self, request: HttpRequest, row: Leaderboard | None) -> HttpResponse:
         """Show the board, computed from the clinic's own sessions."""
-        given = request.GET.copy()
-        given["name"] = given.get("name", "").strip() or gettext("Leaderboard")
-        form = self.get_form(request, row, change=row is not None)(given, instance=row)
+        data = request.GET.copy()
+        data["name"] = data.get("name", "").strip() or gettext("Leaderboard")
+        form = self.get_form(request, row, change=row is not None)(data, instance=row)
         if not form.is_valid():
-            faults = list(iter_form_errors(form))
-            return render(request, "boards/preview_faults.html", {"faults": faults})
+            errors = list(iter_form_errors(form))
+            return render(request, "boards/preview_errors.html", {"errors": errors})
         if form.instance.clinic_id is None:
-            fault = gettext(
+            error = gettext(
                 "It is made of patients, whom a host does not see. Clinics see it on tablets."
             )
-            return render(request, "boards/preview_faults.html", {"faults": [("", fault)]})
+            return render(request, "boards/preview_errors.html", {"errors": [("", error)]})
         board = self._viewer(request, form.instance).make_panel()
         return render(request, "boards/scores.html", {"boards": [board], "ranked": True})
 
     def _viewer(self, request: HttpRequest, board: Leaderboard) -> BoardViewer:
-        """Return who sees the preview: a patient after the newest session, or anybody."""
+        """Return the viewer of the preview: a patient after the newest session, or anybody."""
         now = timezone.now()
         anybody = BoardViewer(board, now, results=self._compute(request, board, now))
         if board.occasion == Occasion.WAITING:
@@ -155,7 +155,7 @@ class LeaderboardAdmin(PreviewAdmin):
         )
         newest = finished.order_by("simulated", "-started_at")
         chosen = request.GET.get("seen_as", "")
-        walkers = self._walkers(request)
+        walkers = self._patients_who_walked(request)
         if chosen.isdecimal():
             patient = walkers.filter(pk=chosen).first()
         else:  # a patient who sees the board itself, where there is one
@@ -177,7 +177,7 @@ class LeaderboardAdmin(PreviewAdmin):
             return None
         return [] if board.is_own else list(read_results(board, now))
 
-    def _walkers(self, request: HttpRequest) -> QuerySet[Patient]:
+    def _patients_who_walked(self, request: HttpRequest) -> QuerySet[Patient]:
         """Return the patients who have walked, those who agreed to boards first."""
         walked = Patient.objects.visible_to(request.user).filter(
             sessions__state=State.FINISHED.value

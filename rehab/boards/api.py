@@ -1,4 +1,4 @@
-"""Calls about leaderboards: which there are, and what a patient would see on them."""
+"""API calls about leaderboards: their settings, and what a patient would see on them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class BoardOut(Schema):
     active: bool
     among: str
     metric: str
-    entry: str
+    aggregation: str
     types: str
     period: str
     display: str
@@ -63,15 +63,15 @@ class BoardPanelOut(Schema):
 
 @router.get("/boards", response=responses(Page[BoardOut]))
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
-def list_boards(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
+def list_boards(request: HttpRequest, paging: Query[Paging]) -> dict[str, Any]:
     """List the clinic's leaderboards."""
-    return paginate(Leaderboard.objects.visible_to(caller(request)).order_by("pk"), wanted)
+    return paginate(Leaderboard.objects.visible_to(caller(request)).order_by("pk"), paging)
 
 
 @router.get("/boards/{board_id}/rows", response=responses(BoardPanelOut, 404))
 @for_roles(Role.LEAD, Role.PT)
 def show_board(request: HttpRequest, board_id: Path[Key]) -> BoardPanel:
-    """Show a board as it is for anybody, with the patients who agreed to be on it."""
+    """Show a board as tablets show it to anybody, with the patients who agreed to be on it."""
     boards = Leaderboard.objects.visible_to(caller(request)).select_related("clinic")
     return BoardViewer(get_object_or_404(boards, pk=board_id), timezone.now()).make_panel()
 

@@ -1,4 +1,4 @@
-"""What can be chosen of a leaderboard: whom it compares, by what, over which time, how shown."""
+"""The choices of a leaderboard's settings."""
 
 from __future__ import annotations
 

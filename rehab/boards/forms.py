@@ -1,4 +1,4 @@
-"""The form that a leaderboard is built in."""
+"""The form of a leaderboard."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rehab.boards.choices import Participants
 from rehab.people.web.admin_base import ClinicForm
 from rehab.training.valences import VALENCES
 
-MAX_GROUP = 1_000  # the preview's address names each; servers refuse addresses beyond 16 kB
+MAX_GROUP = 1_000  # the preview's URL contains each key; servers refuse URLs beyond 16 kB
 
 
 class LeaderboardForm(ClinicForm):

@@ -31,7 +31,7 @@ from rehab.training.valences import VALENCES
 DISPLAY_FIELDS = frozenset(
     {
         "name",
-        "display",  # its part in who may be on the board is `accepted_levels`
+        "display",  # what it changes about eligibility is in `accepted_levels`
         "top_n",
         "total_goal",
         "show_ranks",
@@ -82,7 +82,7 @@ class Leaderboard(ClinicModel):
         _("measure"), max_length=32, choices=metric_choices(), default="hit_rate"
     )
     higher_is_better = models.BooleanField(_("higher is better"), default=True)
-    entry = models.CharField(
+    aggregation = models.CharField(
         _("a row is"), max_length=16, choices=Aggregation.choices, default=Aggregation.EACH
     )
     mean_of = models.PositiveSmallIntegerField(
@@ -251,7 +251,7 @@ class BoardEntry(ScopedModel):
 
     scope = Scope(clinic="patient__clinic")
 
-    # No index of their own: those of the model begin with these columns.
+    # No index for these columns alone: the composite ones below begin with them.
     board = models.ForeignKey(
         Leaderboard, on_delete=models.CASCADE, related_name="entries", db_index=False
     )
@@ -282,7 +282,7 @@ class BoardEntry(ScopedModel):
 class BoardCount(ScopedModel):
     """How many rows of a board have one figure.
 
-    Ranks are sums of these, so that no look at a board counts its rows.
+    Ranks are sums of these, so that no page counts the rows of a board.
     """
 
     scope = Scope(clinic="board__clinic")

@@ -1,4 +1,4 @@
-"""Updates boards when rows change that they depend on: signal receivers."""
+"""Signal receivers that update boards when rows change that they depend on."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def connect_receivers() -> None:
 
 
 def unless_restored(receiver: Callable[..., None]) -> Callable[..., None]:
-    """Ignore rows that a backup restores: the rows of their boards are restored too."""
+    """Skip a receiver while a backup is restored, since boards are restored with it."""
 
     @wraps(receiver)
     def receive(instance: Model, raw: bool = False, **signal: Any) -> None:
@@ -65,8 +65,8 @@ def on_figures(sessions: set[int], **_signal: Any) -> None:
             entries.refresh_patients(patients, now=now)
     except Exception:
         log.exception(
-            "Boards did not follow sessions %s. They are built anew; if they stay away, run "
-            "manage.py rebuildboards",
+            "Boards could not be updated after sessions %s. They are rebuilt in the background; if "
+            "that fails too, run manage.py rebuildboards",
             sessions,
         )
         transaction.on_commit(partial(scheduler.rebuild_after_failure, patients, now), robust=True)

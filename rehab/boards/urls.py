@@ -1,4 +1,4 @@
-"""Addresses of scores and boards."""
+"""URLs of scores and boards."""
 
 from django.urls import path
 

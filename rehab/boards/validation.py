@@ -1,4 +1,4 @@
-"""Which settings of a board are refused: those that would mislead or expose somebody."""
+"""Validation of a board's settings: what would mislead or expose somebody is refused."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class BoardSettings(Protocol):
     valences: Any
     metric: str
     tie_breaker: str
-    entry: str
+    aggregation: str
     display: str
     names: str
     occasion: str
@@ -102,22 +102,25 @@ def _check_days(board: BoardSettings) -> Iterator[tuple[str, str]]:
 
 def _check_rows(board: BoardSettings) -> Iterator[tuple[str, str]]:
     if board.is_own:
-        if board.entry != Aggregation.EACH:
-            yield "entry", _("A board of own sessions shows each of them. Choose “Each session”.")
+        if board.aggregation != Aggregation.EACH:
+            yield (
+                "aggregation",
+                _("A board of own sessions shows each of them. Choose “Each session”."),
+            )
         if board.metric in COUNTING_METRICS:
             yield "metric", _("This says nothing of a single session. Compare with other patients.")
         if board.display == DisplayMode.TOTAL:
             yield "display", _("A total is reached together. Compare with other patients.")
         return
-    if board.entry == Aggregation.EACH:
-        yield "entry", _("A board of several patients shows one row for each of them.")
-    elif board.entry == Aggregation.SUM:
+    if board.aggregation == Aggregation.EACH:
+        yield "aggregation", _("A board of several patients shows one row for each of them.")
+    elif board.aggregation == Aggregation.SUM:
         if board.metric not in SUMMABLE_METRICS:
-            yield "entry", _("This cannot be added up. Choose best, latest or mean.")
+            yield "aggregation", _("This cannot be added up. Choose best, latest or mean.")
     elif board.metric in COUNTING_METRICS:
-        yield "entry", _("This is counted over the period. Choose the sum.")
+        yield "aggregation", _("This is counted over the period. Choose the sum.")
     elif board.display == DisplayMode.TOTAL:
-        yield "entry", _("A total adds up what all have reached. Choose the sum.")
+        yield "aggregation", _("A total adds up what all have reached. Choose the sum.")
 
 
 def _check_display(board: BoardSettings) -> Iterator[tuple[str, str]]:

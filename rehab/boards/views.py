@@ -1,4 +1,4 @@
-"""What a patient sees after a session: how it compares with the earlier ones, and with others."""
+"""Pages of scores: a session compared with earlier ones and other patients; waiting boards."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rehab.people.web.language import activate_patient_language
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN_STATES, State
 
-SHOWN_S = 20  # for which a waiting tablet shows a board, before the next one
+ROTATION_S = 20  # for which a waiting tablet shows each board
 
 
 @for_roles(Role.LEAD, Role.PT, tablets=True)
@@ -29,7 +29,7 @@ SHOWN_S = 20  # for which a waiting tablet shows a board, before the next one
 def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
     """Show the boards of the clinic, and the own sessions with the one at hand marked.
 
-    An open session leads to its page. In a blinded study there is nothing to compare.
+    Redirects to the patient's page of an open session. Shows no boards in a blinded study.
     """
     session = find_session(request, session_id)
     activate_patient_language(session.patient)
@@ -70,7 +70,7 @@ def show_waiting_board(request: HttpRequest) -> HttpResponse:
     boards = make_waiting_panels(actor_of(request).clinic, now)
     if not boards:
         return HttpResponse(status=204)
-    turn = int(now.timestamp() // SHOWN_S) % len(boards)
+    turn = int(now.timestamp() // ROTATION_S) % len(boards)
     return render(request, "boards/waiting.html", {"board": boards[turn]})
 
 

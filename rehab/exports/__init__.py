@@ -1,0 +1,1 @@
+"""Exports of data, and backups of a whole installation."""

@@ -33,7 +33,7 @@ def write_zip(files: Files) -> Iterator[bytes]:
 
 
 def _join(chunks: Iterable[bytes]) -> Iterator[bytes]:
-    """Yield the same bytes in larger chunks: each costs a hop between threads and a frame."""
+    """Yield the same bytes in larger chunks, since each costs a thread switch and a frame."""
     parts: list[bytes] = []
     size = 0
     for chunk in chunks:
@@ -75,7 +75,7 @@ class ZipResponse(StreamingHttpResponse):
         )
 
     async def __aiter__(self) -> AsyncIterator[bytes]:
-        """Yield each part when the one before is sent, computed in the request's own thread."""
+        """Yield each part once the previous one is sent, computed in the request's thread."""
         parts: Any = self.streaming_content
         make_next = sync_to_async(lambda: next(parts, None))
         while (part := await make_next()) is not None:

@@ -26,7 +26,7 @@ from rehab.exports.encryption import decrypt, encrypt
 from rehab.people.models import User
 
 FORMAT = 1
-# What each installation creates itself, or what belongs to browsers of this one.
+# Rows that each installation creates itself, and those of this installation's browsers.
 EXCLUDED_MODELS = {
     "admin.logentry",  # refers to content types, which each installation numbers by itself
     "auth.permission",
@@ -36,7 +36,7 @@ EXCLUDED_MODELS = {
 }
 EXCLUDED_APPS = {"axes"}  # failed sign-ins of the last hours
 BATCH_ROWS = 2000  # rows held in memory
-GZIP = 31  # zlib's window and header for the gzip format
+GZIP_WBITS = 31  # makes zlib write the gzip format
 
 
 class CannotRestore(ValueError):
@@ -45,8 +45,8 @@ class CannotRestore(ValueError):
 
 def backup_models() -> list[type[models.Model]]:
     """Return the models of a backup, including those of many-to-many tables."""
-    every = apps.get_models(include_auto_created=True)
-    return sorted(filter(_is_included, every), key=lambda model: model._meta.label_lower)
+    candidates = apps.get_models(include_auto_created=True)
+    return sorted(filter(_is_included, candidates), key=lambda model: model._meta.label_lower)
 
 
 def _is_included(model: type[models.Model]) -> bool:
@@ -67,7 +67,7 @@ def tables_version() -> list[list[str]]:
 
 @contextmanager
 def consistent_read() -> Iterator[None]:
-    """See the database as it is now until the block ends, without blocking writers."""
+    """Read a consistent snapshot of the database in this block, without blocking writers."""
     if connection.in_atomic_block:
         yield
     elif connection.vendor == "postgresql":
@@ -85,7 +85,7 @@ def consistent_read() -> Iterator[None]:
 
 
 def write_backup(file: BinaryIO, recipients: Sequence[Recipient], now: datetime) -> dict[str, int]:
-    """Write everything into a file; return how many rows of each model."""
+    """Write a backup into a file; return the number of rows of each model."""
     counts: dict[str, int] = {}
     with consistent_read():
         encrypt(_compress(_lines(counts, now)), file, recipients)
@@ -94,22 +94,24 @@ def write_backup(file: BinaryIO, recipients: Sequence[Recipient], now: datetime)
 
 def _lines(counts: dict[str, int], now: datetime) -> Iterator[str]:
     """Yield the header, then every row. Counts are filled in."""
-    kept = backup_models()
-    counts.update({model._meta.label_lower: model._base_manager.count() for model in kept})
+    included_models = backup_models()
+    counts.update(
+        {model._meta.label_lower: model._base_manager.count() for model in included_models}
+    )
     header = {"format": FORMAT, "made_at": now.isoformat(), "tables": tables_version()}
     yield json.dumps(header | {"counts": counts}) + "\n"
-    for model in kept:
+    for model in included_models:
         names = [field.name for field in model._meta.concrete_fields]
         rows = model._base_manager.order_by("pk").iterator(chunk_size=BATCH_ROWS)
-        while some := list(islice(rows, BATCH_ROWS)):
-            yield serializers.serialize("jsonl", some, fields=names)
+        while batch := list(islice(rows, BATCH_ROWS)):
+            yield serializers.serialize("jsonl", batch, fields=names)
 
 
 def _compress(texts: Iterable[str]) -> Iterator[bytes]:
-    packer = zlib.compressobj(wbits=GZIP)
+    compressor = zlib.compressobj(wbits=GZIP_WBITS)
     for text in texts:
-        yield packer.compress(text.encode())
-    yield packer.flush()
+        yield compressor.compress(text.encode())
+    yield compressor.flush()
 
 
 def read_lines(file: BinaryIO, identities: Sequence[Identity]) -> Iterator[str]:
@@ -119,9 +121,9 @@ def read_lines(file: BinaryIO, identities: Sequence[Identity]) -> Iterator[str]:
 
 
 def restore_backup(file: BinaryIO, identities: Sequence[Identity]) -> dict[str, int]:
-    """Restore a backup into an installation that nobody has used; return the rows of each model.
+    """Restore a backup into an unused installation; return the number of rows of each model.
 
-    All of it or nothing. Raises CannotDecrypt and CannotRestore.
+    Restores all of it or nothing. Raises CannotDecrypt and CannotRestore.
     """
     if User.everywhere.exists():
         raise CannotRestore(
@@ -135,16 +137,16 @@ def restore_backup(file: BinaryIO, identities: Sequence[Identity]) -> dict[str, 
             f"The backup was made on {header['made_at'][:10]} by another version of GARRY. Install "
             "that version, restore, and then update."
         )
-    kept = backup_models()
+    included_models = backup_models()
     with transaction.atomic():
-        for model in kept:  # migrations have created measures and protocols
+        for model in included_models:  # migrations have created measures and protocols
             model._base_manager.all()._raw_delete(connection.alias)  # noqa: SLF001
         for row in serializers.deserialize("jsonl", lines):
             row.save(save_m2m=False, force_insert=True)
-        counts = {model._meta.label_lower: model._base_manager.count() for model in kept}
+        counts = {model._meta.label_lower: model._base_manager.count() for model in included_models}
         if counts != header["counts"]:
             raise CannotRestore("Rows are missing. Take another copy of the backup.")
         with connection.cursor() as cursor:
-            for statement in connection.ops.sequence_reset_sql(no_style(), kept):
+            for statement in connection.ops.sequence_reset_sql(no_style(), included_models):
                 cursor.execute(statement)
     return counts

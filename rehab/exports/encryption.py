@@ -1,6 +1,6 @@
-"""Backups are encrypted in the age format (age-encryption.org), which other programs open too.
+"""Encryption of backups in the age format (age-encryption.org), which other programs open too.
 
-They are encrypted to public keys, so that a machine that makes backups cannot read them.
+Backups are encrypted to public keys, so that a machine that makes them cannot read them.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from typing import Any, BinaryIO
 import pyrage
 from pyrage.x25519 import Identity, Recipient
 
-AGE = b"age-encryption.org/"
-OLD = b"GARRY sealed"  # of development versions before 2026-11-22
+AGE_MAGIC = b"age-encryption.org/"
+OLD_MAGIC = b"GARRY sealed"  # of development versions before 2026-11-22
 
 
 class InvalidKey(ValueError):
-    """A text that holds no key; the message says what is wanted."""
+    """Text that is not a valid key; the message says what a key looks like."""
 
 
 class CannotDecrypt(ValueError):
-    """A file that does not open; the message says what to look at."""
+    """A file that cannot be decrypted; the message says why, and what to do."""
 
 
 def generate_key() -> tuple[str, str]:
@@ -60,78 +60,80 @@ def read_identities(text: str) -> list[Identity]:
 
 
 def encrypt(chunks: Iterable[bytes], file: BinaryIO, recipients: Sequence[Recipient]) -> None:
-    """Write chunks into an encrypted file. What chunks or file raise is raised."""
-    held, more = bytearray(), iter(chunks)
+    """Write chunks into an encrypted file. Errors of ``chunks`` and ``file`` are passed on."""
+    buffer, remaining = bytearray(), iter(chunks)
 
     def read(size: int) -> bytes:
-        while len(held) < size and (chunk := next(more, None)) is not None:
-            held.extend(chunk)
-        part = bytes(held[:size])
-        del held[:size]
+        while len(buffer) < size and (chunk := next(remaining, None)) is not None:
+            buffer.extend(chunk)
+        part = bytes(buffer[:size])
+        del buffer[:size]
         return part
 
     problems: list[Exception] = []
-    reader = SimpleNamespace(read=_remembering(problems, read))
+    reader = SimpleNamespace(read=_recording_errors(problems, read))
     writer = SimpleNamespace(
-        write=_remembering(problems, file.write), flush=_remembering(problems, file.flush)
+        write=_recording_errors(problems, file.write), flush=_recording_errors(problems, file.flush)
     )
     try:
         pyrage.encrypt_io(reader, writer, recipients)
     except pyrage.EncryptError:
         if problems:
-            raise problems[0] from None  # pyrage tells it as text
+            raise problems[0] from None  # pyrage's own error has only its text
         raise
 
 
-def _remembering(problems: list[Exception], call: Callable[..., Any]) -> Callable[..., Any]:
-    def remember(*args: Any) -> Any:
+def _recording_errors(problems: list[Exception], call: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that also adds the exceptions of ``call`` to a list."""
+
+    def wrapped(*args: Any) -> Any:
         try:
             return call(*args)
         except Exception as problem:
             problems.append(problem)
             raise
 
-    return remember
+    return wrapped
 
 
 @contextmanager
 def decrypt(file: BinaryIO, identities: Sequence[Identity]) -> Iterator[BinaryIO]:
-    """Offer the content of an encrypted file as a stream, in constant memory.
+    """Provide the content of an encrypted file as a stream, in constant memory.
 
-    Raises CannotDecrypt, at the latest when the block ends: what was read until then is genuine,
-    but only the end tells that it was all.
+    Raises CannotDecrypt, at the latest at the end of the block: what was read before is genuine,
+    but a file that was cut off is only recognized at its end.
     """
-    head = file.read(len(AGE))
+    magic = file.read(len(AGE_MAGIC))
     file.seek(0)
-    if head.startswith(OLD):
+    if magic.startswith(OLD_MAGIC):
         raise CannotDecrypt(
             "It was made by a development version of GARRY from before 22 November 2026. Restore "
             "it with that version."
         )
-    if head != AGE:
+    if magic != AGE_MAGIC:
         raise CannotDecrypt("It is no backup of GARRY. Choose another file.")
     problems: list[Exception] = []
     read_end, write_end = os.pipe()
 
-    def work() -> None:
+    def decrypt_into_pipe() -> None:
         try:
             with os.fdopen(write_end, "wb") as pipe:
                 pyrage.decrypt_io(file, pipe, identities)
-        except Exception as problem:  # told to whoever reads
+        except Exception as problem:  # raised in the reader's thread, below
             problems.append(problem)
 
-    thread = threading.Thread(target=work, name="decrypt")
+    thread = threading.Thread(target=decrypt_into_pipe, name="decrypt")
     thread.start()
-    broken: Exception | None = None
+    read_error: Exception | None = None
     try:
         with os.fdopen(read_end, "rb") as pipe:
             yield pipe
     except (EOFError, OSError, zlib.error) as problem:  # compressed content that ends in the middle
-        broken = problem
+        read_error = problem
     finally:
         thread.join()
-    if problems or broken:
-        raise CannotDecrypt(_explain(problems[0] if problems else broken)) from broken
+    if problems or read_error:
+        raise CannotDecrypt(_explain(problems[0] if problems else read_error)) from read_error
 
 
 def _explain(problem: Exception | None) -> str:

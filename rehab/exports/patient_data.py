@@ -51,7 +51,7 @@ does.
 
 
 def patient_files(user: User, patient: Patient, now: datetime) -> Iterator[tuple[str, Any]]:
-    """Return everything stored of one patient, by name: for the patient and the therapists."""
+    """Return the files with everything stored of one patient, including the name."""
     title = gettext("Everything that GARRY keeps of %(patient)s") % {"patient": patient}
     # Translated now: the rest is written while it is sent, after the request's language has ended.
     readme = write_readme(title, list(FILES), now)
@@ -69,7 +69,7 @@ def _patient_tables(user: User, patient: Patient) -> Iterator[tuple[str, Any]]:
 
 
 def session_files(user: User, now: datetime) -> Iterator[tuple[str, Any]]:
-    """Return all sessions that a user may see, step by step, by pseudonyms."""
+    """Return the files of all sessions that a user may see, by pseudonyms."""
     sessions = TrainingSession.objects.visible_to(user)
     names = [name for name in FILES if not name.endswith(".json")]
     title = gettext("All sessions of %(clinic)s, by pseudonyms") % {"clinic": user.clinic}

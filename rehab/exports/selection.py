@@ -23,7 +23,7 @@ from rehab.sessions.replay import fold_log
 from rehab.training.fold import SessionFold
 from rehab.training.metrics import METRICS
 
-PAGE = 2_000  # rows held in memory
+PAGE_ROWS = 2_000  # rows held in memory
 SESSIONS_PAGE = 200
 STEP_FIELDS = (
     *("number", "time_s", "received_at", "side", "value", "gain", "shown", "goal", "performance"),
@@ -36,7 +36,7 @@ NUMBER, SIDE, REASONS, PHASE = (
 
 @dataclass(frozen=True)
 class Selection:
-    """Sessions that a user may see. ``named``: therapists and sources may be named."""
+    """Sessions that a user may see. ``named``: whether therapists and sources are named."""
 
     user: User
     sessions: QuerySet[TrainingSession]
@@ -59,8 +59,8 @@ class Selection:
         sessions = self.read_sessions()
         while page := list(islice(sessions, SESSIONS_PAGE)):
             metrics: dict[int, dict[str, float]] = {session.pk: {} for session in page}
-            found = SessionMetric.objects.visible_to(self.user).filter(session__in=list(metrics))
-            for key, slug, value in found.values_list("session_id", "slug", "value"):
+            rows = SessionMetric.objects.visible_to(self.user).filter(session__in=list(metrics))
+            for key, slug, value in rows.values_list("session_id", "slug", "value"):
                 metrics[key][slug] = value
             yield from ((session, metrics[session.pk]) for session in page)
 
@@ -144,7 +144,7 @@ class Selection:
 
 
 def _valence_switches(session: TrainingSession) -> list[tuple[int, str]]:
-    """Return after which step which valence was in force, the last one first."""
+    """Return the valences in force, the last one first, each with the step that it came after."""
     if not session.changed_to:
         return [(-1, session.valence)]
     switches = fold_log(SessionFold(session.to_plan()), session).switches
@@ -156,8 +156,8 @@ def _read_pages(rows: QuerySet[Any], names: Sequence[str], key: str) -> Iterator
     place, after = names.index(key), None
     while True:
         rest = rows if after is None else rows.filter(**{f"{key}__gt": after})
-        page = list(rest.values_list(*names)[:PAGE])
+        page = list(rest.values_list(*names)[:PAGE_ROWS])
         yield from page
-        if len(page) < PAGE:
+        if len(page) < PAGE_ROWS:
             return
         after = page[-1][place]

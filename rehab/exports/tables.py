@@ -1,4 +1,4 @@
-"""The tables that are exported: what each column means, and how values are written."""
+"""The tables of exports: the meaning of each column, and the format of values."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def codebook_rows() -> Iterator[tuple[str, ...]]:
 
 
 def format_cell(value: Any) -> Any:
-    """Return a value as it is written to a file: floats exact, text as no formula.
+    """Return a value as it is written to a file: floats exactly, text never as a formula.
 
     A text that a spreadsheet could take for a formula gets a ' before it, and so does one that
     begins with ': taking one ' off gives back the original.

@@ -61,7 +61,7 @@ def audit_export(request: HttpRequest, now: datetime, patient: Patient | None = 
     audit_log.record(
         Act.EXPORT,
         user_of(request),
-        patient=None if patient is None else patient.pk,
+        patient_id=None if patient is None else patient.pk,
         about=request.path,
         address=client_address(request),
         now=now,

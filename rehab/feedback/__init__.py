@@ -1,0 +1,1 @@
+"""The feedback types of a clinic: points, words, confetti and gestures for each valence."""

@@ -1,4 +1,4 @@
-"""Admin of feedback types: all four at once, and for each one form with what a patient will see."""
+"""Admin of feedback types: a list of all four, and a form with a preview for each."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from rehab.people.web.admin_base import ScopedOptions
 from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors
 from rehab.training.valences import BANDS_MAX, VALENCES
 
-READ = ("from_percent", "words", "confetti")
+READ_ONLY_FIELDS = ("from_percent", "words", "confetti")
 
 
-class BandRows(ScopedOptions, admin.TabularInline):
+class BandInline(ScopedOptions, admin.TabularInline):
     """A type's bands on its page."""
 
     model = FeedbackBand
@@ -41,13 +41,13 @@ class BandRows(ScopedOptions, admin.TabularInline):
     max_num = BANDS_MAX
 
     def get_extra(self, request: HttpRequest, obj: Any = None, **options: Any) -> int:
-        """Return the rows for the default bands of a type that has none of its own yet."""
+        """Return the number of default bands for a type that has none of its own yet."""
         default = None if obj and obj.pk else VALENCES.get(request.GET.get("slug", ""))
         return len(default.bands) if default else 0
 
     def get_fields(self, request: HttpRequest, obj: Any = None) -> Any:
         """Return a field for each language, or all words together to those who only read."""
-        return self.fields if self.has_change_permission(request) else READ
+        return self.fields if self.has_change_permission(request) else READ_ONLY_FIELDS
 
 
 @admin.register(FeedbackType)
@@ -58,7 +58,7 @@ class FeedbackTypeAdmin(PreviewAdmin):
     change_list_template = "feedback/admin_list.html"
     change_form_template = "feedback/admin_form.html"
     delete_confirmation_template = "feedback/admin_reset.html"
-    inlines = (BandRows,)
+    inlines = (BandInline,)
     fields = ("slug", "hit_points", "miss_points", "cue_above", "cue_below")
 
     def get_fields(self, request: HttpRequest, obj: Any = None) -> Any:
@@ -129,7 +129,7 @@ class FeedbackTypeAdmin(PreviewAdmin):
     def add_view(
         self, request: HttpRequest, form_url: str = "", extra_context: Any = None
     ) -> HttpResponse:
-        """Edit the defaults of the type that is named; one that has a row already is changed."""
+        """Edit the defaults of a type; redirect to the row of one that was edited before."""
         slug = request.GET.get("slug") or request.POST.get("slug")
         if slug not in VALENCES:
             return self.changelist_view(request)
@@ -143,7 +143,7 @@ class FeedbackTypeAdmin(PreviewAdmin):
     def render_change_form(
         self, request: HttpRequest, context: dict[str, Any], *args: Any, **kwargs: Any
     ) -> HttpResponse:
-        """Show the form, and beside it the type's name and the languages of the preview."""
+        """Show the form, with the type's name and the languages of the preview."""
         obj = kwargs.get("obj")
         slug = obj.slug if obj else request.GET.get("slug") or request.POST.get("slug")
         context["default"] = VALENCES.get(str(slug))
@@ -180,21 +180,21 @@ class FeedbackTypeAdmin(PreviewAdmin):
 
     def render_preview(self, request: HttpRequest, row: FeedbackType | None) -> HttpResponse:
         """Show what a patient would see in each band."""
-        given = request.GET
-        language = given.get("seen_in", "")
+        data = request.GET
+        language = data.get("seen_in", "")
         if language not in dict(LANGUAGES):
             language = clinic_of(user_of(request)).language
-        form = self.get_form(request, row, change=row is not None)(given, instance=row)
+        form = self.get_form(request, row, change=row is not None)(data, instance=row)
         inline = self.get_inline_instances(request, row)[0]
         rows: Any = inline.get_formset(request, row)
-        context: dict[str, Any] = {"language": language, "faults": []}
+        context: dict[str, Any] = {"language": language, "errors": []}
         is_valid = form.is_valid()
-        bands = rows(given, instance=form.instance, prefix="bands")
+        bands = rows(data, instance=form.instance, prefix="bands")
         if is_valid and bands.is_valid():
             context["valence"] = form.instance.to_valence(language, bands.bands(language))
             context["seen"] = list(preview_bands(context["valence"]))
         else:
-            context["faults"] = [*iter_form_errors(form), *find_band_faults(form, bands)]
+            context["errors"] = [*iter_form_errors(form), *iter_band_errors(form, bands)]
         with override(language):
             return render(request, "feedback/preview.html", context)
 
@@ -217,8 +217,8 @@ def initial_bands(slug: str) -> list[dict[str, Any]]:
     ]
 
 
-def find_band_faults(form: Any, bands: Any) -> Iterator[tuple[str, str]]:
-    """Yield what is wrong with the bands, unless something is wrong with their type."""
+def iter_band_errors(form: Any, bands: Any) -> Iterator[tuple[str, str]]:
+    """Yield the errors of the bands, unless the form of their type has errors itself."""
     if not form.errors:
         for row in bands.forms:
             yield from iter_form_errors(row)

@@ -1,4 +1,4 @@
-"""The form that a feedback type is edited in: its points and gestures, and a row for each band."""
+"""The form of a feedback type: its points and gestures, and a row for each band."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class FeedbackTypeForm(ClinicForm):
             yield from ("cue_above", "cue_below")
 
     def _post_clean(self) -> None:
-        # What the form does not ask keeps its default.
+        # Fields that the form leaves out keep their defaults.
         if self.default is not None:
             for name in ("hit_points", "miss_points"):
                 if name not in self.fields:

@@ -1,4 +1,4 @@
-"""The feedback types that a clinic edited. Without a row the defaults hold."""
+"""The feedback types that a clinic edited. Types without a row have the defaults."""
 
 from __future__ import annotations
 

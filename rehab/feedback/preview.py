@@ -1,4 +1,4 @@
-"""The steps that the preview of a feedback type draws: one or two for each band."""
+"""The example steps in the preview of a feedback type: one or two for each band."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rehab.training.valences import Band, Confetti, Valence
 
 SCALE = 1.5  # the thermometer's end
 TOP_Y, BOTTOM_Y = 30, 210  # where the scale ends and begins in the drawing; the goal lies at 90
-SPREAD = (0.618, 0.755)  # of two golden ratios: pieces of confetti that never clump
+SPREAD = (0.618, 0.755)  # additive recurrences that spread the pieces of confetti evenly
 # Dots that stand for an amount of confetti.
 AMOUNTS = {Confetti.NONE: 0, Confetti.LITTLE: 6, Confetti.MUCH: 14, Confetti.MOST: 26}
 

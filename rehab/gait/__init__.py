@@ -1,8 +1,8 @@
 """Strides with A2 from raw signals, while somebody walks. Pure: no Django, no clock.
 
 ``StrideDetector`` and ``TwoLegDetector`` take samples as they come, ``measure_strides`` and
-``measure_both_legs`` whole recordings with the same code. The comments
-of thresholds name their sources.
+``measure_both_legs`` whole recordings with the same code. The comments of thresholds name their
+sources.
 """
 
 from rehab.gait.contacts.gyroscope import ContactKind, GyroscopeContact, GyroscopeDetector

@@ -1,8 +1,8 @@
 """``python -m rehab.gait FILE …``: the strides of recorded signals.
 
 Files are CSV with a header and one row a sample. Known layouts are found by their header; others
-are mapped with ``--columns``. With ``--json``, each file gives one line: an object with its
-strides and its self-check.
+are mapped with ``--columns``. With ``--json``, one line is printed for each file: an object with
+its strides and its self-check.
 """
 
 from __future__ import annotations

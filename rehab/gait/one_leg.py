@@ -16,8 +16,8 @@ from rehab.gait.stances.plausibility import STANCE_MAX_S, STANCE_MIN_S
 from rehab.gait.strides import Flag, RejectionReason, Stride
 
 GRAVITY_M_S2 = 9.81
-KEEP_S = 8.0  # the longest cycle, the longest stance after it, and the piece they came in
-LONGEST_CHUNK_S = 1.0  # of a long chunk is taken at a time
+KEEP_S = 8.0  # the longest cycle, the longest stance after it, and the piece that they end in
+LONGEST_CHUNK_S = 1.0  # longer chunks are processed in pieces of this length
 STRIDE_MAX_S = 4.0
 LONGEST_GAP_S = 0.25  # in a cycle; longer ones may hide a contact
 OFFSET_N = 15.0
@@ -34,7 +34,7 @@ class OtherLeg:
     Attributes
     ----------
     reasons, flags
-        Why the stride is invalid, and what is worth knowing of it.
+        Why the stride is invalid, and what the therapist should know of it.
     step_s, step_length_m, step_symmetry
         As in ``Stride``.
     first_double_support_s, second_double_support_s, weight_ratio
@@ -53,7 +53,7 @@ class OtherLeg:
 
 @dataclass(frozen=True, slots=True)
 class OneLegStride:
-    """A stride as its own leg gives it, before the other leg is considered.
+    """A stride as measured on its own leg, before the other leg is considered.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class LegDetector:
         )
         self._samples = buffer.samples
         self.longest_chunk = int(LONGEST_CHUNK_S * rate_hz)
-        # Contacts of so many samples are there, whatever the rest of a piece and the wait brought.
+        # So many of the newest samples are still buffered when a stride is completed.
         self.reliable_samples = self._samples.keep - 2 * self.longest_chunk
         self._cycle_max = STRIDE_MAX_S * rate_hz
         self._analyzer = StanceAnalyzer(
@@ -206,7 +206,7 @@ class LegDetector:
         return (float(force.sum()) / (end - begin) - offset_n) / self.weight_n
 
     def _is_measurable(self, contact: Contact) -> bool:
-        """Return whether a contact is a stance to be measured; remember where it ended if not."""
+        """Return whether a contact is a stance to be measured; store where it ended if not."""
         is_cut = contact.begin_index == 0  # the record began in the middle of it
         if is_cut or contact.is_bounce:
             self._previous = None if is_cut else self._previous
@@ -243,7 +243,7 @@ class LegDetector:
         return begin, stride_s, contact.begin_s - left_s
 
     def _is_unusual(self, stance_s: float) -> bool:
-        """Compare a stance time with the last ones, valid or not, and remember it."""
+        """Return whether a stance time is far from the last ones, valid or not, and store it."""
         usual = sorted(self._stances)[len(self._stances) // 2] if len(self._stances) > 1 else None
         if STANCE_MIN_S <= stance_s <= STANCE_MAX_S:
             self._stances.append(stance_s)

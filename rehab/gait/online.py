@@ -24,7 +24,7 @@ class StrideDetector:
     Parameters
     ----------
     rate_hz
-        Nominal rate of the samples, 50-5000 Hz. The samples' own times are what is measured with.
+        Nominal rate of the samples, 50-5000 Hz. Times are measured by the samples' own times.
     mass_kg
         Body mass of the walker, 10-300 kg.
     look_ahead_s

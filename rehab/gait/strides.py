@@ -7,7 +7,7 @@ from enum import StrEnum
 
 
 class GaitInputError(ValueError):
-    """Input that nothing can be measured from; the message says the cure."""
+    """Input that nothing can be measured from; the message names the cure."""
 
 
 class RejectionReason(StrEnum):
@@ -15,7 +15,7 @@ class RejectionReason(StrEnum):
 
     TIME_BACKWARDS = "time_backwards"  # the clock stood still or jumped back
     GAP = "gap"  # samples are missing
-    RATE = "rate"  # samples come at another rate than was said
+    RATE = "rate"  # samples come at another rate than the given one
     FORCE_LOST = "force_lost"  # the vertical force vanished or was not finite
     FORCE_TOO_LARGE = "force_too_large"  # more than anybody's weight: unit, or mass
     SHORT_STANCE = "short_stance"
@@ -48,7 +48,7 @@ class Flag(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Stride:
-    """A stance and the swing before it, told at its terminal contact.
+    """A stance and the swing before it, complete at its terminal contact.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Stride:
         Peak ankle push-off power [W/kg] and when it was reached [s]; None where there is none. Only
         a valid stride's value may be shown to anybody.
     valid, reasons, flags
-        Whether the stride counts, why not, and what is worth knowing nevertheless.
+        Whether the stride counts, why not, and what the therapist should know of it.
     stance_s
         From initial to terminal contact [s].
     stride_s, swing_s
@@ -69,7 +69,7 @@ class Stride:
     force_peak_n_kg, moment_peak_nm_kg
         Largest vertical force and plantarflexion moment of the stance, by body mass.
     a2_moment_nm_kg, a2_velocity_rad_s
-        What the power was made of at its peak.
+        Moment and angular velocity where the power peaks.
     propulsion_n_kg
         Largest forward force of the second half of stance, if a forward force is sent.
     position_m

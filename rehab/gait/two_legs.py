@@ -28,7 +28,7 @@ from rehab.gait.strides import Flag, RejectionReason, Stride
 CHUNK_NAMES = ("t_s", *(f"{side} {name}" for side in ("left", "right") for name in CHANNEL_NAMES))
 
 # Mean force of both plates over a cycle, by body weight (docs/reference/gait.md#bad-signals): a
-# handrail takes some of it, a harness up to half; nothing adds any, so that more tells of a wrong
+# handrail takes some of it, a harness up to half; nothing adds any, so that more means a wrong
 # mass, unit or plate.
 SUPPORTED_BELOW = 0.95
 WEIGHT_MIN, WEIGHT_MAX = 0.5, 1.1
@@ -149,7 +149,7 @@ class TwoLegDetector:
         plates, zeros_n = (leg, other), (this.offset_n, known[-1].offset_n if known else 0.0)
         ratio = carried = _find_weight_ratio(stride.cycle_index, this.begin_index, plates, zeros_n)
         if ratio is None and second is not None:
-            # No whole cycle was seen: a step comes near enough to tell a wrong mass.
+            # No whole cycle was seen: a step is accurate enough to find a wrong mass.
             carried = _find_weight_ratio(this.begin_index, second.begin_index, plates, zeros_n)
         if carried is not None and not WEIGHT_MIN <= carried <= WEIGHT_MAX:
             reasons.append(RejectionReason.WEIGHT)

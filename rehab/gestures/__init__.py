@@ -1,0 +1,1 @@
+"""Gestures that a clinic composes for its robots."""

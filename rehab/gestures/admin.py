@@ -1,4 +1,4 @@
-"""Admin of gestures: a PT composes steps, and sees their path or what is wrong with them."""
+"""Admin of gestures: a form of steps, with a drawing of their path or their errors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rehab.people.web.refusals import format_refusal
 from robot.motion.dry_run import DryRun, dry_run, validate_gesture
 from robot.motion.gesture import TETHER_M
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gesture_spec import MOVES_MAX, to_data
+from robot.motion.gesture_spec import MAX_MOVES, to_data
 
 WINDOW_S = 5.0  # of the robot's decisions; a longer gesture still runs at the next one
 
@@ -57,13 +57,13 @@ class StepForm(forms.ModelForm):
                 field.widget.attrs["class"] = "vIntegerField"
 
 
-class StepRows(ScopedOptions, admin.TabularInline):
+class StepInline(ScopedOptions, admin.TabularInline):
     """A gesture's steps on its page."""
 
     model = GestureStep
     form = StepForm
     formset = StepFormSet
-    max_num = MOVES_MAX
+    max_num = MAX_MOVES
     ordering = ("position",)
 
     def get_extra(self, request: HttpRequest, obj: Any = None, **options: Any) -> int:
@@ -90,7 +90,7 @@ class GestureAdmin(ScopedAdmin):
     search_fields = ("name",)
     fields = ("name", "picture")
     readonly_fields = ("picture",)
-    inlines = (StepRows,)
+    inlines = (StepInline,)
 
     @admin.display(description=_("simulated"))
     def simulated(self, gesture: Gesture) -> str:

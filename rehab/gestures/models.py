@@ -1,4 +1,4 @@
-"""Gestures that a clinic composes. `robot` decides which are valid; here they are stored."""
+"""Gestures that a clinic composes. `robot.motion` validates them."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="-0.34 -0.34 0.68 0
 <circle r="{tether}" stroke-width=".003" stroke-dasharray=".012 .01" opacity=".6"/>
 <circle r="{base}" fill="currentColor" stroke="none" opacity=".09"/>
 <path d="M0 -.335v.03M-.01 -.325l.01 -.01l.01 .01" stroke-width=".004" opacity=".6"/>
-{headings}<path d="{way}" stroke="var(--link-fg)" stroke-width=".009"/></svg>"""
+{headings}<path d="{path}" stroke="var(--link-fg)" stroke-width=".009"/></svg>"""
 HEADING = (
     '<path d="M{} {}L{} {}" stroke-width=".004"/>'
     '<text x="{}" y="{}" font-size=".026" text-anchor="middle" dominant-baseline="central"'
@@ -48,7 +48,7 @@ def draw_path(moves: Sequence[Move], dry_run: DryRun, words: str) -> SafeString:
         words=words,
         tether=TETHER_M,
         base=BASE_M,
-        way="M" + "L".join(_point(pose) for pose in dry_run.poses[::2]),
+        path="M" + "L".join(_point(pose) for pose in dry_run.poses[::2]),
         headings=format_html_join(
             "", HEADING, (_heading(at, numbers) for at, numbers in headings.items())
         ),
@@ -63,6 +63,6 @@ def _heading(at: tuple[float, float, int], numbers: list[str]) -> tuple[str, ...
     x_m, y_m, degrees = at
     ahead_x, ahead_y = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     tip = (-(y_m + HEADING_M * ahead_y), -(x_m + HEADING_M * ahead_x))
-    word = (tip[0] + LABEL_M * ahead_x, tip[1] - LABEL_M * ahead_y)
-    drawn = (-y_m, -x_m, *tip, *word)
-    return (*(f"{number:.4f}" for number in drawn), ", ".join(numbers))
+    label = (tip[0] + LABEL_M * ahead_x, tip[1] - LABEL_M * ahead_y)
+    coordinates = (-y_m, -x_m, *tip, *label)
+    return (*(f"{number:.4f}" for number in coordinates), ", ".join(numbers))

@@ -1,0 +1,1 @@
+"""Import from the original GARRY, and the API routes of its paper."""

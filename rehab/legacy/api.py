@@ -1,4 +1,4 @@
-"""The API routes of the paper: users by ID, their sessions with the paper's ten attributes."""
+"""The API routes of the paper: users by ID, and sessions with the paper's ten attributes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from django.shortcuts import get_object_or_404
 from ninja import Field, Path, Query, Router, Schema, Status
 
 from rehab.people.access import clinic_of, for_roles
-from rehab.people.api import Short, patients_of, store
+from rehab.people.api import ShortText, patients_of, store
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.people.web.api_base import (
@@ -27,10 +27,10 @@ from rehab.sessions.schemas import FeedbackType
 router = Router(tags=["The paper's calls"])
 
 
-class PaperUserGiven(RequestBody):
+class PaperUserBody(RequestBody):
     """A new user in the paper's words."""
 
-    name: Short = Field(description="A nickname. The original kept real names; GARRY does not.")
+    name: ShortText = Field(description="A nickname. The original kept real names; GARRY does not.")
 
 
 class PaperUser(Schema):
@@ -56,38 +56,38 @@ class PaperSession(Schema):
 
 
 class PaperFilter(Paging):
-    """Which sessions of a user are wanted."""
+    """Filters of a user's sessions."""
 
     feedback_type: FeedbackType | None = None
 
 
 @router.get("/users/{code}", response=responses(PaperUser, 404))
 @for_roles(Role.LEAD, Role.PT)
-def show_user(request: HttpRequest, code: Path[Short]) -> Patient:
+def show_user(request: HttpRequest, code: Path[ShortText]) -> Patient:
     """Return a user by the ID that a PT would type."""
     return get_object_or_404(patients_of(caller(request)), code=code)
 
 
 @router.post("/users/{code}", response=responses(PaperUser, 409, code=201))
 @for_roles(Role.LEAD, Role.PT)
-def add_user(request: HttpRequest, code: Path[Short], given: PaperUserGiven) -> Status[Patient]:
+def add_user(request: HttpRequest, code: Path[ShortText], body: PaperUserBody) -> Status[Patient]:
     """Create a user with this ID."""
     patient = Patient(clinic=clinic_of(caller(request)))
-    return Status(201, store(patient, {"code": code, "nickname": given.name}))
+    return Status(201, store(patient, {"code": code, "nickname": body.name}))
 
 
 @router.get("/users/{code}/sessions", response=responses(Page[PaperSession], 404))
 @for_roles(Role.LEAD, Role.PT)
 def list_user_sessions(
-    request: HttpRequest, code: Path[Short], wanted: Query[PaperFilter]
+    request: HttpRequest, code: Path[ShortText], filters: Query[PaperFilter]
 ) -> dict[str, Any]:
     """List a user's sessions by non-ascending score; those without a score come last."""
     user = caller(request)
     patient = get_object_or_404(Patient.objects.visible_to(user), code=code)
     sessions = visible_sessions(user).filter(patient=patient).select_related("clinic")
-    if wanted.feedback_type:
-        sessions = sessions.filter(valence=wanted.feedback_type)
-    page = paginate(sessions.order_by(*ORDERS["best"]), wanted)
+    if filters.feedback_type:
+        sessions = sessions.filter(valence=filters.feedback_type)
+    page = paginate(sessions.order_by(*ORDERS["best"]), filters)
     return page | {"items": [to_paper_session(session) for session in page["items"]]}
 
 

@@ -1,4 +1,4 @@
-"""Reader of the original GARRY's database (`data.db`), which is checked and never written to.
+"""Reading the original GARRY's database (`data.db`), which is validated and never written to.
 
 Its columns are typed INTEGER but hold text and decimals as the app sent them
 (docs/reference/original.md#database): numbers as text, a duration as 0:01:22.5, the start as a date
@@ -194,14 +194,14 @@ def _parse_start(row: dict[str, Any]) -> datetime:
     return datetime.combine(stored, clock)
 
 
-def _parse_duration(given: Any) -> float:
+def _parse_duration(value: Any) -> float:
     """Return a duration in seconds, from 0:01:22.5 or a number of seconds."""
-    parts = re.fullmatch(r"(\d{1,3}):([0-5]?\d):([0-5]?\d(?:\.\d+)?)", str(given).strip())
+    parts = re.fullmatch(r"(\d{1,3}):([0-5]?\d):([0-5]?\d(?:\.\d+)?)", str(value).strip())
     if parts is not None:
         hours, minutes, seconds = parts.groups()
         total = int(hours) * 3600 + int(minutes) * 60 + float(seconds)
     else:
-        total = _parse_number({"duration": given}, "duration", MAX_DURATION_S)
+        total = _parse_number({"duration": value}, "duration", MAX_DURATION_S)
     if not 0 <= total <= MAX_DURATION_S:
-        raise InvalidRow(f"duration {given!r} is no duration")
+        raise InvalidRow(f"duration {value!r} is no duration")
     return total

@@ -20,7 +20,7 @@ from rehab.training.plans import SessionPlan
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES, find_valence
 
-SOURCE = "LegacyDatabase GARRY"
+SOURCE = "Original GARRY"
 
 
 class Importer:
@@ -50,16 +50,16 @@ class Importer:
             for pk in self.database.participants
             if pk not in erased
         }
-        for found in self.database.sessions:
-            if found.participant in erased:
+        for legacy in self.database.sessions:
+            if legacy.participant in erased:
                 self.erased["sessions"] += 1
                 continue
-            patient = patients[found.participant]
+            patient = patients[legacy.participant]
             if patient is None:
-                message = f"participant {found.participant} could not be taken over"
-                self.errors["sessions"][found.id] = message
+                message = f"participant {legacy.participant} could not be taken over"
+                self.errors["sessions"][legacy.id] = message
             else:
-                self._import_session(found, patient)
+                self._import_session(legacy, patient)
 
     def _import_participant(self, pk: int) -> Patient | None:
         own = Patient.everywhere.filter(clinic=self.clinic)
@@ -81,53 +81,55 @@ class Importer:
             legacy_id=pk,
         )
 
-    def _import_session(self, found: LegacySession, patient: Patient) -> None:
-        before = TrainingSession.everywhere.filter(clinic=self.clinic, legacy_id=found.id).first()
-        if before is not None and before.legacy_row == found.row:
+    def _import_session(self, legacy: LegacySession, patient: Patient) -> None:
+        existing = TrainingSession.everywhere.filter(
+            clinic=self.clinic, legacy_id=legacy.id
+        ).first()
+        if existing is not None and existing.legacy_row == legacy.row:
             self.existing["sessions"] += 1
             return
-        if before is not None:
-            self.errors["sessions"][found.id] = (
+        if existing is not None:
+            self.errors["sessions"][legacy.id] = (
                 "a session with this id but other contents was imported before. If this is "
                 "another file, import it into a clinic of its own"
             )
             return
         try:
-            self._store(found, patient)
+            self._store(legacy, patient)
         except InvalidSetting as problem:
-            self.errors["sessions"][found.id] = str(problem).removesuffix(".")
+            self.errors["sessions"][legacy.id] = str(problem).removesuffix(".")
         else:
             self.imported["sessions"] += 1
 
-    def _store(self, found: LegacySession, patient: Patient) -> None:
+    def _store(self, legacy: LegacySession, patient: Patient) -> None:
         """Store a finished session without steps. Raises InvalidSetting for an invalid goal."""
         plan = SessionPlan(
             measure=self._measure.to_rule(),
-            valence=find_valence(found.valence),
+            valence=find_valence(legacy.valence),
             phases=(make_phase("training"),),
             trained_side=Side.LEFT,  # unknown, and without steps it has no effect
-            goal=GoalRule(value=found.goal),
+            goal=GoalRule(value=legacy.goal),
         )
-        start = found.start.replace(tzinfo=self._zone)
+        start = legacy.start.replace(tzinfo=self._zone)
         session = TrainingSession.everywhere.create(
             clinic=self.clinic,
             patient=patient,
             measure=self._measure,
             created_at=start,
-            valence=found.valence,
+            valence=legacy.valence,
             trained_side="",
             source=SOURCE,
             plan=plan.to_json(),
             state=State.FINISHED.value,
-            goal=found.goal,
+            goal=legacy.goal,
             started_at=start,
-            ended_at=start + timedelta(seconds=found.duration_s),
-            active_s=found.duration_s,
-            legacy_id=found.id,
-            legacy_row=found.row,
+            ended_at=start + timedelta(seconds=legacy.duration_s),
+            active_s=legacy.duration_s,
+            legacy_id=legacy.id,
+            legacy_row=legacy.row,
         )
-        if plan.valence.has_points and found.score is not None:
-            SessionMetric.everywhere.create(session=session, slug="score", value=found.score)
+        if plan.valence.has_points and legacy.score is not None:
+            SessionMetric.everywhere.create(session=session, slug="score", value=legacy.score)
 
     @property
     def is_complete(self) -> bool:
@@ -135,7 +137,7 @@ class Importer:
         return not any(self.errors.values())
 
     def report(self) -> list[str]:
-        """Return lines that say what was read, what became of it, and what failed and why."""
+        """Return the lines of a report: the counts of each outcome, and the errors with reasons."""
         read = {
             "participants": len(self.database.participants) + len(self.database.participant_errors),
             "sessions": len(self.database.sessions) + len(self.database.session_errors),
@@ -149,13 +151,15 @@ class Importer:
             f"  {noun.removesuffix('s')} {pk}: {message}."
             for noun, errors in self.errors.items()
             for pk, message in sorted(
-                errors.items(), key=lambda one: (isinstance(one[0], str), one)
+                errors.items(), key=lambda item: (isinstance(item[0], str), item)
             )
         ]
         return lines + self._omissions()
 
     def _omissions(self) -> list[str]:
-        without_points = sum(not VALENCES[one.valence].has_points for one in self.database.sessions)
+        without_points = sum(
+            not VALENCES[legacy.valence].has_points for legacy in self.database.sessions
+        )
         lines = [
             "Left out: strides and the trained leg, which the original did not keep.",
         ]

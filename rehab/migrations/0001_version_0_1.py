@@ -902,7 +902,7 @@ class Migration(migrations.Migration):
                     models.BooleanField(default=True, verbose_name="higher is better"),
                 ),
                 (
-                    "entry",
+                    "aggregation",
                     models.CharField(
                         choices=[
                             ("each", "Each session"),

@@ -1,0 +1,1 @@
+"""The start list, and the pages about one patient."""

@@ -20,20 +20,20 @@ class SessionStillOpen(ValueError):
     """The patient has an open session, which must be ended first."""
 
 
-def end_program(patient: Patient, because: EndReason, now: datetime) -> None:
-    """Take a patient off the lists; no session can be set up until it is reopened.
+def end_program(patient: Patient, reason: EndReason, now: datetime) -> None:
+    """End a patient's program; until it is reopened, no session can be set up.
 
     Raises SessionStillOpen.
     """
     with transaction.atomic():
         lock_without_open_session(patient)
         if patient.erased_at is None:
-            patient.ended_at, patient.end_reason = now, because
+            patient.ended_at, patient.end_reason = now, reason
             patient.save(update_fields=["ended_at", "end_reason"])
 
 
 def reopen_program(patient: Patient) -> None:
-    """Put a patient back on the lists, except for an erased one."""
+    """Reopen a patient's program; an erased patient's stays ended."""
     with transaction.atomic():
         patient.lock()
         if patient.erased_at is None:
@@ -42,7 +42,7 @@ def reopen_program(patient: Patient) -> None:
 
 
 def lock_without_open_session(patient: Patient) -> None:
-    """Lock the patient's row. Raises SessionStillOpen where a session could still go on."""
+    """Lock the patient's row. Raises SessionStillOpen where a session is open."""
     patient.lock()
     sessions = TrainingSession.everywhere.filter(
         patient=patient, state__in=[state.value for state in OPEN_STATES]

@@ -27,21 +27,21 @@ from rehab.sessions.log import Remark, SessionEvent
 from rehab.sessions.models import TrainingSession
 
 
-def erase(patient: Patient, because: ErasureReason, by: User | None, now: datetime) -> None:
+def erase(patient: Patient, reason: ErasureReason, by: User | None, now: datetime) -> None:
     """Erase everything that identifies a person, permanently. Raises SessionStillOpen."""
     with transaction.atomic():
         lock_without_open_session(patient)
         if patient.erased_at is not None:
             return  # somebody else has erased it meanwhile
         withdraw_consent(patient, Purpose.BOARDS, by, now)
-        known_as = patient.pseudonym
+        old_pseudonym = patient.pseudonym
         if patient.legacy_id is not None:
             block_reimport(patient.clinic_id, patient.legacy_id)
         patient.pseudonym = patient.code = generate_pseudonym()
         patient.nickname = _("Erased")
         patient.body_mass_kg = patient.legacy_id = patient.alias = None
         patient.ended_at = patient.ended_at or now
-        patient.erased_at, patient.erasure_reason = now, because
+        patient.erased_at, patient.erasure_reason = now, reason
         patient.save()
         sessions = TrainingSession.everywhere.filter(patient=patient)
         # Sources may be files that are named after a person.
@@ -51,7 +51,7 @@ def erase(patient: Patient, because: ErasureReason, by: User | None, now: dateti
         SessionEvent.everywhere.filter(
             session__patient=patient, kind__in=[remark.value for remark in Remark]
         ).update(data={})
-        anonymize_corrections(patient, known_as)
+        anonymize_corrections(patient, old_pseudonym)
         Visit.everywhere.filter(patient=patient).delete()
         erase_values("Patient", patient.pk)
         LogEntry.objects.filter(
@@ -61,8 +61,8 @@ def erase(patient: Patient, because: ErasureReason, by: User | None, now: dateti
         audit_log.record(
             Act.ERASE,
             by,
-            clinic=patient.clinic_id,
-            about=str(ErasureReason(because).label),
+            clinic_id=patient.clinic_id,
+            about=str(ErasureReason(reason).label),
             now=now,
         )
 

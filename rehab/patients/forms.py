@@ -33,7 +33,7 @@ class PatientForm(PatientFieldsForm):
         if self.instance.is_new:
             self.fields["agrees"] = forms.MultipleChoiceField(
                 label=_("What the patient agrees to"),
-                choices=[(one.value, one.label) for one in offered_purposes(self.instance.clinic)],
+                choices=[(p.value, p.label) for p in offered_purposes(self.instance.clinic)],
                 required=False,
                 widget=forms.CheckboxSelectMultiple,
                 help_text=_(
@@ -71,18 +71,18 @@ class ScreenForm(PatientFieldsForm):
         widgets: ClassVar = {"screen_side": forms.RadioSelect, "screen_text": forms.RadioSelect}
 
 
-class EndingForm(forms.Form):
+class EndProgramForm(forms.Form):
     """Why the program ends."""
 
-    because = forms.ChoiceField(
+    reason = forms.ChoiceField(
         label=_("Why?"), choices=EndReason.choices, initial=EndReason.DONE, widget=forms.RadioSelect
     )
 
 
-class ErasingForm(forms.Form):
+class ErasureForm(forms.Form):
     """Why a patient is erased; the code must be typed as confirmation."""
 
-    because = forms.ChoiceField(
+    reason = forms.ChoiceField(
         label=_("Why?"),
         choices=[
             choice for choice in ErasureReason.choices if choice[0] != ErasureReason.RETENTION

@@ -1,4 +1,4 @@
-"""Addresses of the start list and of a patient's pages."""
+"""URLs of the start list and of a patient's pages."""
 
 from django.urls import path
 
@@ -13,7 +13,7 @@ urlpatterns = [
     path("patients/<int:patient_id>/screen/", start.set_screen, name="screen"),
     path("patients/<int:patient_id>/visits/", visits.change_visits, name="visits"),
     path("patients/<int:patient_id>/records/", records.show_records, name="records"),
-    path("patients/<int:patient_id>/end/", records.end, name="end-program"),
-    path("patients/<int:patient_id>/reopen/", records.reopen, name="reopen"),
+    path("patients/<int:patient_id>/end/", records.end_patient_program, name="end-program"),
+    path("patients/<int:patient_id>/reopen/", records.reopen_patient_program, name="reopen"),
     path("patients/<int:patient_id>/erase/", records.erase_patient, name="erase"),
 ]

@@ -1,4 +1,4 @@
-"""Visits: who is expected on which day, and how far each patient has come today."""
+"""Visits: who is expected on which day, and each patient's progress today."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.today import IS_OPEN, todays_sessions
 from rehab.training.changes import OPEN_STATES, State
 
-SOON_DAYS = (0, 1, 2, 7)  # days from today that one tap plans
+QUICK_VISIT_DAYS = (0, 1, 2, 7)  # days from today that one tap plans
 QUARTER_MIN = 15
 
 
@@ -49,7 +49,7 @@ class Visit(ClinicModel):
 
 
 class Progress(StrEnum):
-    """How far a patient has come today, in the order of the list."""
+    """A patient's progress today, in the order of the list."""
 
     WALKING = "walking"
     PAUSED = "paused"
@@ -60,7 +60,7 @@ class Progress(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class PatientToday:
-    """A patient who is expected today, or was here."""
+    """A patient who is expected today or had a session today."""
 
     patient: Patient
     at: time | None

@@ -1,0 +1,1 @@
+"""Clinics, accounts, patients, and who may see what."""

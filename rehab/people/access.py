@@ -21,7 +21,7 @@ from rehab.people.roles import Role
 from rehab.people.sign_in import flow
 
 View = Callable[..., HttpResponseBase]
-Open = TypeVar("Open", bound=Callable[..., Any])  # a page, or a call of the API
+ViewT = TypeVar("ViewT", bound=Callable[..., Any])  # a page, or a call of the API
 PUBLIC: frozenset[Role] = frozenset()
 
 
@@ -29,7 +29,7 @@ class UndeclaredView(PermissionDenied):
     """A view that does not declare who may open it."""
 
 
-def public(view: Open) -> Open:
+def public(view: ViewT) -> ViewT:
     """Open a view to everyone, strangers included."""
     view.access = PUBLIC  # type: ignore[attr-defined]
     return view
@@ -37,7 +37,7 @@ def public(view: Open) -> Open:
 
 def for_roles(
     *roles: Role, tablets: bool = False, enrolling: bool = False, patients: bool = True
-) -> Callable[[Open], Open]:
+) -> Callable[[ViewT], ViewT]:
     """Open a view to signed-in people of these roles.
 
     Parameters
@@ -50,7 +50,7 @@ def for_roles(
         It may show data of patients, so opening it is recorded in the audit log.
     """
 
-    def declare(view: Open) -> Open:
+    def declare(view: ViewT) -> ViewT:
         view.access = frozenset(roles)  # type: ignore[attr-defined]
         view.tablets = tablets  # type: ignore[attr-defined]
         view.enrolling = enrolling  # type: ignore[attr-defined]
@@ -87,12 +87,12 @@ def clinic_of(user: User) -> Clinic:
 def _is_guarded(request: HttpRequest) -> bool:
     """Return whether the page or API call of a request is not public."""
     match = request.resolver_match
-    opened = getattr(request, "call", match and match.func)
-    return getattr(opened, "access", PUBLIC) != PUBLIC
+    view = getattr(request, "call", match and match.func)
+    return getattr(view, "access", PUBLIC) != PUBLIC
 
 
 def _forbid_caching(response: HttpResponseBase) -> None:
-    """Forbid browsers to store a response: going back after the sign-out shows nothing."""
+    """Forbid browsers to store a response, so that going back after a sign-out shows nothing."""
     if not response.has_header("Cache-Control"):
         patch_cache_control(response, private=True, no_store=True)
 

@@ -54,7 +54,7 @@ def redirect_to_own_password(request: HttpRequest, extra_context: Any = None) ->
     return redirect("own-password")
 
 
-# The admin's own pages for these know no second factor.
+# The admin's own pages for these do not ask for a second factor.
 admin.site.login = redirect_to_sign_in  # type: ignore[assignment]
 admin.site.logout = sign_out  # type: ignore[assignment]
 admin.site.password_change = redirect_to_own_password  # type: ignore[assignment]
@@ -116,8 +116,8 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
                 by, address = user_of(request), client_address(request)
                 record_security_change(Act.UNLOCK, by, account, address, timezone.now())
                 lockout.reset_attempts(account)
-        words = gettext("Accounts that may try again: %(count)s.")
-        messages.success(request, words % {"count": accounts.count()})
+        message = gettext("Accounts that may try again: %(count)s.")
+        messages.success(request, message % {"count": accounts.count()})
 
     @admin.action(
         description=_("Remove second factors (lost phone or key)"), permissions=["change"]
@@ -129,11 +129,11 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
                 by, address = user_of(request), client_address(request)
                 record_security_change(Act.FACTORS, by, account, address, timezone.now())
                 factors.remove_second_factors(account)
-        words = gettext(
+        message = gettext(
             "%(count)s account(s) sign in by password alone now, or set up a new second "
             "factor where the clinic asks for one. If a phone was stolen, give a new password too."
         )
-        messages.warning(request, words % {"count": accounts.count()})
+        messages.warning(request, message % {"count": accounts.count()})
 
     def has_module_permission(self, request: HttpRequest) -> bool:
         """Return whether accounts are on the front page."""
@@ -141,12 +141,12 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
 
     def get_fieldsets(self, request: HttpRequest, obj: Any = None) -> Any:
         """Return the fields; only a host, who has no clinic, chooses one."""
-        work = ("role", "clinic") if user_of(request).role == Role.HOST else ("role",)
+        role_fields = ("role", "clinic") if user_of(request).role == Role.HOST else ("role",)
         if obj is None:
             passwords = ("usable_password", "password1", "password2")
-            return [(None, {"fields": ("username", *passwords, *work)})]
+            return [(None, {"fields": ("username", *passwords, *role_fields)})]
         return [
-            (None, {"fields": ("username", "password", *work, "is_active")}),
+            (None, {"fields": ("username", "password", *role_fields, "is_active")}),
             (_("Person"), {"fields": ("first_name", "last_name", "email")}),
         ]
 
@@ -159,12 +159,12 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
         if clinic_id is None:
             return form
 
-        class OfClinic(form):  # type: ignore[misc]
+        class OwnClinicForm(form):  # type: ignore[misc]
             def __init__(self, *args: Any, **kwargs: Any) -> None:
                 super().__init__(*args, **kwargs)
                 self.instance.clinic_id = clinic_id
 
-        return OfClinic
+        return OwnClinicForm
 
     def formfield_for_choice_field(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
         """Offer the roles that this person may assign: only a host creates hosts."""

@@ -33,7 +33,7 @@ from rehab.training.steps import Side
 
 router = Router(tags=["People"])
 
-Short = Annotated[TextLine, Field(max_length=32)]
+ShortText = Annotated[TextLine, Field(max_length=32)]
 Language = Annotated[str, Field(json_schema_extra={"enum": [code for code, _ in LANGUAGES]})]
 
 
@@ -92,8 +92,8 @@ class PatientOut(PatientName):
 class PatientChanges(RequestBody):
     """Changes of a patient; omitted fields stay."""
 
-    code: Short = optional(description="The clinic's own number, never a name.")
-    nickname: Short = optional(description="What the screens say, never a full name.")
+    code: ShortText = optional(description="The clinic's own number, never a name.")
+    nickname: ShortText = optional(description="What the screens say, never a full name.")
     paretic_side: Side = optional(strict=False)
     body_mass_kg: float | None = Field(None, ge=10, le=300)
     language: Language = optional()
@@ -102,14 +102,14 @@ class PatientChanges(RequestBody):
 class PatientIn(PatientChanges):
     """A new patient."""
 
-    code: Short = Field(description="The clinic's own number, never a name.")
-    nickname: Short = Field(description="What the screens say, never a full name.")
+    code: ShortText = Field(description="The clinic's own number, never a name.")
+    nickname: ShortText = Field(description="What the screens say, never a full name.")
 
 
 class PatientFilter(Paging):
     """Filters of a list of patients."""
 
-    code: Short | None = None
+    code: ShortText | None = None
 
 
 def patients_of(user: User) -> QuerySet[Patient]:

@@ -1,7 +1,7 @@
 """Network addresses of clients, and whether they belong to a clinic's own networks.
 
 From elsewhere a session is watched only with the patient's consent to remote view. A clinic that
-names no networks makes no difference and offers no remote view.
+names no networks makes no such distinction and offers no remote view.
 """
 
 from __future__ import annotations

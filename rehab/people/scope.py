@@ -57,8 +57,8 @@ class Scope:
 
     def clinic_filter(self, clinic_id: int) -> Q:
         """Return the condition on the rows that a member of this clinic may see."""
-        mine = Q(**{self.clinic: clinic_id})
-        return mine | Q(**{f"{self.clinic}__isnull": True}) if self.shared else mine
+        own = Q(**{self.clinic: clinic_id})
+        return own | Q(**{f"{self.clinic}__isnull": True}) if self.shared else own
 
     def role_filter(self, role: Role) -> Q:
         """Return a further condition for a member with this role. Usually none."""
@@ -139,12 +139,12 @@ class ClinicModel(ScopedModel):
         abstract = True
 
     def save(self, *args: Any, **kwargs: Any) -> None:
-        """Save the row. Raises CrossClinic where a related row belongs to another clinic."""
+        """Save the row. Raises CrossClinicReference for a related row of another clinic."""
         self.check_one_clinic()
         super().save(*args, **kwargs)
 
     def check_one_clinic(self) -> None:
-        """Raise CrossClinic where a related row belongs to another clinic."""
+        """Raise CrossClinicReference for a related row of another clinic."""
         mine = getattr(self, "clinic_id", None)
         for field in self._meta.concrete_fields:
             if not field.is_relation or field.name == "clinic":

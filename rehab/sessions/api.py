@@ -87,7 +87,7 @@ def list_stations(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]
 def list_sessions(request: HttpRequest, wanted: Query[SessionFilter]) -> dict[str, Any]:
     """List the clinic's sessions; `order=best` is by non-ascending score."""
     user = caller(request)
-    asked: dict[str, Any] = {
+    conditions: dict[str, Any] = {
         "patient": wanted.patient,
         "patient__pseudonym": wanted.pseudonym,
         "valence": wanted.feedback_type,
@@ -95,7 +95,7 @@ def list_sessions(request: HttpRequest, wanted: Query[SessionFilter]) -> dict[st
         "created_at__gte": wanted.since,
         "created_at__lt": wanted.until,
     }
-    given = Q(**{name: value for name, value in asked.items() if value is not None})
+    given = Q(**{name: value for name, value in conditions.items() if value is not None})
     return paginate(visible_sessions(user).filter(given).order_by(*ORDERS[wanted.order]), wanted)
 
 

@@ -1,7 +1,7 @@
 """Corrections of sessions that have ended: who walked, whether it counts, a note.
 
 The log stays as it is. Each correction is a row of its own with author, time, reason and the
-previous value; what follows from it (figures, boards, trends) changes in the same transaction.
+previous value; figures, boards and trends change in the same transaction.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def current_values(session: TrainingSession, reader: Any) -> Values:
 
 
 def normalize_newlines(text: str) -> str:
-    """Return text with the line ends that are stored: browsers send CR LF."""
+    """Return text with LF line ends, as they are stored; browsers send CR LF."""
     return text.replace("\r\n", "\n")
 
 
@@ -171,7 +171,7 @@ def correct_session(
 def _describe_conflict(
     session: TrainingSession, before: Values, expected: Values, reader: User
 ) -> str:
-    """Return what was changed since somebody opened the form, and by whom."""
+    """Return a message with what was changed since somebody opened the form, and by whom."""
     corrections = describe_corrections(session, reader)
     found = []
     for field in (field for field in CorrectedField if before[field] != expected[field]):

@@ -1,4 +1,4 @@
-"""Edited feedback texts reach the clinic's open sessions, from their next step on.
+"""Applies edited feedback texts to the clinic's open sessions, from their next step on.
 
 Like a start or a pause by the API, the change goes through this process's runtime and is logged
 before it takes effect. Points and gestures of a session that has been set up do not change.

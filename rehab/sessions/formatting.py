@@ -89,7 +89,7 @@ STATE_LABELS: dict[State, Any] = {
 
 
 def format_state(state: str) -> str:
-    """Return a session's state as text, empty for a finished one."""
+    """Return a session's state as text; empty for a finished one."""
     return str(STATE_LABELS[State(state)])
 
 
@@ -101,6 +101,6 @@ def clinic_time(moment: datetime, clinic: Clinic) -> datetime:
 def midnight_of(moment: datetime) -> datetime:
     """Return the moment at which a local moment's day began.
 
-    Where clocks go back at midnight's hour (Havana), there are two midnights: the first counts.
+    Where clocks go back at midnight (Havana), there are two midnights: the first counts.
     """
     return moment.replace(hour=0, minute=0, second=0, microsecond=0, fold=0)

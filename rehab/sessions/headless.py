@@ -32,7 +32,7 @@ BATCH = 500
 class Pace:
     """How fast strides arrive: ``speed`` times true cadence, or as fast as they are stored (None).
 
-    Clock and sleep are parameters, so that no test has to wait.
+    Clock and sleep are parameters, so that tests do not have to wait.
     """
 
     speed: float | None = None
@@ -97,7 +97,7 @@ def compare_with_recording(
     """Compare our hits with the recording's own; return counts by phase.
 
     ``compared`` counts the rows with a recorded value and flag, valid or not; ``agree`` those where
-    our rule (shown ≥ goal) gives the recorded flag; ``hits`` the hits by our rule.
+    our rule (shown ≥ goal) agrees with the recorded flag; ``hits`` the hits by our rule.
     """
     counts: dict[int, dict[str, int]] = defaultdict(lambda: {"compared": 0, "agree": 0, "hits": 0})
     steps = Step.everywhere.filter(session=session).order_by("number").iterator()

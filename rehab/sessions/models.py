@@ -117,7 +117,7 @@ class TrainingSession(ClinicModel):
     # Of an imported session, which has no steps: its key and row in the original GARRY's database.
     legacy_id = models.BigIntegerField(_("imported session"), null=True, editable=False)
     legacy_row = models.JSONField(null=True, editable=False)
-    # The process that writes the log; each change of owner raises the epoch and locks out the last.
+    # The process that writes the log; a new owner raises the epoch, which locks the old one out.
     epoch = models.PositiveIntegerField(default=0, editable=False)
     owner = models.CharField(max_length=200, blank=True, editable=False)
 

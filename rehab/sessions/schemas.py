@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from ninja import Field, Schema
 from pydantic import AfterValidator
 
-from rehab.people.api import PatientName, Short
+from rehab.people.api import PatientName, ShortText
 from rehab.people.web.api_base import (
     AwareDatetime,
     Key,
@@ -102,7 +102,7 @@ class SessionFilter(Paging):
     """Which sessions are wanted, and in which order."""
 
     patient: Key | None = None
-    pseudonym: Short | None = None
+    pseudonym: ShortText | None = None
     feedback_type: FeedbackType | None = None
     state: State | None = None
     since: AwareDatetime | None = Field(None, description="Created at this moment or later.")
@@ -123,7 +123,7 @@ class SessionRequestBody(RequestBody):
     station: Key = optional()
     source: TextLine = optional(description="`live`, `synthetic good`, `recording walk.csv`, …")
     trained_side: Side = optional(strict=False)
-    robot: TextLine = optional(description="As in the set-up: `off`, `quiet`, `normal`, …")
+    robot: TextLine = optional(description="As in the set-up: `off`, `gentle`, `normal`.")
     robot_above: TextLine = optional(description="Gesture after a window above the threshold.")
     robot_below: TextLine = optional(description="Gesture after a window below it.")
 

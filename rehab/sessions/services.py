@@ -27,7 +27,7 @@ from rehab.training.valences import CueGestures, Valence, find_valence
 
 
 class StationTaken(InvalidSetting):
-    """A session is open at this station: its tablet shows one, and its sensor feeds one."""
+    """A session is open at this station, whose tablet and sensor serve one at a time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

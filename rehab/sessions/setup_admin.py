@@ -23,7 +23,9 @@ from rehab.sessions.setup.gestures import robot_gesture_choices
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase, display_name
 
-TEMPORARY_OFFSET = 10_000  # of positions while phases change places; no protocol has as many
+TEMPORARY_OFFSET = (
+    10_000  # of positions while phases change places; no protocol has this many phases
+)
 
 
 class SharedAdmin(ScopedAdmin):
@@ -82,7 +84,7 @@ class PhaseFormSet(LabeledFormSet):
             phase.position = position
 
 
-class PhaseRows(ScopedOptions, admin.TabularInline):
+class PhaseInline(ScopedOptions, admin.TabularInline):
     """A protocol's phases on its page."""
 
     model = ProtocolPhase
@@ -103,7 +105,7 @@ class ProtocolAdmin(SharedAdmin):
     change_form_template = "sessions/protocol_form.html"
     list_display = ("named", "whose", "phase_count", "length", "about")
     search_fields = ("name", "description", "phases__name")
-    inlines = (PhaseRows,)
+    inlines = (PhaseInline,)
     actions = row_actions = viewer_actions = ("copy_to_clinic",)
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Protocol]:

@@ -1,6 +1,6 @@
-"""Where steps come from: one module each, without Django, so that a clinic machine can run them.
+"""Sources of steps: one module each, without Django, so that a clinic machine can run them.
 
-A source supplies measurements in the order walked. It scores nothing. ``client`` sends them to the
+A source supplies measurements in the order walked, unscored. ``client`` sends them to the
 server, ``intake`` makes strides of what labs send, ``source`` defines what a source is.
 """
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rehab.sources.source import LiveSource, PlayedSource
 
 # Name: the module that has it as SOURCE, and what it is for. A module is imported when its source
-# is wanted: signals take numpy, which a simulated patient can do without.
+# is used: signals need numpy, a simulated patient does not.
 SOURCES: dict[str, tuple[str, str]] = {
     "recording": ("rehab.sources.recording.source", "play a recorded session, or recorded signals"),
     "synthetic": ("rehab.sources.synthetic.source", "simulate a patient, as strides or as signals"),

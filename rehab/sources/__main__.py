@@ -1,7 +1,7 @@
 """`python -m rehab.sources NAME …`: runs a source that dials in to the server.
 
 Exit status: 0 all strides are stored, or the session was ended; 2 the command line, the recording
-or what comes cannot be used; 3 the server will not have this source; 130 stopped by Ctrl-C.
+or what comes cannot be used; 3 the server refuses this source; 130 stopped by Ctrl-C.
 """
 
 from __future__ import annotations
@@ -209,7 +209,7 @@ def run(name: str, options: Namespace, stack: ExitStack) -> int:
         )
 
     if isinstance(source, LiveSource):
-        # Takes numpy, which a simulated patient can do without.
+        # Imports numpy, which a simulated patient does not need.
         from rehab.sources.intake import Intake
 
         feed = LiveFeed()

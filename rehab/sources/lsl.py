@@ -21,7 +21,8 @@ from rehab.sources.intake import Intake, IntakeSettings, add_signal_arguments
 from rehab.sources.reporting import Notify, SourceError
 from rehab.sources.source import LiveSource
 
-# For streams; one on the same network answers within 0.7 s (docs/reference/gait.md#streaming).
+# How long to look for streams; one on the same network answers within 0.7 s
+# (docs/reference/gait.md#streaming).
 RESOLVE_S = 1.0
 PULL_S = 0.2
 SILENT_S = 1.0
@@ -36,7 +37,7 @@ class ClockCorrection:
     """Converts a sender's time stamps to this machine's clock, without steps in between.
 
     The measured difference varies by fractions of a millisecond. It is followed by at most ``slew``
-    of the time that passes; a change of more than ``jump_s`` is another clock, and taken at once.
+    of the time that passes; a change of more than ``jump_s`` is another clock, and applied at once.
     """
 
     def __init__(self, measured_s: float, slew: float = 0.001, jump_s: float = 0.1) -> None:
@@ -133,7 +134,7 @@ class LslSource(LiveSource):
 
     async def _find(self, intake: Intake) -> list[Stream]:
         """Find and open the streams, however long it takes until they are there."""
-        said = ""
+        last_problem = ""
         while True:
             found = await asyncio.to_thread(self._pylsl.resolve_streams, RESOLVE_S)
             chosen, missing = choose_streams(found, self._wanted)
@@ -146,9 +147,9 @@ class LslSource(LiveSource):
                     for stream in opened:
                         check_labels(stream, intake)
                     return opened
-            if missing != said:
+            if missing != last_problem:
                 self._notify(missing)
-            said = missing
+            last_problem = missing
 
     def _open(self, info: Any) -> Stream:
         flags = self._pylsl.proc_dejitter | self._pylsl.proc_monotonize if self._dejitter else 0
@@ -195,7 +196,7 @@ class LslSource(LiveSource):
         inlet.close_stream()
 
     def _correct(self, inlet: Any, correction: ClockCorrection | None) -> ClockCorrection | None:
-        """Measure the sender's clock; keep what was known where it does not answer."""
+        """Measure the sender's clock; return the old correction where it does not answer."""
         try:
             measured_s = inlet.time_correction(timeout=2.0 if correction is None else 0.01)
         except LOST:

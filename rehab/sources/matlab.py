@@ -42,7 +42,7 @@ class MatlabSource(LiveSource):
         )
 
     def __init__(self, options: Namespace, notify: Notify) -> None:
-        """Read the command line. Raises SourceError for an address of no use."""
+        """Read the command line. Raises SourceError for an invalid address."""
         self.settings = IntakeSettings(side=Side(options.side) if options.side else None)
         self.address = parse_address(options.connect, ("ws",))
         self._keyword: str = options.keyword
@@ -50,27 +50,27 @@ class MatlabSource(LiveSource):
         self._goal: float | None = None
 
     async def read(self, intake: Intake) -> None:
-        """Read strides until MATLAB sends ``end``; start anew where the connection breaks."""
-        said = ""
+        """Read strides until MATLAB sends ``end``; start over where the connection breaks."""
+        last_problem = ""
         while True:
             await intake.wait_for_start()
             try:
                 async with connect(str(self.address), proxy=None, compression=None) as socket:
-                    said = ""
+                    last_problem = ""
                     if await self._receive_all(socket, intake):
                         self._notify("MATLAB has sent all.")
                         return
             except (OSError, WebSocketException) as problem:
                 text = f"No MATLAB server at {self.address} ({problem})"
-                if text != said:
+                if text != last_problem:
                     self._notify(
                         f"{text}. Start GarryMatlabServer there; trying every {RETRY_S:g} s."
                     )
-                said = text
+                last_problem = text
             await asyncio.sleep(RETRY_S)
 
     async def _receive_all(self, socket: ClientConnection, intake: Intake) -> bool:
-        """Read what comes; return whether that was all."""
+        """Read strides; return whether MATLAB has sent them all."""
         await socket.send(self._keyword)
         self._notify(f"Asked MATLAB for {self._keyword!r}.")
         try:

@@ -23,7 +23,7 @@ from rehab.sources.source import LiveSource
 RETRY_S = 1.0  # between attempts to reach a lab that is not there
 SILENT_S = 5.0  # after which another sender of datagrams may take over
 READ_BYTES = 64 * 1024
-TAKEN = "Another program already sends here. Stop it first."
+SENDER_TAKEN = "Another program already sends here. Stop it first."
 
 
 class RowsSource(LiveSource):
@@ -43,7 +43,7 @@ class RowsSource(LiveSource):
         add_signal_arguments(parser)
 
     def __init__(self, options: Namespace, notify: Notify) -> None:
-        """Read the command line. Raises SourceError for an address of no use."""
+        """Read the command line. Raises SourceError for an invalid address."""
         self.settings = IntakeSettings.read(options)
         self.address = (
             parse_address(options.listen)
@@ -90,7 +90,7 @@ class RowsSource(LiveSource):
                 try:
                     peer = _name(writer.get_extra_info("peername"))
                     if not self._claim_sender(peer):
-                        writer.write(f"{TAKEN}\n".encode())
+                        writer.write(f"{SENDER_TAKEN}\n".encode())
                         await writer.drain()
                         return
                     await self._receive_all(_read_tcp(reader), intake, peer)
@@ -114,15 +114,15 @@ class RowsSource(LiveSource):
             if self._claim_sender(peer):
                 await self._receive_all(_read_ws(socket), intake, peer)
             else:
-                await socket.send(TAKEN)
-                await socket.close(1013, TAKEN)
+                await socket.send(SENDER_TAKEN)
+                await socket.close(1013, SENDER_TAKEN)
 
         listening = await stack.enter_async_context(serve(serve_ws, host, port))
         return Address(kind, *next(iter(listening.sockets)).getsockname()[:2])
 
     async def _keep_connecting(self, intake: Intake) -> None:
         """Connect to a lab that serves, again and again."""
-        said = ""
+        last_problem = ""
         while True:
             try:
                 if self.address.kind == "tcp":
@@ -135,19 +135,19 @@ class RowsSource(LiveSource):
                 else:
                     async with connect(str(self.address), proxy=None) as socket:
                         await self._receive_all(_read_ws(socket), intake, str(self.address))
-                said = ""
+                last_problem = ""
             except (OSError, WebSocketException) as problem:
                 text = f"No lab answers at {self.address} ({getattr(problem, 'strerror', problem)})"
-                if text != said:
+                if text != last_problem:
                     self._notify(f"{text}. Start its script; trying again every {RETRY_S:g} s.")
-                said = text
+                last_problem = text
             await asyncio.sleep(RETRY_S)
 
     def _make_reader(self) -> LineReader:
         return LineReader(self._header)
 
     def _claim_sender(self, peer: str) -> bool:
-        """Return whether this sender is the only one, and remember it."""
+        """Return whether this sender is the only one, and store it."""
         if self._sender:
             self._notify(
                 f"{peer} wants to send as well and was turned away: {self._sender} already does. "
@@ -164,8 +164,8 @@ class RowsSource(LiveSource):
         lines = self._make_reader()
         try:
             async for data in stream:
-                _take(lines, data, intake)
-            _take(lines, b"\n", intake)
+                _add_lines(lines, data, intake)
+            _add_lines(lines, b"\n", intake)
         finally:
             self._sender = ""
             self._notify(f"{peer} sends no more.")
@@ -191,10 +191,10 @@ class _Datagrams(asyncio.DatagramProtocol):
             self._peer = addr
             self._notify(f"{_name(addr)} sends.")
         self._heard_s = now_s
-        _take(self._lines, data if data.endswith(b"\n") else data + b"\n", self._intake)
+        _add_lines(self._lines, data if data.endswith(b"\n") else data + b"\n", self._intake)
 
 
-def _take(lines: LineReader, data: bytes, intake: Intake) -> None:
+def _add_lines(lines: LineReader, data: bytes, intake: Intake) -> None:
     rows, wrong = lines.read_bytes(data)
     for text in wrong:
         intake.reject_row(text)

@@ -136,7 +136,7 @@ class SerialSensorSource(LiveSource):
         loop = asyncio.get_running_loop()
         stopped = threading.Event()
 
-        def take(rows: list[Mapping[str, Cell]], damaged: int) -> None:
+        def add_rows(rows: list[Mapping[str, Cell]], damaged: int) -> None:
             for _ in range(damaged):
                 intake.reject_row(
                     f"A frame of {self.port} was damaged. Use a shorter cable, another USB port or "
@@ -149,7 +149,10 @@ class SerialSensorSource(LiveSource):
                 loop.call_soon_threadsafe(function, *arguments)
 
         reading = threading.Thread(
-            target=self._read_port, args=(call_in_loop, take, stopped), name="serial", daemon=True
+            target=self._read_port,
+            args=(call_in_loop, add_rows, stopped),
+            name="serial",
+            daemon=True,
         )
         reading.start()
         try:
@@ -161,23 +164,23 @@ class SerialSensorSource(LiveSource):
     def _read_port(
         self,
         call_in_loop: Callable[..., None],
-        take: Callable[[list[Mapping[str, Cell]], int], None],
+        add_rows: Callable[[list[Mapping[str, Cell]], int], None],
         stopped: threading.Event,
     ) -> None:
-        said = ""
+        last_problem = ""
         while not stopped.is_set():
             try:
                 port = self._open_port(self.port, self._baud)
             except (OSError, ValueError) as problem:  # SerialException is an OSError
                 text = f"{self.port} cannot be opened ({problem})"
-                if text != said:
+                if text != last_problem:
                     call_in_loop(
                         self._notify, f"{text}. Plug the sensor in, or close what uses it."
                     )
-                said = text
+                last_problem = text
                 stopped.wait(RETRY_S)
                 continue
-            said = ""
+            last_problem = ""
             call_in_loop(self._notify, f"Reading {self.port}.")
             frames = FrameReader()
             try:
@@ -186,7 +189,7 @@ class SerialSensorSource(LiveSource):
                     before = frames.damaged
                     rows = frames.read(data) if data else []
                     if rows or frames.damaged > before:
-                        call_in_loop(take, rows, frames.damaged - before)
+                        call_in_loop(add_rows, rows, frames.damaged - before)
             except OSError as problem:
                 call_in_loop(
                     self._notify,

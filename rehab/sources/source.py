@@ -1,4 +1,4 @@
-"""What a source is: made from a command line, it supplies strides."""
+"""The base classes of sources, which are made from a command line and supply strides."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class PlayedSource(Source):
 
 
 class LiveSource(Source):
-    """A source whose strides, or the signals they are measured from, come when they come.
+    """A source whose strides, or the signals that they are measured from, come in real time.
 
     ``settings`` define how to read what comes.
     """
@@ -65,8 +65,8 @@ class LiveSource(Source):
 
     @abstractmethod
     async def read(self, intake: Intake) -> None:
-        """Hand everything that comes to the intake; return when no more can come.
+        """Pass everything that comes to the intake; return when no more can come.
 
         It waits for senders that are not there yet and reconnects to them. Raises SourceError for
-        what only a person at the machine can put right.
+        a problem that only a person at the machine can solve.
         """

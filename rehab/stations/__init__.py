@@ -1,0 +1,1 @@
+"""Stations, their devices, and the pairing of tablets."""

@@ -22,7 +22,7 @@ from rehab.stations.pins import MAX_LENGTH, set_pin
 from rehab.stations.presence import format_device_state
 
 
-class DeviceRows(ScopedOptions, admin.TabularInline):
+class DeviceInline(ScopedOptions, admin.TabularInline):
     """A station's devices on its page; each has a page of its own, with its token."""
 
     model = Device
@@ -85,7 +85,7 @@ class StationAdmin(ScopedAdmin):
     fields = ("name", "pin", "no_pin")
     list_display = ("name", "tablets", "sources", "robots", "has_pin")
     search_fields = ("name", "devices__name")
-    inlines = (DeviceRows,)
+    inlines = (DeviceInline,)
 
     def get_queryset(self, request: HttpRequest) -> QuerySet[Station]:
         """Return the visible stations with their devices."""
@@ -132,7 +132,7 @@ class StationAdmin(ScopedAdmin):
 
 @admin.register(Device)
 class DeviceAdmin(TokenAdmin):
-    """Devices of the clinic. A token is shown once, when it is made."""
+    """Devices of the clinic. A token is shown once, when it is issued."""
 
     list_display = ("name", "kind", "station", "state", "last_seen_at", "created_at")
     list_filter = (

@@ -21,11 +21,11 @@ MAX_ATTEMPTS = 10
 
 
 class PairingRefused(ValueError):
-    """A pairing that is not possible; the message tells what to do."""
+    """A pairing that is not possible; the message says what to do."""
 
 
 class PairingRateLimited(PairingRefused):
-    """One address asks for more codes than its tablets can need."""
+    """An address has started more pairings than its tablets can need."""
 
 
 def start_pairing(address: str, now: datetime) -> tuple[Pairing, str]:
@@ -41,9 +41,9 @@ def start_pairing(address: str, now: datetime) -> tuple[Pairing, str]:
             _("Too many codes were asked for from this network. Try again in five minutes.")
         )
     pending = f"pairing-pending-{address}"
-    mine = Pairing.everywhere.filter(pk__in=cache.get(pending, []), device__isnull=True)
-    kept = list(mine.order_by("-pk").values_list("pk", flat=True)[: MAX_PENDING_PER_ADDRESS - 1])
-    mine.exclude(pk__in=kept).delete()
+    own = Pairing.everywhere.filter(pk__in=cache.get(pending, []), device__isnull=True)
+    kept = list(own.order_by("-pk").values_list("pk", flat=True)[: MAX_PENDING_PER_ADDRESS - 1])
+    own.exclude(pk__in=kept).delete()
     if Pairing.everywhere.count() >= MAX_PENDING:
         raise PairingRefused(_("Too many tablets are being paired. Try again in five minutes."))
     secret = secrets.token_urlsafe(32)
@@ -102,8 +102,8 @@ def claim_token(pairing: Pairing) -> str | None:
     device = pairing.device
     if device is None or device.is_revoked:
         return None
-    taken, _ = Pairing.everywhere.filter(pk=pairing.pk).delete()
-    if not taken:
+    deleted, _ = Pairing.everywhere.filter(pk=pairing.pk).delete()
+    if not deleted:  # another request claimed it
         return None
     token = device.new_token()
     device.save()

@@ -14,13 +14,13 @@ from django.utils.translation import gettext as _
 from rehab.stations.models import PinAttempts, Station
 
 MIN_LENGTH, MAX_LENGTH = 4, 8
-FREE_ATTEMPTS = 3  # failures up to here lock nothing: fingers slip
+FREE_ATTEMPTS = 3  # fewer failures than these lock nothing: fingers slip
 FIRST_LOCKOUT = timedelta(seconds=30)  # each further one lasts twice as long
 LONGEST_LOCKOUT = timedelta(hours=1)
 
 
 class PinRefused(ValueError):
-    """A PIN that is not accepted; the message tells what to do."""
+    """A PIN that is not accepted; the message says what to do, ``wait_s`` how long to wait."""
 
     def __init__(self, message: str, wait_s: int = 0) -> None:
         super().__init__(message)
@@ -45,16 +45,16 @@ def check_pin(station: Station, screen: str, pin: str, now: datetime) -> None:
         station=station, screen=screen, defaults={"locked_until": now}
     )
     if attempts.locked_until > now:
-        raise _locked(attempts.locked_until - now)
+        raise _lockout_error(attempts.locked_until - now)
     lockout = lockout_after(attempts.failures + 1)
     unchanged = PinAttempts.everywhere.filter(pk=attempts.pk, failures=attempts.failures)
     counted = unchanged.update(failures=attempts.failures + 1, locked_until=now + lockout)
     if not counted:  # there was another attempt meanwhile
-        raise _locked(timedelta(seconds=1))
+        raise _lockout_error(timedelta(seconds=1))
     if check_password(pin, station.pin_hash):
         PinAttempts.everywhere.filter(pk=attempts.pk).delete()
     elif lockout:
-        raise _locked(lockout)
+        raise _lockout_error(lockout)
     else:
         raise PinRefused(_("This is not the PIN."))
 
@@ -66,7 +66,8 @@ def lockout_after(failures: int) -> timedelta:
     return min(FIRST_LOCKOUT * (1 << min(failures - FREE_ATTEMPTS, 20)), LONGEST_LOCKOUT)
 
 
-def _locked(left: timedelta) -> PinRefused:
+def _lockout_error(left: timedelta) -> PinRefused:
+    """Return the error that says how long a screen is still locked."""
     seconds = max(1, round(left.total_seconds()))
     if seconds < 60:
         words = _("Wrong PIN. Wait %(count)s seconds.") % {"count": seconds}

@@ -1,4 +1,4 @@
-"""When a device last connected, as text."""
+"""Text about when a device last connected."""
 
 from __future__ import annotations
 
@@ -44,5 +44,5 @@ def format_device_state(device: Device, now: datetime) -> str:
 
 def is_overdue(device: Device, now: datetime) -> bool:
     """Return whether a device has a token that it has never used."""
-    never = not device.builtin and not device.is_revoked and device.last_seen_at is None
-    return never and now - device.created_at > OVERDUE_AFTER
+    is_unused = not device.builtin and not device.is_revoked and device.last_seen_at is None
+    return is_unused and now - device.created_at > OVERDUE_AFTER

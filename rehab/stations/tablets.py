@@ -42,8 +42,8 @@ class TabletMiddleware:
     def __call__(self, request: HttpRequest) -> HttpResponseBase:
         """Pass the request on."""
         token = request.COOKIES.get(COOKIE)
-        kind, _, given = request.headers.get("Authorization", "").partition(" ")
-        if token is None and kind.lower() == "bearer":
-            token = given.strip()
+        scheme, _, bearer = request.headers.get("Authorization", "").partition(" ")
+        if token is None and scheme.lower() == "bearer":
+            token = bearer.strip()
         request.tablet = find_tablet(token, timezone.now())  # type: ignore[attr-defined]
         return self.get_response(request)

@@ -1,6 +1,6 @@
-"""Another machine's clock, estimated from nothing but the times that arrive from it.
+"""Another machine's clock, estimated only from the times that arrive from it.
 
-Each time arrives some delay after it was true, and the shortest delay says most.
+Each time arrives with some delay; the one with the shortest delay is the best estimate.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from __future__ import annotations
 LATE_S = 5.0
 # How much slower than ours a clock may run. A ceramic resonator, the worst that times a sensor, is
 # off by ±0.5 % when it is made and ±0.2 % by temperature (Murata, CERALOCK catalog P16E), a quartz
-# by less than ±0.01 %; ours is a quartz. So no drift alone makes anything late, and what a fresh
-# time may be behind grows by at most 0.6 s for each minute in which none was.
+# by less than ±0.01 %; ours is a quartz. So drift alone makes no time late, and the estimate falls
+# behind by at most 0.6 s for each minute without a fresh time.
 DRIFT_MAX = 0.01
 
 
 class RemoteClock:
-    """Estimates a remote clock from the times that arrive, and tells fresh times from late ones.
+    """Estimates a remote clock from the times that arrive, and distinguishes fresh from late ones.
 
     The time that arrived with the shortest delay so far stands for a fresh one. The estimate decays
     by ``DRIFT_MAX``, so that a clock that runs slow is followed; a delay that grows no faster
@@ -28,12 +28,12 @@ class RemoteClock:
     speed
         Seconds of that clock in one of ours.
     time_s, now_s
-        What it shows while ours shows ``now_s`` [s], where the device said so; else None.
+        What it shows while ours shows ``now_s`` [s], where the device has sent it; else None.
     """
 
     def __init__(self, speed: float = 1.0, time_s: float | None = None, now_s: float = 0.0) -> None:
         self._speed = speed
-        # That clock when ours shows 0, in its own seconds; and when something fresh was heard.
+        # That clock when ours shows 0, in its own seconds; and when the last fresh time arrived.
         self._offset = None if time_s is None else time_s - now_s * speed
         self._seen_s = now_s
         self._last_s: float | None = None  # the time that came last

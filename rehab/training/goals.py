@@ -71,7 +71,7 @@ class GoalRule:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What the PT wants of the whole session: "60 % of the steps, over ten minutes".
+    """The target of a whole session, set by the PT: "60 % of the steps, over ten minutes".
 
     Attributes
     ----------
@@ -98,7 +98,15 @@ class Target:
             raise InvalidSetting("The planned duration must be more than 0 seconds.")
 
     def is_met(self, hit_rate: float | None, active_s: float) -> bool | None:
-        """Return whether both wishes are fulfilled; None where there are none."""
+        """Return whether the target is met; None where there is none.
+
+        Parameters
+        ----------
+        hit_rate
+            Of the session's feedback phases (ratio); None while unknown.
+        active_s
+            Walked time [s].
+        """
         if self.hit_rate is None and self.duration_s is None:
             return None
         rate_met = self.hit_rate is None or (hit_rate is not None and hit_rate >= self.hit_rate)

@@ -1,10 +1,10 @@
-"""Marks text for translation. Rules know no languages: the pages that show it translate it."""
+"""Marks text for translation by pages; the rules themselves know no languages."""
 
 from __future__ import annotations
 
 
 def gettext_noop(text: str) -> str:
-    """Return the text as it is: only the name matters, by which gettext's tools collect it."""
+    """Return the text as it is; gettext's tools collect it by this function's name."""
     return text
 
 

@@ -9,10 +9,10 @@ from rehab.training.fold import SessionFold
 from rehab.training.marking import gettext_noop
 
 # Below this share of the baseline a gain is within a walker's own noise (CV 6.5-12 %,
-# standard error of a 50-stride mean 1-2 %: docs/reference/gait.md#phases), and a share of it would
-# mean nothing.
+# standard error of a 50-stride mean 1-2 %: docs/reference/gait.md#phases), and a share of it is
+# meaningless.
 MIN_TRAINED_GAIN = 0.03
-# A change relative to (nearly) nothing means nothing; this share of the largest value is nothing.
+# A change relative to (nearly) zero is meaningless: below this share of the largest value.
 MIN_BASELINE_SHARE = 1e-6
 
 
@@ -90,7 +90,7 @@ def _retention_in_washout(fold: SessionFold) -> float | None:
 
 
 def _steps(fold: SessionFold) -> float | None:
-    """Judged steps of feedback phases: what hit rate and score were made from."""
+    """Judged steps of feedback phases, from which hit rate and score follow."""
     return float(fold.feedback.judged) or None
 
 
@@ -104,7 +104,7 @@ def _attended(fold: SessionFold) -> float | None:
 
 
 def _target_met(fold: SessionFold) -> float | None:
-    """1 where the PT's wishes for the session were fulfilled, else 0; None without a wish."""
+    """1 where the PT's target for the session was met, else 0; None without a target."""
     met = fold.plan.target.is_met(fold.feedback.hit_rate, fold.active_s)
     return None if met is None or not fold.trained.valid else float(met)
 

@@ -20,7 +20,7 @@ class PhaseKind:
     feedback
         Whether its phases give feedback, unless they say otherwise.
     calm_words
-        What the patient's screen says in a phase without feedback.
+        Text of the patient's screen in a phase without feedback.
     """
 
     slug: str

@@ -12,11 +12,11 @@ from rehab.training.phases import Phase
 from rehab.training.steps import Side
 from rehab.training.valences import CueGestures, Valence, bands_from_json
 
-# The paper's default (P 3.4.1): the robot answers windows of at least 90 % of the goal.
+# The paper's default (P 3.4.1): the robot responds to windows of at least 90 % of the goal.
 DEFAULT_ACTIVATION_THRESHOLD = 0.90
 
-# How the robot may answer: the share of a gesture's size. What makes half of it gentle (no sounds,
-# half the speed) is the robot's own rule.
+# How lively the robot is: the share of a gesture's size. The robot itself makes half of it gentle
+# (no sounds, half the speed).
 ROBOT_LEVELS = {"normal": 1.0, "gentle": 0.5, "off": 0.0}
 
 
@@ -45,7 +45,7 @@ class ChartStyle(StrEnum):
 def check_chart_style(style: object) -> ChartStyle:
     """Return the chart style of that name. Raises InvalidSetting, naming the known ones."""
     try:
-        return ChartStyle(style)  # type: ignore[arg-type]  # whatever it is, it is looked up
+        return ChartStyle(style)  # type: ignore[arg-type]  # any object may be looked up
     except ValueError:
         raise InvalidSetting(
             "A chart's style is one of: {known}.", known=", ".join(ChartStyle)
@@ -59,7 +59,7 @@ def name_robot_level(intensity: float | None) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SessionPlan:
-    """What is measured and rewarded, in which phases, towards which goal, and how a robot answers.
+    """What is measured and rewarded, in which phases, towards which goal, and what a robot does.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ class SessionPlan:
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> SessionPlan:
-        """Return the plan of ``to_json``'s data, which may lack what later versions added."""
+        """Return the plan of ``to_json``'s data, also of versions that had fewer fields."""
         return cls(
             measure=Measure(**data["measure"]),
             valence=_read_valence(data["valence"]),

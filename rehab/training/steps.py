@@ -31,7 +31,7 @@ class InvalidReason(StrEnum):
 
 
 class InvalidMeasurement(ValueError):
-    """A stride that cannot even be stored; the message says what is wrong with it."""
+    """A stride that cannot be stored; the message says what is wrong with it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class ScoredStep:
-    """A stride with its verdict: everything that the log keeps of it but when it arrived.
+    """A stride with its verdict: all that the log stores of it, except when it arrived.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ def find_invalid_reasons(measurement: Measurement, measure: Measure) -> tuple[st
     """
     value, reasons = measurement.value, measurement.reasons
     if value is None:
-        # A value that is not finite is stored as None; it was not missing.
+        # A value that was not finite is stored as None, and is not missing.
         return (
             reasons
             if InvalidReason.NOT_FINITE in reasons

@@ -10,7 +10,7 @@ from rehab.training.tallies import Block, Tally
 
 
 def summarize_tally(tally: Tally) -> dict[str, Any]:
-    """Return the counts and means of some steps."""
+    """Return the counts of some steps, their hit rate (ratio), and their means."""
     return {
         "strides": tally.strides,
         "valid": tally.valid,

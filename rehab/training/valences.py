@@ -1,6 +1,6 @@
-"""Valences (for people: feedback types): what a hit or a miss earns, and what is said about it.
+"""Valences (for people: feedback types): what a hit or a miss earns, with texts and gestures.
 
-All of it is data. Pages and robots know no valence: they show and do what these rows say.
+All of it is data. Pages and robots know no valence; they follow this data.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from typing import Any
 from rehab.training.marking import Marked, gettext_noop
 from rehab.training.measures import InvalidSetting
 
-# More would say no more, and overflow where points are stored.
+# Larger numbers tell a patient nothing more, and overflow where points are stored.
 POINTS_MAX = 1000
 BANDS_MAX = 12
-TEXT_MAX = 60  # characters; longer ones fit no tablet in a size that is read from a treadmill
+TEXT_MAX = 60  # characters; longer texts do not fit a tablet at a size that is read from afar
 
 
 class Emblem(StrEnum):
-    """The drawing that says what a step meant, recognizable by shape alone."""
+    """The drawing for what a step earned, recognizable by its shape alone."""
 
     GAIN = "gain"
     LOSS = "loss"
@@ -40,7 +40,7 @@ class Confetti(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """What is said from this performance upwards, until the next band.
+    """Words and confetti from this performance upwards, until the next band.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Valence:
 
     @property
     def rewards(self) -> bool:
-        """Whether a hit earns anything, so that a row of hits is worth telling the patient."""
+        """Whether a hit earns points, so that pages show the patient a row of hits."""
         return (self.hit_points or 0) > 0
 
     def points(self, hit: bool) -> int | None:
@@ -151,10 +151,10 @@ class Valence:
         return Emblem.GAIN if points > 0 else Emblem.LOSS if points < 0 else Emblem.NEUTRAL
 
     def keeps_rule_set(self, hit_points: int | None, miss_points: int | None) -> bool:
-        """Return whether these points would leave it the rule set that it is.
+        """Return whether with these points it would still be the same rule set.
 
-        A study that names a type must be able to rely on it: what rewards hits goes on to do so,
-        what takes nothing never does, and what has no points gets none.
+        A study that names a type must be able to rely on it: a type that rewards hits always does,
+        one that takes nothing for a miss never does, and one without points has none.
         """
         if not self.has_points or hit_points is None or miss_points is None:
             return (hit_points, miss_points) == (self.hit_points, self.miss_points)

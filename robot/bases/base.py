@@ -35,7 +35,7 @@ class Abilities:
     announces
         Whether it has lights and sounds, with which it tells that it is about to move.
     real_time
-        Whether it lives by the computer's clock, so it cannot run on a virtual one.
+        Whether it runs by the computer's clock, so it cannot run on a virtual one.
     closed_loop
         Whether it reports where it is. Without that its pose is dead reckoning by its orders.
     bumpers
@@ -93,7 +93,7 @@ class SensorState:
 
 @dataclass(frozen=True, slots=True)
 class BaseState:
-    """Pose of a base by its odometry, from home; its velocity; its other sensors."""
+    """Pose of a base from home, by its odometry; its velocity; its other sensors."""
 
     pose: Pose
     twist: Twist
@@ -115,7 +115,7 @@ class MobileBase(ABC):
     """
 
     name: ClassVar[str]
-    abilities: Abilities  # of the class, or of one that was told what it has
+    abilities: Abilities  # of the class, or of an object with other topics
     port: str = ""  # address of its port or bridge, where it has one; set before it is opened
 
     @abstractmethod
@@ -185,7 +185,7 @@ class MobileBase(ABC):
 
     @abstractmethod
     def set_home(self) -> None:
-        """Make this place home. A simulation is put back to its own home."""
+        """Make the present place home. A simulated base is put back to its own home."""
 
     def ground_truth(self) -> GroundTruth | None:
         """Return its true pose where that is known: in a simulation."""

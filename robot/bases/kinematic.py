@@ -10,11 +10,11 @@ from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, ORDER_HOLDS_S, Limit
 from robot.motion.pose import HOME, advance
 from robot.motion.twist import STILL, Twist
 
-WHEELS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
+WHEEL_LIMITS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
 
 
 class KinematicBase(MobileBase):
-    """Moves as ``advance`` says, on a clock [s] that is a parameter."""
+    """Moves by ``advance``, on a clock [s] that is a parameter."""
 
     name: ClassVar[str] = "kinematic"
     abilities = Abilities(simulated=True, moves=True)
@@ -29,7 +29,7 @@ class KinematicBase(MobileBase):
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
         self._move()
-        self._twist, self._ordered_s = WHEELS.clip(twist), self._time_s
+        self._twist, self._ordered_s = WHEEL_LIMITS.clip(twist), self._time_s
         return self._twist
 
     def stop(self) -> None:
@@ -51,7 +51,7 @@ class KinematicBase(MobileBase):
         return GroundTruth(self.read().pose, self._farthest_m)
 
     def _move(self) -> None:
-        """Bring it to where it is now; no further than its last order held."""
+        """Advance its pose to the present, at most for as long as its last order held."""
         now_s = self._monotonic()
         held_until_s = self._ordered_s + ORDER_HOLDS_S
         moved_s = min(now_s, held_until_s) - self._time_s

@@ -22,22 +22,22 @@ from robot.bases.kobuki_protocol.commands import (
 from robot.bases.kobuki_protocol.feedback import Button, decode_feedback
 from robot.bases.kobuki_protocol.frame_filter import Estimate, FrameFilter
 from robot.bases.kobuki_protocol.frames import BAUD, FrameReader
-from robot.bases.kobuki_protocol.wheels import STOP, WHEELBASE_M, control_of, twist_of
+from robot.bases.kobuki_protocol.wheels import STOP, WHEELBASE_M, control_to_twist, twist_to_control
 from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, Limits
 from robot.motion.odometry import Odometry
 from robot.motion.twist import STILL, Twist
 from robot.port.client import PortClient, ReceivedBytes
 from robot.port.usb import find_port
 
-WHEELS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
+WHEEL_LIMITS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
 STOP_FRAME = encode_commands(STOP)
 
 FIRMWARE_MAJOR = 1  # what the reference driver takes (docs/reference/kobuki.md#firmware)
-ASK_EVERY_S = 0.1  # for the versions, until they are known
+REQUEST_EVERY_S = 0.1  # for the versions, until they are known
 LIGHT_EVERY_S = 1.0  # lights again, for a base that was switched off meanwhile
-# A hazard counts for so long [s] after it was felt last: no look in between misses it.
-FELT_S = 0.1
-GREETING_S = 1.5  # a base that is switched on has told all by then
+# A hazard counts for this long [s] after it was last detected, so that no tick misses it.
+HAZARD_HOLD_S = 0.1
+GREETING_S = 1.5  # a base that is switched on has reported everything by then
 
 LIGHTS = {
     Indication.WAITING: Output(0),
@@ -57,16 +57,16 @@ class KobukiBase(MobileBase):
     def __init__(self, monotonic: Callable[[], float]) -> None:
         self._monotonic = monotonic
         self._client: PortClient | None = None
-        self._lock = threading.Lock()  # what is heard comes on another thread
+        self._lock = threading.Lock()  # data are received on another thread
         self._reader = FrameReader(decode_feedback)
         self._filter = FrameFilter()
         self._odometry = Odometry(WHEELBASE_M)
         self._estimate: Estimate | None = None
         self._opened = 0
         self._seen_s = self._begun_s = monotonic()
-        self._felt: dict[str, float] = {}
+        self._detected_s: dict[str, float] = {}
         self._indication, self._sound = Indication.WAITING, b""
-        self._asked_s = self._lit_s = monotonic() - LIGHT_EVERY_S
+        self._requested_s = self._lit_s = monotonic() - LIGHT_EVERY_S
 
     def __enter__(self) -> Self:
         """Open the port, stop the base, and wait a moment for its firmware version."""
@@ -96,7 +96,7 @@ class KobukiBase(MobileBase):
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """Count what came in damaged and what the port's process did not send."""
+        """How many frames came in damaged, and how many the port's process did not send."""
         with self._lock:
             reader = self._reader
             counts = Counter(
@@ -121,16 +121,16 @@ class KobukiBase(MobileBase):
 
     @property
     def problem(self) -> str:
-        """Return why the port is not open; empty where it is."""
+        """Why the port is not open; empty where it is."""
         return "" if self._client is None else self._client.problem
 
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
         if self._client is None or self._client.is_dead:
             raise BaseLost("The process that owns the port does not run: see its messages above.")
-        control = control_of(WHEELS.clip(twist))
+        control = twist_to_control(WHEEL_LIMITS.clip(twist))
         self._client.order(encode_commands(control), self._extra_commands())
-        return twist_of(control)
+        return control_to_twist(control)
 
     def stop(self) -> None:
         """Stand still at once."""
@@ -144,7 +144,9 @@ class KobukiBase(MobileBase):
         now_s = self._monotonic()
         with self._lock:
             estimate, odometry = self._estimate, self._odometry
-            felt = {name for name, felt_s in self._felt.items() if now_s - felt_s <= FELT_S}
+            detected = {
+                name for name, at_s in self._detected_s.items() if now_s - at_s <= HAZARD_HOLD_S
+            }
             silent_s, firmware = now_s - self._seen_s, self._filter.firmware
             if estimate is None:
                 return BaseState(
@@ -154,9 +156,9 @@ class KobukiBase(MobileBase):
             if firmware is not None and firmware.major != FIRMWARE_MAJOR:
                 refusal = "firmware_refused"
             sensors = SensorState(
-                hazards=frozenset(felt - {"stop_button"}),
+                hazards=frozenset(detected - {"stop_button"}),
                 refusal=refusal,
-                stop_pressed="stop_button" in felt,
+                stop_pressed="stop_button" in detected,
                 battery_v=estimate.battery_v if estimate.battery_v > 0 else None,
                 is_charging=estimate.is_charging,
                 silent_s=silent_s,
@@ -171,7 +173,7 @@ class KobukiBase(MobileBase):
             self._odometry.set_home()
 
     def show(self, indication: Indication, *, aloud: bool) -> None:
-        """Show it by the first light, and by a short sound."""
+        """Show its state by the first light, and by a short sound."""
         self._indication, self._lit_s = indication, self._monotonic() - LIGHT_EVERY_S
         if aloud and indication in SOUNDS:
             self._sound = encode_commands(SoundSequence(SOUNDS[indication]))
@@ -183,34 +185,34 @@ class KobukiBase(MobileBase):
         if now_s - self._lit_s >= LIGHT_EVERY_S:
             self._lit_s = now_s
             extra += encode_commands(GpOutput(Output.POWER | LIGHTS[self._indication]))
-        if self._filter.firmware is None and now_s - self._asked_s >= ASK_EVERY_S:
-            self._asked_s = now_s
+        if self._filter.firmware is None and now_s - self._requested_s >= REQUEST_EVERY_S:
+            self._requested_s = now_s
             extra += encode_commands(RequestExtra(Extra.HARDWARE | Extra.FIRMWARE | Extra.UDID))
         return extra
 
-    def _receive(self, heard: ReceivedBytes) -> None:
+    def _receive(self, received: ReceivedBytes) -> None:
         """Handle bytes of the base, on the client's thread."""
         with self._lock:
-            if heard.opened != self._opened:
-                self._opened = heard.opened
-                self._filter.forget()
-            for feedback in self._reader.feed(heard.data):
-                estimate = self._filter.take(feedback, heard.at_s)
+            if received.opened != self._opened:
+                self._opened = received.opened
+                self._filter.reset()
+            for feedback in self._reader.feed(received.data):
+                estimate = self._filter.update(feedback, received.at_s)
                 if estimate is not None:
-                    self._update(estimate, heard.at_s)
+                    self._update(estimate, received.at_s)
 
     def _update(self, estimate: Estimate, at_s: float) -> None:
-        anew = estimate.began_anew and self._estimate is not None
+        has_restarted = estimate.restarted and self._estimate is not None
         self._estimate, self._seen_s = estimate, at_s
         self._odometry.add(
             estimate.left_m, estimate.right_m, estimate.heading_rad, estimate.turn_rad_s
         )
-        felt = {
+        detected = {
             "bump": estimate.bumper,
             "cliff": estimate.cliff,
             "wheel_drop": estimate.wheel_drop,
             "over_current": estimate.over_current,
-            "restarted": anew,  # switched off or carried away: home is unknown
+            "restarted": has_restarted,  # switched off or carried away: home is unknown
             "stop_button": estimate.buttons & Button.B0,
         }
-        self._felt |= {name: at_s for name, is_felt in felt.items() if is_felt}
+        self._detected_s |= {name: at_s for name, is_felt in detected.items() if is_felt}

@@ -24,7 +24,7 @@ class NullBase(MobileBase):
         return STILL
 
     def stop(self) -> None:
-        """Stand still, as ever."""
+        """Do nothing: it always stands still."""
 
     def read(self) -> BaseState:
         """Return home, standing still."""

@@ -27,7 +27,7 @@ class TwinBase(KobukiBase):
         super().__init__(monotonic)
         self._options = options
         self._twin: subprocess.Popen[str] | None = None
-        self._asking = threading.Lock()
+        self._order_lock = threading.Lock()
 
     def __enter__(self) -> Self:
         """Start the twin, and open its port. Raises BaseLost where it does not start."""
@@ -64,20 +64,20 @@ class TwinBase(KobukiBase):
     def set_home(self) -> None:
         """Carry it back to where it began."""
         self.stop()
-        self.ask({"do": "carry_home"})
+        self.send_order({"do": "carry_home"})
         super().set_home()
 
     def ground_truth(self) -> GroundTruth:
         """Return its true pose, and the largest distance from home since the last call."""
-        seen = self.ask({"do": "look"})
+        seen = self.send_order({"do": "look"})
         return GroundTruth(Pose(**seen["pose"]), seen["farthest_m"])
 
-    def ask(self, order: Mapping[str, Any]) -> dict[str, Any]:
+    def send_order(self, order: Mapping[str, Any]) -> dict[str, Any]:
         """Send an order to the twin, and return its answer. Raises BaseLost and ValueError."""
         twin = self._twin
         if twin is None or twin.stdin is None or twin.stdout is None:
             raise BaseLost("The twin has not been started.")
-        with self._asking:
+        with self._order_lock:
             try:
                 twin.stdin.write(json.dumps(order) + "\n")
                 twin.stdin.flush()

@@ -1,1 +1,1 @@
-"""What a robot does and says of itself: windows, decisions, safety, status. Time is a parameter."""
+"""What a robot does and reports: windows, decisions, safety, status. Time is a parameter."""

@@ -15,8 +15,8 @@ def control_loop(
 ) -> Iterator[float]:
     """Tick a performer 50 times a second.
 
-    The caller lets the time pass, by sleeping, by awaiting, or by moving a virtual clock, and may
-    look at the performer meanwhile.
+    The caller waits, by sleeping, by awaiting, or by moving a virtual clock, and may read the
+    performer's state meanwhile.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def control_loop(
     monotonic
         The clock [s] that the performer is ticked by.
     is_over
-        Asked before each wait; the loop ends once it is true.
+        Called before each wait; the loop ends once it returns True.
 
     Yields
     ------

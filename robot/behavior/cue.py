@@ -9,7 +9,7 @@ from typing import Any
 from robot.wire.frames import BadFrame, read_number
 from robot.wire.limits import MAX_CUE_GESTURES, MAX_NAME_CHARS
 
-LEAST_INTENSITY = 0.1
+MIN_INTENSITY = 0.1
 # A cue of this intensity or less is performed quietly: without sounds, and at this share of every
 # speed and acceleration, so that half as far takes as long (our choice).
 QUIET = 0.5
@@ -28,7 +28,7 @@ class Cue:
         Mean performance that a window has to reach; 1 is the goal.
     window_s, rest_s
         Length of a window, and time from the start of one gesture to the start of the next, both
-        on the source's clock [s]: so what a robot does follows from the log, without chance.
+        on the source's clock [s], so that what a robot does follows from the log.
     intensity
         Share of a gesture's size, 0.1 to 1; 0 for no gesture at all.
     gestures
@@ -49,8 +49,8 @@ class Cue:
         if not isinstance(cue, dict):
             raise BadFrame('"cue" is an object.')
         intensity = read_number(cue, "intensity", 0.0, 1.0)
-        if 0 < intensity < LEAST_INTENSITY:
-            raise BadFrame(f'"intensity" is 0, or a number from {LEAST_INTENSITY:g} to 1.')
+        if 0 < intensity < MIN_INTENSITY:
+            raise BadFrame(f'"intensity" is 0, or a number from {MIN_INTENSITY:g} to 1.')
         gestures = cue.get("gestures", [])
         if not isinstance(gestures, list) or len(gestures) > MAX_CUE_GESTURES:
             raise BadFrame(f'"gestures" is a list of up to {MAX_CUE_GESTURES}.')

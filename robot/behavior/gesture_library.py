@@ -13,18 +13,18 @@ from robot.motion.limits import Limits
 
 # Why a name cannot be performed.
 UNKNOWN_GESTURE = "unknown_gesture"
-BAD_GESTURE = "bad_gesture"  # it came along, and no base may perform it
+BAD_GESTURE = "bad_gesture"  # received with the cue, and refused
 
 
 class GestureLibrary:
-    """Gestures by name.
+    """The built-in gestures and the received ones, by name.
 
     Parameters
     ----------
-    own
+    builtin
         Those that no cue may replace.
     limits
-        Speeds and accelerations that a gesture has to do with.
+        Speeds and accelerations that a gesture must keep to.
     """
 
     def __init__(self, builtin: Mapping[str, Gesture], limits: Limits) -> None:

@@ -1,8 +1,8 @@
 """What a robot does with the server's messages. Time is a parameter, so that hours take a second.
 
 It moves only while all of this holds: the server was heard within ``SILENCE_S``, the session runs,
-and safety.py sees nothing against it. Anything else ends the gesture, and no gesture is made up for
-later.
+and ``safety`` finds no fault. Anything else ends the gesture; a gesture that was missed is not
+played later.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from robot.wire.limits import PERFORMANCE_MAX, TIME_MAX_S
 
 Message = Mapping[str, Any]
 
-# Without a sign of life for so long [s] the base stands still. The server gives one every 0.25 s,
-# and one may come 0.4 s late; what nobody hears should move no longer than 0.75 s, and the order to
-# stand still takes up to 0.05 s to the wheels.
+# Without a message for this long [s] the base stands still. The server sends a heartbeat every
+# 0.25 s, and one may come 0.4 s late; without a server a base should move for at most 0.75 s, and
+# the order to stand still takes up to 0.05 s to the wheels.
 SILENCE_S = 0.65
 
-# Codes: why a robot does not move, and how a gesture ended; safety.py has more.
+# Codes: why a robot does not move, and how a gesture ended; ``safety`` has more.
 NO_LINK = "no_link"
 NO_SESSION = "no_session"
 NOT_RUNNING = "not_running"
@@ -57,7 +57,7 @@ class Performer:
     decision
         The newest decision; None before there was one.
     bad_messages, last_bad_message
-        How many messages were not the protocol, and what was wrong with the last one.
+        How many messages broke the protocol, and what was wrong with the last one.
     """
 
     def __init__(
@@ -88,23 +88,23 @@ class Performer:
 
     @property
     def is_linked(self) -> bool:
-        """Whether the server has welcomed it and is heard."""
+        """Whether the server has sent its welcome on this connection, which is not lost."""
         return self._is_welcome
 
     def handle(self, message: Message, now_s: float) -> None:
-        """Handle a message of the server; count one that is not the protocol, to no effect."""
+        """Handle a message of the server; one that breaks the protocol is only counted."""
         try:
             self._dispatch(message, now_s)
         except BadFrame as problem:
             self.count_bad_message(str(problem))
 
     def count_bad_message(self, problem: str) -> None:
-        """Count something that was not the protocol."""
+        """Count a message that breaks the protocol."""
         self.bad_messages += 1
         self.last_bad_message = problem
 
     def disconnect(self, reason: str) -> None:
-        """Stand still at once: the server is not heard any more. A real base is disarmed."""
+        """Stand still at once: the connection to the server is lost. A real base is disarmed."""
         self._is_welcome = self._is_running = False
         self.status.reset()
         self.safety.disconnect()
@@ -144,7 +144,7 @@ class Performer:
 
     def tick(self, now_s: float) -> None:
         """Order the base's next twist; to be called 50 times a second. Raises BaseLost."""
-        # Without a session it does not move, and nobody gives signs of life.
+        # Without a session it does not move, and the server sends no heartbeat.
         if self._session is not None and self._is_welcome and now_s - self._heard_s > SILENCE_S:
             self.disconnect(NO_LINK)
         state, player = self.base.read(), self.player
@@ -156,7 +156,7 @@ class Performer:
         if was is not None and not player.is_busy:
             self.status.report_gesture(was, "ended", player.outcome)
             if player.outcome in (OUT_OF_TIME, BAD_ODOMETRY):
-                # What did not get there is held or blocked, and would be again in a moment.
+                # A base that did not get there is held or blocked, and would be again at once.
                 self.safety.latch_fault(STALLED, now_s)
                 self._stop_for(STALLED)
         self._report(now_s, state)
@@ -184,7 +184,9 @@ class Performer:
             case "arm":
                 self._handle_arm(now_s)
             case _:
-                raise BadFrame("A robot hears welcome, step, state, cue, stop, arm, heartbeat.")
+                raise BadFrame(
+                    "A robot understands welcome, step, state, cue, stop, arm, heartbeat."
+                )
 
     def _handle_welcome(self, message: Message) -> None:
         session = message.get("session")
@@ -238,12 +240,12 @@ class Performer:
             self.status.report_gesture(gesture, "ended", self.player.outcome)
 
     def _handle_stop(self) -> None:
-        """Follow a person's stop."""
+        """Stop for a person, and latch it."""
         self.safety.stop(STOPPED)
         self._halt(STOPPED)
 
     def _stop_for(self, reason: str) -> None:
-        """Stand still for a reason of its own, and have it stay so."""
+        """Stand still for a fault that is latched, and report it."""
         self._halt(reason)
         self.reports.append(stop_report(reason))
 
@@ -278,7 +280,7 @@ class Performer:
         if reason or gesture is None:
             self.reports.append(decision_report(decision, None, None, reason, share))
             return
-        # What replicates the paper does the same every time.
+        # The paper's own gestures replicate it, and are the same every time.
         strength = 1.0 if gesture.name in ORIGINALS else decision.strength
         intensity = round(cue.intensity * strength * self.safety.share, 3)
         self.reports.append(decision_report(decision, gesture.name, intensity, "", share))
@@ -307,7 +309,7 @@ class Performer:
         return ""
 
     def _state(self, there: BaseState) -> tuple[str, str]:
-        """Return the robot's state, and why it would not perform now."""
+        """Return the robot's state, and why it would not perform now, as codes."""
         reason = self.safety.blocking_reason(there)
         if self.safety.latch:
             return "stopped", reason

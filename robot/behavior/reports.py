@@ -23,7 +23,7 @@ def status_report(
 ) -> Report:
     """Return the report of a robot's status.
 
-    ``battery`` is its share and whether that is low. Counters at 0 are left out.
+    ``battery`` is its share (0 to 1) and whether that is low. Counters at 0 are omitted.
     """
     pose, (battery_share, is_low) = there.pose, battery
     return {

@@ -1,8 +1,8 @@
-"""Whether a robot may move, and what stops it. Time is a parameter; nothing here asks or waits.
+"""Whether a robot may move, and what stops it. Time is a parameter; nothing here reads or waits.
 
-There are two kinds of no. A *latch* stops the base at once and holds until a person arms it again:
-what the base felt, what it did that nobody ordered, a person's stop. An *obstacle* keeps the next
-gesture from starting as long as it lasts. Numbers without a source of their own are those of
+A *latch* stops the base at once and holds until a person arms it again: a hazard that the base
+detected, a motion that was not ordered, a person's stop. An *obstacle* keeps the next gesture from
+starting as long as it lasts. Numbers without a source of their own are those of
 docs/reference/kobuki.md#beside-a-person; no standard gives any for a base of this size
 (docs/reference/kobuki.md#standards).
 """
@@ -17,20 +17,20 @@ from robot.motion.limits import ORDER_HOLDS_S
 from robot.motion.pose import HOME
 from robot.motion.twist import Twist
 
-# Light and sound come so long before a gesture [s]: a sudden motion may startle the walker.
+# Light and sound come this long before a gesture [s]: a sudden motion may startle the walker.
 ANNOUNCE_S = 0.5
 
-# Nothing heard of the base for so long [s]. The reference takes 0.1 s
+# Nothing heard of the base for this long [s]. The reference driver allows 0.1 s
 # (docs/reference/kobuki.md#watchdogs); twice that forgives a busy computer (largest gap measured:
 # 0.03 s) and keeps the whole within 0.35 s.
 BASE_SILENT_S = 0.2
-# A computer that hung for so long [s] while the base was to move: the base has stopped by itself,
-# and what was interrupted does not go on by itself (rule 2, ISO 13850).
+# A computer that hung for this long [s] during a gesture: the base has stopped by itself, and a
+# gesture that was interrupted is not resumed (ISO 13850).
 LAPSED_S = ORDER_HOLDS_S
 
-# A wheel that moves so much otherwise than ordered [m/s], for so long [s]: held, lifted or pushed.
-ASTRAY_M_S = 0.1
-ASTRAY_S = 0.5
+# A wheel that deviates this much from its order [m/s], for this long [s]: held, lifted or pushed.
+DEVIATION_M_S = 0.1
+DEVIATION_S = 0.5
 # From a Kobuki's middle to a wheel (docs/reference/kobuki.md#odometry-and-gyro).
 HALF_TRACK_M = 0.115
 SLIP_RAD = 0.175  # 10°: wheels and gyro disagree about a gesture's turns
@@ -47,18 +47,18 @@ EMPTY_S = 1.0  # a voltage dips when wheels start (our choice)
 AT_HOME_M = 0.05
 AT_HOME_RAD = 0.087  # 5°
 
-# An arming so soon after the robot stopped itself [s] was given before anyone could look (our
-# choice; people react to what they see after 0.2 s and more).
-SEEN_S = 1.0
+# An arming sooner than this after the robot stopped itself [s] was given before anyone could look
+# (our choice; people react to what they see after 0.2 s and more).
+REARM_AFTER_S = 1.0
 
-# Where no odometry closes the loop, a gesture is short: of half its size, and within the limits not
-# longer than this [s]; and after so many since it was armed a person has to look where the base is
-# (ours: with 10 % of each way astray, 20 of them come to half the tether).
+# Without odometry a gesture is short: half its size, and within the limits no longer than this [s];
+# and after this many gestures since it was armed a person has to look where it is (our choice: with
+# an error of 10 % of each way, 20 of them come to half the tether).
 OPEN_LOOP_SHARE = 0.5
-OPEN_LOOP_S = 4.0
-OPEN_LOOP_MOST = 20
+OPEN_LOOP_MAX_S = 4.0
+OPEN_LOOP_MAX_GESTURES = 20
 
-# Latches; those that a base feels have its own codes.
+# Latches; hazards that a base detects have its own codes.
 STOPPED = "stopped"  # by a person
 BUTTON = "button"  # by a person, at the base
 BASE_SILENT = "base_silent"
@@ -74,8 +74,8 @@ UNWATCHED = "unwatched"  # a real base, and no PT's page is open
 CHARGING = "charging"
 BATTERY_LOW = "battery_low"
 AWAY = "away_from_home"
-OPEN_LOOP = "open_loop"  # too long a gesture for a base that does not tell where it is
-PLACE_UNKNOWN = "place_unknown"  # such a base has to be looked at, and armed
+OPEN_LOOP = "open_loop"  # too long a gesture for a base without odometry
+PLACE_UNKNOWN = "place_unknown"  # a person has to look at such a base, and arm it
 
 
 def battery_share(battery_v: float) -> float:
@@ -100,11 +100,11 @@ class Safety:
     latch
         What stopped it, as a code; empty where nothing did. The first cause stays.
     is_armed
-        Whether a person lets it move, as far as that is up to people.
+        Whether a person has armed it.
     is_watched
         Whether a PT's page is open.
     refused_arms
-        How many armings could not be followed.
+        How many armings were refused.
     """
 
     def __init__(self, abilities: Abilities) -> None:
@@ -113,22 +113,22 @@ class Safety:
         self.is_armed = abilities.simulated
         self.is_watched = False
         self.refused_arms = 0
-        self._felt_s: float | None = None  # when the robot itself stopped; None for a person's stop
-        self._looked_s: float | None = None
-        self._since: dict[str, float] = {}  # when what holds now began
+        self._fault_s: float | None = None  # when it stopped itself; None for a person's stop
+        self._checked_s: float | None = None
+        self._since: dict[str, float] = {}  # when each fault that holds now began
         self._slip_rad = 0.0  # when the gesture began
-        self._begun = 0  # gestures since it was armed
-        self._is_low = False
+        self._gestures_started = 0  # gestures since it was armed
+        self._battery_was_low = False
 
     def stop(self, reason: str) -> None:
         """Latch for a person's stop. Repeating it changes nothing."""
         self.latch = self.latch or reason
-        self._felt_s = None
+        self._fault_s = None
 
     def latch_fault(self, reason: str, now_s: float) -> None:
         """Latch for a reason that the robot itself found."""
         if not self.latch:
-            self.latch, self._felt_s = reason, now_s
+            self.latch, self._fault_s = reason, now_s
 
     def disconnect(self) -> None:
         """Reset what depends on the server: a real base has to be armed again."""
@@ -152,21 +152,21 @@ class Safety:
             Why it cannot be armed, as a code; empty where it is armed now.
         """
         reason = self._base_fault(state)
-        if not reason and self._felt_s is not None and now_s - self._felt_s < SEEN_S:
+        if not reason and self._fault_s is not None and now_s - self._fault_s < REARM_AFTER_S:
             reason = self.latch
         if reason:
             self.refused_arms += 1
             self.latch_fault(reason, now_s)
             return reason
-        self.latch, self._felt_s, self.is_armed = "", None, True
-        self._begun = 0
+        self.latch, self._fault_s, self.is_armed = "", None, True
+        self._gestures_started = 0
         self._since.clear()
         return ""
 
     def start_gesture(self, now_s: float, state: BaseState) -> None:
         """Store where and when a gesture begins."""
-        self._looked_s, self._slip_rad = now_s, state.sensors.slip_rad
-        self._begun += 1
+        self._checked_s, self._slip_rad = now_s, state.sensors.slip_rad
+        self._gestures_started += 1
 
     def check(self, now_s: float, state: BaseState, ordered: Twist, *, performing: bool) -> str:
         """Return the code of what must stop the base now, and latch it; empty where nothing must.
@@ -182,8 +182,8 @@ class Safety:
         performing
             Whether a gesture is played, its announcement included.
         """
-        elapsed_s = 0.0 if self._looked_s is None else now_s - self._looked_s
-        self._looked_s = now_s
+        elapsed_s = 0.0 if self._checked_s is None else now_s - self._checked_s
+        self._checked_s = now_s
         found = next(self._faults(now_s, state, ordered, performing, elapsed_s), "")
         if self.latch or not (found == BUTTON or self.is_armed):
             return ""
@@ -206,7 +206,7 @@ class Safety:
             return BATTERY_LOW
         if is_real and not self.is_watched:
             return UNWATCHED
-        if not self._abilities.closed_loop and self._begun >= OPEN_LOOP_MOST:
+        if not self._abilities.closed_loop and self._gestures_started >= OPEN_LOOP_MAX_GESTURES:
             return PLACE_UNKNOWN
         return ""
 
@@ -217,7 +217,7 @@ class Safety:
 
     def rejection_reason(self, gesture: Gesture) -> str:
         """Return why the base cannot perform a gesture safely; empty where it can."""
-        is_long = not self._abilities.closed_loop and gesture.least_s > OPEN_LOOP_S
+        is_long = not self._abilities.closed_loop and gesture.min_duration_s > OPEN_LOOP_MAX_S
         return OPEN_LOOP if is_long else ""
 
     @staticmethod
@@ -238,16 +238,18 @@ class Safety:
     def _faults(
         self, now_s: float, state: BaseState, ordered: Twist, performing: bool, elapsed_s: float
     ) -> Iterator[str]:
-        """Yield the codes of all that is wrong, the most direct first."""
+        """Yield the codes of all faults, the most direct first."""
         if reason := self._base_fault(state):
             yield reason
         if performing and elapsed_s > LAPSED_S:
             yield LAPSED
         if state.pose.distance_m(HOME) > TETHER_M:
             yield TETHER
-        astray_m_s = abs(ordered.v_m_s - state.twist.v_m_s)
-        astray_m_s += HALF_TRACK_M * abs(ordered.w_rad_s - state.twist.w_rad_s)
-        if self._has_held(STALLED, performing and astray_m_s > ASTRAY_M_S, now_s, ASTRAY_S):
+        deviation_m_s = abs(ordered.v_m_s - state.twist.v_m_s)
+        deviation_m_s += HALF_TRACK_M * abs(ordered.w_rad_s - state.twist.w_rad_s)
+        if self._has_held(
+            STALLED, performing and deviation_m_s > DEVIATION_M_S, now_s, DEVIATION_S
+        ):
             yield STALLED
         if performing and abs(state.sensors.slip_rad - self._slip_rad) > SLIP_RAD:
             yield SLIPPED
@@ -264,5 +266,7 @@ class Safety:
 
     def _is_battery_low(self, battery_v: float | None) -> bool:
         if battery_v is not None:
-            self._is_low = battery_v < (BATTERY_WARN_V if self._is_low else BATTERY_LOW_V)
-        return self._is_low
+            self._battery_was_low = battery_v < (
+                BATTERY_WARN_V if self._battery_was_low else BATTERY_LOW_V
+            )
+        return self._battery_was_low

@@ -1,4 +1,4 @@
-"""What a robot makes known: reports to the server, lights and sounds to people."""
+"""A robot's status: reports to the server, lights and sounds for people."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from robot.motion.gesture import Gesture
 
 STATUS_MOVING_S = 0.25
 STATUS_IDLE_S = 1.0
-REPORTS_KEPT = 64  # while nobody fetches them the oldest are dropped: what is past is past
+REPORTS_KEPT = 64  # while nobody sends them, the oldest are dropped
 
 State = tuple[str, str]  # the robot's state, and why it would not perform now
 
@@ -34,13 +34,13 @@ class StatusReporter:
     def __init__(self, base: MobileBase) -> None:
         self.reports: deque[Report] = deque(maxlen=REPORTS_KEPT)
         self._base = base
-        self._told_s: float | None = None  # the last status
-        self._told: State | None = None
+        self._reported_s: float | None = None  # the last status
+        self._reported: State | None = None
         self._indication: Indication | None = None
 
     def reset(self) -> None:
         """Make the next status due at once, for a server that knows nothing yet."""
-        self._told_s = None
+        self._reported_s = None
 
     def report_gesture(self, gesture: Gesture, phase: str, outcome: str) -> None:
         """Report that a gesture has started or ended."""
@@ -58,10 +58,10 @@ class StatusReporter:
     ) -> None:
         """Report the status where it has changed, and every so often."""
         every_s = STATUS_IDLE_S if gesture is None else STATUS_MOVING_S
-        due = self._told_s is None or not 0 <= now_s - self._told_s < every_s
-        if not due and state == self._told:
+        due = self._reported_s is None or not 0 <= now_s - self._reported_s < every_s
+        if not due and state == self._reported:
             return
-        self._told_s, self._told = now_s, state
+        self._reported_s, self._reported = now_s, state
         name = None if gesture is None else gesture.name
         volts = there.sensors.battery_v
         battery = (None, False) if volts is None else (battery_share(volts), volts < BATTERY_WARN_V)

@@ -1,8 +1,7 @@
-"""When a robot answers: the mean performance of five seconds of walking against a threshold.
+"""When a robot responds: the mean performance of five seconds of walking against a threshold.
 
 The paper's rule (P 3.4.1), on the source's clock: windows of 5 s follow each other without a gap
-from the first step on; a window's mean is *above* where it reaches the threshold. Here are the
-session's order to its robot, the windows, and when a gesture may start.
+from the first step on; a window's mean is *above* where it reaches the threshold.
 """
 
 from __future__ import annotations
@@ -12,11 +11,11 @@ from dataclasses import dataclass
 
 from robot.behavior.cue import Cue
 
-MIN_STEPS = 2  # fewer valid steps in a window say nothing
-# A window above is answered in full from this mean performance on, where the strong words for the
-# patient begin; at the threshold with this share of it (our choice).
+MIN_STEPS = 2  # of a window; with fewer valid steps there is no decision
+# A window above gets a gesture of full size from this mean performance on, where the strong words
+# for the patient begin; at the threshold one of this share (our choice).
 FULL_PERFORMANCE = 1.1
-FAINT = 0.5
+MIN_STRENGTH = 0.5
 
 # Why no gesture followed a decision.
 NO_GESTURE = "no_gesture"  # the order names none for it
@@ -28,7 +27,7 @@ OFF = "off"  # the order's intensity is 0
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What a window came to; ``at_s`` is the time of the step that ended it."""
+    """The result of a window; ``at_s`` is the time of the step that ended it."""
 
     from_s: float
     until_s: float
@@ -40,19 +39,19 @@ class Decision:
 
     @property
     def is_late(self) -> bool:
-        """Whether it is of so long ago that nobody may answer it any more."""
+        """Whether it ended more than a window ago, too late for a gesture."""
         return self.at_s - self.until_s > self.until_s - self.from_s
 
     @property
     def strength(self) -> float:
-        """The share of the cue's intensity that answers it, ``FAINT`` to 1.
+        """The share of the cue's intensity for its gesture, ``MIN_STRENGTH`` to 1.
 
-        Above the threshold it grows with the mean performance; a window below never makes it grow.
+        Above the threshold it grows with the mean performance; below it is 1.
         """
         if not self.above or self.mean >= FULL_PERFORMANCE:
             return 1.0
         grown = (self.mean - self.threshold) / (FULL_PERFORMANCE - self.threshold)
-        return FAINT + (1 - FAINT) * grown
+        return MIN_STRENGTH + (1 - MIN_STRENGTH) * grown
 
 
 class WindowDecider:
@@ -60,7 +59,7 @@ class WindowDecider:
 
     Windows are counted from the first step: the one with the number k has the steps of which
     ``(time - first) / window_s`` lies in [k, k + 1). A window ends with the first step of a later
-    one, for the source's clock is told by steps alone.
+    one, since only steps carry the source's clock.
     """
 
     def __init__(self, cue: Cue) -> None:
@@ -100,7 +99,7 @@ class WindowDecider:
         if self._first_s is None:
             self._first_s = time_s
             if self._started_s is not None and self._started_s > time_s:
-                self._started_s = time_s  # set back meanwhile: nobody knows how long ago it was
+                self._started_s = time_s  # the clock was set back: how long ago it was is unknown
         window = math.floor((time_s - self._first_s) / self.cue.window_s)
         if window < self._window:
             self.drop_window()
@@ -139,7 +138,7 @@ class WindowDecider:
         Parameters
         ----------
         decision
-            What the window came to.
+            The window's result.
         performing
             Whether a gesture is running.
         """

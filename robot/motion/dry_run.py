@@ -13,8 +13,8 @@ from robot.motion.limits import DEFAULT_LIMITS, TICK_S, Limits
 from robot.motion.player import DONE, Player
 from robot.motion.pose import HOME, Pose, advance
 
-# Where it has to end [m, rad] (docs/reference/kobuki.md#beside-a-person asks for 1 cm and 2°; a
-# player is nearer than that).
+# How near to home it has to end [m, rad] (docs/reference/kobuki.md#beside-a-person asks for 1 cm
+# and 2°; a player comes nearer than that).
 END_M = 0.01
 END_RAD = 0.035
 
@@ -29,7 +29,7 @@ class DryRun:
 
     @property
     def farthest_m(self) -> float:
-        """How far from home it has been [m]."""
+        """The largest distance from home [m]."""
         return max(pose.distance_m(HOME) for pose in self.poses)
 
 
@@ -75,7 +75,7 @@ def validate_gesture(data: Any, limits: Limits = DEFAULT_LIMITS) -> Gesture:
     return gesture
 
 
-@lru_cache(maxsize=64)  # it comes with every cue, and a dry run takes some 20 ms
+@lru_cache(maxsize=64)  # a gesture comes with every cue, and a dry run takes some 20 ms
 def _check_dry_run(gesture: Gesture, limits: Limits) -> None:
     result = dry_run(gesture, limits)
     if result.farthest_m > TETHER_M:

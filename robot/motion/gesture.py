@@ -1,7 +1,7 @@
 """Gestures: places to go to, one after the other, and home again.
 
-A gesture says where, never for how long: timed ones end rotated and displaced as soon as a base
-speeds up gently (docs/reference/kobuki.md#timed-gestures).
+A gesture is defined by places and not by times: timed ones end rotated and displaced as soon as a
+base accelerates gently (docs/reference/kobuki.md#timed-gestures).
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ NEAR_M = 0.004
 NEAR_RAD = 0.02
 
 GESTURE_MAX_S = 16.0  # the paper's longest, with slack
-WAYPOINTS_MAX = 32
-TURN_MAX_RAD = math.tau  # a longer cable than this winds up
+MAX_WAYPOINTS = 32
+TURN_MAX_RAD = math.tau  # beyond this a cable winds up
 # Slower turns stick and shake (docs/reference/kobuki.md#what-users-report: below 0.33 rad/s).
-LEAST_PACE = 0.2
-SLACK = 1.5  # a waypoint's time over its shortest possible: odometry, grip and latency cost some
+MIN_PACE = 0.2
+SLACK = 1.5  # time of a waypoint over the shortest possible, for odometry, grip and latency
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class Waypoint:
 
     @property
     def pose(self) -> Pose:
-        """Where it is."""
+        """The pose to come to."""
         return Pose(self.x_m, self.y_m, self.heading_rad)
 
 
@@ -79,8 +79,8 @@ class Gesture:
     def scaled(self, intensity: float) -> Gesture:
         """Return the gesture at a share of its size, which never takes longer.
 
-        Ways shrink, and turns with them as long as it drives on the line ahead of home only. Where
-        it drives aside its turns set the direction, and stay as they are.
+        Ways shrink, and turns too where it only drives on the line ahead of home. Where it drives
+        aside, its turns set the direction and stay as they are.
 
         Parameters
         ----------
@@ -118,10 +118,10 @@ class Gesture:
         return all(abs(drive.heading_rad) < 1e-9 for drive in drives)
 
     @property
-    def least_s(self) -> float:
+    def min_duration_s(self) -> float:
         """The shortest time that it can take within the default limits [s]."""
         return sum(
-            hold_s + sum(segment.least_s(limits) for segment in segments)
+            hold_s + sum(segment.min_duration_s(limits) for segment in segments)
             for segments, limits, hold_s in stages(self.waypoints, DEFAULT_LIMITS)
         )
 
@@ -136,8 +136,8 @@ def check_gesture(gesture: Gesture) -> None:
         home, and a way that is driven backwards and was not driven forwards before (a Kobuki has no
         rear bumper). The message names the waypoint and the cure.
     """
-    if not 1 <= len(gesture.waypoints) <= WAYPOINTS_MAX:
-        raise BadGesture("A gesture has 1 to {most} goals.", most=WAYPOINTS_MAX)
+    if not 1 <= len(gesture.waypoints) <= MAX_WAYPOINTS:
+        raise BadGesture("A gesture has 1 to {most} goals.", most=MAX_WAYPOINTS)
     for number, waypoint in enumerate(gesture.waypoints, start=1):
         check_waypoint(number, waypoint)
     last = gesture.waypoints[-1].pose
@@ -151,25 +151,25 @@ def check_gesture(gesture: Gesture) -> None:
             took=sum(needed_s),
             most=GESTURE_MAX_S,
         )
-    for number, (waypoint, least_s) in enumerate(
+    for number, (waypoint, min_duration_s) in enumerate(
         zip(gesture.waypoints, needed_s, strict=True), start=1
     ):
-        if waypoint.within_s < least_s:
+        if waypoint.within_s < min_duration_s:
             raise BadWaypoint(
                 number,
                 "{part} {number} needs {needed:.1f} s; give it as long.",
-                needed=math.ceil(10 * least_s) / 10,
+                needed=math.ceil(10 * min_duration_s) / 10,
             )
     _check_ways_back(gesture.waypoints)
 
 
 def needed_time_s(segments: Sequence[Segment], limits: Limits, hold_s: float) -> float:
     """Return the time that a waypoint needs at least [s]: its segments with slack, and its hold."""
-    return SLACK * sum(segment.least_s(limits) for segment in segments) + hold_s
+    return SLACK * sum(segment.min_duration_s(limits) for segment in segments) + hold_s
 
 
 def check_waypoint(number: int, waypoint: Waypoint) -> None:
-    """Check what holds for a waypoint whatever comes before it. Raises BadWaypoint."""
+    """Check a waypoint by itself, whatever comes before it. Raises BadWaypoint."""
     numbers = (
         waypoint.x_m,
         waypoint.y_m,
@@ -193,9 +193,9 @@ def check_waypoint(number: int, waypoint: Waypoint) -> None:
         raise BadWaypoint(
             number, "{part} {number} turns more than once around. Turn back first, or less."
         )
-    if not LEAST_PACE <= waypoint.pace <= 1:
+    if not MIN_PACE <= waypoint.pace <= 1:
         raise BadWaypoint(
-            number, "{part} {number} has a pace outside {least:g} to 1.", least=LEAST_PACE
+            number, "{part} {number} has a pace outside {least:g} to 1.", least=MIN_PACE
         )
     if not (0 < waypoint.within_s <= GESTURE_MAX_S and 0 <= waypoint.hold_s <= waypoint.within_s):
         raise BadWaypoint(
@@ -206,7 +206,7 @@ def check_waypoint(number: int, waypoint: Waypoint) -> None:
 
 
 def _check_ways_back(waypoints: Sequence[Waypoint]) -> None:
-    """Refuse a way that is backed over and was not come over before."""
+    """Refuse a way that is driven backwards and was not driven forwards before."""
     seen: list[tuple[Pose, Pose]] = []
     start = HOME
     for number, waypoint in enumerate(waypoints, start=1):

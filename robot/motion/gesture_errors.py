@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def gettext_noop(text: str) -> str:
-    """Return a text that is marked for translation; the robot's computer has no translations."""
+    """Return the text, marked for translation by the server; a robot translates nothing."""
     return text
 
 
@@ -12,7 +12,7 @@ NOT_FINITE = gettext_noop("{part} {number} has a number that is not finite.")
 
 
 class Marked(str):
-    """A word within a message that is translated by itself."""
+    """A word within a message, translated separately."""
 
     __slots__ = ()
 
@@ -29,12 +29,12 @@ class BadGesture(ValueError):
 
 
 class BadWaypoint(BadGesture):
-    """A gesture of which one waypoint is at fault: ``number`` says which."""
+    """A gesture with a bad waypoint: ``number`` says which, from 1."""
 
     def __init__(self, number: int, template: str, /, **values: object) -> None:
         super().__init__(template, part=Marked("Goal"), number=number, **values)
         self.number = number
 
-    def of_step(self, number: int) -> BadGesture:
+    def for_step(self, number: int) -> BadGesture:
         """Return the error for the step that the waypoint belongs to."""
         return BadGesture(self.template, **self.values | {"part": Marked("Step"), "number": number})

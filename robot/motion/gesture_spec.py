@@ -1,7 +1,7 @@
-"""Specifications of composed gestures: steps relative to the base, made into poses from home.
+"""Specifications of composed gestures: steps relative to the base, converted to poses from home.
 
-They are sent as data, so that a new one needs no new robot. Server and robot read them here, so
-that both refuse the same ones with the same message.
+They are sent as data, so that a new gesture needs no new robot software. Server and robot both
+parse them here, and so refuse the same ones with the same message.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from robot.motion.limits import DEFAULT_LIMITS
 from robot.motion.pose import HOME, Pose
 
 NAME = re.compile(r"[A-Za-z0-9_-]{1,32}")
-MOVES_MAX = 16
-LEAST_WAY_M = 0.01  # less is invisible, and within the base's tolerance
-LEAST_TURN_RAD = math.radians(1)
+MAX_MOVES = 16
+MIN_FORWARD_M = 0.01  # a shorter way is invisible, and within the base's tolerance
+MIN_TURN_RAD = math.radians(1)
 
 # The last step ends at home if it is so near [m, rad]: people round 0.1414 m to 0.14.
 HOME_M = 0.005
 HOME_RAD = math.radians(2)
 
-# A step without a time of its own gets so much of what it needs, some twice the shortest possible
-# (docs/reference/kobuki.md#beside-a-person), and a moment [s] for the last millimeters of a very
-# short one.
-GENEROUS, MOMENT_S = 1.4, 0.5
+# A step without a time of its own gets this multiple of the time that it needs, about twice the
+# shortest possible (docs/reference/kobuki.md#beside-a-person), and some extra [s] for the last
+# millimeters of a very short one.
+TIME_FACTOR, EXTRA_S = 1.4, 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Move:
     hold_s
         How long to stay there [s].
     pace
-        Share of the limits to go at, ``LEAST_PACE`` to 1.
+        Share of the limits to go at, ``MIN_PACE`` to 1.
     within_s
         Time that it may take, pause included [s]; None for as long as it needs.
     """
@@ -110,7 +110,7 @@ def _read_move(number: int, step: Any) -> Move:
 
 
 def check_name(name: Any) -> str:
-    """Return a name. Raises BadGesture for one that messages cannot carry or robots have."""
+    """Return a name. Raises BadGesture for an invalid one, and for that of a built-in gesture."""
     if not isinstance(name, str) or not NAME.fullmatch(name):
         raise BadGesture("A gesture's name has 1 to 32 letters, digits, hyphens or underscores.")
     if name in GESTURES or name in ORIGINALS:
@@ -126,7 +126,7 @@ def build_gesture(name: Any, moves: Sequence[Move]) -> Gesture:
     name
         1 to 32 letters, digits, hyphens or underscores; not that of a built-in gesture.
     moves
-        1 to ``MOVES_MAX`` steps, which end at home within ``HOME_M`` and ``HOME_RAD``.
+        1 to ``MAX_MOVES`` steps, which end at home within ``HOME_M`` and ``HOME_RAD``.
 
     Raises
     ------
@@ -134,20 +134,20 @@ def build_gesture(name: Any, moves: Sequence[Move]) -> Gesture:
         For a step or a gesture that no base may perform; names the step and the cure.
     """
     check_name(name)
-    if not 1 <= len(moves) <= MOVES_MAX:
-        raise BadGesture("A gesture has 1 to {most} steps.", most=MOVES_MAX)
+    if not 1 <= len(moves) <= MAX_MOVES:
+        raise BadGesture("A gesture has 1 to {most} steps.", most=MAX_MOVES)
     for number, move in enumerate(moves, start=1):
         _check_move(number, move)
-    of_steps = list(_to_waypoints(moves))
-    waypoints = [waypoint for made in of_steps for waypoint in made]
-    owners = [number for number, made in enumerate(of_steps, start=1) for _ in made]
+    step_waypoints = list(_to_waypoints(moves))
+    waypoints = [waypoint for step in step_waypoints for waypoint in step]
+    owners = [number for number, step in enumerate(step_waypoints, start=1) for _ in step]
     try:
         for number, waypoint in enumerate(waypoints, start=1):
             check_waypoint(number, waypoint)
-        waypoints[-1] = _at_home(waypoints[-1])
-        return Gesture(name, name, tuple(_give_times(waypoints, owners, moves)))
+        waypoints[-1] = _end_at_home(waypoints[-1])
+        return Gesture(name, name, tuple(_assign_times(waypoints, owners, moves)))
     except BadWaypoint as problem:
-        raise problem.of_step(owners[problem.number - 1]) from None
+        raise problem.for_step(owners[problem.number - 1]) from None
 
 
 def _check_move(number: int, move: Move) -> None:
@@ -158,13 +158,13 @@ def _check_move(number: int, move: Move) -> None:
         raise BadGesture(
             "Step {number} does nothing. Give it a turn, a way or a pause.", number=number
         )
-    if 0 < abs(move.forward_m) < LEAST_WAY_M:
+    if 0 < abs(move.forward_m) < MIN_FORWARD_M:
         raise BadGesture(
             "Step {number} goes less than {least:g} m, which nobody sees. Make it longer.",
             number=number,
-            least=LEAST_WAY_M,
+            least=MIN_FORWARD_M,
         )
-    if 0 < abs(move.turn_rad) < LEAST_TURN_RAD:
+    if 0 < abs(move.turn_rad) < MIN_TURN_RAD:
         raise BadGesture(
             "Step {number} turns by less than 1°, which nobody sees. Turn further.", number=number
         )
@@ -172,7 +172,7 @@ def _check_move(number: int, move: Move) -> None:
 
 def step_poses(moves: Sequence[Move]) -> list[Pose]:
     """Return the pose at the end of each step, seen from home."""
-    return [made[-1].pose for made in _to_waypoints(moves)]
+    return [step[-1].pose for step in _to_waypoints(moves)]
 
 
 def _to_waypoints(moves: Sequence[Move]) -> Iterator[list[Waypoint]]:
@@ -183,10 +183,10 @@ def _to_waypoints(moves: Sequence[Move]) -> Iterator[list[Waypoint]]:
         poses = [turned] if move.turn_rad or not move.forward_m else []
         if move.forward_m:
             poses.append(_ahead(turned, move.forward_m))
-        made = [Waypoint(p.x_m, p.y_m, p.heading_rad, GESTURE_MAX_S, move.pace) for p in poses]
-        made[-1] = replace(made[-1], hold_s=move.hold_s)
-        yield made
-        here = made[-1].pose
+        step = [Waypoint(p.x_m, p.y_m, p.heading_rad, GESTURE_MAX_S, move.pace) for p in poses]
+        step[-1] = replace(step[-1], hold_s=move.hold_s)
+        yield step
+        here = step[-1].pose
 
 
 def _ahead(pose: Pose, by_m: float) -> Pose:
@@ -199,7 +199,7 @@ def _ahead(pose: Pose, by_m: float) -> Pose:
     return Pose(heading_rad=pose.heading_rad) if place.distance_m(HOME) <= HOME_M else place
 
 
-def _at_home(last: Waypoint) -> Waypoint:
+def _end_at_home(last: Waypoint) -> Waypoint:
     """Return the last waypoint moved to home. Raises BadGesture where it is not near."""
     heading_rad = math.tau * round(last.heading_rad / math.tau)
     away_m, off_rad = last.pose.distance_m(HOME), last.heading_rad - heading_rad
@@ -224,22 +224,22 @@ def _at_home(last: Waypoint) -> Waypoint:
     return replace(last, x_m=0.0, y_m=0.0, heading_rad=heading_rad)
 
 
-def _give_times(
+def _assign_times(
     waypoints: Sequence[Waypoint], owners: Sequence[int], moves: Sequence[Move]
 ) -> Iterator[Waypoint]:
     """Share each step's time among its waypoints, by what they need."""
     needed_s = [needed_time_s(*stage) for stage in stages(waypoints, DEFAULT_LIMITS)]
     of_step = dict.fromkeys(owners, 0.0)
-    for owner, least_s in zip(owners, needed_s, strict=True):
-        of_step[owner] += least_s
-    for waypoint, owner, least_s in zip(waypoints, owners, needed_s, strict=True):
+    for owner, min_duration_s in zip(owners, needed_s, strict=True):
+        of_step[owner] += min_duration_s
+    for waypoint, owner, min_duration_s in zip(waypoints, owners, needed_s, strict=True):
         all_s, given_s = of_step[owner], moves[owner - 1].within_s
         if given_s is None:
-            given_s = min(GENEROUS * all_s + MOMENT_S, max(GESTURE_MAX_S, all_s))
+            given_s = min(TIME_FACTOR * all_s + EXTRA_S, max(GESTURE_MAX_S, all_s))
         elif given_s < all_s:
             raise BadGesture(
                 "Step {number} needs {needed:.1f} s. Give it as long, or leave its time empty.",
                 number=owner,
                 needed=math.ceil(10 * all_s) / 10,
             )
-        yield replace(waypoint, within_s=min(given_s * least_s / all_s, GESTURE_MAX_S))
+        yield replace(waypoint, within_s=min(given_s * min_duration_s / all_s, GESTURE_MAX_S))

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 from robot.motion.twist import STILL, Twist
 
-TICK_S = 0.02  # between two orders to a base: 50 Hz, as often as a Kobuki tells where it is
+TICK_S = 0.02  # between two orders to a base: 50 Hz, the rate of a Kobuki's feedback
 
-# Longer than this between two orders [s], a limiter counts no more: what hung may not lurch
+# A limiter counts at most this between two orders [s]: a program that hung must not make a base
+# lurch
 # (docs/reference/kobuki.md#orders).
 LONGEST_STEP_S = 0.1
 
@@ -45,7 +46,7 @@ class Limits:
     Notes
     -----
     Sources of the defaults: docs/reference/kobuki.md#beside-a-person. Slowing down may be quicker
-    than speeding up, so that a base that was told to stop does.
+    than speeding up, so that a stop is quick.
     """
 
     v_m_s: float = 0.20
@@ -128,7 +129,7 @@ def _ramp(now: float, wanted: float, more: float, less: float) -> float:
     return math.copysign(max(abs(wanted), abs(now) - less), now)
 
 
-def least_time_s(distance: float, speed: float, speed_up: float, slow_down: float) -> float:
+def min_time_s(distance: float, speed: float, speed_up: float, slow_down: float) -> float:
     """Return the shortest time from rest to rest over a distance [s].
 
     Parameters

@@ -6,22 +6,22 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robot.motion.limits import Limits, least_time_s
+from robot.motion.limits import Limits, min_time_s
 from robot.motion.pose import Pose, wrap
 
-ALIKE_M = 0.01  # a way lies on another one, give or take so much [m]
+ALIKE_M = 0.01  # how far apart two ways may be to count as the same [m]
 
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """Turn on the spot to a heading [rad], seen from home; ``by_rad`` from where it should be."""
+    """Turn on the spot to a heading from home [rad]; ``by_rad`` is the planned angle."""
 
     heading_rad: float
     by_rad: float
 
-    def least_s(self, limits: Limits) -> float:
+    def min_duration_s(self, limits: Limits) -> float:
         """Return the shortest time that it takes [s]."""
-        return least_time_s(
+        return min_time_s(
             self.by_rad, limits.w_rad_s, limits.speed_up_rad_s2, limits.slow_down_rad_s2
         )
 
@@ -35,9 +35,9 @@ class Drive:
     heading_rad: float
     by_m: float
 
-    def least_s(self, limits: Limits) -> float:
+    def min_duration_s(self, limits: Limits) -> float:
         """Return the shortest time that it takes [s]."""
-        return least_time_s(self.by_m, limits.v_m_s, limits.speed_up_m_s2, limits.slow_down_m_s2)
+        return min_time_s(self.by_m, limits.v_m_s, limits.speed_up_m_s2, limits.slow_down_m_s2)
 
 
 Segment = Turn | Drive
@@ -48,7 +48,7 @@ def plan_path(start: Pose, waypoint: Pose) -> tuple[Segment, ...]:
 
     The base turns to face the place, drives there and turns to the waypoint's heading. A place that
     lies behind is driven to backwards, so that a base that went out comes back the way it went.
-    A turn by 0 is a segment too: who follows it comes to that heading from wherever it is.
+    A turn by 0 is a segment too: following it corrects the heading.
     """
     segments: list[Segment] = []
     heading_rad = start.heading_rad

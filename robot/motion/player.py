@@ -1,4 +1,4 @@
-"""Plays a gesture: what to order now, given the time and where the base is."""
+"""Plays a gesture: the twist to order now, given the time and the pose of the base."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections import deque
 from dataclasses import replace
 
-from robot.motion.gesture import LEAST_PACE, NEAR_M, NEAR_RAD, Gesture, Waypoint
+from robot.motion.gesture import MIN_PACE, NEAR_M, NEAR_RAD, Gesture, Waypoint
 from robot.motion.gesture_errors import gettext_noop
 from robot.motion.limits import Limits
 from robot.motion.path import Drive, Segment, Turn, plan_path
@@ -17,16 +17,16 @@ DONE = "done"
 OUT_OF_TIME = gettext_noop("out_of_time")
 BAD_ODOMETRY = "bad_odometry"
 
-# Slowing down is begun for this share of what the limits allow, so that an order that comes a
-# little late is still in time.
+# Braking is planned with this share of the limits, so that an order that comes a little late is
+# still in time.
 BRAKING = 0.8
-# Speed for each meter or radian that is left [1/s]: the last centimeter without overshoot, at
-# orders that are 20 ms apart and a base that follows within 100 ms.
+# Speed for each meter or radian that is left [1/s]: no overshoot in the last centimeter with orders
+# every 20 ms and a base that follows within 100 ms.
 CLOSING_PER_S = 8.0
-# At home it waits so long [s] for orders that are still on their way, and turns once more if they
+# At home it waits this long [s] for orders that are still on their way, and turns once more if they
 # have carried it past.
 SETTLE_S = 0.1
-# While driving: heading offset for each meter beside the line [rad/m], at most so much [rad].
+# While driving: heading offset for each meter beside the line [rad/m], and its maximum [rad].
 STEER_RAD_M = 2.5
 STEER_MAX_RAD = 0.3
 
@@ -35,7 +35,7 @@ class Player:
     """Plays one gesture at a time, closed on odometry.
 
     ``step`` is to be called some 50 times a second, whether a gesture is played or not; it never
-    gives more than the limits allow, and eases off by itself after the last waypoint.
+    exceeds the limits, and slows down by itself after the last waypoint.
 
     Parameters
     ----------
@@ -55,13 +55,13 @@ class Player:
         self._until_s = 0.0  # the waypoint's time is over
         self._there_s: float | None = None  # when its segments were done
         self._begins_s = 0.0  # before that it stands still, announced
-        self._verdict = ""  # the outcome-to-be, while the base comes to rest
+        self._verdict = ""  # the outcome, set while the base comes to rest
         self._turns_rad = 0.0  # full turns that were made before the gesture
         self._pace = 1.0
 
     @property
     def is_busy(self) -> bool:
-        """Whether a gesture is played, its coming to rest included."""
+        """Whether a gesture is played, or the base comes to rest after it."""
         return self.gesture is not None
 
     def start(
@@ -101,7 +101,7 @@ class Player:
             self._verdict = reason
 
     def halt(self, reason: str) -> None:
-        """End the gesture and order stillness at once, without slowing down first."""
+        """End the gesture and order a stop at once, without slowing down first."""
         if self.is_busy:
             self._end(self._verdict or reason)
         self.twist = STILL
@@ -128,7 +128,7 @@ class Player:
         return self.twist
 
     def _wanted_twist(self, time_s: float, pose: Pose) -> tuple[Limits, Twist]:
-        """Return the limits and the twist that the present waypoint asks for."""
+        """Return the limits and the wanted twist for the present waypoint."""
         here = replace(pose, heading_rad=pose.heading_rad - self._turns_rad)
         while self._waypoint is not None and not self._verdict:
             limits = self.limits.scaled(self._share(self._waypoint))
@@ -170,7 +170,7 @@ class Player:
 
     def _share(self, waypoint: Waypoint) -> float:
         """Return the share of the limits for a waypoint."""
-        return max(LEAST_PACE, waypoint.pace * self._pace)
+        return max(MIN_PACE, waypoint.pace * self._pace)
 
     def _end(self, outcome: str) -> None:
         self.gesture, self._waypoint = None, None

@@ -1,4 +1,4 @@
-"""Poses of a base, and how it moves if nothing slips.
+"""Poses of a base, and its motion where nothing slips.
 
 Right-handed, as in ROS (REP 103): x ahead, y to the left, headings counter-clockwise.
 """
@@ -21,7 +21,7 @@ class Pose:
 
     @property
     def is_finite(self) -> bool:
-        """Whether all three numbers are."""
+        """Whether all three numbers are finite."""
         return all(map(math.isfinite, (self.x_m, self.y_m, self.heading_rad)))
 
     def distance_m(self, other: Pose) -> float:

@@ -18,12 +18,12 @@ class Twist:
 
     @property
     def is_still(self) -> bool:
-        """Whether it moves nothing."""
+        """Whether both speeds are 0."""
         return self.v_m_s == 0 and self.w_rad_s == 0
 
     @property
     def is_finite(self) -> bool:
-        """Whether both numbers are."""
+        """Whether both numbers are finite."""
         return math.isfinite(self.v_m_s) and math.isfinite(self.w_rad_s)
 
 

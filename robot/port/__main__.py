@@ -2,8 +2,8 @@
 
 A base may go on with its last setpoint forever (docs/reference/kobuki.md#watchdogs). So a small
 process of its own sends it, 50 times a second, what was ordered last, and the stop frame as soon as
-that is older than 0.25 s, the pipe of the orders closes, or anything at all goes wrong here. It
-knows no base, only bytes. Orders come on standard input, what was received goes to standard output,
+that is older than 0.25 s, the pipe of the orders closes, or anything else goes wrong here. It knows
+no base, only bytes. Orders come on standard input, what was received goes to standard output,
 a JSON line each:
 
     {"number": 7, "sent_s": 12.34, "frame": "aa55…", "once": "aa55…"}
@@ -27,10 +27,10 @@ from functools import partial
 from typing import Any
 
 from robot.port.owner import READ_S, PortOwner, SerialPort
-from robot.port.setpoint import LONGEST_FRAME
+from robot.port.setpoint import MAX_FRAME_BYTES
 
-WRITE_S = 0.1  # a port that takes nothing for so long is lost
-LINES_KEPT = 25  # of what was heard, while nobody reads it: half a second
+WRITE_S = 0.1  # a port that accepts nothing for this long is lost
+LINES_KEPT = 25  # received ones, while nobody reads them: half a second
 
 
 class PipeWriter:
@@ -41,13 +41,13 @@ class PipeWriter:
         self._lines: deque[bytes] = deque(maxlen=LINES_KEPT)
         self._awake = threading.Event()
 
-    def write(self, said: dict[str, Any]) -> None:
+    def write(self, report: dict[str, Any]) -> None:
         """Queue a line."""
-        self._lines.append(json.dumps(said).encode() + b"\n")
+        self._lines.append(json.dumps(report).encode() + b"\n")
         self._awake.set()
 
     def run(self, on_end: Callable[[], None]) -> None:
-        """Write until nobody is there to read any more, which is the end."""
+        """Write until the pipe is closed at its other end, then call ``on_end``."""
         with contextlib.suppress(OSError):
             while True:
                 self._awake.wait()
@@ -60,12 +60,12 @@ class PipeWriter:
 
 
 def listen(pipe: int, order: Callable[[bytes], None], on_end: Callable[[], None]) -> None:
-    """Pass on each line of a pipe until it closes, which is the end."""
+    """Pass each line of a pipe to ``order`` until it closes, then call ``on_end``."""
     rest = b""
     with contextlib.suppress(OSError):
         while data := os.read(pipe, 65536):
             *lines, rest = (rest + data).split(b"\n")
-            rest = rest[-LONGEST_FRAME * 8 :]  # no order is longer
+            rest = rest[-MAX_FRAME_BYTES * 8 :]  # no order is longer
             for line in lines:
                 order(line)
     on_end()
@@ -78,14 +78,14 @@ def open_serial(url: str, baud: int) -> SerialPort:
     port = serial.serial_for_url(
         url, baudrate=baud, timeout=READ_S, write_timeout=WRITE_S, exclusive=True
     )
-    # Not every port can: a pty and a socket have no chip that would wait.
+    # Not every port has this mode: a pty and a socket have no chip with a timer.
     with contextlib.suppress(OSError, ValueError, AttributeError, NotImplementedError):
         port.set_low_latency_mode(True)
     return port
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Own the port of the command line until standard input closes or we are told to end."""
+    """Own the port of the command line until standard input closes or a signal ends it."""
     parser = ArgumentParser(prog="python -m robot.port", description=__doc__)
     parser.add_argument("url", help="/dev/kobuki, COM3, a pty, or socket://host:port")
     parser.add_argument("--baud", type=int, default=115200)
@@ -96,7 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for name in ("SIGTERM", "SIGHUP", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), lambda *_: owner.end())
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who orders: the pipe closes then
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends our parent: the pipe closes
     orders = partial(listen, sys.stdin.fileno(), owner.order, owner.end)
     for work in (orders, partial(writer.run, owner.end)):
         threading.Thread(target=work, daemon=True).start()

@@ -1,7 +1,7 @@
-"""The other end of the pipes of ``robot.port``: starts that process, orders, hears and watches it.
+"""The client of ``robot.port``: starts that process, sends it orders, reads it and supervises it.
 
-Each watches the other: the process stops the base when we fall silent, and is replaced by a new
-one, which begins with stops, when it does.
+Each supervises the other: the process stops the base when our orders stop coming; when its reports
+stop coming it is replaced by a new process, which begins with stops.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from pathlib import Path
 from robot.motion.limits import ORDER_HOLDS_S
 
 PACKAGES = Path(__file__).parents[2]
-OWNER_SILENT_S = 0.3  # it says a word every 0.1 s
+OWNER_SILENT_S = 0.3  # it reports every 0.1 s
 START_S = 3.0  # a slow computer starts Python
 END_S = 1.0
-MOST_DEATHS = 5  # in a row, without a word from any: it cannot be run here
+MAX_DEATHS = 5  # in a row without a report from any: it cannot be run here
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +47,8 @@ class PortClient:
         Speed of the line [bit/s].
     stop
         The frame that stops the base.
-    hear
-        Called with what came in, on a thread of its own.
+    on_data
+        Called with the received bytes, on a thread of its own.
     monotonic
         The computer's clock [s], which the process shares.
 
@@ -57,7 +57,7 @@ class PortClient:
     problem
         Why the port is not open; empty where it is.
     counters
-        What went wrong, of this process and the ones before it.
+        How often something went wrong, with this process and the ones before it.
     is_dead
         Whether no process can be kept alive.
     """
@@ -67,12 +67,12 @@ class PortClient:
         url: str,
         baud: int,
         stop: bytes,
-        hear: Callable[[ReceivedBytes], None],
+        on_data: Callable[[ReceivedBytes], None],
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self._command = [sys.executable, "-m", "robot.port", url]
         self._command += ["--baud", str(baud), "--stop", stop.hex()]
-        self._hear = hear
+        self._on_data = on_data
         self._monotonic = monotonic
         self.problem = "The port has not been opened yet."
         self.counters: Counter[str] = Counter(restarts=0, junk=0)
@@ -80,8 +80,8 @@ class PortClient:
         self._number = 0
         self._openings = self._openings_before = 0
         self._counted: Counter[str] = Counter()  # by the present process
-        self._word_s = self._ordered_s = monotonic()
-        self._has_spoken, self._deaths = False, 0
+        self._last_report_s = self._ordered_s = monotonic()
+        self._has_reported, self._deaths = False, 0
         self._closing = threading.Event()
         self._process = self._start()
         self._thread = threading.Thread(target=self._listen, daemon=True)
@@ -91,10 +91,10 @@ class PortClient:
         """Order this frame in place of the last one; ``once`` is sent one time before it."""
         now_s = self._monotonic()
         if now_s - self._ordered_s > ORDER_HOLDS_S:
-            self._word_s = now_s  # it was us who hung
+            self._last_report_s = now_s  # we hung, not the process
         self._ordered_s = now_s
-        if now_s - self._word_s > (OWNER_SILENT_S if self._has_spoken else START_S):
-            self._word_s = now_s
+        if now_s - self._last_report_s > (OWNER_SILENT_S if self._has_reported else START_S):
+            self._last_report_s = now_s
             self._process.kill()  # it hangs; the next one begins with stops
             return
         self._number += 1
@@ -132,23 +132,23 @@ class PortClient:
     def _listen(self) -> None:
         """Read from one process after the other until closed or failed."""
         try:
-            self._hear_on()
+            self._supervise()
         finally:
             self.is_dead = not self._closing.is_set()
 
-    def _hear_on(self) -> None:
+    def _supervise(self) -> None:
         while True:
-            self._hear_out(self._process)
+            self._read_process(self._process)
             if self._closing.is_set():
                 return
-            self._deaths = 0 if self._has_spoken else self._deaths + 1
-            if self._deaths >= MOST_DEATHS:
+            self._deaths = 0 if self._has_reported else self._deaths + 1
+            if self._deaths >= MAX_DEATHS:
                 return
             self.counters["restarts"] += 1
             self.counters.update(self._counted)
             self._counted = Counter()
             self._openings_before = self._openings
-            self._word_s, self._has_spoken = self._monotonic(), False
+            self._last_report_s, self._has_reported = self._monotonic(), False
             self.problem = "The process that owns the port died, and is restarted."
             self._process = self._start()
             if self._closing.is_set():  # closed meanwhile: nobody else knows of this one
@@ -156,7 +156,7 @@ class PortClient:
                 self._process.wait(END_S)
                 return
 
-    def _hear_out(self, process: subprocess.Popen[bytes]) -> None:
+    def _read_process(self, process: subprocess.Popen[bytes]) -> None:
         if process.stdout is None or process.stdin is None:
             return
         with process.stdout, contextlib.suppress(OSError, ValueError):
@@ -164,26 +164,26 @@ class PortClient:
             while data := process.stdout.read(65536):
                 *lines, rest = (rest + data).split(b"\n")
                 for line in lines:
-                    self._take(line)
+                    self._handle_line(line)
         with contextlib.suppress(OSError):
             process.stdin.close()
         process.wait()
 
-    def _take(self, line: bytes) -> None:
+    def _handle_line(self, line: bytes) -> None:
         try:
-            said = json.loads(line)
-            heard = ReceivedBytes(
-                float(said["at_s"]), int(said["opened"]), bytes.fromhex(said["bytes"])
+            report = json.loads(line)
+            received = ReceivedBytes(
+                float(report["at_s"]), int(report["opened"]), bytes.fromhex(report["bytes"])
             )
-            self._counted = Counter(said["counters"])
-            self.problem = str(said["problem"])
+            self._counted = Counter(report["counters"])
+            self.problem = str(report["problem"])
         except (ValueError, TypeError, KeyError):
             self.counters["junk"] += 1
             return
-        self._word_s, self._has_spoken = self._monotonic(), True
-        self._openings = self._openings_before + heard.opened
-        if heard.data:
-            self._hear(ReceivedBytes(heard.at_s, self._openings, heard.data))
+        self._last_report_s, self._has_reported = self._monotonic(), True
+        self._openings = self._openings_before + received.opened
+        if received.data:
+            self._on_data(ReceivedBytes(received.at_s, self._openings, received.data))
 
     def count(self) -> dict[str, int]:
         """Return all counters, those of the present process included."""

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 from robot.motion.limits import ORDER_HOLDS_S
 
-EARLY_S = 0.05  # an order from further in the future was made up
-LONGEST_FRAME = 64  # a Kobuki's buffer for commands [bytes] (docs/reference/kobuki.md#framing)
+MAX_AHEAD_S = 0.05  # an order from further in the future is refused
+MAX_FRAME_BYTES = 64  # a Kobuki's buffer for commands [bytes] (docs/reference/kobuki.md#framing)
 
 
 class BadOrder(ValueError):
-    """A line that is no order; the message says what one is."""
+    """A line that is no order; the message says what an order is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,23 +31,23 @@ class Order:
     def read(cls, line: bytes) -> Order:
         """Return the order of a line. Raises BadOrder."""
         try:
-            said = json.loads(line)
-            number, sent_s = said["number"], said["sent_s"]
-            frame, once = bytes.fromhex(said["frame"]), bytes.fromhex(said.get("once", ""))
+            fields = json.loads(line)
+            number, sent_s = fields["number"], fields["sent_s"]
+            frame, once = bytes.fromhex(fields["frame"]), bytes.fromhex(fields.get("once", ""))
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
             raise BadOrder("An order is a JSON object with number, sent_s and frame.") from None
         if type(number) is not int or type(sent_s) not in (int, float):
             raise BadOrder('"number" is a whole number, "sent_s" a number.')
-        if not math.isfinite(sent_s) or not 0 < len(frame) <= LONGEST_FRAME >= len(once):
-            raise BadOrder(f"Numbers are finite, frames have up to {LONGEST_FRAME} bytes.")
+        if not math.isfinite(sent_s) or not 0 < len(frame) <= MAX_FRAME_BYTES >= len(once):
+            raise BadOrder(f"Numbers are finite, frames have up to {MAX_FRAME_BYTES} bytes.")
         return cls(number, float(sent_s), frame, once)
 
 
 class Setpoint:
     """The last order while it is fresh, else the stop. Nothing is queued.
 
-    After a pause in the orders, and at the beginning, nothing but the stop is sent until just that
-    is ordered: what was interrupted does not go on by itself.
+    After a pause in the orders, and at the beginning, only the stop is sent until the stop is
+    ordered: a motion that was interrupted is not resumed.
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ class Setpoint:
     Attributes
     ----------
     counters
-        How many orders were ``bad`` (no order), ``old`` (their number was not new, or their time is
-        over), ``refused`` (before a stop was ordered), and how often orders ``lapsed``.
+        How many orders were ``bad`` (not an order), ``old`` (their number is not new, or they are
+        out of date), ``refused`` (before a stop was ordered), and how often orders ``lapsed``.
     """
 
     def __init__(self, stop: bytes) -> None:
@@ -80,7 +80,10 @@ class Setpoint:
             return self._store(order, now_s)
 
     def _store(self, order: Order, now_s: float) -> bytes:
-        if order.number <= self._number or not -EARLY_S <= now_s - order.sent_s <= ORDER_HOLDS_S:
+        if (
+            order.number <= self._number
+            or not -MAX_AHEAD_S <= now_s - order.sent_s <= ORDER_HOLDS_S
+        ):
             self.counters["old"] += 1
             return b""
         self._number = order.number
@@ -98,7 +101,7 @@ class Setpoint:
             order = self._order
             if order is None or order.frame == self.stop:
                 return self.stop
-            if -EARLY_S <= now_s - order.sent_s <= ORDER_HOLDS_S:
+            if -MAX_AHEAD_S <= now_s - order.sent_s <= ORDER_HOLDS_S:
                 return order.frame
             self.counters["lapsed"] += 1
             self._order, self._is_held = None, True

@@ -12,8 +12,8 @@ from pathlib import Path
 # A Kobuki's USB chip; the serial number tells it from any other FTDI cable
 # (docs/reference/kobuki.md#serial-link).
 VENDOR, PRODUCT, SERIAL = 0x0403, 0x6001, "kobuki"
-DEFAULT_PORT = "/dev/kobuki"  # what the udev rule makes
-LATENCY_MS = 1  # the chip's timer; as it comes from the shop it waits 16 ms
+DEFAULT_PORT = "/dev/kobuki"  # made by the udev rule
+LATENCY_MS = 1  # the chip's timer; the factory setting is 16 ms
 
 UDEV_RULE = (
     'SUBSYSTEM=="tty", ATTRS{idVendor}=="0403", ATTRS{idProduct}=="6001", '
@@ -67,16 +67,16 @@ def check_port(
     system: str = sys.platform,
     drivers: Path = Path("/sys/bus/usb-serial"),
 ) -> Iterator[Diagnosis]:
-    """Yield what is right and wrong with a port, without opening it.
+    """Yield the result of each check of a port, without opening it.
 
     Parameters
     ----------
     port
-        As it would be opened; socket://… has nothing to look at.
+        As it would be opened; of socket://… nothing is checked.
     usbs
-        What ``list_ports`` gives.
+        The result of ``list_ports``.
     system, drivers
-        The operating system, and where Linux tells of its USB serial drivers.
+        The operating system, and where Linux lists its USB serial drivers.
     """
     kobukis = [usb.device for usb in usbs if usb.is_kobuki]
     if "://" in port:

@@ -1,1 +1,1 @@
-"""ROS by way of rosbridge: frames and messages (pure), and the websocket that carries them."""
+"""ROS through rosbridge: frames and messages (pure), and the websocket that carries them."""

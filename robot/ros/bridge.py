@@ -1,7 +1,7 @@
-"""The websocket to a rosbridge, on a thread of its own: it comes back by itself, and keeps nothing.
+"""The websocket to a rosbridge, on a thread of its own: it reconnects by itself and queues nothing.
 
-What is said is asked for at the moment when it can be sent. A connection that is lost takes all
-with it that was to be said; what is said after it is what holds then.
+The client is asked for frames only when they can be sent. What a lost connection could not send is
+dropped, so that the next one begins with the present state.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from robot.ros.frames import MAX_FRAME_BYTES, BadRosFrame, Frame, Incoming, read
 DEFAULT_URL = "ws://127.0.0.1:9090"
 
 PING_EVERY_S = PONG_WITHIN_S = 1.0
-SEND_WITHIN_S = 0.5  # a bridge that takes nothing for so long takes nothing any more
+SEND_WITHIN_S = 0.5  # a bridge that accepts nothing for this long is lost
 CONNECT_WITHIN_S = 3.0
 CLOSE_WITHIN_S = 0.5
 RETRY_FIRST_S, RETRY_LONGEST_S = 0.2, 5.0
@@ -35,7 +35,7 @@ END_S = 2.0
 
 
 class TopicClient(Protocol):
-    """What publishes and subscribes at a bridge; every call is told the time."""
+    """What publishes and subscribes at a bridge; every call gets the time."""
 
     def open(self, now_s: float) -> Iterable[Frame]:
         """Return the first frames of a new connection."""
@@ -43,10 +43,10 @@ class TopicClient(Protocol):
     def due(self, now_s: float) -> Iterable[Frame]:
         """Return the frames to send now."""
 
-    def hear(self, heard: Incoming, now_s: float) -> None:
-        """Handle a received frame. Raises BadRosFrame."""
+    def handle(self, incoming: Incoming, now_s: float) -> None:
+        """Handle a received frame. Raises BadRosFrame where it is not understood."""
 
-    def lose(self, now_s: float) -> None:
+    def disconnect(self, now_s: float) -> None:
         """Handle the loss of the connection."""
 
     def end(self, now_s: float) -> Iterable[Frame]:
@@ -74,8 +74,8 @@ class Bridge:
     problem
         Why there is no connection; empty while there is one.
     counters
-        How often a connection came about (``bridge_openings``), and how many frames meant nothing
-        (``bridge_bad``).
+        How often a connection was made (``bridge_openings``), and how many frames were not
+        understood (``bridge_bad``).
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class Bridge:
 
     @property
     def is_dead(self) -> bool:
-        """Whether nothing is sent any more."""
+        """Whether its thread has ended, so that nothing is sent any more."""
         return not self._thread.is_alive()
 
     def wake(self) -> None:
@@ -118,17 +118,17 @@ class Bridge:
 
     def _run(self) -> None:
         with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
-            runner.run(self._stay())
+            runner.run(self._run_until_closed())
 
-    async def _stay(self) -> None:
+    async def _run_until_closed(self) -> None:
         """Connect, again and again, until closed."""
         closing = asyncio.create_task(self._closing.wait())
         while not self._closing.is_set():
-            staying = asyncio.create_task(self._connect())
-            await asyncio.wait((staying, closing), return_when=asyncio.FIRST_COMPLETED)
-            staying.cancel()
+            connecting = asyncio.create_task(self._connect())
+            await asyncio.wait((connecting, closing), return_when=asyncio.FIRST_COMPLETED)
+            connecting.cancel()
             with suppress(asyncio.CancelledError):
-                await staying
+                await connecting
         closing.cancel()
 
     async def _connect(self) -> None:
@@ -151,57 +151,59 @@ class Bridge:
             self.counters["bridge_openings"] += 1
             self.problem = ""
             try:
-                await self._converse(socket)
+                await self._exchange_frames(socket)
             finally:
                 with self._lock:
-                    self._client.lose(self._monotonic())
+                    self._client.disconnect(self._monotonic())
                 self.problem = f"The connection to the rosbridge at {self.url} was lost."
         await self._sleep(self._back_off.next_s())
 
-    async def _converse(self, socket: ClientConnection) -> None:
+    async def _exchange_frames(self, socket: ClientConnection) -> None:
         """Send and receive until the connection is lost or the bridge closed."""
         try:
-            await self._say(socket, self._client.open)
-            hearing = asyncio.create_task(self._listen(socket))
+            await self._send(socket, self._client.open)
+            receiving = asyncio.create_task(self._receive(socket))
             try:
-                while not hearing.done():
-                    await self._say(socket, self._client.due)
+                while not receiving.done():
+                    await self._send(socket, self._client.due)
                     with suppress(TimeoutError):
                         async with asyncio.timeout(TICK_S):
                             await self._wanted.wait()
                     self._wanted.clear()
             finally:
-                hearing.cancel()
+                receiving.cancel()
                 with suppress(asyncio.CancelledError):
-                    await hearing
+                    await receiving
         except (ConnectionClosed, TimeoutError):
             socket.transport.abort()
         except asyncio.CancelledError:
             with suppress(ConnectionClosed, TimeoutError):
-                await self._say(socket, self._client.end)
+                await self._send(socket, self._client.end)
             raise
         finally:
             await socket.close()
 
-    async def _say(self, socket: ClientConnection, ask: Callable[[float], Iterable[Frame]]) -> None:
+    async def _send(
+        self, socket: ClientConnection, next_frames: Callable[[float], Iterable[Frame]]
+    ) -> None:
         with self._lock:
-            frames = list(ask(self._monotonic()))
+            frames = list(next_frames(self._monotonic()))
         for frame in frames:
             async with asyncio.timeout(SEND_WITHIN_S):
                 await socket.send(to_text(frame))
 
-    async def _listen(self, socket: ClientConnection) -> None:
+    async def _receive(self, socket: ClientConnection) -> None:
         with suppress(ConnectionClosed):
             async for text in socket:
                 try:
-                    heard = read_frame(text)
+                    incoming = read_frame(text)
                     with self._lock:
-                        self._client.hear(heard, self._monotonic())
+                        self._client.handle(incoming, self._monotonic())
                 except BadRosFrame:
                     self.counters["bridge_bad"] += 1
                 else:
                     self._back_off.reset()
-                    self._wanted.set()  # what was waited for may have come
+                    self._wanted.set()  # an echo may allow the next frame
 
 
 def find_bridge() -> str:

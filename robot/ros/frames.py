@@ -1,8 +1,7 @@
 """Frames of rosbridge v2: the six operations that are sent, and the two that are received.
 
-A bridge complains of nothing that it is told (docs/reference/rosbridge.md#behavior): what matters
-has to come back from it. So nothing is sent here that waits in a queue anywhere: publishers and
-subscriptions keep one.
+A bridge reports no errors (docs/reference/rosbridge.md#behavior), so what matters is confirmed by
+its echo. So that nothing waits in a queue, publishers and subscriptions keep one message.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ Frame = dict[str, Any]
 
 
 class BadRosFrame(ValueError):
-    """A received frame without a meaning here; the message says what one would be."""
+    """A received frame that is not understood; the message says what would be."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,14 +37,14 @@ class Publication:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
-    """What a service answered to the question of that name; None where it could not."""
+class ServiceResponse:
+    """The response to the service call of that id; ``values`` are None where it failed."""
 
-    question: str
+    call_id: str
     values: Mapping[str, Any] | None
 
 
-Incoming = Publication | Answer
+Incoming = Publication | ServiceResponse
 
 
 def advertise(topic: Topic, *, latch: bool = False) -> Frame:
@@ -86,9 +85,9 @@ def unsubscribe(topic: Topic) -> Frame:
     return {"op": "unsubscribe", "topic": topic.name, "id": topic.name}
 
 
-def call_service(service: str, arguments: Mapping[str, Any], question: str) -> Frame:
-    """Return a service call; its answer has the question's name."""
-    return {"op": "call_service", "service": service, "args": dict(arguments), "id": question}
+def call_service(service: str, arguments: Mapping[str, Any], call_id: str) -> Frame:
+    """Return a service call; its response has the same id."""
+    return {"op": "call_service", "service": service, "args": dict(arguments), "id": call_id}
 
 
 def to_text(frame: Frame) -> str:
@@ -97,7 +96,7 @@ def to_text(frame: Frame) -> str:
 
 
 def read_frame(text: str | bytes) -> Incoming:
-    """Return a publication or an answer. Raises BadRosFrame for anything else."""
+    """Return a publication or a service response. Raises BadRosFrame for anything else."""
     try:
         frame = json.loads(text)
     except (ValueError, RecursionError):
@@ -105,9 +104,9 @@ def read_frame(text: str | bytes) -> Incoming:
     match frame:
         case {"op": "publish", "topic": str(topic), "msg": dict(message)}:
             return Publication(topic, message)
-        case {"op": "service_response", "id": str(question), **rest}:
-            # A failure puts its words where the values would be
+        case {"op": "service_response", "id": str(call_id), **rest}:
+            # A failure has its message where the values would be
             # (docs/reference/rosbridge.md#messages).
             values = rest.get("values") if rest.get("result") is True else None
-            return Answer(question, values if isinstance(values, dict) else None)
-    raise BadRosFrame('A frame that is heard has the "op" publish or service_response.')
+            return ServiceResponse(call_id, values if isinstance(values, dict) else None)
+    raise BadRosFrame('A received frame has the "op" publish or service_response.')

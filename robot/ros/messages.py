@@ -1,8 +1,8 @@
 """Messages of ROS 1 as JSON: written and read, with every number checked.
 
-Every number that comes in is checked: a bridge passes on NaN, text and whatever else it is given
-(docs/reference/rosbridge.md#behavior). Axes are those of motion.py, which are those of ROS (REP
-103).
+Every number that comes in is checked: a bridge passes on NaN, text and anything else that it gets
+(docs/reference/rosbridge.md#behavior). Axes are those of ``robot.motion``, which are those of ROS
+(REP 103).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ EVENTS = {
 }
 SENSOR_TYPES = (*EVENTS, BOOL)
 
-# No base of ours is further from anywhere [m], nor faster [m/s, rad/s]: such a number was made up.
+# Larger distances [m] and speeds [m/s, rad/s] are impossible for our bases, and refused.
 FARTHEST_M = 1e6
 FASTEST = 100.0
 
@@ -65,7 +65,7 @@ def read_odometry(message: Message) -> tuple[Pose, Twist]:
 
 
 def read_event(kind: str, message: Message) -> tuple[int, bool]:
-    """Read an event: which sensor, and whether it feels something. Raises BadRosFrame."""
+    """Read an event: which sensor, and whether it detects a hazard. Raises BadRosFrame."""
     if kind == BOOL:
         data = message.get("data")
         if not isinstance(data, bool):
@@ -83,5 +83,5 @@ def _number(message: Any, most: float, *path: str) -> float:
     if isinstance(message, bool) or not isinstance(message, (int, float)):
         raise BadRosFrame(f"{'.'.join(path)} is a number.")
     if not abs(message) <= most:
-        raise BadRosFrame(f"{'.'.join(path)} is no number that could be.")
+        raise BadRosFrame(f"{'.'.join(path)} is not within ±{most:g}.")
     return float(message)

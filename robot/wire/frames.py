@@ -14,12 +14,12 @@ NAME = re.compile(rf"[A-Za-z0-9_.:-]{{1,{MAX_NAME_CHARS}}}")
 
 
 class BadFrame(ValueError):
-    """A frame that is not the protocol; the message says what would be.
+    """A frame that breaks the protocol; the message says what to send instead.
 
     Parameters
     ----------
     message
-        What to send instead.
+        The cure, for people.
     code
         The ``code`` of the ``error`` message that answers it.
     """

@@ -13,9 +13,9 @@ MAX_NAME_CHARS = 64
 MAX_CUE_GESTURES = 8  # composed ones that come along with a cue
 MAX_NESTING = 8  # of objects and lists in a report
 
-# Seconds since 1970 pass, milliseconds do not.
+# Times in seconds since 1970 are accepted, times in milliseconds are not.
 TIME_MAX_S = 1e10
-# A tiny goal must not make numbers that no chart, database or JSON reader can hold.
+# With a tiny goal, performance would outgrow charts, database and JSON readers.
 PERFORMANCE_MAX = 1000.0
 
 ROBOT_HEARTBEAT_S = 0.25  # robots stand still after 0.65 s of silence

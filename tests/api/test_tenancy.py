@@ -57,7 +57,7 @@ def calls() -> Iterator[str]:
 
 
 def find_leaks(worlds: tuple[World, World]) -> tuple[list[str], Counter[str]]:
-    """Make every call as every program. Give what they should not have got, and counts."""
+    """Make every call as every program. Return what they should not have got, and counts."""
     before = [snapshot(world) for world in worlds]
     counts: Counter[str] = Counter()
     leaks: list[str] = []
@@ -140,7 +140,7 @@ def test_sessions_and_boards_of_anybody_are_caught(monkeypatch):
 
 
 def snapshot(world: World) -> list[Any]:
-    """Give a clinic's rows as they are, but for what its own programs add."""
+    """Return a clinic's rows as they are, but for what its own programs add."""
     rows: dict[type[Model], Any] = {kind: row.pk for kind, row in world.rows.items()}
     seen = (Patient, TrainingSession, Leaderboard)
     return [list(kind.everywhere.filter(pk=rows[kind]).values()) for kind in seen]

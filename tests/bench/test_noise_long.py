@@ -17,7 +17,7 @@ GROWTH_MAX_MB = 30.0  # of a process, over all that comes after those
 
 
 def used_mb() -> float:
-    """Give the memory of this process."""
+    """Return the memory of this process."""
     gc.collect()
     return float(psutil.Process().memory_info().rss / 2**20)
 

@@ -119,7 +119,7 @@ def test_page_speed(tmp_path: Path, slower: int) -> None:
 
 
 def _task_times(trace: bytes) -> list[float]:
-    """Give what the tasks of the page's main thread took, in ms, shortest first."""
+    """Return what the tasks of the page's main thread took, in ms, shortest first."""
     events = json.loads(trace)["traceEvents"]
     tasks = [event for event in events if event["name"] == "RunTask"]
     busy = Counter((task["pid"], task["tid"]) for task in tasks)

@@ -5,8 +5,8 @@ import statistics
 
 import pytest
 
-from tests.robot_room import robot_room
-from tests.robot_stops import LINK_S, STOPS, kill_server
+from tests.support.robot_room import robot_room
+from tests.support.robot_stops import LINK_S, STOPS, kill_server
 
 ROUNDS = 20
 

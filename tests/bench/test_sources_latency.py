@@ -93,7 +93,7 @@ async def measure(folder: Path, way: str) -> list[float]:
 
 
 def open_outlet():
-    """Open an outlet; give what pushes samples into it."""
+    """Open an outlet; return what pushes samples into it."""
     import pylsl
 
     info = pylsl.StreamInfo("GARRY bench", "Gait", len(NAMES), RATE_HZ, "double64", "garry-bench")

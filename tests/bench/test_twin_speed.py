@@ -37,7 +37,7 @@ def run_twin() -> float:
     commands = [encode_commands(ordered(number)) for number in range(FRAMES)]
     began_s = time.perf_counter()
     for number, command in enumerate(commands):
-        firmware.take(command, number * FRAME_S)
+        firmware.receive(command, number * FRAME_S)
         firmware.step(number * FRAME_S)
     return time.perf_counter() - began_s
 

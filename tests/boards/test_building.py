@@ -12,7 +12,7 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.boards.building import entries, scheduler
-from rehab.boards.building.scheduler import Builder
+from rehab.boards.building.scheduler import BoardBuilder
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.boards.panels.viewer import make_session_panels, make_waiting_panels
 from rehab.people.models import Clinic, Patient, User
@@ -52,7 +52,7 @@ def sessions(db: None, woken: list[bool]) -> list[TrainingSession]:
 
 
 def make_board(session: TrainingSession, **fields: object) -> Leaderboard:
-    how = {"among": "clinic", "entry": "best", "min_valid_strides": 1, "period": "all"}
+    how = {"among": "clinic", "aggregation": "best", "min_valid_strides": 1, "period": "all"}
     board = Leaderboard(clinic=session.clinic, **{"name": "Board"} | how | fields)
     board.full_clean()
     board.save()
@@ -107,7 +107,7 @@ def test_what_fails_half_way_goes_on_where_it_was(sessions, monkeypatch):
     entries.build_next(board.pk, 4, NOW)
     kept = stored()
     with monkeypatch.context() as patch:
-        patch.setattr(entries, "_count", lambda *_: 1 / 0)
+        patch.setattr(entries, "_add_to_counts", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             entries.build_next(board.pk, 4, NOW)
     assert stored() == kept
@@ -145,7 +145,7 @@ def test_another_measure_or_group_is_another_board(sessions):
     assert stored() != by_hits
     board.refresh_from_db()
     board.among = "self"
-    board.entry = "each"
+    board.aggregation = "each"
     board.save()
     build(board)
     assert stored() == ([], [])
@@ -176,7 +176,7 @@ def test_a_clinics_other_settings_hide_no_board(sessions):
     clinic = Clinic.everywhere.get()
     Patient.everywhere.update(boards="across")
     across = Leaderboard(
-        name="Across", among="across", entry="best", types="all", min_valid_strides=1
+        name="Across", among="across", aggregation="best", types="all", min_valid_strides=1
     )
     across.save()
     boards = [across, make_board(sessions[0])]
@@ -260,7 +260,7 @@ def test_the_thread_catches_up_with_the_calendar(transactional_db, sessions):
     BoardEntry.everywhere.update(stale_on=NOW.date() - timedelta(days=1), figure=1)
     BoardCount.everywhere.all().delete()
     BoardCount.everywhere.create(board=board, valence="positive", figure=1, rows=PEOPLE)
-    builder = Builder()
+    builder = BoardBuilder()
     builder.wake()
     while (thread := builder._thread) is not None:
         thread.join(20)
@@ -299,7 +299,7 @@ def test_the_form_says_how_far_it_is(sessions):
 @pytest.mark.django_db(transaction=True)
 def test_the_thread_builds_all_that_is_to_be_built_and_ends(sessions):
     boards = [make_board(sessions[0], name=f"Board {n}") for n in range(2)]
-    builder = Builder()
+    builder = BoardBuilder()
     builder.wake()
     builder.wake()
     thread = builder._thread
@@ -320,7 +320,7 @@ def test_the_thread_builds_all_that_is_to_be_built_and_ends(sessions):
 @pytest.mark.django_db(transaction=True)
 def test_trouble_ends_the_thread_and_the_next_look_begins_again(sessions, monkeypatch, caplog):
     make_board(sessions[0])
-    builder = Builder()
+    builder = BoardBuilder()
     with monkeypatch.context() as patch:
         patch.setattr(entries, "build_next", lambda *_: 1 / 0)
         builder.wake()

@@ -32,7 +32,7 @@ def test_the_defaults_are_safe():
         "among": "self",
         "types": "same",
         "metric": "hit_rate",
-        "entry": "each",
+        "aggregation": "each",
         "min_valid_strides": 100,
         "include_simulated": False,
         "period": "days_30",
@@ -82,20 +82,23 @@ def test_the_defaults_are_safe():
         ({"among": "clinic"}, "one row for each"),
         ({"min_participants": 3}, "greater than or equal to 5"),
         ({"period": "dates"}, "Give both dates"),
-        ({"entry": "best"}, "Choose “Each session”"),
+        ({"aggregation": "best"}, "Choose “Each session”"),
         ({"metric": "attended"}, "Compare with other patients"),
         ({"display": "total"}, "reached together"),
-        ({"among": "clinic", "entry": "sum"}, "cannot be added up"),
-        ({"among": "clinic", "entry": "best", "metric": "target_met"}, "Choose the sum"),
-        ({"among": "clinic", "entry": "best", "display": "total"}, "Choose the sum"),
+        ({"among": "clinic", "aggregation": "sum"}, "cannot be added up"),
+        ({"among": "clinic", "aggregation": "best", "metric": "target_met"}, "Choose the sum"),
+        ({"among": "clinic", "aggregation": "best", "display": "total"}, "Choose the sum"),
         ({"occasion": "waiting"}, "belongs to nobody yet"),
-        ({"occasion": "waiting", "among": "clinic", "entry": "best"}, "belongs to nobody yet"),
         (
-            {"occasion": "waiting", "among": "clinic", "entry": "best", "display": "top"},
+            {"occasion": "waiting", "among": "clinic", "aggregation": "best"},
+            "belongs to nobody yet",
+        ),
+        (
+            {"occasion": "waiting", "among": "clinic", "aggregation": "best", "display": "top"},
             "no session at hand",
         ),
-        ({"among": "across", "entry": "best"}, "the host's"),
-        ({"among": "across", "entry": "best", "names": "code"}, "animal names only"),
+        ({"among": "across", "aggregation": "best"}, "the host's"),
+        ({"among": "across", "aggregation": "best", "names": "code"}, "animal names only"),
         ({"top_n": 0}, "greater than or equal to 1"),
         ({"tie_breaker": "luck"}, "not a valid choice"),
     ],
@@ -137,7 +140,7 @@ def test_a_preview_shows_the_clinics_own_rows_and_stores_nothing(world):
     client = client_of(world)
     counts = [model.everywhere.count() for model in (Leaderboard, BoardEntry)]
     wanted = filled(
-        among="clinic", entry="best", names="code", min_valid_strides=1, period="all", name=""
+        among="clinic", aggregation="best", names="code", min_valid_strides=1, period="all", name=""
     )
     page = client.get(PREVIEW, wanted).content.decode()
     assert world.patient.code in page
@@ -166,7 +169,7 @@ def test_what_is_seen_in_the_preview_is_what_the_tablet_shows(world):
 def test_the_first_and_the_last_day_can_be_chosen_and_none_beyond(world, zone):
     Clinic.everywhere.filter(pk=world.clinic.pk).update(time_zone=zone)
     client = client_of(world)
-    wanted = filled(among="clinic", entry="best", period="dates")
+    wanted = filled(among="clinic", aggregation="best", period="dates")
     for first, last, status in (
         (FIRST_DAY, LAST_DAY, 302),
         (date(2026, 1, 1), date.max, 200),
@@ -214,7 +217,7 @@ def test_a_saved_board_is_previewed_as_it_is_stored_until_its_rows_would_be_othe
     for number, other in enumerate(made, start=1):
         client.get(PREVIEW, fields | {"group": group} | other)
         assert len(read) == number
-    client.get(PREVIEW, fields | {"among": "self", "entry": "each"})
+    client.get(PREVIEW, fields | {"among": "self", "aggregation": "each"})
     assert len(read) == 3
 
 
@@ -227,7 +230,7 @@ def test_a_preview_says_what_cannot_be(world):
 def test_a_group_has_patients_of_the_own_clinic_and_enough_of_them(world):
     other = build_world("birch")
     client = client_of(world)
-    wanted = filled(among="group", entry="best")
+    wanted = filled(among="group", aggregation="best")
     few = client.get(PREVIEW, wanted | {"group": [world.patient.pk]}).content.decode()
     assert "Choose at least 5 patients." in few
     foreign = client.get(PREVIEW, wanted | {"group": [other.patient.pk]}).content.decode()
@@ -241,7 +244,7 @@ def test_a_group_of_a_thousand_is_saved_and_one_of_more_is_told_what_to_do(world
     )
     client = client_of(world)
     many = list(Patient.everywhere.filter(nickname="G").values_list("pk", flat=True))
-    wanted = filled(among="group", entry="best") | {"group": many}
+    wanted = filled(among="group", aggregation="best") | {"group": many}
     for answer in (
         client.get(PREVIEW, wanted),
         client.post(reverse("admin:rehab_leaderboard_add"), wanted),
@@ -264,7 +267,7 @@ def test_who_may_not_build_a_board_sees_no_preview(world, role, status):
 
 def test_only_a_host_builds_boards_across_clinics_and_sees_no_patient_in_it(world):
     host = signed_in(User.everywhere.create_user("host", role=Role.HOST))
-    wanted = filled(name="Across", among="across", entry="best")
+    wanted = filled(name="Across", among="across", aggregation="best")
     pt = client_of(world)
     assert "not one of the available choices" in pt.get(PREVIEW, wanted).content.decode()
     preview = host.get(PREVIEW, wanted).content.decode()

@@ -31,9 +31,9 @@ def test_rows_that_were_kept_up_are_those_that_are_made_anew(clinic):
     for number, fields in enumerate(
         (
             {},
-            {"types": "all", "metric": "best_streak", "entry": "latest"},
-            {"metric": "score", "entry": "mean"},
-            {"types": "all", "metric": "active_minutes", "entry": "sum", "period": "days_30"},
+            {"types": "all", "metric": "best_streak", "aggregation": "latest"},
+            {"metric": "score", "aggregation": "mean"},
+            {"types": "all", "metric": "active_minutes", "aggregation": "sum", "period": "days_30"},
         )
     ):
         board_of(clinic, **{"name": f"Board {number}"} | fields)
@@ -82,7 +82,7 @@ def test_boards_that_did_not_follow_heal_by_themselves(
     with monkeypatch.context() as patch, django_capture_on_commit_callbacks(execute=True):
         patch.setattr(entries, "read_results", lambda *_: 1 / 0)
         walk(people[5], "positive", strides(20, 0), days_ago=1)
-    assert "Boards did not follow" in caplog.text
+    assert "Boards could not be updated" in caplog.text
     assert entries.find_unbuilt() == board.pk
     assert not Leaderboard.everywhere.get(pk=frozen.pk).is_being_built
     told = {shown.title: shown.note for shown in make_session_panels(sessions[0], NOW)}

@@ -20,7 +20,7 @@ from rehab.boards.ranking.periods import period_of
 from rehab.boards.ranking.results import own_results
 from rehab.boards.ranking.sessions import CountedSession
 from rehab.boards.ranking.standings import ComputedStandings
-from rehab.boards.ranking.visibility import MAX_OWN, find_own_sessions
+from rehab.boards.ranking.visibility import MAX_OWN, find_visible_own_rows
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionMetric
@@ -297,7 +297,7 @@ def test_a_valence_is_ranked_by_what_it_pays():
 def test_a_long_board_keeps_the_best_and_those_around(mine):
     sessions = [own_session(pk, hit_rate=(200 - pk) / 200, score=200 - pk) for pk in range(200)]
     standings = rank(Scale.POINTS, sessions)
-    visible = find_own_sessions(standings, standings.find_session(mine))
+    visible = find_visible_own_rows(standings, standings.find_session(mine))
     shown = [each.row.session_id for each in visible]
     assert len(shown) <= MAX_OWN
     assert shown == sorted(set(shown))

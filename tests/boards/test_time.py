@@ -72,7 +72,7 @@ def test_another_time_zone_is_another_day_at_once(period):
     clinic = Clinic.everywhere.create(name="Elm", boards_across=True, time_zone="UTC")
     day = SATURDAY.date()
     began = {"period_from": day, "period_to": day} if period == "dates" else {}
-    how = {"metric": "active_minutes", "entry": "sum", "types": "all"}
+    how = {"metric": "active_minutes", "aggregation": "sum", "types": "all"}
     board_of(clinic, period=period, **began, **how)
     person = patient_of(clinic, "A")
     for hours in (8, 8, 1):  # the first two are Friday's in California

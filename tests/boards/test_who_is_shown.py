@@ -416,9 +416,11 @@ def test_a_group_compares_the_chosen_alone(clinic):
 # --- figures --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("entry", "value"), [("best", "80%"), ("latest", "40%"), ("mean", "55%")])
-def test_what_stands_in_a_row(clinic, entry, value):
-    board = board_of(clinic, entry=entry, mean_of=2)
+@pytest.mark.parametrize(
+    ("aggregation", "value"), [("best", "80%"), ("latest", "40%"), ("mean", "55%")]
+)
+def test_what_stands_in_a_row(clinic, aggregation, value):
+    board = board_of(clinic, aggregation=aggregation, mean_of=2)
     person = patient_of(clinic, "A")
     for days_ago, hits in ((3, 8), (2, 7), (1, 4)):
         walk(person, "positive", strides(hits, 10 - hits), days_ago=days_ago)
@@ -427,7 +429,9 @@ def test_what_stands_in_a_row(clinic, entry, value):
 
 
 def test_only_sessions_that_are_long_enough_ended_and_walked_count(clinic):
-    board = board_of(clinic, min_valid_strides=10, entry="sum", metric="attended", types="all")
+    board = board_of(
+        clinic, min_valid_strides=10, aggregation="sum", metric="attended", types="all"
+    )
     person = patient_of(clinic, "A")
     walk(person, "positive", strides(9, 0))
     walk(person, "positive", strides(90, 0), simulated=True)
@@ -445,8 +449,8 @@ def test_only_sessions_that_are_long_enough_ended_and_walked_count(clinic):
 
 
 def test_minutes_of_a_day_are_counted_up_to_an_hour_and_targets_by_the_day(clinic):
-    minutes = board_of(clinic, entry="sum", metric="active_minutes", types="all")
-    days = board_of(clinic, name="Days", entry="sum", metric="target_met", types="all")
+    minutes = board_of(clinic, aggregation="sum", metric="active_minutes", types="all")
+    days = board_of(clinic, name="Days", aggregation="sum", metric="target_met", types="all")
     person = patient_of(clinic, "A")
     for _ in range(2):
         walk(person, "positive", strides(2400, 0), days_ago=2, wanted=0.5)
@@ -457,7 +461,9 @@ def test_minutes_of_a_day_are_counted_up_to_an_hour_and_targets_by_the_day(clini
 
 
 def test_a_total_is_reached_together_and_hidden_below_five(clinic):
-    board_of(clinic, display="total", entry="sum", metric="steps", types="all", total_goal=200)
+    board_of(
+        clinic, display="total", aggregation="sum", metric="steps", types="all", total_goal=200
+    )
     people = people_of(clinic, 5, boards="total")
     sessions = walk_down(people[:4])
     alone = see(sessions[1])

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.browser
 
 
 def run(server: Server, script: str) -> list[str]:
-    """Run a script beside the server; give the words that it prints."""
+    """Run a script beside the server; return the words that it prints."""
     done = subprocess.run(
         [sys.executable, "manage.py", "shell", "-v0", "-c", script],
         cwd=ROOT,

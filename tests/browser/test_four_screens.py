@@ -18,7 +18,7 @@ TOLD = ("performance", "number", "goal", "of-twenty", "judged")
 
 
 def told(monitor: Page) -> list[str]:
-    """Give what a therapist's page says of the session's strides."""
+    """Return what a therapist's page says of the session's strides."""
     return [monitor.locator(f"[data-show={name}]").inner_text() for name in TOLD]
 
 

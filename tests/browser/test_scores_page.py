@@ -50,7 +50,7 @@ def sessions(server) -> tuple[str, str]:
 
 @contextmanager
 def tablet(browser: Browser, server: Server, size: str, *, still: bool = False) -> Iterator[Page]:
-    """Give a page of a signed-in tablet that is only tapped. Complaints fail."""
+    """Return a page of a signed-in tablet that is only tapped. Complaints fail."""
     width, height = SIZES[size]
     context = browser.new_context(
         base_url=server.url,
@@ -72,7 +72,7 @@ def tablet(browser: Browser, server: Server, size: str, *, still: bool = False) 
 
 
 def is_in_view(page: Page, board: str) -> bool:
-    """Say whether the marked row lies whole within the board that is shown."""
+    """Return whether the marked row lies whole within the board that is shown."""
     inside: bool = page.evaluate(
         """(board) => {
           const place = document.getElementById(board).getBoundingClientRect();

@@ -50,7 +50,7 @@ def sign_out(page: Page) -> None:
 
 
 def fresh_code(secret: str, after: str = "") -> str:
-    """Give a code that was not used yet, waiting for it where need be."""
+    """Return a code that was not used yet, waiting for it where need be."""
     while (code := generate_code(secret, int(time.time()) // TIME_STEP_S)) == after:
         time.sleep(0.5)
     return code

@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 
 from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.exports.archive import ZipResponse, write_csv, write_zip
-from rehab.exports.selection import PAGE, Selection
+from rehab.exports.selection import PAGE_ROWS, Selection
 from rehab.exports.tables import STEPS, TABLES, format_cell
 from rehab.patients.visits import plan_visit
 from rehab.people.audit.audit_log import Act, AuditEntry
@@ -300,13 +300,13 @@ def test_a_nickname_that_is_a_formula_stays_text(world):
 def test_pages_of_steps_join_without_a_gap(world):
     step = Step.everywhere.get(number=1)
     columns = {f.attname: getattr(step, f.attname) for f in Step._meta.concrete_fields}
-    numbers = range(11, 2 * PAGE + 1)
+    numbers = range(11, 2 * PAGE_ROWS + 1)
     Step.everywhere.bulk_create(Step(**columns | {"id": None, "number": n}) for n in numbers)
     user = world.people[Role.LEAD]
     sessions = TrainingSession.objects.visible_to(user)
     place = [column.name for column in STEPS.columns].index("number")
     rows = Selection(user, sessions, named=False).step_rows()
-    assert [row[place] for row in rows] == list(range(1, 2 * PAGE + 1))
+    assert [row[place] for row in rows] == list(range(1, 2 * PAGE_ROWS + 1))
 
 
 def test_memory_does_not_grow_with_the_number_of_steps():

@@ -78,7 +78,7 @@ def test_what_the_rules_refuse_the_form_refuses_and_the_preview_says(world, slug
     given = feedback_form(slug, **changes)
     assert why.lower() in client.post(f"{ADD}?slug={slug}", given).content.decode().lower()
     assert not FeedbackType.everywhere.filter(slug=slug).exists()
-    assert client.get(PREVIEW, given).context["faults"]
+    assert client.get(PREVIEW, given).context["errors"]
 
 
 def test_explicit_has_neither_points_nor_gestures_to_edit(world):

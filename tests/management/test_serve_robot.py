@@ -86,7 +86,7 @@ def family(pid: int) -> list[psutil.Process]:
 
 
 async def perform(url: str, cookie: str, token: str) -> list[dict[str, Any]]:
-    """Start the session, walk well until a gesture has ended, stop the robot; give its reports."""
+    """Start the session, walk until a gesture has ended, stop the robot; return its reports."""
     page = {"Cookie": f"sessionid={cookie}", "Origin": url.replace("ws", "http")}
     source = {"Authorization": f"Bearer {token}"}
     reports: list[dict[str, Any]] = []

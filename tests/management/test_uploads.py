@@ -23,7 +23,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 
 def post(server: Server, head: bytes, body: bytes) -> bytes:
-    """Send a body; give what is answered until the server hangs up."""
+    """Send a body; return what is answered until the server hangs up."""
     answer = b""
     with socket.create_connection(("127.0.0.1", server.port), timeout=10) as connection:
         try:

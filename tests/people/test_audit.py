@@ -67,7 +67,7 @@ SILENT = {
 
 
 def is_silent(name: str) -> bool:
-    """Say, independently of the code under test, whether a route shows nothing of patients."""
+    """Return, apart from the code under test, whether a route shows nothing of patients."""
     bare = {
         *("clinic", "user", "apitoken", "station", "device", "measure", "protocol", "gesture"),
         *("feedbacktype", "preset"),
@@ -197,7 +197,7 @@ def test_care_goes_on_when_the_log_cannot_be_written_but_nothing_is_given_out(wo
 
 
 def test_entries_cannot_be_changed_or_deleted(world):
-    audit_log.record(Act.VIEW, world.people[Role.PT], patient=world.patient.pk, now=NOW)
+    audit_log.record(Act.VIEW, world.people[Role.PT], patient_id=world.patient.pk, now=NOW)
     entry = entries().get()
     visible = AuditEntry.objects.visible_to(world.people[Role.LEAD])
     for attempt in (
@@ -217,7 +217,7 @@ def test_entries_cannot_be_changed_or_deleted(world):
 
 def test_leads_read_it_in_the_admin_and_nobody_writes_there(world):
     audit_log.record(
-        Act.EXPORT, world.people[Role.PT], patient=world.patient.pk, about="here", now=NOW
+        Act.EXPORT, world.people[Role.PT], patient_id=world.patient.pk, about="here", now=NOW
     )
     entry = entries().get()
     lead = client_of(world, Role.LEAD)

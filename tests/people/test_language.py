@@ -25,7 +25,7 @@ def pt(world: World) -> Client:
 
 
 def spoken(client: Client, path: str, browser: str = "en") -> str:
-    """Give the language that a page says it has, in its head and to the browser."""
+    """Return the language that a page says it has, in its head and to the browser."""
     answer = client.get(path, headers={"Accept-Language": browser})
     found = re.search(r'<html lang="([^"]+)" dir="ltr">', answer.content.decode())
     assert found, answer.content[:200]

@@ -116,7 +116,7 @@ def world(world: World) -> World:
 
 
 def complaints(client: Client, url: str, data: Mapping[str, object]) -> str:
-    """Send a form that is refused; give what its page complains of."""
+    """Send a form that is refused; return what its page complains of."""
     answer = client.post(url, data)
     assert answer.status_code == 200
     lists = re.findall(

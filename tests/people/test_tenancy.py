@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,12 +39,24 @@ from tests.support.world import (
 pytestmark = pytest.mark.django_db
 
 
-@pytest.fixture
-def worlds() -> tuple[World, World]:
+Worlds = Callable[[], tuple[World, World]]
+
+
+def build_worlds() -> tuple[World, World]:
     both = build_world("amber"), build_world("birch")
     for world in both:
         fill_board(world)
     return both
+
+
+@pytest.fixture(scope="class")
+def kept_worlds(keep: Callable[..., Worlds]) -> Worlds:
+    return keep(build_worlds)
+
+
+@pytest.fixture
+def worlds(kept_worlds: Worlds, db: None) -> tuple[World, World]:
+    return kept_worlds()
 
 
 # --- models -------------------------------------------------------------------------------------

@@ -12,10 +12,10 @@ STEP = {"type": "step", "number": 1, "performance": 0.9, "shown": 0.99, "goal": 
 
 
 def begin(valence="positive", names=tuple(TOPICS)):
-    """Give a client on an open connection that knows its session, and all that it said."""
+    """Return a client on an open connection that knows its session, and all that it said."""
     client = OriginalTopicClient(names)
     opened = list(client.open(0.0))
-    client.follow(WELCOME | {"valence": valence}, 0.0)
+    client.handle_message(WELCOME | {"valence": valence}, 0.0)
     return client, opened + list(client.due(0.0))
 
 
@@ -46,9 +46,9 @@ def test_a_type_that_the_original_does_not_know_is_not_told():
 def test_nothing_is_told_of_a_server_that_does_not_say_it():
     client = OriginalTopicClient(TOPICS)
     list(client.open(0.0))
-    client.follow(WELCOME, 0.0)
-    client.follow({"type": "welcome", "session": None}, 0.0)
-    client.decide(True, 0.0)
+    client.handle_message(WELCOME, 0.0)
+    client.handle_message({"type": "welcome", "session": None}, 0.0)
+    client.publish_decision(True, 0.0)
     assert list(client.due(0.0)) == []
 
 
@@ -56,57 +56,57 @@ def test_nothing_is_told_of_a_server_that_does_not_say_it():
 @pytest.mark.parametrize("valence", ["positive", "negative", "binary", "explicit"])
 def test_a_good_step_where_the_original_tells_one(valence, above):
     client, _ = begin(valence)
-    client.decide(above, 1.0)
+    client.publish_decision(above, 1.0)
     told = [("/garry/good_step", {"data": above})] if valence in ("positive", "binary") else []
     assert published(client.due(1.0)) == told
 
 
 def test_steps_are_what_was_shown_and_the_goal():
     client, _ = begin()
-    client.follow(STEP, 1.0)
+    client.handle_message(STEP, 1.0)
     assert published(client.due(1.0)) == [("/garry/data", {"a2": 0.99, "goal": 1.1})]
 
 
 @pytest.mark.parametrize("bad", [None, "1", True, math.nan, math.inf, 1e300, {}])
 def test_a_number_that_is_none_is_not_told(bad):
     client, _ = begin()
-    client.follow(STEP | {"shown": bad}, 1.0)
-    client.follow(STEP | {"goal": bad}, 1.0)
-    client.follow({"type": "step"}, 1.0)
+    client.handle_message(STEP | {"shown": bad}, 1.0)
+    client.handle_message(STEP | {"goal": bad}, 1.0)
+    client.handle_message({"type": "step"}, 1.0)
     assert list(client.due(1.0)) == []
 
 
 def test_a_reconnection_tells_what_holds_and_nothing_that_is_past():
     client, _ = begin()
-    client.follow(STEP, 1.0)
-    client.decide(True, 1.0)
-    client.lose(1.0)
-    client.follow(STEP, 1.1)
-    client.decide(True, 1.1)
+    client.handle_message(STEP, 1.0)
+    client.publish_decision(True, 1.0)
+    client.disconnect(1.0)
+    client.handle_message(STEP, 1.1)
+    client.publish_decision(True, 1.1)
     frames = [*client.open(1.2), *client.due(1.2)]
     assert published(frames) == [("/garry/feedback_type", {"data": "Positive"})]
 
 
 def test_what_could_not_be_said_within_a_second_is_past():
     client, _ = begin()
-    client.decide(True, 1.0)
+    client.publish_decision(True, 1.0)
     assert published(client.due(2.1)) == []
 
 
 def test_only_the_chosen_topics_are_used():
     client, said = begin(names=["good_step"])
-    client.follow(STEP, 1.0)
-    client.decide(True, 1.0)
+    client.handle_message(STEP, 1.0)
+    client.publish_decision(True, 1.0)
     said += [*client.due(1.0), *client.end(1.0)]
     assert {frame["topic"] for frame in said} == {"/garry/good_step"}
 
 
 def test_what_does_not_come_back_is_told_with_the_cure():
     client, _ = begin()
-    client.hear(Publication("/garry/feedback_type", {"data": "Positive"}), 0.1)
-    client.follow(STEP, 1.0)
+    client.handle(Publication("/garry/feedback_type", {"data": "Positive"}), 0.1)
+    client.handle_message(STEP, 1.0)
     list(client.due(1.0))
     assert client.problem(2.9) == ""
     assert "build the package garry_ros there" in client.problem(3.1)
-    client.hear(Publication("/garry/data", {"a2": 0.99, "goal": 1.1}), 3.2)
+    client.handle(Publication("/garry/data", {"a2": 0.99, "goal": 1.1}), 3.2)
     assert client.problem(9.0) == ""

@@ -81,12 +81,12 @@ def test_a_gesture_on_a_twin_with_unequal_wheels():  # the others: tests/bench/t
 def test_a_bump_ends_it_and_another_one_is_refused():
     with TwinBase(time.monotonic) as twin:
         bump = {"do": "set", "name": "bumper", "value": 2}
-        threading.Timer(1.0, lambda: twin.ask(bump)).start()
+        threading.Timer(1.0, lambda: twin.send_order(bump)).start()
         played = play_gesture(GESTURES["celebrate"], twin, time.monotonic, time.sleep)
         assert played["outcome"] == "bump"
-        assert twin.ask({"do": "look"})["setpoint"] == [0, 0]
+        assert twin.send_order({"do": "look"})["setpoint"] == [0, 0]
         assert play_gesture(GESTURES["nod"], twin, time.monotonic, time.sleep)["outcome"] == "bump"
-        twin.ask(bump | {"value": 0})
+        twin.send_order(bump | {"value": 0})
         twin.set_home()
         time.sleep(0.3)
         assert twin.ground_truth().pose.x_m == pytest.approx(0, abs=0.001)

@@ -6,7 +6,7 @@ from robot.simulation import Simulation
 from tests.support.robot_stage import CUE
 
 
-def test_a_rehearsal_is_a_live_robot_on_another_clock(stage):
+def test_a_simulation_is_a_live_robot_on_another_clock(stage):
     performances = [0.5 + (number * 37 % 60) / 60 for number in range(60)]
     stage.walk(*performances)
     stage.wait(5)
@@ -26,7 +26,7 @@ def test_nothing_moves_at_a_null_base():
     assert not simulation.gestures
 
 
-def test_a_rehearsal_refuses_what_a_robot_would():
+def test_a_simulation_refuses_what_a_robot_would():
     with pytest.raises(ValueError, match="window_s"):
         Simulation("kinematic", CUE | {"window_s": 0})
     for name in ("twin", "kobuki"):

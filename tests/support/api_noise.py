@@ -45,14 +45,14 @@ class Noise:
 
 
 def make_noise(paths: dict[str, Any], schemas: dict[str, Any], known: list[str]) -> Any:
-    """Give a strategy of calls. ``known`` are keys and codes of rows, one's own and others'."""
+    """Return a strategy of calls. ``known`` are keys and codes of rows, one's own and others'."""
     texts = st.sampled_from(JUNK_TEXTS) | st.text(max_size=20)
     plain = st.sampled_from(JUNK) | texts | st.integers() | st.floats()
     junk = st.recursive(plain, lambda inner: st.lists(inner, max_size=2), max_leaves=4)
     keys = st.sampled_from([int(text) for text in known if text.isdigit()])
 
     def fitting(schema: dict[str, Any]) -> Any:
-        """Give values that are described, those on the border among them."""
+        """Return values that are described, those on the border among them."""
         offered: list[Any] = []
         for described in schema.get("anyOf", [schema]):
             reference = described.get("$ref", "").rsplit("/", 1)[-1]

@@ -8,7 +8,7 @@ import django
 
 
 def seed(role: str) -> str:
-    """Give a new account of the first clinic a token."""
+    """Return a new account of the first clinic a token."""
     from rehab.people.models import User
     from rehab.people.sign_in.first_start import first_clinic, prepare_database
     from tests.support.programs import bearer_token

@@ -9,7 +9,7 @@ from rehab.sessions.models import TrainingSession
 from tests.support.walks import strides, walk
 from tests.support.world import NOW, agreeing
 
-COMMON = {"among": "clinic", "entry": "best", "min_valid_strides": 1, "period": "all"}
+COMMON = {"among": "clinic", "aggregation": "best", "min_valid_strides": 1, "period": "all"}
 
 
 def patient_of(clinic: Clinic, code: str, boards: str = "clinic", **fields) -> Patient:

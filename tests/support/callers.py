@@ -82,7 +82,7 @@ class Caller:
             await self.wire.send_input({"type": "websocket.receive", "text": text})
 
     async def hear(self, kind: str | None = None) -> Message:
-        """Give the next message, or the next one of a type."""
+        """Return the next message, or the next one of a type."""
         async with asyncio.timeout(PATIENCE_S):
             while True:
                 if self.code is not None:
@@ -100,7 +100,7 @@ class Caller:
         return message
 
     async def overhear(self) -> list[Message]:
-        """Give what has come without waiting for anything."""
+        """Return what has come without waiting for anything."""
         await turns()
         before = len(self.heard)
         while not self.wire.output_queue.empty():
@@ -113,7 +113,7 @@ class Caller:
             pass
 
     async def sent_away(self) -> tuple[int, Message]:
-        """Wait until the server closes; give the code and the error it told."""
+        """Wait until the server closes; return the code and the error it told."""
         async with asyncio.timeout(PATIENCE_S):
             while self.code is None:
                 self._note(await self.wire.output_queue.get())
@@ -141,7 +141,7 @@ class SourceCaller(Caller):
         self.number = 0
 
     async def hello(self, **extra: Any) -> Message:
-        """Say hello; give the welcome."""
+        """Say hello; return the welcome."""
         await self.say({"type": "hello", "version": 1, "run": "r1", "last": 0, **extra})
         welcome = await self.hear("welcome")
         if welcome["session"] is not None:
@@ -157,7 +157,7 @@ class SourceCaller(Caller):
 
 
 def a_step(number: int, value: Any = 4.0, **extra: Any) -> Message:
-    """Give a step frame."""
+    """Return a step frame."""
     step = {"type": "step", "number": number, "time_s": number * 1.1, "side": "left"}
     return step | {"value": value} | extra
 
@@ -168,7 +168,7 @@ class Page(Caller):
     confirms = True
 
     async def watch(self) -> Message:
-        """Open it; give the snapshot."""
+        """Open it; return the snapshot."""
         await self.dial()
         return await self.hear("snapshot")
 
@@ -185,11 +185,11 @@ class Page(Caller):
         return [event["number"] for event in self.events if event["kind"] in kinds]
 
     def last(self, kind: str) -> Message:
-        """Give the latest event of a kind."""
+        """Return the latest event of a kind."""
         return [event for event in self.events if event["kind"] == kind][-1]
 
     async def overhear(self) -> list[Message]:
-        """Give what has come without waiting for anything; confirm it."""
+        """Return what has come without waiting for anything; confirm it."""
         before = len(self.heard)
         while frames := [m["frame"] for m in await super().overhear() if "frame" in m]:
             if not self.confirms:
@@ -198,7 +198,7 @@ class Page(Caller):
         return self.heard[before:]
 
     async def until(self, is_there: Callable[[Message], bool]) -> Message:
-        """Wait for an event that fits; give it."""
+        """Wait for an event that fits; return it."""
         looked = 0
         while True:
             for event in self.events[looked:]:
@@ -210,7 +210,7 @@ class Page(Caller):
                 await self.say({"type": "seen", "frame": frame["frame"]})
 
     async def until_step(self, number: int) -> Message:
-        """Wait for a step's event; give it."""
+        """Wait for a step's event; return it."""
         return await self.until(lambda event: event.get("number") == number)
 
 
@@ -228,7 +228,7 @@ class MonitorPage(Page):
         super().__init__(f"/ws/session/{session_id}/monitor/{query}", **options)
 
     async def change(self, kind: str, value: Any = None) -> Message:
-        """Ask for a change; give the answer."""
+        """Ask for a change; return the answer."""
         mark = f"m{len(self.heard)}"
         await self.say({"type": "change", "kind": kind, "value": value, "id": mark})
         while True:
@@ -244,7 +244,7 @@ class RobotCaller(Caller):
         super().__init__("/ws/robot/", token=token, origin=None, **options)
 
     async def hello(self) -> Message:
-        """Say hello; give the welcome."""
+        """Say hello; return the welcome."""
         await self.say({"type": "hello", "version": 1, "base": "null"})
         return await self.hear("welcome")
 
@@ -253,7 +253,7 @@ _keys: dict[int, str] = {}
 
 
 def sign_in(user: User) -> str:
-    """Give the key of a signed-in person's browser session (made by ``build_place``)."""
+    """Return the key of a signed-in person's browser session (made by ``build_place``)."""
     return _keys[user.pk]
 
 
@@ -274,19 +274,19 @@ class Place:
         return self.people[Role.PT]
 
     def source(self) -> SourceCaller:
-        """Give the station's source."""
+        """Return the station's source."""
         return SourceCaller(self.tokens["source"])
 
     def robot(self) -> RobotCaller:
-        """Give the station's robot."""
+        """Return the station's robot."""
         return RobotCaller(self.tokens["robot"])
 
     def tablet(self, session: TrainingSession, query: str = "") -> PatientPage:
-        """Give the station's tablet."""
+        """Return the station's tablet."""
         return PatientPage(session.pk, query, token=self.tokens["tablet"], origin=None)
 
     def monitor(self, session: TrainingSession, query: str = "") -> MonitorPage:
-        """Give the PT's page."""
+        """Return the PT's page."""
         return MonitorPage(session.pk, query, user=self.pt)
 
 
@@ -352,7 +352,7 @@ async def change(session: TrainingSession, kind: str, value: float | None = None
 
 
 async def numbers(session: TrainingSession) -> list[int]:
-    """Give the numbers of a session's stored steps."""
+    """Return the numbers of a session's stored steps."""
     steps = Step.everywhere.filter(session=session).order_by("number")
     return [number async for number in steps.values_list("number", flat=True)]
 

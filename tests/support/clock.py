@@ -20,7 +20,7 @@ ZONE = os.environ.get("GARRY_TEST_ZONE") or "UTC"
 HERE = START.astimezone(ZoneInfo(ZONE))  # as a clinic's clock shows it
 
 # Their children (servers, Chromium) have the machine's clock, or they measure it.
-REAL = ("bench", "browser", "real_clock", "realtime", "screenshots")
+REAL = ("bench", "browser", "realtime", "screenshots")
 
 
 def has_real_clock(item: pytest.Item) -> bool:

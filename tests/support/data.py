@@ -9,7 +9,7 @@ DATA = Path(os.environ.get("GARRY_TEST_DATA", Path(__file__).parents[3] / "share
 
 
 def recording(name: str) -> Path:
-    """Give a real recording's path, or skip the test where the recordings are absent."""
+    """Return a real recording's path, or skip the test where the recordings are absent."""
     path = DATA / "sessions" / name
     if not path.exists():
         pytest.skip(f"no real recordings at {DATA} (set GARRY_TEST_DATA)")
@@ -17,7 +17,7 @@ def recording(name: str) -> Path:
 
 
 def signals(folder: str) -> Path:
-    """Give the folder of a real recording of signals, or skip the test where there is none."""
+    """Return the folder of a real recording of signals, or skip the test where there is none."""
     path = DATA / "raw" / folder
     if not path.exists():
         pytest.skip(f"no real signals at {DATA} (set GARRY_TEST_DATA)")

@@ -100,7 +100,7 @@ class FakeKobuki:
         return self._speed != 0
 
     def moved_after(self, since_s: float) -> float:
-        """Give how long after a time its setpoint was still other than zero [s]."""
+        """Return how long after a time its setpoint was still other than zero [s]."""
         last, speed = 0.0, 0
         for at_s, now, _ in list(self.orders):
             if speed and at_s > since_s:

@@ -71,7 +71,7 @@ class FakeGarry:
             await self.tell(type="step", number=1, time_s=time_s, performance=performance)
 
     async def until(self, fits, within_s: float = 10) -> Message:
-        """Wait for a report that fits; give it."""
+        """Wait for a report that fits; return it."""
         async with asyncio.timeout(within_s):
             while True:
                 for report in self.reports:

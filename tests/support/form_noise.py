@@ -80,7 +80,7 @@ class Form(HTMLParser):
 
 
 def make_noise() -> st.SearchStrategy[Noise]:
-    """Give a strategy of requests; numbers are taken modulo what there is."""
+    """Return a strategy of requests; numbers are taken modulo what there is."""
     junk = st.sampled_from([*JUNK_TEXTS, "on", "1", "2", "[]", "{}", "x" * 70_000])
     junk |= st.text(max_size=20) | st.integers().map(str)
     numbers = st.integers(0, 10_000)
@@ -125,14 +125,14 @@ class Site:
         return browser.cookies
 
     def client(self, actor: Actor) -> Client:
-        """Give a browser that is signed in as somebody, whatever was done before."""
+        """Return a browser that is signed in as somebody, whatever was done before."""
         client = Client(raise_request_exception=False)
         for name, morsel in self._cookies[actor.label].items():
             client.cookies[name] = morsel.value
         return client
 
     def form(self, actor: Actor, route: Route) -> dict[str, str]:
-        """Give what an honest form of a page would send."""
+        """Return what an honest form of a page would send."""
         key = actor.label, route.url
         if key not in self._forms:
             page = self.client(actor).get(route.url)
@@ -210,7 +210,7 @@ class Inspector:
             assert list(what_leaks(actor, route, response, self.site.worlds)) == [], asked
 
     def tell(self) -> str:
-        """Say what came of it."""
+        """Return what came of it."""
         opened = sum(map(bool, self.reached.values()))
         counts = ", ".join(f"{code}: {number}" for code, number in sorted(self.answers.items()))
         return (

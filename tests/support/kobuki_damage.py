@@ -36,12 +36,12 @@ Damage = Callable[[bytes, random.Random], bytes]
 
 
 def is_bumped(number: int) -> bool:
-    """Say whether the bumper is pressed in this frame."""
+    """Return whether the bumper is pressed in this frame."""
     return number % BUMP_EVERY >= BUMP_EVERY - 50
 
 
 def drive(number: int, noise: random.Random) -> Feedback:
-    """Give the frame of a base that drives straight on at 0.2 m/s, and bumps now and then.
+    """Return the frame of a base that drives straight on at 0.2 m/s, and bumps now and then.
 
     Its raw gyro is noise, so that AA 55 stands in one frame of a few thousand.
     """
@@ -99,7 +99,7 @@ def mutate(data: bytes, chance: random.Random) -> bytes:
 
 
 def keep_share(chance: random.Random, frames: int, damage: Damage) -> float:
-    """Give the share of undamaged frames that a reader kept."""
+    """Return the share of undamaged frames that a reader kept."""
     reader, undamaged, kept = FrameReader(decode_feedback), 0, 0
     waiting: deque[Feedback] = deque(maxlen=8)  # sent whole, not yet heard
     for number in range(frames):
@@ -147,7 +147,7 @@ def live_through(chance: random.Random, frames: int) -> Life:
         life.mutated += was_damaged
         for heard in reader.feed(sent):
             life.fooled_checksum += heard not in said
-            seen = frame_filter.take(heard, number * FRAME_S)
+            seen = frame_filter.update(heard, number * FRAME_S)
             if seen is not None and number > 2:
                 for fault in _faults(seen, frame_filter, number):
                     life.wrong.append(f"frame {number}: {fault} {seen}")
@@ -168,7 +168,7 @@ def _faults(seen: Estimate, frame_filter: FrameFilter, number: int) -> Iterator[
         or frame_filter.hardware
     ):
         yield "button, charger or version"
-    if seen.began_anew:
+    if seen.restarted:
         yield "began anew"
     ticks = (DRIVE_TICKS * (number - back) for back in range(LAG))
     if min(abs(seen.left_m - tick * TICK_M) for tick in ticks) > ROLL_BOUND_M:

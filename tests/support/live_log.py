@@ -10,7 +10,7 @@ import django
 
 
 def read(session_id: int) -> dict[str, Any]:
-    """Give a session's step numbers, and whether folding its log again gives the same verdicts."""
+    """Return a session's step numbers, and whether folding its log again gives the verdicts."""
     from rehab.sessions.log import Step
     from rehab.sessions.models import TrainingSession
     from rehab.sessions.replay import log_entries

@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 
 def draw(strategy: st.SearchStrategy[T], count: int) -> list[T]:
-    """Give so many examples of a strategy, the same in every run."""
+    """Return so many examples of a strategy, the same in every run."""
     drawn: list[T] = []
 
     @settings(

@@ -16,7 +16,7 @@ ROOT = "/api/v1"
 
 
 def bearer_token(user: User, role: str) -> str:
-    """Give an account a new API token."""
+    """Make an account a new API token."""
     row = ApiToken(clinic=user.clinic, user=user, name="program", role=role)
     token = row.new_token()
     row.save()
@@ -51,5 +51,5 @@ class Program:
 
 
 def program_of(world: World, role: Role) -> Program:
-    """Give a program of somebody of this role."""
+    """Return a program of somebody of this role."""
     return Program(bearer_token(world.people[role], role))

@@ -27,7 +27,7 @@ START_S = 20.0
 
 @cache
 def why_missing() -> str:
-    """Say why there is no ROS here; empty where there is."""
+    """Return why there is no ROS here; empty where there is."""
     look = "import rospy, rosmaster, geometry_msgs.msg, nav_msgs.msg, std_msgs.msg"
     if Path(PYTHON).exists():
         done = subprocess.run([PYTHON, "-c", look], capture_output=True)
@@ -128,7 +128,7 @@ class RosNode:
 
 
 def to_json(value):
-    """Give a message, or a part of one, as JSON has it."""
+    """Return a message, or a part of one, as JSON has it."""
     if hasattr(value, "__slots__") and hasattr(value, "_type"):
         return {name: to_json(getattr(value, name)) for name in value.__slots__}
     if hasattr(value, "to_sec"):

@@ -43,7 +43,7 @@ class Stage:
         self.client.is_there, self.client = False, None
         self.inbox.clear()
         self.outbox.clear()
-        self.base_client.lose(self.now_s)
+        self.base_client.disconnect(self.now_s)
 
     def wait(self, span_s, order=STILL):
         for _ in range(round(span_s / TICK_S)):
@@ -63,7 +63,7 @@ class Stage:
         self.robot.tell()
         while self.inbox and not self.is_frozen:
             with suppress(BadRosFrame):
-                self.base_client.hear(read_frame(self.inbox.pop(0)), self.now_s)
+                self.base_client.handle(read_frame(self.inbox.pop(0)), self.now_s)
 
     def tell(self, topic, message):
         self.inbox.append(json.dumps({"op": "publish", "topic": topic, "msg": message}))

@@ -37,14 +37,14 @@ class Server:
 
 
 def free_port() -> int:
-    """Give a port that nobody listens on."""
+    """Return a port that nobody listens on."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
 
 
 def clean_environment(folder: Path, port: int) -> dict[str, str]:
-    """Give this process's environment with none of its GARRY settings."""
+    """Return this process's environment with none of its GARRY settings."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith("GARRY_")}
     return clean | {"GARRY_DATA_DIR": str(folder), "GARRY_PORT": str(port)}
 

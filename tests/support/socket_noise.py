@@ -85,7 +85,7 @@ class Noise:
 
 
 def make_noise() -> st.SearchStrategy[Noise]:
-    """Give a strategy of what a socket sends."""
+    """Return a strategy of what a socket sends."""
     texts = st.sampled_from(JUNK_TEXTS) | st.text(max_size=20)
     plain = st.sampled_from([*JUNK, float("nan"), float("inf")]) | texts | st.floats()
     junk = st.recursive(
@@ -106,7 +106,7 @@ def make_noise() -> st.SearchStrategy[Noise]:
 
     @st.composite
     def altered(draw_one: Any, socket: str) -> str:
-        """Give a valid message with parts put out of shape, at any depth."""
+        """Return a valid message with parts put out of shape, at any depth."""
         message = json.loads(json.dumps(draw_one(st.sampled_from(TEMPLATES[socket]))))
         for _ in range(draw_one(st.integers(1, 3))):
             inside: Any = message
@@ -223,7 +223,7 @@ class Ward:
             await self.look()
 
     def tell(self) -> str:
-        """Say what came of it."""
+        """Return what came of it."""
         codes = ", ".join(f"{code}: {number}" for code, number in sorted(self.codes.items()))
         return (
             f"{self.codes.total()} noisy frames ({codes}), "

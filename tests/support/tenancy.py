@@ -35,7 +35,7 @@ KEYS: dict[str, tuple[type[Model], str]] = {
 
 
 def may_read(actor: Actor, model: type[Model], clinic: str) -> bool:
-    """Say, independently of the code under test, whether an actor may read a clinic's rows."""
+    """Return, apart from the code under test, whether an actor may read a clinic's rows."""
     if actor.role == "host":
         return model.__name__ in HOST_SEES
     if actor.clinic != clinic:
@@ -80,7 +80,7 @@ def walk_patterns(
 
 
 def all_routes(worlds: tuple[World, ...]) -> Iterator[Route]:
-    """Give every address that the site knows, for the rows of every clinic."""
+    """Return every address that the site knows, for the rows of every clinic."""
     for name, _, pattern in walk_patterns(get_resolver()):
         wanted = set(pattern.pattern.converters) or set(
             getattr(pattern.pattern, "regex", None).groupindex
@@ -168,7 +168,7 @@ def enter(actor: Actor, worlds: tuple[World, ...]) -> Client:
 def find_leaks(
     worlds: tuple[World, ...], actors: list[Actor], under: str = "/"
 ) -> tuple[list[str], Counter[str]]:
-    """Open every address as every actor. Give what they should not have got, and counts."""
+    """Open every address as every actor. Return what they should not have got, and counts."""
     leaks: list[str] = []
     counts: Counter[str] = Counter()
     routes = [r for r in dict.fromkeys(all_routes(worlds)) if r.url.startswith(under)]
@@ -186,7 +186,7 @@ def find_leaks(
 def what_leaks(
     actor: Actor, route: Route, response: Any, worlds: tuple[World, ...]
 ) -> Iterator[str]:
-    """Give what is wrong with an answer: a foreign mark, an open door, a failure."""
+    """Return what is wrong with an answer: a foreign mark, an open door, a failure."""
     body = words_of(response)
     if response.status_code >= 500:
         yield f"{actor.label}: {route.url} fails with {response.status_code}"
@@ -210,7 +210,7 @@ def may_read_mark(actor: Actor, model: type[Model], world: World) -> bool:
 def find_offers(worlds: tuple[World, ...], actors: list[Actor]) -> tuple[list[str], int]:
     """Look at the pickers of every admin form, in pages and inlines, for everyone who may open one.
 
-    Give the rows of other clinics that they offer, and how many pickers there are.
+    Return the rows of other clinics that they offer, and how many pickers there are.
     """
     leaks, checked = [], 0
     for actor in actors:

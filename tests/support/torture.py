@@ -180,7 +180,7 @@ class Torture:
                     return
 
     async def run(self, sessions: int, rounds: int) -> dict[str, Any]:
-        """Kill the server so many times; give what the log and the viewers ended with."""
+        """Kill the server so many times; return what the log and the viewers ended with."""
         server = await self.start_server()
         rows = json.loads(self.run_python("-m", "tests.support.live_seed", str(sessions)))
         self.walks = [Walk(row, self.port, self.rate) for row in rows]
@@ -212,7 +212,7 @@ class Torture:
             await asyncio.sleep(0.05)
 
     def find_faults(self, ended: dict[str, Any]) -> list[str]:
-        """Give everything that must not have happened."""
+        """Return everything that must not have happened."""
         faults = [] if ended["status"] == 0 else [f"the server ended with {ended['status']}"]
         for walk in self.walks:
             name = f"session {walk.row['session']}"

@@ -26,7 +26,7 @@ M_TICK = 1 / 11724.4  # docs/reference/kobuki.md#odometry-and-gyro
 
 
 def order(speed: int, radius: int) -> bytes:
-    """Give a base control command, by the table of docs/reference/kobuki.md#commands."""
+    """Return a base control command, by the table of docs/reference/kobuki.md#commands."""
     return framed(struct.pack("<BBhh", 1, 4, speed, radius))
 
 
@@ -56,7 +56,7 @@ def whole(data: bytes) -> bytes:
 
 
 def parts(payload: bytes) -> dict[int, bytes]:
-    """Give each sub-payload of a payload by its id, in its order."""
+    """Return each sub-payload of a payload by its id, in its order."""
     found, at = {}, 0
     while at < len(payload):
         size = payload[at + 1]
@@ -67,7 +67,7 @@ def parts(payload: bytes) -> dict[int, bytes]:
 
 
 def core(payload: bytes) -> tuple[int, ...]:
-    """Give time, bumper, drop, cliff, left, right, pwm, pwm, buttons, charger, battery, current."""
+    """Return time, bumper, drop, cliff, left, right, 2 pwm, buttons, charger, battery, current."""
     return struct.unpack("<HBBBHHbbBBBB", parts(payload)[1])
 
 
@@ -112,19 +112,19 @@ class Bench:
         self.twin = Twin(firmware, self.wire)
 
     def live(self, for_s, send=b""):
-        """Give the payloads of a time [s]; ``send`` goes out at its beginning."""
+        """Return the payloads of a time [s]; ``send`` goes out at its beginning."""
         self.wire.coming += send
         return unframe(self.live_bytes(for_s))
 
     def live_bytes(self, for_s):
         for _ in range(round(for_s / FRAME_S)):
             self.now_s += FRAME_S
-            self.twin.live(self.now_s)
+            self.twin.step(self.now_s)
         sent, self.wire.sent = self.wire.sent, b""
         return sent
 
     def do(self, what, **more):
-        return self.twin.do({"do": what, **more}, self.now_s)
+        return self.twin.execute({"do": what, **more}, self.now_s)
 
     @property
     def pose(self):

@@ -52,7 +52,7 @@ class Feet:
         self._socket.send(json.dumps(message))
 
     def hear(self, kind: str) -> dict[str, Any]:
-        """Give the next message of a type."""
+        """Return the next message of a type."""
         while True:
             message: dict[str, Any] = json.loads(self._socket.recv(10))
             if message["type"] == kind:

@@ -111,11 +111,11 @@ def visit(
 
 
 def at_end(began: datetime, aggregate: SessionAggregate) -> datetime:
-    """Give the moment after the last stride."""
+    """Return the moment after the last stride."""
     return began + timedelta(seconds=aggregate.fold.last_number + 1)
 
 
 def strides(hits: int, misses: int) -> list[Walked]:
-    """Give so many hits and misses, in turn as long as both last."""
+    """Return so many hits and misses, in turn as long as both last."""
     both = [value for _ in range(min(hits, misses)) for value in (HIT, MISS)]
     return [*both, *[HIT] * (hits - misses), *[MISS] * (misses - hits)]

@@ -41,7 +41,7 @@ NOW = START  # the moment at which a test begins
 
 
 def mark(clinic: str, model: type[Model]) -> str:
-    """Give the text that marks a clinic's rows of a model, and stands nowhere else."""
+    """Return the text that marks a clinic's rows of a model, and stands nowhere else."""
     return f"zq{clinic}{model.__name__.lower()}qz"
 
 
@@ -70,12 +70,12 @@ class World:
 
 
 def scoped_models() -> list[type[Any]]:
-    """Give every model of the app, found by itself."""
+    """Return every model of the app, found by itself."""
     return list(apps.get_app_config("rehab").get_models())
 
 
 def agreeing(patient: Patient) -> Patient:
-    """Give a patient who agrees to stand on the boards that are set."""
+    """Return a patient who agrees to stand on the boards that are set."""
     if patient.boards != Boards.OWN:
         record_consent(patient, Purpose.BOARDS, None, NOW, patient.boards)
     return patient
@@ -179,7 +179,7 @@ def build_world(name: str) -> World:
         clinic=clinic,
         name=mark(name, Leaderboard),
         among="clinic",
-        entry="best",
+        aggregation="best",
         display="top",
         names="code",
         period="all",
@@ -279,14 +279,14 @@ def fill_board(world: World) -> None:
 
 
 def signed_in(user: User, **options: Any) -> Client:
-    """Give a browser in which somebody is signed in."""
+    """Return a browser in which somebody is signed in."""
     client = Client(**options)
     client.force_login(user)
     return client
 
 
 def client_of(world: World, role: Role = Role.PT, **options: Any) -> Client:
-    """Give the browser of a clinic's person of that role."""
+    """Return the browser of a clinic's person of that role."""
     return signed_in(world.people[role], **options)
 
 
@@ -301,7 +301,7 @@ class Actor:
 
 
 def all_actors(*worlds: World) -> list[Actor]:
-    """Give every role of every clinic, a host, a stranger, and an account that is switched off."""
+    """Return every role of every clinic, a host, a stranger, and an account switched off."""
     host = User.everywhere.create_user("host", role=Role.HOST)
     actors = [Actor("stranger", AnonymousUser()), Actor("host", host, None, "host")]
     for world in worlds:

@@ -1,0 +1,1 @@
+"""Storing the rows of boards and keeping them up to date."""

@@ -1,4 +1,4 @@
-"""Keeps the stored rows of boards in step with the sessions that they are computed from.
+"""Keeping the stored rows of boards in step with the sessions that they are computed from.
 
 Rows are written here only, each together with the count of its figure. They change when a session
 ends or is removed, a patient agrees or withdraws, a board is created or edited, and with the
@@ -72,17 +72,17 @@ def refresh(
         locked = _lock(board.pk)
         if locked is None:
             return
-        before, after = _replace(locked, patients, now, corrected=corrected)
+        before, after = _recompute_rows(locked, patients, now, corrected=corrected)
         if locked.built_to is not None:  # later ones are counted when they are built
             before = [row for row in before if row.patient_id <= locked.built_to]
             after = [row for row in after if row.patient_id <= locked.built_to]
         changed = _tally(after)
         changed.subtract(_tally(before))
-        _count(locked, changed)
+        _add_to_counts(locked, changed)
 
 
 def is_snapshot(board: Leaderboard, now: datetime) -> bool:
-    """Whether a board's rows stay as they were when it was frozen."""
+    """Return whether a board's rows stay as they were when it was frozen."""
     return board.built_to is None and board.active and not board.is_own and is_over(board, now)
 
 
@@ -91,12 +91,14 @@ def drop_ineligible(board: Leaderboard) -> None:
     with transaction.atomic():
         locked = _lock(board.pk)
         if locked is None or locked.built_to is not None:
-            return  # building does the same
+            return  # a board that is being built drops them itself
         rows = BoardEntry.everywhere.filter(board=locked)
         rows.exclude(patient__in=eligible_patients(locked)).delete()
         BoardCount.everywhere.filter(board=locked).delete()
-        alike = rows.order_by().values_list("valence", "figure").annotate(rows=Count("pk"))
-        _count(locked, Counter({(valence, figure): number for valence, figure, number in alike}))
+        by_figure = rows.order_by().values_list("valence", "figure").annotate(rows=Count("pk"))
+        _add_to_counts(
+            locked, Counter({(valence, figure): number for valence, figure, number in by_figure})
+        )
 
 
 def start_rebuild(board: Leaderboard) -> None:
@@ -108,8 +110,8 @@ def start_rebuild(board: Leaderboard) -> None:
             BoardCount.everywhere.filter(board=board).delete()
 
 
-def build_next(board_id: int, most: int, now: datetime) -> bool:
-    """Build the rows of the next patients, ``most`` at most; return whether there are more.
+def build_next(board_id: int, limit: int, now: datetime) -> bool:
+    """Build the rows of the next patients, ``limit`` at most; return whether there are more.
 
     The progress is stored with them, so that any process can go on after a crash.
     """
@@ -117,10 +119,10 @@ def build_next(board_id: int, most: int, now: datetime) -> bool:
         board = _lock(board_id)
         if board is None or board.built_to is None:
             return False
-        patients = next_patients(board, board.built_to, most)
-        _, after = _replace(board, patients, now)
-        _count(board, _tally(after))
-        built_to = patients[-1] if len(patients) == most else None
+        patients = next_patients(board, board.built_to, limit)
+        _, after = _recompute_rows(board, patients, now)
+        _add_to_counts(board, _tally(after))
+        built_to = patients[-1] if len(patients) == limit else None
         Leaderboard.everywhere.filter(pk=board_id).update(built_to=built_to)
     return built_to is not None
 
@@ -131,10 +133,12 @@ def find_unbuilt() -> int | None:
     return unbuilt.values_list("pk", flat=True).first()
 
 
-def find_outdated(now: datetime, few: int) -> int | None:
-    """Return a board that has more than ``few`` rows of an earlier day, or None."""
+def find_outdated(now: datetime, limit: int) -> int | None:
+    """Return a board that has more than ``limit`` rows of an earlier day, or None."""
     boards = Leaderboard.everywhere.filter(active=True).select_related("clinic").order_by("pk")
-    return next((board.pk for board in boards if len(find_stale(board, now, few + 1)) > few), None)
+    return next(
+        (board.pk for board in boards if len(find_stale(board, now, limit + 1)) > limit), None
+    )
 
 
 def measure_progress(board: Leaderboard) -> int | None:
@@ -153,37 +157,37 @@ def _lock(board_id: int) -> Leaderboard | None:
     return Leaderboard.everywhere.select_for_update().filter(pk=board_id).first()
 
 
-def next_patients(board: Leaderboard, after: int, most: int) -> list[int]:
-    """Return the next patients who have a row or are eligible, ``most`` at most."""
+def next_patients(board: Leaderboard, after: int, limit: int) -> list[int]:
+    """Return the next patients who have a row or are eligible, ``limit`` at most."""
     rows = BoardEntry.everywhere.filter(board=board, patient__gt=after).order_by("patient_id")
-    found = set(rows.values_list("patient_id", flat=True).distinct()[:most])
+    found = set(rows.values_list("patient_id", flat=True).distinct()[:limit])
     if _has_rows(board):
         eligible = eligible_patients(board).filter(pk__gt=after).order_by("pk")
-        found.update(eligible.values_list("pk", flat=True)[:most])
-    return sorted(found)[:most]
+        found.update(eligible.values_list("pk", flat=True)[:limit])
+    return sorted(found)[:limit]
 
 
 def _has_rows(board: Leaderboard) -> bool:
     return board.active and not board.is_own
 
 
-def find_stale(board: Leaderboard, now: datetime, most: int) -> set[int]:
-    """Return patients with a row of which a session has left the period; from ``most`` rows."""
+def find_stale(board: Leaderboard, now: datetime, limit: int) -> set[int]:
+    """Return the patients of up to ``limit`` rows with a session that has left the period."""
     today = last_day_of(board, now)
     stale = BoardEntry.everywhere.filter(board=board, stale_on__lte=today)
-    return set(stale.values_list("patient_id", flat=True)[:most])
+    return set(stale.values_list("patient_id", flat=True)[:limit])
 
 
-def refresh_stale(board_id: int, most: int, now: datetime) -> bool:
-    """Bring ``most`` of those rows up to date; return whether there may be more."""
+def refresh_stale(board_id: int, limit: int, now: datetime) -> bool:
+    """Bring up to ``limit`` stale rows up to date; return whether there may be more."""
     board = Leaderboard.everywhere.filter(pk=board_id).first()
-    patients = find_stale(board, now, most) if board else set()
+    patients = find_stale(board, now, limit) if board else set()
     if board and patients:
         refresh(board, patients, now=now, corrected=True)
     return bool(patients)
 
 
-def _replace(
+def _recompute_rows(
     board: Leaderboard, patients: Collection[int], now: datetime, *, corrected: bool = False
 ) -> tuple[list[BoardEntry], list[BoardEntry]]:
     """Recompute the rows of some patients; return those before and those after."""
@@ -209,7 +213,7 @@ def _replace(
 
 
 def _differs(row: BoardEntry, other: BoardEntry | None) -> bool:
-    """Whether two rows of a patient differ in anything that is shown or ordered by."""
+    """Return whether two rows of a patient differ in anything that is shown or ordered by."""
     return other is None or (
         row.figure,
         row.points_at_stake,
@@ -227,19 +231,19 @@ def _tally(rows: Iterable[BoardEntry]) -> Counter[tuple[str, int]]:
     return Counter((row.valence, row.figure) for row in rows)
 
 
-def _count(board: Leaderboard, changed: Counter[tuple[str, int]]) -> None:
+def _add_to_counts(board: Leaderboard, changed: Counter[tuple[str, int]]) -> None:
     """Add to the counts of some figures; delete those that come to 0."""
     altered = {key: number for key, number in changed.items() if number}
     if not altered:
         return
     counts = BoardCount.everywhere.filter(board=board, figure__in={key[1] for key in altered})
-    there = {(one.valence, one.figure): one for one in counts}
-    known = [there[key].pk for key in altered if key in there]
+    stored = {(count.valence, count.figure): count for count in counts}
+    known = [stored[key].pk for key in altered if key in stored]
     if known:
         BoardCount.everywhere.filter(pk__in=known).delete()
-    for key, one in there.items():
+    for key, count in stored.items():
         if key in altered:
-            altered[key] += one.rows
+            altered[key] += count.rows
     BoardCount.everywhere.bulk_create(
         BoardCount(board=board, valence=valence, figure=figure, rows=rows)
         for (valence, figure), rows in sorted(altered.items())

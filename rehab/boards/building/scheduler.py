@@ -1,4 +1,4 @@
-"""Rebuilds boards: of a few patients at once, of many in a thread, a batch of patients at a time.
+"""Rebuilding boards: of a few patients at once, of many in a thread in batches of patients.
 
 SQLite allows one writer at a time, and steps must be stored meanwhile: a step's commit waits for
 one batch at most. The progress is stored with each batch (`entries.py`), so that a server that was
@@ -34,26 +34,26 @@ FIRST_SIZE, MIN_SIZE, MAX_SIZE = 20, 10, 1_000  # patients a batch
 Work = Callable[[int, datetime], bool]
 
 
-class Builder:
-    """Runs one thread at most, while there is something to build."""
+class BoardBuilder:
+    """Builds boards in a thread, which runs only while there is something to build."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
-        self._ends = threading.Event()
+        self._stopping = threading.Event()
         self._is_wanted = False
 
     def wake(self) -> None:
         """Start the thread if there may be something to build. Never waits."""
         with self._lock:
             self._is_wanted = True
-            if self._thread is None and not self._ends.is_set():
+            if self._thread is None and not self._stopping.is_set():
                 self._thread = threading.Thread(target=self._run, name="garry-boards", daemon=True)
                 self._thread.start()
 
     def stop(self) -> None:
         """Stop after the current batch; another server, or the next start, goes on."""
-        self._ends.set()
+        self._stopping.set()
         with self._lock:
             thread = self._thread
         if thread is not None:
@@ -71,13 +71,13 @@ class Builder:
             connection.close()
 
     def _find_work(self) -> Work | None:
-        """Return what is to be built; None, with no thread any more, where nothing is.
+        """Return what is to be built; None, and the thread ends, where there is nothing.
 
-        Looks again if it was woken meanwhile.
+        If ``wake`` was called meanwhile, it looks again.
         """
         while True:
             with self._lock:
-                if self._ends.is_set() or not self._is_wanted:
+                if self._stopping.is_set() or not self._is_wanted:
                     self._thread = None
                     return None
                 self._is_wanted = False
@@ -89,18 +89,18 @@ class Builder:
 
     def _run_batches(self, work: Work) -> None:
         size, more = FIRST_SIZE, True
-        while more and not self._ends.is_set():
+        while more and not self._stopping.is_set():
             began = time.perf_counter()
             more = work(size, timezone.now())
             held_s = time.perf_counter() - began
             size = max(MIN_SIZE, min(MAX_SIZE, round(size * min(2.0, BATCH_S / held_s))))
-            self._ends.wait(max(held_s, PAUSE_S))
+            self._stopping.wait(max(held_s, PAUSE_S))
         if not more:
             entries.analyze_tables()
 
 
 def find_work(now: datetime) -> Work | None:
-    """Return what builds a board, or brings its outdated rows up to date; None for nothing."""
+    """Return the work that builds or updates a board; None where there is none."""
     board_id = entries.find_unbuilt()
     if board_id is not None:
         return partial(entries.build_next, board_id)
@@ -110,7 +110,7 @@ def find_work(now: datetime) -> Work | None:
     return None
 
 
-board_builder = Builder()
+board_builder = BoardBuilder()
 atexit.register(board_builder.stop)
 
 

@@ -1,4 +1,4 @@
-"""The boards that are always there: a patient's own sessions of one feedback type, and of all.
+"""The panels of own sessions on every scores page: of one feedback type, and of all.
 
 Points rank sessions of one type, hit rates those of all. Sessions that were simulated and those
 that a person walked never share a board. Only finished sessions with judged steps are on one:
@@ -21,7 +21,7 @@ from rehab.boards.ranking.periods import period_of
 from rehab.boards.ranking.results import own_results
 from rehab.boards.ranking.sessions import read_sessions
 from rehab.boards.ranking.standings import ComputedStandings
-from rehab.boards.ranking.visibility import find_own_sessions
+from rehab.boards.ranking.visibility import find_visible_own_rows
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
@@ -60,7 +60,7 @@ def make_board(scale: Scale, types: CountedTypes) -> Leaderboard:
     return Leaderboard(
         among=Participants.SELF,
         metric=scale.metric,
-        entry=Aggregation.EACH,
+        aggregation=Aggregation.EACH,
         types=types,
         min_valid_strides=0,
         include_simulated=True,
@@ -81,7 +81,7 @@ def make_own_panels(session: TrainingSession, now: datetime) -> list[BoardPanel]
         board = make_board(scale, CountedTypes.SAME)
         boards.insert(0, ("same", pgettext("board", "This type"), scale, board))
     period = period_of(by_rate, now)
-    # By the patient's index and the metrics' own: no other patient's rows are read.
+    # Filtered so that indexes are used and no other patient's rows are read.
     rows = SessionMetric.everywhere.filter(
         session__patient=session.patient_id,
         session__simulated=session.simulated,
@@ -91,7 +91,7 @@ def make_own_panels(session: TrainingSession, now: datetime) -> list[BoardPanel]
     visible = []
     for _slug, _label, _scale, board in boards:
         standings = ComputedStandings(board, own_results(board, sessions, session.valence, period))
-        visible.append(find_own_sessions(standings, standings.find_session(session.pk)))
+        visible.append(find_visible_own_rows(standings, standings.find_session(session.pk)))
     walked = (
         TrainingSession.everywhere.only("created_at", "started_at", "active_s")
         .order_by()  # by key; the model's own order would lead through the clinic's other rows

@@ -1,4 +1,4 @@
-"""Rows of boards as pages show them: figures, names, days."""
+"""The rows of panels: figures, names and days as text."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from datetime import date, datetime
 from rehab.boards.choices import NameStyle
 from rehab.boards.models import Leaderboard
 from rehab.boards.ranking.eligibility import eligible_patients
-from rehab.boards.ranking.sessions import SHARES
+from rehab.boards.ranking.sessions import PERCENT_METRICS
 from rehab.boards.ranking.visibility import VisibleRow
 from rehab.people.aliases import format_alias
 from rehab.sessions.formatting import NBSP, format_day, format_duration, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.training.metrics import METRICS
 
-UNITS = {"%", "min"}  # those that are written beside a figure; the board's name tells the others
+UNITS = {"%", "min"}  # written beside a figure; others follow from the board's name
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,15 @@ class PanelRow:
 
 def format_figure(slug: str, value: int) -> str:
     """Return a metric's figure as boards show it."""
-    unit = "%" if slug in SHARES else METRICS[slug].unit
+    unit = "%" if slug in PERCENT_METRICS else METRICS[slug].unit
     return format_number(value, 0) + (f"{NBSP}{unit}" if unit in UNITS else "")
 
 
 def format_rows(board: Leaderboard, visible: Sequence[VisibleRow]) -> list[PanelRow]:
     """Return rows with their figures and ranks, without names or days."""
-    full = 100 if board.metric in SHARES else max([1, *(each.row.figure for each in visible)])
+    full = (
+        100 if board.metric in PERCENT_METRICS else max([1, *(each.row.figure for each in visible)])
+    )
     rows: list[PanelRow] = []
     for each in visible:
         at_stake = each.row.points_at_stake
@@ -64,7 +66,7 @@ def format_rows(board: Leaderboard, visible: Sequence[VisibleRow]) -> list[Panel
 
 
 def shows_rank(board: Leaderboard, visible: VisibleRow) -> bool:
-    """Whether a row's rank is shown. By points that can only be lost it never is."""
+    """Return whether a row's rank is shown; it never is for points that can only be lost."""
     return board.show_ranks and visible.has_rank and visible.row.points_at_stake is None
 
 

@@ -1,4 +1,4 @@
-"""Makes the panel of a board: the others, all together, or the own sessions and why."""
+"""The panel of a board for its viewer: rows, a total, or the own sessions and why."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 
-OWN = gettext_noop("These are your own sessions.")
-BUILT = gettext_noop("This board is being built.")
+OWN_SESSIONS_NOTE = gettext_noop("These are your own sessions.")
+BEING_BUILT_NOTE = gettext_noop("This board is being built.")
 
 
 def boards_on(occasion: Occasion, clinic: Clinic) -> list[Leaderboard]:
@@ -75,7 +75,7 @@ def count_participants(standings: Standings, fewest: int) -> int:
 
 @dataclass(frozen=True)
 class BoardViewer:
-    """Whoever looks at a board: a patient, with or without a session at hand, or anybody.
+    """The viewer of a board: a patient, with or without a session at hand, or anybody.
 
     ``results`` are those of a board that is not stored as it is here, computed from the sessions.
     """
@@ -97,7 +97,9 @@ class BoardViewer:
         if board.is_own:
             return self._own_panel("")
         if self.results is None and not self._is_up_to_date():
-            return self._own_panel(f"{_(BUILT)} {_(OWN)}" if patient else _(BUILT))
+            return self._own_panel(
+                f"{_(BEING_BUILT_NOTE)} {_(OWN_SESSIONS_NOTE)}" if patient else _(BEING_BUILT_NOTE)
+            )
         standings = self._standings()
         count = count_participants(standings, board.min_participants)
         people = ngettext("%(count)d patient on it now.", "%(count)d patients on it now.", count)
@@ -106,10 +108,10 @@ class BoardViewer:
             fewest = {"fewest": board.min_participants}
             why = _("Under %(fewest)d, all see their own sessions.") % fewest
             few = _("Fewer than %(fewest)d people so far.") % fewest
-            return self._own_panel(f"{few} {_(OWN)}", f"{people} {why}")
+            return self._own_panel(f"{few} {_(OWN_SESSIONS_NOTE)}", f"{people} {why}")
         if patient is not None and not eligible_patients(board).filter(pk=patient.pk).exists():
             why = _("%(patient)s has not agreed to be on it.") % {"patient": patient.nickname}
-            return self._own_panel(_(OWN), f"{people} {why}")
+            return self._own_panel(_(OWN_SESSIONS_NOTE), f"{people} {why}")
         me = standings.find(patient.pk) if patient else None
         if board.display == DisplayMode.TOTAL:
             return self._panel(total=self._total(standings, me), shared=True, summary=people)
@@ -119,7 +121,7 @@ class BoardViewer:
         if rows:
             return self._panel(rows=rows, shared=True, summary=people)
         why = _("Outside its first half, own sessions are shown.")
-        return self._own_panel(_(OWN), f"{people} {why}")
+        return self._own_panel(_(OWN_SESSIONS_NOTE), f"{people} {why}")
 
     def _is_up_to_date(self) -> bool:
         if self.board.is_being_built:
@@ -160,7 +162,7 @@ class BoardViewer:
         metrics = SessionMetric.everywhere.filter(session__patient=patient)
         sessions = read_sessions(board, metrics, period)
         standings = ComputedStandings(board, own_results(board, sessions, self.valence, period))
-        if board.entry == Aggregation.SUM:
+        if board.aggregation == Aggregation.SUM:
             mine = format_rows(board, find_visible_rows(self._own_board(), standings, None))
             rows = [replace(row, title="", rank=None, you=True) for row in mine]
             return self._panel(rows=rows, note=note, summary=summary)

@@ -1,4 +1,4 @@
-"""Which patients may be on a board of several."""
+"""Which patients may be on a board of several patients."""
 
 from __future__ import annotations
 

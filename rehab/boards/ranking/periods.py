@@ -69,7 +69,7 @@ def last_day_of(board: Leaderboard, now: datetime) -> date:
 
 
 def is_over(board: Leaderboard, now: datetime) -> bool:
-    """Whether a frozen board's last day has passed."""
+    """Return whether a frozen board's last day has passed."""
     return (
         board.frozen_on is not None
         and last_day_of(board, now) < now.astimezone(zone_of(board)).date()

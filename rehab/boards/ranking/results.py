@@ -1,4 +1,4 @@
-"""What a patient's sessions come to on a board: one row's figure, and what it is ordered by."""
+"""A patient's result on a board: the figure of the row, and the key that orders it."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from rehab.boards.ranking.periods import Period, period_of
 from rehab.boards.ranking.sessions import CountedSession, is_kept, read_sessions
 from rehab.sessions.log import SessionMetric
 
-# The most that one day adds to a sum: no board may tempt anyone to walk on and on.
+# The most that one day adds to a sum, so that no board tempts a patient to overdo it.
 MAX_PER_DAY = {"active_minutes": 60.0, "target_met": 1.0}
-MAX_FIGURE = 10**9  # larger figures are cut to it, so that all keys have as many digits
+MAX_FIGURE = 10**9  # figures are limited to this, so that all keys have the same length
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Result:
     key
         What rows are ordered by: the greater, the better.
     stale_on
-        The day from which it is out of date though nobody walked; None for never.
+        The day from which it is out of date without any new session; None for never.
     """
 
     patient_id: int
@@ -78,7 +78,7 @@ def own_results(
         for session in sessions
         if board.list_key(session.valence) == board.list_key(valence) and session.counts_for(board)
     ]
-    if board.entry == Aggregation.SUM:
+    if board.aggregation == Aggregation.SUM:
         return [aggregate(board, valence, own, period)] if own else []
     return [make_result(board, valence, [session], period) for session in own]
 
@@ -87,7 +87,7 @@ def aggregate(
     board: Leaderboard, valence: str, sessions: list[CountedSession], period: Period
 ) -> Result:
     """Return the result of a patient's sessions: their best, latest, mean or sum."""
-    match board.entry:
+    match board.aggregation:
         case Aggregation.BEST:
             results = [make_result(board, valence, [session], period) for session in sessions]
             return max(results, key=lambda result: result.key)
@@ -102,7 +102,7 @@ def make_result(
     board: Leaderboard, valence: str, sessions: Sequence[CountedSession], period: Period
 ) -> Result:
     """Return the result of some sessions, by their sum or their mean."""
-    add = board.entry == Aggregation.SUM
+    add = board.aggregation == Aggregation.SUM
     figures = ((session.day, session.figure(board.metric)) for session in sessions)
     figure = combine(figures, board.metric, add)
     stakes = ((session.day, session.points_at_stake(board.metric)) for session in sessions)

@@ -20,7 +20,7 @@ from rehab.training.changes import State
 from rehab.training.valences import VALENCES
 
 # Ratios that are shown in percent.
-SHARES = frozenset({"hit_rate", "mean_performance"})
+PERCENT_METRICS = frozenset({"hit_rate", "mean_performance"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,21 +52,21 @@ class CountedSession:
         Where it is not known how many points were at stake, 0: imported sessions have points and
         may have no steps.
         """
-        value = self.values.get(slug, 0.0) * (100 if slug in SHARES else 1)
+        value = self.values.get(slug, 0.0) * (100 if slug in PERCENT_METRICS else 1)
         if not is_kept(slug, self.valence):
             return value
         at_stake = self.points_at_stake(slug)
         return at_stake + value if at_stake else 0.0
 
     def points_at_stake(self, slug: str) -> float:
-        """Return the most points that could be kept: all steps at the cost of a miss. Else 0."""
+        """Return the points that could be kept at most (steps × cost of a miss); else 0."""
         if not is_kept(slug, self.valence):
             return 0.0
         steps = 100 if slug == "points_per_100_steps" else self.values.get("steps", 0)
         return self.miss_cost * steps
 
     def counts_for(self, board: Leaderboard) -> bool:
-        """Whether it has what a board ranks by, and is long enough for it."""
+        """Return whether it has the metric that a board ranks by, and is long enough for it."""
         return (
             board.metric in self.values
             and not (self.is_mixed and needs_one_valence(board))
@@ -81,7 +81,7 @@ def read_sessions(
     period: Period,
     more_metrics: frozenset[str] = frozenset(),
 ) -> Iterator[CountedSession]:
-    """Yield the sessions that count on a board, patient by patient, each in the order of time.
+    """Yield the sessions that count on a board, grouped by patient and ordered by time.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def read_sessions(
 def _narrow(
     board: Leaderboard, rows: QuerySet[SessionMetric], period: Period
 ) -> QuerySet[SessionMetric]:
-    """Leave the metrics of sessions that a board's settings admit."""
+    """Return the metrics of sessions that a board's settings admit."""
     rows = rows.filter(session__state=State.FINISHED.value, session__started_at__isnull=False)
     rows = rows.filter(session__excluded=False)
     if not board.include_simulated:
@@ -145,19 +145,19 @@ def _narrow(
 
 
 def needs_one_valence(board: Leaderboard) -> bool:
-    """Whether a session whose feedback type was changed has no place on a board."""
+    """Return whether a board excludes sessions whose feedback type was changed."""
     by_points = {board.metric, board.tie_breaker} & POINT_METRICS
     return board.types != CountedTypes.ALL or bool(by_points)
 
 
 def is_long_enough(board: Leaderboard, values: dict[str, float]) -> bool:
-    """Whether a session with these metrics has the steps, or the minutes, that a board asks for."""
+    """Return whether a session with these metrics has the steps or minutes that a board needs."""
     if values.get("steps", 0) >= board.min_valid_strides:
         return True
     return board.min_minutes is not None and values.get("active_minutes", 0) >= board.min_minutes
 
 
 def is_kept(slug: str, valence: str) -> bool:
-    """Whether a metric is shown as points kept: in this valence points can only be lost."""
+    """Return whether a metric is shown as points kept: in this valence points can only be lost."""
     known = VALENCES.get(valence)
     return slug in POINT_METRICS and known is not None and known.has_points and not known.rewards

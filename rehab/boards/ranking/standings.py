@@ -1,4 +1,4 @@
-"""The ranked rows of a board: read from stored rows, or computed from results at hand.
+"""The ranked rows of a board: read from stored rows, or computed from results.
 
 Both must agree; a test compares them. Stored rows are found by index: rows by their key, ranks as
 sums over the board's distinct figures. No query reads or counts all rows.
@@ -20,15 +20,15 @@ from rehab.people.models import Patient
 
 Columns = tuple[int, int, int | None, str]
 COLUMNS = ("patient_id", "figure", "points_at_stake", "key")
-MERIT, KEY = 10, 44  # digits of a key: those of its merit, and all (results.py, make_key)
+MERIT_DIGITS, KEY_DIGITS = 10, 44  # of a key, see `results.make_key`
 
-# A patient's row; how many rows, and how many figures, are better; how many rows are equal, with
-# the first and the last key among them. By hand: Django takes longer to write this SQL than a
-# database to run it.
+# Selects a patient's row; how many rows, and how many figures, are better; how many rows are equal,
+# and the first and last key among them. Raw SQL, since Django takes longer to compile this query
+# than a database to run it.
 _COUNTS = "FROM rehab_boardcount c WHERE c.board_id = e.board_id AND c.valence = e.valence"
 _EQUALS = f"""FROM rehab_boardentry o WHERE o.board_id = e.board_id AND o.valence = e.valence
-    AND o."key" > SUBSTR(e."key", 1, {MERIT})
-    AND o."key" <= SUBSTR(e."key", 1, {MERIT}) || '{"9" * (KEY - MERIT)}'"""
+    AND o."key" > SUBSTR(e."key", 1, {MERIT_DIGITS})
+    AND o."key" <= SUBSTR(e."key", 1, {MERIT_DIGITS}) || '{"9" * (KEY_DIGITS - MERIT_DIGITS)}'"""
 FIND_ROW = f"""
 SELECT {", ".join(f'e."{column}"' for column in COLUMNS)},
     (SELECT COALESCE(SUM(c."rows"), 0) {_COUNTS} AND c.figure {{better}} e.figure),
@@ -62,8 +62,8 @@ class Standings(Protocol):
     count: int
     total: int
 
-    def count_people(self, most: int) -> int:
-        """Return how many rows are of people, not of simulated patients; ``most`` at most."""
+    def count_people(self, limit: int) -> int:
+        """Return how many rows are of people, not of simulated patients; ``limit`` at most."""
 
     def find(self, patient_id: int) -> RankedRow | None:
         """Return a patient's row; None where there is none."""
@@ -89,7 +89,7 @@ def number_ranks(board: Leaderboard, figures: Iterable[int]) -> list[tuple[int, 
 
 
 class ComputedStandings:
-    """Standings of results at hand: of own sessions, or of a board that is not saved yet."""
+    """Standings of computed results: of own sessions, or of a board that is not saved yet."""
 
     def __init__(self, board: Leaderboard, results: Iterable[Result]) -> None:
         self._board = board
@@ -110,11 +110,11 @@ class ComputedStandings:
             for row, (shared, rank) in zip(rows, ranks, strict=True)
         ]
 
-    def count_people(self, most: int) -> int:
-        """Return how many rows are of people, not of simulated patients; ``most`` at most."""
+    def count_people(self, limit: int) -> int:
+        """Return how many rows are of people, not of simulated patients; ``limit`` at most."""
         simulated = Patient.everywhere.filter(simulated=True, clinic=self._board.clinic_id)
         others = set(simulated.values_list("pk", flat=True))
-        return min(most, sum(row.patient_id not in others for row in self._rows))
+        return min(limit, sum(row.patient_id not in others for row in self._rows))
 
     def find(self, patient_id: int) -> RankedRow | None:
         """Return a patient's row; None where there is none."""
@@ -148,9 +148,9 @@ class StoredStandings:
         """Return the stored rows of this list."""
         return BoardEntry.everywhere.filter(board=self._board, valence=self._valence)
 
-    def count_people(self, most: int) -> int:
-        """Return how many rows are of people, not of simulated patients; ``most`` at most."""
-        return self.find_rows().filter(patient__simulated=False)[:most].count()
+    def count_people(self, limit: int) -> int:
+        """Return how many rows are of people, not of simulated patients; ``limit`` at most."""
+        return self.find_rows().filter(patient__simulated=False)[:limit].count()
 
     def find(self, patient_id: int) -> RankedRow | None:
         """Return a patient's row. Its rank is the number of rows with better figures, and one."""
@@ -186,25 +186,25 @@ class StoredStandings:
         figures = {me.figure, *(row[1] for row in (*above, *below))}
         sizes: dict[int, int] = {}
         if len(figures) > 1:  # on a large board neighbors are mostly equals
-            alike = self._counts.filter(figure__in=figures)
-            sizes = dict(alike.values_list("figure", "rows"))
+            counts = self._counts.filter(figure__in=figures)
+            sizes = dict(counts.values_list("figure", "rows"))
         up: list[RankedRow] = [me]
         for row in above:
-            up.append(self._next(row, up[-1], -sizes.get(row[1], 1), -1))
+            up.append(self._rank_neighbor(row, up[-1], -sizes.get(row[1], 1), -1))
         down: list[RankedRow] = [me]
         for row in below:
-            down.append(self._next(row, down[-1], sizes.get(down[-1].figure, 1), 1))
+            down.append(self._rank_neighbor(row, down[-1], sizes.get(down[-1].figure, 1), 1))
         return [*reversed(up), *down[1:]]
 
-    def _next(self, row: Columns, beside: RankedRow, size: int, step: int) -> RankedRow:
-        """Return the row beside a ranked one; another figure is ``size`` ranks off."""
-        other = row[1] != beside.figure
-        shared = beside.shared_rank + size if other else beside.shared_rank
+    def _rank_neighbor(self, row: Columns, neighbor: RankedRow, size: int, step: int) -> RankedRow:
+        """Return the row next to a ranked one; a different figure is ``size`` ranks off."""
+        other = row[1] != neighbor.figure
+        shared = neighbor.shared_rank + size if other else neighbor.shared_rank
         match self._board.ties:
             case TieRule.DENSE:
-                return make_row(row, shared, beside.rank + step if other else beside.rank)
+                return make_row(row, shared, neighbor.rank + step if other else neighbor.rank)
             case TieRule.EARLIER:
-                return make_row(row, shared, beside.rank + step)
+                return make_row(row, shared, neighbor.rank + step)
         return make_row(row, shared, shared)
 
     def _count_equals_before(self, key: str, ends: tuple[str, ...], size: int) -> int:
@@ -213,7 +213,7 @@ class StoredStandings:
         A figure may have some ten thousand rows; which end is nearer is estimated from the keys.
         """
         rows, (first, last) = self.find_rows(), ends
-        highest, mine, lowest = (int(one[MERIT:]) for one in (first, key, last))
+        highest, mine, lowest = (int(one[MERIT_DIGITS:]) for one in (first, key, last))
         if 2 * mine >= highest + lowest:
             return rows.filter(key__gt=key, key__lte=first).count()
         return size - 1 - rows.filter(key__gte=last, key__lt=key).count()

@@ -1,4 +1,4 @@
-"""Which rows of a board are shown to whom: never anybody else in its last half."""
+"""Which rows of a board a viewer may see: never other patients in its last half."""
 
 from __future__ import annotations
 
@@ -38,9 +38,8 @@ def find_visible_rows(
 ) -> list[VisibleRow]:
     """Return the rows that are shown to a patient or, without ``me``, to anybody.
 
-    Of several patients only the first half is shown, and no rank in the last half is told. A
-    patient who is there and would see the neighbors gets nothing, and is shown the own sessions
-    instead.
+    Of several patients only the first half is shown, and no rank in the last half. Where
+    neighbors are shown, a patient in the last half gets an empty list, and pages show own sessions.
     """
     last = standings.count if board.is_own else (standings.count + 1) // 2
     if board.display == DisplayMode.NEIGHBORS:
@@ -69,8 +68,8 @@ def _find_neighbors(
     ]
 
 
-def find_own_sessions(standings: ComputedStandings, me: RankedRow | None) -> list[VisibleRow]:
-    """Return all own sessions; of very many the best, and those around the one at hand."""
+def find_visible_own_rows(standings: ComputedStandings, me: RankedRow | None) -> list[VisibleRow]:
+    """Return all own sessions; of more than ``MAX_OWN`` the best and those around ``me``."""
     rows = standings.top(standings.count)
     at = 0 if me is None else rows.index(me)
     near = range(at - OWN_NEIGHBORS, at + OWN_NEIGHBORS + 1)

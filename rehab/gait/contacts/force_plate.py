@@ -77,7 +77,7 @@ class ContactFinder:
         contact_n: float = CONTACT_N,
         release_n: float = RELEASE_N,
     ) -> None:
-        # Those of the samples that are still there, and the last one before them.
+        # The contacts of the buffered samples, and the last one before them.
         self.recent: deque[Contact] = deque()
         self.offset_n = 0.0
         self._buffer = buffer
@@ -152,18 +152,18 @@ class ContactFinder:
         if seen and not bounce:
             self._update_offset(at)
         self._current = Contact(at, time_s, self.offset_n, seen, bounce)
-        self._forget_before(index - self._buffer.samples.keep)
+        self._drop_before(index - self._buffer.samples.keep)
         self.recent.append(self._current)
         self._stuck_index = index + int(STUCK_S * self._rate_hz)
 
-    def _forget_before(self, index: int) -> None:
+    def _drop_before(self, index: int) -> None:
         recent = self.recent
         while len(recent) > 1 and (end := recent[1].end_index) is not None and end < index:
             recent.popleft()
 
     def _end(self, index: int, ended: list[Contact]) -> None:
         contact = self._current
-        assert contact is not None  # noqa: S101 (said for mypy)
+        assert contact is not None  # noqa: S101 (for mypy)
         contact.end_index = index
         contact.end_s = self._interpolate_crossing(index, self.offset_n + self._release_n)
         self._current = None
@@ -203,9 +203,9 @@ class ContactFinder:
             self.offset_n = sorted(self._offsets)[len(self._offsets) // 2]
 
     def _recover_from_drift(self, index: int) -> None:
-        """Check after a long contact whether it is the plate's zero that has moved, not the foot.
+        """Reset the plate's zero where it has drifted so far that a contact does not end.
 
-        The lowest tenth of a second is taken for a swing if it lies near enough to zero.
+        The lowest tenth of a second counts as a swing if it lies near enough to zero.
         """
         block = max(1, int(BLOCK_S * self._rate_hz))
         self._stuck_index = index + int(STUCK_S * self._rate_hz)

@@ -23,7 +23,7 @@ SWING_RAD_S = 1.75  # 100 °/s; walking turns a foot by 300 °/s, a shuffle whil
 SWING_SHARE = 0.4  # of the median of the last swings
 SWINGS = 10
 SWING_MIN_S, SWING_MAX_S = 0.15, 1.5
-NOISE_RAD_S = 0.3  # what turns back and forth by less is noise
+NOISE_RAD_S = 0.3  # smaller changes of direction are noise
 SHANK_PEAK_S = 0.15  # after the end of its forward swing the shank turns back fastest
 SHANK_PUSH_S = 0.3  # before its forward swing
 GAP_S = 0.1
@@ -102,7 +102,7 @@ class GyroscopeDetector:
         self._swing_begin_s: float | None = None  # when the swing began
         self._terminal_s: float | None = None
         self._fastest = 0.0
-        self._rotation_end_s: float | None = None  # where the turning last ended
+        self._rotation_end_s: float | None = None  # when the rotation last ended
         self._backward_peak = (-math.inf, 0.0)  # of the shank after its swing
         self._is_confirmed = False
         self._backward.clear()

@@ -64,7 +64,7 @@ def _own_leg(side: str) -> dict[str, Column]:
 
 
 SIGNAL_LAYOUTS = {
-    # What our sources send and keep.
+    # As our sources send and store them.
     "garry": ColumnMap(Column("time_s"), {side: _own_leg(side) for side in SIDES}),
     # Moore, Hnat, van den Bogert 2015 (PeerJ 3:e918), as written by their GaitAnalysisToolKit.
     "moore2013": ColumnMap(

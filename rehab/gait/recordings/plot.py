@@ -38,7 +38,7 @@ def plot_strides(
     Parameters
     ----------
     path
-        The file to write; its name's end says the format.
+        The file to write; its suffix determines the format.
     t_s
         Times [s], shape (n,).
     forces_n

@@ -1,4 +1,4 @@
-"""Whether signals are what they should be, told plainly to the therapist during baseline."""
+"""Checks of signals during baseline: signs, units, weight and lag, with a cure for each."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from rehab.gait.stances.continuity import RATE_TOLERANCE
 from rehab.gait.strides import Stride
 from rehab.gait.two_legs import SUPPORTED_BELOW, TwoLegDetector
 
-OFTEN = 0.2  # of the strides; what is wrong with fewer is the walker's, not the set-up's
+OFTEN = 0.2  # of the strides; a fault of fewer is the walker's, not the set-up's
 WEIGHT_ABOVE = 1.05  # shoes and instrumentation weigh up to 3 % (moore2013)
 USUAL_LOAD = (0.42, 0.58)  # of body weight on one leg; 0.52 on each of moore2013's
-OWN_TOLERANCE_S = 0.003  # against the person's own mark
+OWN_TOLERANCE_S = 0.003  # against the same person's earlier check
 USUAL_MOMENT = (0.8, 2.0)  # Nm/kg, healthy (docs/reference/gait.md#usual-values)
 USUAL_A2 = (0.3, 7.0)  # W/kg (docs/reference/gait.md#usual-values)
 
@@ -168,7 +168,7 @@ def _round(rate_hz: float) -> str:
 
 
 def _check_force(force: Floats, strides: list[Stride], weight_n: float) -> list[tuple[str, str]]:
-    """Check the force itself, where no strides or no usable ones come of it."""
+    """Check the force itself, where there are no strides, or no usable ones."""
     finite = force[np.isfinite(force)]
     if not len(finite):
         return [("force_lost", "No vertical force arrives. Look at the plate and its channel.")]
@@ -234,7 +234,7 @@ def _compute_mean_load(time: Floats, leg: LegSamples, strides: list[Stride]) -> 
 
 
 def _check_load(load_kg: float, mass_kg: float, side: str) -> list[Finding]:
-    """Check the load of one leg: of the weight it should carry about half."""
+    """Check the load of one leg, which should carry about half of the weight."""
     share = load_kg / mass_kg
     if not (share < USUAL_LOAD[0] or share > USUAL_LOAD[1]):
         return []

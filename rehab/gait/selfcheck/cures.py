@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rehab.gait.strides import RejectionReason
 
-# Reasons that are not here are the walker's own, or told from the samples' times.
+# Other reasons are the walker's own, or follow from the samples' times.
 CURES = {
     RejectionReason.TIME_BACKWARDS: (
         "The clock stands still or jumps back. Send the sensors' own times."

@@ -11,7 +11,7 @@ from rehab.gait.signals.filters import Floats, ZeroPhaseFilter, differentiate, i
 from rehab.gait.strides import Stride
 
 # A foot that has left the floor stops plantarflexing: the ankle brakes hardest 51 ms after terminal
-# contact (moore2013, shown to be in time by its authors: 52.7 ms left, 49.2 ms right). The mark
+# contact (moore2013, shown to be in time by its authors: 52.7 ms left, 49.2 ms right). The peak
 # moves with an injected lag to 0.3 ms; between people it is taken to differ by 8 ms.
 DECELERATION_S = 0.051
 PERSON_TOLERANCE_S = 0.008

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rehab.gait.signals.filters import Floats
-
-TIME, FORCE, MOMENT, ANGLE, FORWARD, POSITION = range(6)
-CHANNEL_NAMES = ("force_n", "moment_nm", "angle_rad", "forward_n", "position_m")
+from rehab.gait.signals.samples import CHANNEL_NAMES, FORCE, TIME
 
 
 class SampleBuffer:
@@ -35,7 +33,7 @@ class SampleBuffer:
         self.legs = [LegBuffer(self, leg) for leg in tables]
         self._table = table
         self._rows = [tables[0][TIME], *(row for leg in tables for row in leg[FORCE:])]
-        self._sent = [False] * len(self._rows)  # what never is, stays NaN
+        self._sent = [False] * len(self._rows)  # rows that were never sent stay NaN
 
     def append(self, chunk: Sequence[Floats | None], count: int) -> None:
         """Append ``count`` samples of each channel: times, then those of each leg; None for NaN."""

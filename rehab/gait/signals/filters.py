@@ -27,7 +27,7 @@ class ZeroPhaseFilter:
     def __init__(self, cutoff_hz: float, rate_hz: float) -> None:
         self._b, self._a = butter(2, cutoff_hz / (rate_hz / 2))
         self._settled = np.asarray(lfilter_zi(self._b, self._a), dtype=np.float64)[np.newaxis]
-        # Four time constants of the slowest decay: what is further away does not count.
+        # Four time constants of the slowest decay: samples further away have no influence.
         self.padding = max(3, round(4 * rate_hz / (2 * np.pi * cutoff_hz * np.sqrt(0.5))))
 
     def smooth(self, signals: Floats) -> Floats:
@@ -45,7 +45,7 @@ class ZeroPhaseFilter:
         return self.smooth_extended(np.concatenate((before, signals, after), axis=1), n)
 
     def smooth_extended(self, signals: Floats, padding: int) -> Floats:
-        """Return rows filtered that bring ``padding`` samples beyond each end, without these."""
+        """Return rows filtered and without the ``padding`` samples that they have at each end."""
         forward, _ = lfilter(self._b, self._a, signals, zi=signals[:, :1] * self._settled)
         turned = forward[:, ::-1]
         backward, _ = lfilter(self._b, self._a, turned, zi=turned[:, :1] * self._settled)

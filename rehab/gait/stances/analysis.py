@@ -23,11 +23,10 @@ from rehab.gait.stances.plausibility import (
 from rehab.gait.stances.resampling import resample_stance
 from rehab.gait.strides import RejectionReason
 
-BEFORE_S = 0.25  # of swing that the filter gets to settle, and that the moment is looked at in
+BEFORE_S = 0.25  # of swing: for the filter to settle, and for the check of the moment in swing
 LONGEST_S = BEFORE_S + STANCE_MAX_S + 1.0
-DECIMATED_HZ = (
-    200.0  # neighbors are averaged down to 200-400 Hz before the filter: 6 Hz lose nothing
-)
+# Neighbors are averaged down to 200-400 Hz before the filter: signals up to 6 Hz lose nothing.
+DECIMATED_HZ = 200.0
 FORWARD_HZ = 20.0
 
 
@@ -40,7 +39,7 @@ class Stance:
     reasons
         Why it is invalid.
     push_off
-        Of its end.
+        At its end.
     propulsion_n_kg
         Largest forward force of the second half of stance.
     position_m
@@ -164,8 +163,8 @@ def _bridge_gaps(window: Floats, stance: int) -> tuple[Floats | None, float]:
     """Return a stance's samples with gaps in moment and angle bridged, and the longest bridge [s].
 
     The samples are None where nothing is known to bridge between. The time is the longest from
-    sample ``stance`` on over which a straight line stands. Gaps too long for it have their reason
-    already; what is measured across them is shown to nobody.
+    sample ``stance`` on that a straight line bridges. Longer gaps have made the stride invalid
+    already, so that values measured across them are not shown.
     """
     time = window[TIME]
     steps = time[stance + 1 :] - time[stance:-1]

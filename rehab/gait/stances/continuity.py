@@ -1,6 +1,6 @@
 """Whether the samples of a stance are continuous: gaps, frozen values, jumps, spikes and steps.
 
-These are faults of sensors and of the way from them; what a person cannot walk is checked in
+These are faults of sensors and of their connection; physiological limits are checked in
 ``plausibility``.
 """
 
@@ -19,8 +19,8 @@ from rehab.gait.strides import RejectionReason
 
 GAP_S = 0.05  # bridged by a straight line up to here (docs/reference/gait.md#time-base)
 RATE_TOLERANCE = 0.2
-# One value for so long is no measurement. The moment changes all through stance; the angle rests
-# where the ankle turns, but not to the last digit.
+# One value repeated for this long is no measurement. The moment changes all through stance; the
+# angle rests where the ankle turns, but not to the last digit.
 FROZEN_S = {MOMENT: 0.02, ANGLE: 0.04}
 MOMENT_JUMP = (0.15, 40.0)  # Nm/kg at once, and Nm/kg/s; walking reaches 20
 ANGLE_JUMP = (0.05, 15.0)  # rad at once, and rad/s; walking reaches 8
@@ -31,12 +31,12 @@ VELOCITY_JUMP = (5.0, 400.0)  # rad/s, where velocities are sent
 # curve. Of both a walker makes less than k × range × (h / stance)², since the curves of walkers
 # differ in size and in the time that they take more than in form: where nothing was wrong, k was
 # 150 at most for the angle and 110 for the moment (both legs of moore2013; synthetic people, 0.3 to
-# 6.5 W/kg). Beside it: a little, and so many times the median, for the sensor's noise.
+# 6.5 W/kg). Added to that: a constant, and a multiple of the median, for the sensor's noise.
 APART_S = 0.01
 ANGLE_BEND = (160.0, 0.008, 6.0)  # rad
 MOMENT_STEP = (110.0, 0.02, 6.0)  # Nm/kg
-LOOK_FROM = 0.3  # of stance. What comes before is too far from push-off to change it
-MOMENT_TO_S = 0.02  # before its end; a moment that labs make from the force ends with a step
+CHECK_FROM = 0.3  # of stance; before that it is too far from push-off to change it
+MOMENT_TO_S = 0.02  # before its end; a moment that is computed from the force ends with a step
 
 
 def check_samples(
@@ -110,7 +110,7 @@ def check_steps(
     apart_s = apart / stance.rate_hz
     duration_s = stance.end_s - stance.begin_s
     walking = apart_s * max(apart_s, (apart_s + gap_s) / 2) / duration_s**2
-    first = stance.index(LOOK_FROM)
+    first = stance.index(CHECK_FROM)
     last = stance.end + 1 - round(MOMENT_TO_S * stance.rate_hz)
     angle = stance.signals[ANGLE - FORCE, first:]
     if last - first <= apart or len(angle) <= 2 * apart:

@@ -16,15 +16,15 @@ from rehab.gait.signals.filters import (
 )
 from rehab.gait.stances.resampling import ResampledStance
 
-# Below, the center of pressure is a division by about nothing
+# Below, the center of pressure is a division by almost zero
 # (docs/reference/gait.md#center-of-pressure).
 COP_FORCE_N = 40.0
 COP_REACH_M = 0.35  # from the ankle; no shoe is longer
 CUTOFF_HZ = 6.0
 # Of stance; the peak comes at 0.88-0.90 of it (docs/reference/gait.md#push-off).
 PUSH_OFF_FROM = 0.4
-# What the ankle is taken to do after the last sample, where the filter needs to know: its
-# plantarflexion brakes evenly, so that it ends about 60 ms after the foot left the floor (56 and
+# How the signals are extended after the last sample, for the filter: the ankle's plantarflexion
+# brakes evenly, so that it ends about 60 ms after the foot left the floor (56 and
 # 62 ms on the legs of moore2013), turns back for 30 ms and goes on as fast; its moment stays as
 # small as it is. Against point-symmetric extension this takes the error of A2 from 2.1 to 1.0 % at
 # terminal contact and from 0.5 to 0.14 % 50 ms later. 55 or 70 ms would give 1.4 and 0.8 %.

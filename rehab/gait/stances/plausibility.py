@@ -20,14 +20,14 @@ CUT_S = 0.02
 CUT_SHARE = 0.5
 FORCE_MAX = 2.0  # of body weight; fast walking reaches 1.5
 # Mean force of one plate over a cycle, by body weight, where the other plate is not known: half of
-# what two may carry (``legs``) and, as the sound leg carries more after a stroke (60 ± 7 % when
+# what two may carry (``two_legs``) and, as the sound leg carries more after a stroke (60 ± 7 % when
 # standing, PMC4777057), rather more than half of the weight. Pounds for kilograms give 0.23.
 LOAD_MIN, LOAD_MAX = 0.25, 0.75
 # Nm/kg. Healthy people reach 0.8-2.0 (docs/reference/gait.md#usual-values), after a stroke 0.3; a
 # fast runner 3.5.
 MOMENT_MIN = 0.1  # below, the force passes within 1 cm of the ankle all through stance
 MOMENT_MAX = 3.5
-MOMENT_SWING = 0.4  # of the stance's peak, at any moment of the swing before
+MOMENT_SWING = 0.4  # of the stance's peak, at any time of the swing before
 MOMENT_DRIFT = 0.08  # Nm/kg, for most of that swing; the foot's weight alone gives 0.03
 LEVER_MAX_M = 0.3  # moment by force in late stance: ankle to toes are 0.16 (moore2013) to 0.23
 LEVER_FROM = 0.7  # of stance
@@ -41,7 +41,7 @@ LEVER_CHANGE = (0.45, 2.5)
 ANGLE_RANGE_MIN = 0.02
 ANGLE_RANGE_MAX = 1.6
 A2_MAX = 12.0  # W/kg: 2 Nm/kg at 6 rad/s
-PEAK_FROM = 0.6  # of stance. Push-off peaks at 0.88-0.90 of it; what peaks earlier is none
+PEAK_FROM = 0.6  # of stance. Push-off peaks at 0.88-0.90 of it; an earlier peak is no push-off
 REVERSED_SHARE = 0.5  # of the peak; an ankle that pushed does not brake so much before it leaves
 # A foot that leaves the floor has been plantarflexing, or resting, to the last: there the ankle
 # turns 1.1 to 1.9 times as fast as at A2 (moore2013). The other leg's rolls over its foot by then.
@@ -102,7 +102,7 @@ def check_lever(stance: ResampledStance, offset_n: float, weight_n: float) -> li
     lever_m = _find_lever(force, moment, int(moment.argmax()))
     last_m = _find_lever(force, moment, int(leaving[-1]))
     low, high = LEVER_CHANGE
-    # A moment that is not positive then is judged by others.
+    # A moment that is not positive at its peak is refused by other checks.
     if lever_m > 0 and not low * lever_m <= last_m <= high * lever_m:
         return [RejectionReason.MOMENT_OUT_OF_STEP]
     return []

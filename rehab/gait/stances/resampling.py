@@ -10,7 +10,7 @@ import numpy as np
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import ANGLE, FORCE, TIME
 
-MIN_STANCE_SAMPLES = 8  # of a stance; 0.16 s at 50 Hz
+MIN_STANCE_SAMPLES = 8  # 0.16 s at 50 Hz
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,7 +51,9 @@ class Command(BaseCommand):
         finally:
             new.unlink(missing_ok=True)
         for clinic in Clinic.everywhere.all():
-            audit_log.record(Act.BACKUP, None, clinic=clinic.pk, about="manage.py backup", now=now)
+            audit_log.record(
+                Act.BACKUP, None, clinic_id=clinic.pk, about="manage.py backup", now=now
+            )
         size_mb = file.stat().st_size / 1e6
         self.stdout.write(
             f"{file}: {size_mb:.1f} MB, {counts['rehab.patient']} patients, "

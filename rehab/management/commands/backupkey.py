@@ -15,7 +15,7 @@ class Command(BaseCommand):
     help = "Print a new pair of keys: a public one to make backups, a secret one to restore them."
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Print a key file with comments about where to keep each key."""
+        """Print a key file, with comments about where to keep each key."""
         secret, public = generate_key()
         self.stdout.write(
             "# Print this page or keep it on a stick, away from the server: without it no backup "

@@ -169,7 +169,7 @@ def examine_children() -> Iterator[Diagnosis]:
     for child in status["children"]:
         state = f"{child['name']}: {child['state']}, restarted {child['restarts']} times"
         failed = child["state"] == "failed"
-        last = "; ".join(child["last_output"]) or "it said nothing"
+        last = "; ".join(child["last_output"]) or "no output"
         yield Diagnosis("children", state, f"Its last words: {last}" if failed else "")
 
 

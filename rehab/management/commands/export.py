@@ -35,18 +35,18 @@ class Command(BaseCommand):
         user = User.everywhere.select_related("clinic").filter(username=username).first()
         if user is None or user.clinic is None:
             raise CommandError(f"No clinic's account is called {username!r}. Look in the admin.")
-        now, key = timezone.now(), None
+        now, patient_id = timezone.now(), None
         files = session_files(user, now)
         if patient is not None:
-            whose = Patient.objects.visible_to(user).filter(code=patient).first()
-            if whose is None:
+            row = Patient.objects.visible_to(user).filter(code=patient).first()
+            if row is None:
                 raise CommandError(f"{username} sees no patient with the code {patient!r}.")
-            files, key = patient_files(user, whose, now), whose.pk
+            files, patient_id = patient_files(user, row, now), row.pk
         audit_log.record(
             Act.EXPORT,
             None,
-            clinic=user.clinic_id,
-            patient=key,
+            clinic_id=user.clinic_id,
+            patient_id=patient_id,
             about=f"manage.py export --as {username}",
             now=now,
         )

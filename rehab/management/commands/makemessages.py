@@ -1,4 +1,4 @@
-"""Django's `makemessages`, extended by the keywords of our scripts (static/js/language.js)."""
+"""Django's `makemessages` with the keywords of our scripts (static/js/shared/language.js)."""
 
 from pathlib import Path
 
@@ -7,7 +7,8 @@ from django.core.management.commands import makemessages
 OPTIONS = makemessages.Command
 DATE_HEADER = '"POT-Creation-Date:'  # omitted: it would change every time
 
-# Which argument is the template of an error. The comment tells translators: no patient reads it.
+# The argument that is the template of an error. "refusal" is a comment for translators: no patient
+# reads these texts.
 REFUSALS = [
     f'--keyword={name}:{place},"refusal"'
     for name, place in (

@@ -1,4 +1,4 @@
-"""`manage.py migrate`: Django's own, after a look at whose tables these are."""
+"""`manage.py migrate`: Django's command, which refuses databases of development versions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rehab.people.sign_in.first_start import refuse_development_database
 
 
 class Command(migrate.Command):
-    """Applies migrations, but never to a database that a development version made."""
+    """Applies migrations, except to a database made by a development version."""
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Migrate. Raises CommandError, with the cure, where that cannot be done."""

@@ -1,4 +1,4 @@
-"""`manage.py restore`: a backup, restored into a new installation."""
+"""`manage.py restore`: restore a backup into a new installation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rehab.exports.encryption import CannotDecrypt, InvalidKey, read_identities
 
 
 class Command(BaseCommand):
-    """Creates the tables and restores everything or nothing."""
+    """Creates the tables, and restores everything or nothing."""
 
     help = "Restore FILE into a new installation, decrypted with a secret key."
 
@@ -47,5 +47,5 @@ class Command(BaseCommand):
             raise CommandError(f"{file}: {problem}") from problem
         self.stdout.write(
             f"{counts['rehab.patient']} patients, {counts['rehab.trainingsession']} sessions and "
-            f"{counts['rehab.step']} steps are here. Everybody signs in anew."
+            f"{counts['rehab.step']} steps are restored. Everybody has to sign in again."
         )

@@ -17,11 +17,13 @@ from rehab.people.models import Clinic, ErasureReason
 class Command(BaseCommand):
     """Erases patients and deletes old log entries by each clinic's own periods."""
 
-    help = "Erase whom clinics have kept long enough (Clinic: keep patients, keep the logs)."
+    help = "Erase patients and logs that clinics have kept for as long as they set in the admin."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Add the options."""
-        parser.add_argument("--dry-run", action="store_true", help="say whom, and change nothing")
+        parser.add_argument(
+            "--dry-run", action="store_true", help="list whom it would erase, and change nothing"
+        )
 
     def handle(self, *args: Any, dry_run: bool, **options: Any) -> None:
         """Erase, and print how many. Patients with an open session are named and skipped."""
@@ -40,9 +42,9 @@ class Command(BaseCommand):
             with transaction.atomic():
                 deleted = delete_old_logs(clinic, now)
                 transaction.set_rollback(dry_run)
-            would = "would let go" if dry_run else "let go"
+            action = "would delete" if dry_run else "deleted"
             self.stdout.write(
-                f"{clinic}: {erased} patient(s) erased, {would} {deleted} log entries."
+                f"{clinic}: {erased} patient(s) erased, {action} {deleted} log entries."
             )
         if dry_run:
             self.stdout.write("Nothing was changed (--dry-run).")

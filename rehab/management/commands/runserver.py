@@ -1,4 +1,4 @@
-"""`manage.py runserver`: Django's development server, with the live path inside."""
+"""`manage.py runserver`: daphne's development server, with the live sessions."""
 
 from daphne.management.commands.runserver import Command as DaphneCommand
 
@@ -6,6 +6,6 @@ from rehab.sessions.live.server import LiveServer
 
 
 class Command(DaphneCommand):  # type: ignore[misc]
-    """Daphne's command with our server, in the process that really serves."""
+    """Daphne's command, which runs our server in the process that serves."""
 
     server_cls = LiveServer

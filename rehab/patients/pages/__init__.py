@@ -1,0 +1,1 @@
+"""The pages of the start list, of visits and of records."""

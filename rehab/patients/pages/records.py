@@ -13,7 +13,7 @@ from django.views.decorators.http import require_POST, require_safe
 
 from rehab.patients.closure import SessionStillOpen, end_program, reopen_program
 from rehab.patients.erasure import erase
-from rehab.patients.forms import EndingForm, ErasingForm
+from rehab.patients.forms import EndProgramForm, ErasureForm
 from rehab.people.access import for_roles, user_of
 from rehab.people.consent.services import active_consents
 from rehab.people.models import EndReason, ErasureReason, Patient, User
@@ -22,7 +22,7 @@ from rehab.sessions.models import TrainingSession
 
 
 def get_patient(user: User, patient_id: int) -> Patient:
-    """Return a patient that somebody may see. Raises Http404 for any other."""
+    """Return a patient that a user may see. Raises Http404 for any other."""
     patients = Patient.objects.visible_to(user).select_related("clinic")
     return get_object_or_404(patients, pk=patient_id)
 
@@ -41,11 +41,11 @@ def render_records(request: HttpRequest, patient: Patient, **forms: Any) -> Http
     sessions = TrainingSession.objects.visible_to(user).filter(patient=patient)
     context = {
         "patient": patient,
-        "held": list(active_consents(patient).values()),
+        "consents": list(active_consents(patient).values()),
         "count": sessions.count(),
         "may_erase": user.role == Role.LEAD,
-        "ending": EndingForm(),
-        "erasing": ErasingForm(patient=patient),
+        "ending": EndProgramForm(),
+        "erasing": ErasureForm(patient=patient),
         **forms,
     }
     return render(request, "patients/records.html", context)
@@ -53,14 +53,14 @@ def render_records(request: HttpRequest, patient: Patient, **forms: Any) -> Http
 
 @for_roles(Role.LEAD, Role.PT)
 @require_POST
-def end(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """End a patient's program: off the lists, with the summary to take home."""
+def end_patient_program(request: HttpRequest, patient_id: int) -> HttpResponse:
+    """End a patient's program, so that the patient is no longer listed."""
     patient = get_patient(user_of(request), patient_id)
-    form = EndingForm(request.POST)
+    form = EndProgramForm(request.POST)
     if not form.is_valid():
         return render_records(request, patient, ending=form)
     try:
-        end_program(patient, EndReason(form.cleaned_data["because"]), timezone.now())
+        end_program(patient, EndReason(form.cleaned_data["reason"]), timezone.now())
     except SessionStillOpen as problem:
         form.add_error(None, str(problem))
         return render_records(request, patient, ending=form)
@@ -71,8 +71,8 @@ def end(request: HttpRequest, patient_id: int) -> HttpResponse:
 
 @for_roles(Role.LEAD, Role.PT)
 @require_POST
-def reopen(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Take a patient back in."""
+def reopen_patient_program(request: HttpRequest, patient_id: int) -> HttpResponse:
+    """Reopen a patient's program."""
     patient = get_patient(user_of(request), patient_id)
     reopen_program(patient)
     return redirect("patient", patient_id=patient.pk)
@@ -84,11 +84,11 @@ def erase_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Erase everything that identifies a person, after the code was typed as confirmation."""
     user = user_of(request)
     patient = get_patient(user, patient_id)
-    form = ErasingForm(request.POST, patient=patient)
+    form = ErasureForm(request.POST, patient=patient)
     if patient.erased_at is not None or not form.is_valid():
         return render_records(request, patient, erasing=form)
     try:
-        erase(patient, ErasureReason(form.cleaned_data["because"]), user, timezone.now())
+        erase(patient, ErasureReason(form.cleaned_data["reason"]), user, timezone.now())
     except SessionStillOpen as problem:
         form.add_error(None, str(problem))
         return render_records(request, patient, erasing=form)

@@ -15,7 +15,7 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from rehab.patients.forms import PatientForm, ScreenForm
-from rehab.patients.visits import SOON_DAYS, Visit, patients_today, suggested_time
+from rehab.patients.visits import QUICK_VISIT_DAYS, Visit, patients_today, suggested_time
 from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
@@ -30,7 +30,7 @@ DEMO_CODE = "demo"
 
 
 def patients_by_last_visit(user: User) -> QuerySet[Patient]:
-    """Return the patients of somebody's clinic, the most recent session first."""
+    """Return the patients of a user's clinic, the most recent session first."""
     return (
         Patient.objects.visible_to(user)
         .annotate(last_here=Max("sessions__created_at"), count=Count("sessions"))
@@ -48,7 +48,7 @@ def open_sessions(user: User) -> QuerySet[TrainingSession]:
     )
 
 
-def start_lists(user: User, query: str = "") -> dict[str, Any]:
+def start_context(user: User, query: str = "") -> dict[str, Any]:
     """Return the context of the start page: who is expected today, and all patients."""
     now = clinic_time(timezone.now(), clinic_of(user))
     patients = patients_by_last_visit(user)
@@ -72,7 +72,7 @@ def start_lists(user: User, query: str = "") -> dict[str, Any]:
 def choose_patient(request: HttpRequest) -> HttpResponse:
     """List who is expected today, then all patients."""
     query = request.GET.get("q", "").strip()
-    context = start_lists(user_of(request), query) | {"q": query}
+    context = start_context(user_of(request), query) | {"q": query}
     return render(request, "patients/start.html", context)
 
 
@@ -80,12 +80,12 @@ def choose_patient(request: HttpRequest) -> HttpResponse:
 @never_cache
 @require_safe
 def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Offer a patient the session like last time, another one, the past ones, the next visit."""
+    """Show a patient: a session like last time, other set-ups, past sessions, planned visits."""
     user = user_of(request)
     patient = get_object_or_404(patients_by_last_visit(user), pk=patient_id)
     first_station(patient.clinic)
     initial = initial_choices(patient, user)
-    lists = start_lists(user)
+    lists = start_context(user)
     today = lists["now"].date()
     visits = Visit.objects.visible_to(user).filter(patient=patient, day__gte=today)
     context = lists | {
@@ -96,7 +96,7 @@ def show_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
         "visits": visits,
         "soon": [
             (days, today + timedelta(days=days))
-            for days in SOON_DAYS
+            for days in QUICK_VISIT_DAYS
             if days or all(row.patient != patient for row in lists["today"])
         ],
         "at": suggested_time(user, patient, lists["now"]),
@@ -144,7 +144,7 @@ def set_screen(request: HttpRequest, patient_id: int) -> HttpResponse:
 def add_demo(request: HttpRequest) -> HttpResponse:
     """Add a simulated patient, for people who want to try GARRY."""
     user = user_of(request)
-    patient, _made = Patient.objects.visible_to(user).get_or_create(
+    patient, _created = Patient.objects.visible_to(user).get_or_create(
         clinic=clinic_of(user),
         code=DEMO_CODE,
         defaults={"nickname": "Demo", "paretic_side": "left", "simulated": True},

@@ -13,7 +13,7 @@ from django.utils.dateparse import parse_date, parse_time
 from django.utils.translation import gettext as _
 from django.views.decorators.http import require_POST
 
-from rehab.patients.visits import SOON_DAYS, Visit, plan_visit, suggested_time
+from rehab.patients.visits import QUICK_VISIT_DAYS, Visit, plan_visit, suggested_time
 from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
@@ -41,7 +41,7 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
         return redirect("patient", patient_id=patient.pk)
     now = clinic_time(timezone.now(), patient.clinic)
     try:
-        if (days := given.get("in", "")) in map(str, SOON_DAYS):
+        if (days := given.get("in", "")) in map(str, QUICK_VISIT_DAYS):
             day = now.date() + timedelta(days=int(days))
             at = suggested_time(user, patient, now) if int(days) else None
         else:

@@ -1,0 +1,1 @@
+"""The audit log, the access log of pages and calls, and the change history."""

@@ -28,13 +28,13 @@ SUBJECTS = {
     "code": ("Patient", "code", "pk"),
     "session_id": ("TrainingSession", "pk", "patient_id"),
 }
-PAGES_WITHOUT_PATIENTS = {
+ADMIN_PAGES_WITHOUT_PATIENTS = {
     "login",
     "logout",
     "jsi18n",
     "password_change",
     "password_change_done",
-}  # of admin
+}
 
 
 def record_request(request: HttpRequest, response: HttpResponseBase, now: datetime) -> None:
@@ -57,7 +57,7 @@ def record_request(request: HttpRequest, response: HttpResponseBase, now: dateti
     entry = audit_log.build_entry(
         Act.VIEW if is_read else Act.CHANGE,
         actor,
-        patient=find_patient(match, actor.clinic_id),
+        patient_id=find_patient_id(match, actor.clinic_id),
         about=about,
         address=client_address(request),
         now=now,
@@ -75,11 +75,11 @@ def _may_show_patients(request: HttpRequest, match: ResolverMatch) -> bool:
     """Return whether a page or call may have shown data of patients."""
     if match.app_names == ["admin"]:
         model = _model_of(match)
-        return match.url_name not in PAGES_WITHOUT_PATIENTS and (
+        return match.url_name not in ADMIN_PAGES_WITHOUT_PATIENTS and (
             model is None or leads_to_patients(model)
         )
-    opened = getattr(request, "call", match.func)  # a call of the API, or a page
-    return bool(getattr(opened, "access", None)) and getattr(opened, "patients", True)
+    view = getattr(request, "call", match.func)  # a call of the API, or a page
+    return bool(getattr(view, "access", None)) and getattr(view, "patients", True)
 
 
 def _model_of(match: ResolverMatch) -> type[Model] | None:
@@ -104,12 +104,14 @@ def leads_to_patients(model: type[Model]) -> bool:
     return any(leads_to_patients(other) for other in related)
 
 
-def find_patient(match: ResolverMatch, clinic: int | None) -> int | None:
-    """Return the key of the patient of a page; None for a list of several."""
+def find_patient_id(match: ResolverMatch, clinic_id: int | None) -> int | None:
+    """Return the key of the patient that a page shows; None for a list of several."""
     for name, value in match.kwargs.items():
         if name in SUBJECTS:
             model_name, by, key = SUBJECTS[name]
-            return _find_key(apps.get_model("rehab", model_name), key, clinic=clinic, **{by: value})
+            return _find_key(
+                apps.get_model("rehab", model_name), key, clinic=clinic_id, **{by: value}
+            )
     model, row = _model_of(match), str(match.kwargs.get("object_id", ""))
     if model is None or not row.isdecimal():
         return None

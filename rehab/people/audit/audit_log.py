@@ -155,26 +155,26 @@ def build_entry(
     act: Act,
     actor: Any,
     *,
-    patient: int | None = None,
+    patient_id: int | None = None,
     about: str = "",
     address: str = "",
-    clinic: int | None = None,
+    clinic_id: int | None = None,
     now: datetime,
 ) -> AuditEntry:
     """Return an entry, not saved. ``actor`` is a person or a device.
 
-    Without one it is the server's console, which needs a ``clinic``.
+    Without an actor it is the server's console, which needs a ``clinic_id``.
     """
     person = actor if isinstance(actor, User) else None
     through = SERVER if actor is None else person.program if person else str(actor)
-    home: Any = getattr(actor, "clinic_id", None) or clinic
+    entry_clinic_id: Any = getattr(actor, "clinic_id", None) or clinic_id
     return AuditEntry(
-        clinic_id=home,
+        clinic_id=entry_clinic_id,
         at=now,
         by=person,
         through=through[:64],
         act=act,
-        patient_id=patient,
+        patient_id=patient_id,
         about=about[:200],
         address=truncate_address(address),
     )
@@ -187,12 +187,12 @@ def record(act: Act, actor: Any, **details: Any) -> None:
 
 def record_security_change(act: Act, actor: User, row: Any, address: str, now: datetime) -> None:
     """Add an entry about a change to who has access: of an account, a device or an API token."""
-    clinic = clinic_id_of(row) or actor.clinic_id
+    clinic_id = clinic_id_of(row) or actor.clinic_id
     about = f"{row._meta.verbose_name}: {row}"
-    if clinic is None:  # a host's own account belongs to no clinic's log
+    if clinic_id is None:  # a host's own account belongs to no clinic's log
         log.warning("%s, %s, by %s from %s", act.label, about, actor, truncate_address(address))
         return
-    record(act, actor, clinic=clinic, about=about, address=address, now=now)
+    record(act, actor, clinic_id=clinic_id, about=about, address=address, now=now)
 
 
 def record_after_the_fact(entries: list[AuditEntry]) -> None:
@@ -202,13 +202,13 @@ def record_after_the_fact(entries: list[AuditEntry]) -> None:
     """
     try:
         with transaction.atomic():
-            AuditEntry.everywhere.bulk_create([one for one in entries if one.clinic_id])
+            AuditEntry.everywhere.bulk_create([entry for entry in entries if entry.clinic_id])
     except DatabaseError:
-        log.exception("The audit log missed: %s", ", ".join(str(one) for one in entries))
+        log.exception("The audit log missed: %s", ", ".join(str(entry) for entry in entries))
 
 
 def truncate_address(address: str) -> str:
-    """Return the network of an address, enough to tell a clinic but not a machine."""
+    """Return the network of an address: it identifies a clinic, but no single machine."""
     try:
         parsed = ip_address(address)
     except ValueError:
@@ -217,14 +217,14 @@ def truncate_address(address: str) -> str:
     return str(ip_network((parsed, bits), strict=False))
 
 
-def delete_before(clinic: int, moment: datetime) -> int:
+def delete_before(clinic_id: int, moment: datetime) -> int:
     """Delete a clinic's entries from before a moment. Return how many."""
-    return _mutable_rows().filter(clinic=clinic, at__lt=moment).delete()[0]
+    return _mutable_rows().filter(clinic=clinic_id, at__lt=moment).delete()[0]
 
 
-def anonymize_patient(patient: int) -> None:
+def anonymize_patient(patient_id: int) -> None:
     """Remove an erased patient from the entries."""
-    _mutable_rows().filter(patient=patient).update(patient=None, about="")
+    _mutable_rows().filter(patient=patient_id).update(patient=None, about="")
 
 
 def _mutable_rows() -> QuerySet[AuditEntry]:

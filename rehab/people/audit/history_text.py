@@ -45,8 +45,8 @@ def changes_of(user: Any, row: ScopedModel, parts: Sequence[type[Model]] = ()) -
         )
         mine: Any = part
         keys = mine.objects.visible_to(user).filter(**{link: row.pk}).values("pk")
-        gone = Q(kind=HistoryEntry.Kind.DELETED, **{f"changes__{link}__0": row.pk})
-        wanted |= Q(model_name=part.__name__) & (Q(object_id__in=keys) | gone)
+        deleted = Q(kind=HistoryEntry.Kind.DELETED, **{f"changes__{link}__0": row.pk})
+        wanted |= Q(model_name=part.__name__) & (Q(object_id__in=keys) | deleted)
     entries = (
         HistoryEntry.objects.visible_to(user).filter(wanted).select_related("by")[:MAX_ENTRIES]
     )

@@ -1,0 +1,1 @@
+"""Consents of patients, and tombstones of those who were erased."""

@@ -74,7 +74,7 @@ def active_consents(patient: Patient) -> dict[str, Consent]:
 
 def offered_purposes(clinic: Clinic) -> list[Purpose]:
     """Return what a clinic asks for: remote view only where it has named its own networks."""
-    return [one for one in Purpose if clinic.networks or one is not Purpose.REMOTE]
+    return [purpose for purpose in Purpose if clinic.networks or purpose is not Purpose.REMOTE]
 
 
 def is_remote_view_allowed(patient: Patient, address: str) -> bool:

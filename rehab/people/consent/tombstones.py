@@ -1,7 +1,7 @@
 """Tombstones of erased patients, so that the import does not bring them back.
 
 The legacy database still has them as participants. A tombstone is a keyed hash of the clinic and
-the legacy id. It only tells, with the server's key, whether a given id was erased here, and refers
+the legacy id. With the server's key it shows whether a given id was erased here; it refers
 to no other row.
 """
 
@@ -38,17 +38,19 @@ class ImportTombstone(ScopedModel):
         return self.id_hash[:8]
 
 
-def block_reimport(clinic: int, legacy_id: int) -> None:
+def block_reimport(clinic_id: int, legacy_id: int) -> None:
     """Block a participant from being imported again."""
-    ImportTombstone.everywhere.get_or_create(clinic_id=clinic, id_hash=_hash_id(clinic, legacy_id))
+    ImportTombstone.everywhere.get_or_create(
+        clinic_id=clinic_id, id_hash=_hash_id(clinic_id, legacy_id)
+    )
 
 
-def is_reimport_blocked(clinic: int, legacy_id: int) -> bool:
+def is_reimport_blocked(clinic_id: int, legacy_id: int) -> bool:
     """Return whether a participant was erased here."""
-    id_hash = _hash_id(clinic, legacy_id)
-    return ImportTombstone.everywhere.filter(clinic=clinic, id_hash=id_hash).exists()
+    id_hash = _hash_id(clinic_id, legacy_id)
+    return ImportTombstone.everywhere.filter(clinic=clinic_id, id_hash=id_hash).exists()
 
 
-def _hash_id(clinic: int, legacy_id: int) -> str:
-    hashed = salted_hmac("garry.import_tombstones", f"{clinic} {legacy_id}", algorithm="sha256")
+def _hash_id(clinic_id: int, legacy_id: int) -> str:
+    hashed = salted_hmac("garry.import_tombstones", f"{clinic_id} {legacy_id}", algorithm="sha256")
     return hashed.hexdigest()

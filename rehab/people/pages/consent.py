@@ -28,7 +28,7 @@ from rehab.people.forms import ConsentTextForm
 from rehab.people.models import Boards, Patient
 from rehab.people.roles import Role
 
-MEANING = {
+MEANINGS = {
     Purpose.CARE: gettext_lazy("Sessions are kept, and therapists plan the training with them."),
     Purpose.RESEARCH: gettext_lazy(
         "Researchers of the clinic see the sessions under a false name."
@@ -45,7 +45,7 @@ LEVELS = {
 
 
 @dataclass(frozen=True)
-class Choice:
+class PurposeChoice:
     """A purpose on the page, with its options."""
 
     purpose: Purpose
@@ -59,7 +59,7 @@ class Choice:
 @for_roles(Role.LEAD, Role.PT)
 @require_http_methods(["GET", "HEAD", "POST"])
 def show_consent(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Show a patient's consents, and record the answer that was tapped."""
+    """Show a patient's consents; a POST records the answer to one of them."""
     user = user_of(request)
     patients = Patient.objects.visible_to(user).select_related("clinic")
     patient = get_object_or_404(patients, pk=patient_id)
@@ -89,12 +89,12 @@ def show_consent(request: HttpRequest, patient_id: int) -> HttpResponse:
     return render(request, "people/consent.html", context)
 
 
-def list_choices(patient: Patient) -> list[Choice]:
-    """Return every purpose with the patient's consent."""
+def list_choices(patient: Patient) -> list[PurposeChoice]:
+    """Return the purposes that are offered, or consented to, each with its options."""
     active, text = active_consents(patient), current_text(patient.clinic)
     choices = []
-    asked = {*offered_purposes(patient.clinic), *map(Purpose, active)}
-    for purpose in (one for one in Purpose if one in asked):
+    listed = {*offered_purposes(patient.clinic), *map(Purpose, active)}
+    for purpose in (purpose for purpose in Purpose if purpose in listed):
         consent = active.get(purpose)
         if purpose == Purpose.BOARDS:
             now = patient.boards if consent else Boards.OWN
@@ -106,14 +106,16 @@ def list_choices(patient: Patient) -> list[Choice]:
         is_outdated = consent is not None and consent.text_id != text.pk
         is_missing = purpose == Purpose.CARE and not is_care_allowed(patient)
         choices.append(
-            Choice(purpose, str(MEANING[purpose]), consent, is_outdated, options, is_missing)
+            PurposeChoice(
+                purpose, str(MEANINGS[purpose]), consent, is_outdated, options, is_missing
+            )
         )
     return choices
 
 
 @for_roles(Role.LEAD, patients=False)
 @require_http_methods(["GET", "HEAD", "POST"])
-def edit_text(request: HttpRequest) -> HttpResponse:
+def edit_consent_text(request: HttpRequest) -> HttpResponse:
     """Let a lead publish a new version of the text. Older versions stay as they are."""
     user = user_of(request)
     clinic = clinic_of(user)

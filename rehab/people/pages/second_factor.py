@@ -23,8 +23,8 @@ from rehab.people.sign_in.forms import WRONG_FIRST_CODE, AppForm, OwnPasswordFor
 SECRET = "app_secret"  # noqa: S105 (key of the browser session, until the app has shown a code)
 
 
-def owner(request: HttpRequest) -> User:
-    """Return the account that enrolls. Raises PermissionDenied for a stranger."""
+def enrolling_user(request: HttpRequest) -> User:
+    """Return the account that may enroll a factor. Raises PermissionDenied for a stranger."""
     if isinstance(request.user, User):
         return request.user
     user = flow.pending_enrollment(request, timezone.now())
@@ -36,9 +36,9 @@ def owner(request: HttpRequest) -> User:
 @for_roles(*Role, enrolling=True, patients=False)
 @never_cache
 @require_safe
-def choose(request: HttpRequest) -> HttpResponse:
+def choose_factor(request: HttpRequest) -> HttpResponse:
     """Show the kinds of second factors that can be enrolled here."""
-    user = owner(request)
+    user = enrolling_user(request)
     context = {
         "owner": user,
         "is_required": factors.is_required(user),
@@ -53,14 +53,14 @@ def choose(request: HttpRequest) -> HttpResponse:
 @require_http_methods(["GET", "HEAD", "POST"])
 def add_app(request: HttpRequest) -> HttpResponse:
     """Show the secret for an app, and store it once the app has shown the right code."""
-    user = owner(request)
+    user = enrolling_user(request)
     secret: str = request.session.setdefault(SECRET, totp.generate_secret())
     form = AppForm(request.POST if request.method == "POST" else None)
     if form.is_valid():
         new = factors.add_app(user, secret, form.cleaned_data["code"], timezone.now())
         if new is not None:
             del request.session[SECRET]
-            return _added(request, user, new)
+            return _finish_enrollment(request, user, new)
         form.add_error("code", WRONG_FIRST_CODE)
     drawing = segno.make(totp.provisioning_uri(secret, user.username), micro=False)
     spaced = " ".join(secret[start : start + 4] for start in range(0, len(secret), 4))
@@ -73,14 +73,14 @@ def add_app(request: HttpRequest) -> HttpResponse:
 @require_http_methods(["GET", "HEAD", "POST"])
 def add_passkey(request: HttpRequest) -> HttpResponse:
     """Have the browser create a passkey, and store it."""
-    user = owner(request)
+    user = enrolling_user(request)
     if not passkeys.are_supported(request):
         raise Http404
     problem = ""
     if request.method == "POST":
         name = request.POST.get("name", "").strip()[:64] or _("Passkey")
         try:
-            return _added(
+            return _finish_enrollment(
                 request, user, passkeys.register(request, user, name, request.POST["passkey"])
             )
         except (KeyError, passkeys.PasskeyRejected):
@@ -89,8 +89,8 @@ def add_passkey(request: HttpRequest) -> HttpResponse:
     return render(request, "people/sign_in/add_passkey.html", context)
 
 
-def _added(request: HttpRequest, user: User, new: list[str]) -> HttpResponse:
-    """Go on after an enrollment: finish a pending sign-in, and show new recovery codes."""
+def _finish_enrollment(request: HttpRequest, user: User, new: list[str]) -> HttpResponse:
+    """Finish a pending sign-in, if there is one, and show new recovery codes."""
     next_url = reverse("account")
     if request.user.is_authenticated:
         request.session[flow.SECOND_FACTOR_VERIFIED] = True
@@ -99,7 +99,7 @@ def _added(request: HttpRequest, user: User, new: list[str]) -> HttpResponse:
     if not new:
         messages.success(request, _("Added."))
         return redirect(next_url)
-    return _show(request, new, next_url)
+    return _show_recovery_codes(request, new, next_url)
 
 
 @for_roles(*Role, patients=False)
@@ -113,7 +113,7 @@ def renew_codes(request: HttpRequest) -> HttpResponse:
         return redirect("account")
     form = OwnPasswordForm(request, user, request.POST if request.method == "POST" else None)
     if form.is_valid():
-        return _show(request, factors.renew_recovery_codes(user), reverse("account"))
+        return _show_recovery_codes(request, factors.renew_recovery_codes(user), reverse("account"))
     context = {
         "form": form,
         "title": _("New recovery codes"),
@@ -123,7 +123,7 @@ def renew_codes(request: HttpRequest) -> HttpResponse:
     return render(request, "people/sign_in/confirm_password.html", context)
 
 
-def _show(request: HttpRequest, new: list[str], next_url: str) -> HttpResponse:
+def _show_recovery_codes(request: HttpRequest, new: list[str], next_url: str) -> HttpResponse:
     return render(
         request, "people/sign_in/recovery_codes.html", {"codes": new, "next_url": next_url}
     )
@@ -133,7 +133,7 @@ def _show(request: HttpRequest, new: list[str], next_url: str) -> HttpResponse:
 @never_cache
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
-def remove(request: HttpRequest) -> HttpResponse:
+def remove_authenticator(request: HttpRequest) -> HttpResponse:
     """Remove one of the own authenticators, after the password."""
     user = user_of(request)
     which = request.GET.get("which", "")

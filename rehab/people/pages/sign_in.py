@@ -23,7 +23,7 @@ from rehab.people.sign_in import factors, flow, passkeys
 from rehab.people.sign_in.forms import CodeForm, SignInForm
 
 
-def first_page(user: User) -> str:
+def landing_page(user: User) -> str:
     """Return the page to show after a sign-in that asked for none."""
     return reverse("start" if user.role in {Role.LEAD, Role.PT} else "admin:index")
 
@@ -37,11 +37,11 @@ class SignIn(LoginView):
     def form_valid(self, form: Any) -> HttpResponse:
         """Sign in, or go on to the second factor."""
         user: User = form.get_user()
-        then = self.get_redirect_url() or first_page(user)
-        if flow.begin(self.request, user, then, timezone.now()):
-            return HttpResponseRedirect(then)
-        has_one = factors.authenticators_of(user).exists()
-        return redirect("second-factor" if has_one else "set-up-second-factor")
+        next_url = self.get_redirect_url() or landing_page(user)
+        if flow.begin(self.request, user, next_url, timezone.now()):
+            return HttpResponseRedirect(next_url)
+        has_factor = factors.authenticators_of(user).exists()
+        return redirect("second-factor" if has_factor else "set-up-second-factor")
 
 
 sign_in = public(SignIn.as_view())
@@ -51,8 +51,8 @@ sign_in = public(SignIn.as_view())
 @never_cache
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
-def prove(request: HttpRequest) -> HttpResponse:
-    """Take the code or passkey of a pending sign-in. Without one, start over."""
+def verify_second_factor(request: HttpRequest) -> HttpResponse:
+    """Verify the code or passkey of a pending sign-in; without a pending one, start over."""
     now = timezone.now()
     user = flow.pending_second_factor(request, now)
     if user is None:

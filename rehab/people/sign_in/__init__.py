@@ -1,0 +1,1 @@
+"""Signing in: passwords, second factors, passkeys, tokens, lockout, browser sessions."""

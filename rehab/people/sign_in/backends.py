@@ -13,7 +13,7 @@ from rehab.people.sign_in import factors
 
 
 class PasswordBackend(ModelBackend):
-    """Django's own, which also loads the clinic: every page needs it."""
+    """Django's backend; it also loads the clinic, which every page needs."""
 
     def get_user(self, user_id: Any) -> User | None:
         """Return the account of a browser session; None for one that is not active."""
@@ -25,6 +25,6 @@ class CodeBackend:
     """Accepts a code of an authenticator app, or a recovery code. Signs nobody in by itself."""
 
     def authenticate(self, request: HttpRequest | None, username: str, code: str) -> User | None:
-        """Return the account where the code is valid; None for any other."""
+        """Return the account where the code is valid; else None."""
         user = User.everywhere.filter(username=username, is_active=True).first()
         return user if user and factors.verify_code(user, code, timezone.now()) else None

@@ -17,7 +17,7 @@ from rehab.people.roles import Role
 
 FIRST_USERNAME = "pt"
 FIRST_CLINIC = "My clinic"
-# What development versions from before 22 November 2026 began with; today's begins otherwise.
+# The first migration of development versions from before 22 November 2026.
 DEVELOPMENT_MIGRATION = ("rehab", "0001_initial")
 
 
@@ -45,7 +45,7 @@ def prepare_database() -> None:
 
 
 def refuse_development_database(using: str = DEFAULT_DB_ALIAS) -> None:
-    """Raise CommandError, with the cure, for a database whose tables a development version made."""
+    """Raise CommandError, with the cure, for a database made by a development version."""
     if DEVELOPMENT_MIGRATION not in MigrationRecorder(connections[using]).applied_migrations():
         return
     name = connections[using].settings_dict["NAME"]

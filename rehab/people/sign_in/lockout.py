@@ -21,7 +21,7 @@ from django.utils.translation import ngettext
 from rehab.people.models import User
 from rehab.people.networks import client_address
 
-CODE_SUFFIX = " (code)"  # no username has a blank
+CODE_SUFFIX = " (code)"  # no username contains a space
 
 Credentials = Mapping[str, Any] | None
 
@@ -40,7 +40,7 @@ def lockout_parameters(request: Any, credentials: Credentials = None) -> list[st
 def lockout_response(
     request: HttpRequest, response: HttpResponse, credentials: Credentials
 ) -> HttpResponse:
-    """Answer with our own page, which tells how long to wait, and the status 429."""
+    """Return our own page, which says how long to wait, with the status 429."""
     response.status_code = 429
     return response
 

@@ -76,7 +76,7 @@ def register(request: HttpRequest, user: User, name: str, answer: str) -> list[s
         registered = _relying_party(request).register_complete(
             _pop_challenge(request), json.loads(answer)
         )
-    except Exception as problem:  # fido2 raises many kinds for what strangers may send
+    except Exception as problem:  # fido2 raises many types of errors for malformed answers
         raise PasskeyRejected from problem
     if registered.credential_data is None:
         raise PasskeyRejected
@@ -88,14 +88,14 @@ def verify(request: HttpRequest, user: User, answer: str, now: datetime) -> None
     """Verify a signature by one of the account's passkeys. Raises PasskeyRejected."""
     own = {_credential(key).credential_id: key for key in _passkeys_of(user)}
     try:
-        given = AuthenticationResponse.from_dict(json.loads(answer))
+        response = AuthenticationResponse.from_dict(json.loads(answer))
         _relying_party(request).authenticate_complete(
-            _pop_challenge(request), _credentials_of(user), given
+            _pop_challenge(request), _credentials_of(user), response
         )
-        key = own[given.raw_id]
+        key = own[response.raw_id]
     except Exception as problem:  # as above
         raise PasskeyRejected from problem
-    if not key.record_use(given.response.authenticator_data.counter, now):
+    if not key.record_use(response.response.authenticator_data.counter, now):
         raise PasskeyRejected  # the counter has not advanced: the key may be a copy
 
 

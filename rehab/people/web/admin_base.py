@@ -21,6 +21,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import user_of
 from rehab.people.audit.audit_log import Act, record_security_change
+from rehab.people.audit.history import clinic_id_of
 from rehab.people.audit.history_text import changes_of
 from rehab.people.networks import client_address
 from rehab.people.roles import Right, Role, rights_of
@@ -38,12 +39,7 @@ def rights_for(request: HttpRequest, model: type[models.Model]) -> Right:
 
 def may_modify(user: Any, row: ScopedModel) -> bool:
     """Return whether a person may change a visible row: shared rows are for the host alone."""
-    if not row.scope.shared or user.role == Role.HOST:
-        return True
-    owner: Any = row
-    for step in row.scope.clinic.split("__"):
-        owner = getattr(owner, step)
-    return owner is not None
+    return not row.scope.shared or user.role == Role.HOST or clinic_id_of(row) is not None
 
 
 class RestrictedChangeList(ChangeList):
@@ -238,13 +234,13 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
                 continue
             rows = referrer.objects.visible_to(request.user)
             if count := rows.filter(**{f"{relation.field.name}__in": keys}).count():
-                words = gettext("Stays, without its %(what)s: %(things)s (%(count)s)")
-                named = {
+                template = gettext("Stays, without its %(what)s: %(things)s (%(count)s)")
+                values = {
                     "what": relation.field.verbose_name,
                     "things": referrer._meta.verbose_name_plural,
                     "count": count,
                 }
-                deleted.append(words % named)
+                deleted.append(template % values)
         return (deleted, *others)
 
 
@@ -259,7 +255,7 @@ class TokenAdmin(ScopedAdmin):
         token = None if change else obj.new_token()
         super().save_model(request, obj, form, change)
         if token:
-            self._show(request, obj, token)
+            self._show_token(request, obj, token)
 
     @admin.action(description=_("Give new tokens (old ones stop at once)"), permissions=["change"])
     def renew_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:
@@ -271,7 +267,7 @@ class TokenAdmin(ScopedAdmin):
                 token = holder.new_token()
                 holder.revoked_at = None
                 holder.save()
-            self._show(request, holder, token)
+            self._show_token(request, holder, token)
 
     @admin.action(description=_("Revoke tokens"), permissions=["change"])
     def revoke_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:
@@ -280,12 +276,12 @@ class TokenAdmin(ScopedAdmin):
         for holder in valid:  # one by one, so that the change history records each
             holder.revoked_at = timezone.now()
             holder.save(update_fields=["revoked_at"])
-        said = ngettext("%(count)d token revoked.", "%(count)d tokens revoked.", len(valid))
-        messages.success(request, said % {"count": len(valid)})
+        message = ngettext("%(count)d token revoked.", "%(count)d tokens revoked.", len(valid))
+        messages.success(request, message % {"count": len(valid)})
 
-    def _show(self, request: HttpRequest, holder: TokenModel, token: str) -> None:
-        said = gettext("Token of %(holder)s, shown this one time only: %(token)s")
-        messages.warning(request, said % {"holder": holder, "token": token})
+    def _show_token(self, request: HttpRequest, holder: TokenModel, token: str) -> None:
+        message = gettext("Token of %(holder)s, shown this one time only: %(token)s")
+        messages.warning(request, message % {"holder": holder, "token": token})
 
 
 class ReadOnlyAdmin(ScopedAdmin):

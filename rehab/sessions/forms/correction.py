@@ -24,10 +24,10 @@ from rehab.sessions.models import TrainingSession
 
 
 class CorrectionForm(forms.Form):
-    """The values that a session shall have from now on, and the reason.
+    """The new values of a session, and the reason.
 
-    Beside each field the page sends its initial value: only what differs from that is changed,
-    and nothing is where somebody else has corrected the session meanwhile.
+    The page sends each field with its initial value: only fields that differ from it are changed,
+    and none is where somebody else has corrected the session meanwhile.
     """
 
     patient: forms.ModelChoiceField[Patient] = forms.ModelChoiceField(
@@ -103,7 +103,7 @@ class CorrectionForm(forms.Form):
 
     @property
     def counts_initial(self) -> str:
-        """The hidden initial value of ``counts``: drawing each choice by itself leaves it out."""
+        """The hidden initial value of ``counts``, which a template that draws each choice omits."""
         return self["counts"].as_hidden(only_initial=True)
 
     def initial_values(self) -> Values:
@@ -143,7 +143,7 @@ class CorrectionForm(forms.Form):
         return True
 
     def _show_current_values(self, changes: Values) -> None:
-        """Replace what was sent by the values in force, except for what this person changed."""
+        """Show the values in force, except for the fields that this person changed."""
         stored = TrainingSession.objects.visible_to(self.by).select_related("patient")
         session = stored.get(pk=self.session.pk)
         current = current_values(session, self.by)

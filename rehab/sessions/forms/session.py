@@ -45,8 +45,8 @@ from rehab.training.valences import VALENCES
 # 60 % of the steps, ten minutes.
 WANTED_HITS_PERCENT = 60
 PLANNED_MINUTES = 10
-# Mean A2 of a healthy walk in the recordings (docs/reference/gait.md#protocol): where a first goal
-# begins.
+# The goal that is offered first: mean A2 of a healthy walk in the recordings
+# (docs/reference/gait.md#protocol).
 FIRST_GOAL_W_KG = 3.9
 TRAINING_ONLY, WITH_BASELINE = "Training only", "Baseline, training, washout"
 
@@ -170,8 +170,8 @@ class SessionForm(forms.Form):
         return None
 
 
-# Typical stride time of the recordings (docs/reference/gait.md#phases), to tell how long a phase of
-# strides takes.
+# Typical stride time of the recordings (docs/reference/gait.md#phases), for the duration of a phase
+# that is limited by strides.
 STRIDE_S = 1.1
 
 

@@ -77,7 +77,7 @@ def _store(entries: list[PendingEntry]) -> None:
     audit_log.record_after_the_fact(
         [
             audit_log.build_entry(
-                entry.act, entry.actor, patient=patients[entry.session_id], **entry.details
+                entry.act, entry.actor, patient_id=patients[entry.session_id], **entry.details
             )
             for entry in entries
             if entry.session_id in patients

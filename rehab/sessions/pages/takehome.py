@@ -19,7 +19,7 @@ from rehab.sessions.reports.takehome import summarize_for_patient
 @for_roles(Role.LEAD, Role.PT)
 @require_safe
 def show_take_home(request: HttpRequest, patient_id: int) -> HttpResponse:
-    """Show in plain words what a patient has walked, without a person's simulated sessions."""
+    """Show in plain words what a patient has walked; a person's simulated sessions do not count."""
     user = user_of(request)
     patient = get_object_or_404(
         Patient.objects.visible_to(user).select_related("clinic"), pk=patient_id

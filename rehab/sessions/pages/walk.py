@@ -20,7 +20,7 @@ from rehab.training.changes import ENDED_STATES, State
 
 
 @for_roles(Role.LEAD, Role.PT, tablets=True)
-@xframe_options_sameorigin  # the therapist's page mirrors this one in a frame, to be looked at only
+@xframe_options_sameorigin  # the therapist's page mirrors this one in a frame
 @csp_replace({"frame-ancestors": [SELF]})  # type: ignore[arg-type]  # knows no views with arguments
 def show_walk(request: HttpRequest, session_id: int) -> HttpResponse:
     """Show a session as the patient sees it; one that has ended shows its scores."""

@@ -26,7 +26,7 @@ from rehab.training.changes import OPEN_STATES, State
 MAX_ENDED = 40  # ended sessions of today that are listed; open ones are all listed
 OPEN_TOO_LONG = timedelta(hours=3)  # no visit takes as long
 REVOKED_ALERT_FOR = timedelta(days=7)  # how long an alert tells of a revoked device
-# Who walks comes first, then what could go on, then what is over.
+# Running sessions come first, then those that can go on, then those that have ended.
 STATE_ORDER = [State.RUNNING, State.PAUSED, State.READY, State.FINISHED, State.ABORTED]
 
 
@@ -53,7 +53,7 @@ class Alert:
 
 
 def dashboard_context(user: User, now: datetime) -> dict[str, Any]:
-    """Return the template's context; each part as far as the user's role sees its rows."""
+    """Return the template's context, with the rows that the user's role may see."""
     clinic = clinic_of(user)
     today = sessions_today(user, clinic, now)
     open_sessions = [row.session for row in today if row.is_open]
@@ -114,7 +114,7 @@ def _format_time(moment: datetime, midnight: datetime) -> str:
 def find_alerts(
     user: User, today: Iterable[SessionRow], stations: Iterable[StationStatus], now: datetime
 ) -> Iterator[Alert]:
-    """Yield what somebody should look after: sessions left open, devices that cannot dial in."""
+    """Yield the problems to solve: sessions left open, devices that cannot dial in."""
     for row in today:
         too_long = row.is_open and now - row.session.began_at > OPEN_TOO_LONG
         if too_long and user.role != Role.RESEARCHER:

@@ -25,7 +25,7 @@ from rehab.sessions.reports.trend import TrendPoint, load_trend
 from rehab.training.changes import ChangeKind
 from rehab.training.plans import SessionPlan
 
-# What one page has room for; what is omitted is counted, and is on the session's own page.
+# What one page has room for; omitted entries are counted, and are on the session's own page.
 MAX_PHASES, MAX_GOALS, MAX_TIMES = 9, 6, 6
 ADVERSE = (Remark.FALL, Remark.NEAR_FALL, Remark.PAIN, Remark.DIZZINESS)
 REMARKS = {kind.value for kind in Remark}
@@ -133,7 +133,7 @@ def _join(entries: list[str]) -> str:
 
 
 def _describe_robot(events: list[SessionEvent]) -> str:
-    """Return what the robot did: gestures, windows that it answered, stops."""
+    """Return what the robot did as text: gestures, windows at or above its threshold, stops."""
     kinds: defaultdict[str, list[SessionEvent]] = defaultdict(list)
     for event in events:
         kinds[event.kind].append(event)

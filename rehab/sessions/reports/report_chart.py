@@ -17,7 +17,7 @@ def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
 
     At or above the goal is a disc, below a ring, without a goal a cross; an invalid stride is a
     mark below the axis. The goal is a line, phases without feedback are shaded.
-    ``chart``: of `review.stride_chart`. Returns {} without strides.
+    ``chart`` is the result of ``review.stride_chart``. Returns {} without strides.
     """
     strides = chart["strides"]
     numbers, shown, goals = strides["number"], strides["shown"], strides["goal"]

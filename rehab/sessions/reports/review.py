@@ -27,7 +27,7 @@ from rehab.training.plans import SessionPlan
 from rehab.training.summary import summarize_session
 from rehab.training.valences import VALENCES
 
-# Counted only: listed, they would hide what people did.
+# Only counted: in a list they would hide what people did.
 ROBOT_ACTIVITY = (RobotEntry.DECISION.value, RobotEntry.GESTURE.value)
 # Of what is no change; those that are not here have the log's own label.
 EVENT_LABELS = {
@@ -53,7 +53,7 @@ class DescribedEvent:
 
 @dataclass(frozen=True, slots=True)
 class SessionReview:
-    """A session with its figures (``training.figures``), its events and the data of its chart.
+    """A session with its figures (``training.summary``), its events and the data of its chart.
 
     ``rows`` are all events of its log, ``events`` those without gestures and decisions of the
     robot, ``gestures`` is the number of gestures that the robot began.
@@ -157,7 +157,7 @@ def stride_chart(
 
 
 def _valences_by_run(fold: SessionFold, runs: Sequence[list[int]]) -> list[str]:
-    """Return the valence that begins with each run of strides, to stand behind its name."""
+    """Return a suffix for each run's name: the valence that begins with it, or nothing."""
     ends = [0, *(run[-1] for run in runs)]
     return [
         "".join(
@@ -168,5 +168,5 @@ def _valences_by_run(fold: SessionFold, runs: Sequence[list[int]]) -> list[str]:
 
 
 def _round(value: float | None) -> float | None:
-    """Return a value to four places: more would only lengthen the page."""
+    """Return a value rounded to four places, which keeps the page short."""
     return None if value is None else round(value, 4)

@@ -28,7 +28,7 @@ from rehab.stations.models import Station
 # Name in the form → the column, and how many units of the form are one unit of the column.
 RANGES = {"score": ("metric_score", 1), "hits": ("metric_hit_rate", 100), "goal": ("goal", 1)}
 
-# The days before and after are still valid dates in every time zone.
+# Limits that leave room for a day more or less, in every time zone.
 FIRST_DAY, LAST_DAY = date(1900, 1, 1), date(2999, 12, 31)
 NO_DAY = _("Give a day of the years 1900 to 2999.")
 DAYS = [MinValueValidator(FIRST_DAY, NO_DAY), MaxValueValidator(LAST_DAY, NO_DAY)]
@@ -107,7 +107,7 @@ def _midnight(day: Any, zone: str) -> datetime:
 
 
 class SessionSearchFilter(ListFilter):
-    """The form as a filter of the admin. An invalid form shows its errors and finds nothing."""
+    """The form as a filter of the admin. With an invalid form, errors and no sessions are shown."""
 
     title = _("what was walked")
     template = "admin/search_filter.html"

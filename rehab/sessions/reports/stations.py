@@ -1,4 +1,4 @@
-"""What is connected at a clinic's stations, and who walks there."""
+"""The status of a clinic's stations: devices, open session, connections."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ def _local_day(point: TrendPoint, now: datetime) -> date:
 
 
 def _describe_change(points: list[TrendPoint]) -> str:
-    """Return how the mean has changed. A decrease is stated without a judgment."""
+    """Return how the mean has changed as text. A decrease is stated without a judgment."""
     if len(points) < 2 or points[0].session == points[-1].session:
         return ""
     before, after = points[0].with_feedback, points[-1].with_feedback

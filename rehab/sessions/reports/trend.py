@@ -24,7 +24,7 @@ from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.training.phases import Phase
 
-SESSIONS = 30  # as many as can be told apart in a chart
+SESSIONS = 30  # more cannot be distinguished in a chart
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,7 +79,7 @@ class WeekSummary:
 
 
 def week_summary(user: User, clinic: Clinic, now: datetime) -> WeekSummary:
-    """Return the figures of the clinic's week so far, without sessions that were corrected away.
+    """Return the figures of the clinic's week so far, without sessions that a correction excluded.
 
     Simulated sessions count only where no person has walked.
     """

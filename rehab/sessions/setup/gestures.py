@@ -19,10 +19,8 @@ from robot.motion.dry_run import validate_gesture
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gestures import GESTURES, ORIGINALS
 
-DEFAULT_GESTURE, NO_GESTURE = (
-    "(usual)",
-    "(nothing)",
-)  # choices beside gestures, none of which has such a name
+# Choices beside gestures, whose names have no parentheses.
+DEFAULT_GESTURE, NO_GESTURE = "(usual)", "(nothing)"
 
 
 def robot_gesture_choices(by: User) -> list[tuple[str, Any]]:
@@ -91,8 +89,8 @@ def composed_gestures(patient: Patient, cue: CueGestures) -> Iterator[dict[str, 
 def silence_cue(cue: CueGestures, default: CueGestures, chosen: CueGestures) -> CueGestures:
     """Return the cue of another valence that a session may be changed to.
 
-    Where the PT chose no gesture although ``default`` has one, the result has none either: a change
-    of the feedback must not make a robot move that was set to stand still.
+    Where the PT chose no gesture although ``default`` has one, the result has none either: a robot
+    that was set to stand still must not move after a change of the feedback.
     """
     return CueGestures(
         None if default.above and not chosen.above else cue.above,

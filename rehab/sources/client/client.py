@@ -26,7 +26,7 @@ class SourceClient:
     Parameters
     ----------
     dial
-        Makes the link, given ``greet`` and ``on_lost`` by name.
+        Returns the link, given ``greet`` and ``on_lost`` by name.
     feed
         Where the strides come from: a ``StridePlayback`` plays them, a ``LiveFeed`` has them as
         they are measured.
@@ -110,18 +110,18 @@ class SourceClient:
 
     def describe(self) -> str:
         """Return the state of the client in one line."""
-        session, visit = self._queue.session, self._follower
+        session, follower = self._queue.session, self._follower
         if session is None:
-            return "Waiting for a session." if visit.is_welcome else "Waiting for the server."
+            return "Waiting for a session." if follower.is_welcome else "Waiting for the server."
         share = self._unusable / self._strides if self._strides else 0.0
-        goal = "" if visit.goal is None else f", goal {visit.goal:g} {visit.unit}".rstrip()
-        away = "" if visit.is_welcome else ", server out of reach"
+        goal = "" if follower.goal is None else f", goal {follower.goal:g} {follower.unit}".rstrip()
+        away = "" if follower.is_welcome else ", server out of reach"
         return (
-            f"Session {session} {visit.state}{away}: {self._strides} strides, "
+            f"Session {session} {follower.state}{away}: {self._strides} strides, "
             f"{self.unacknowledged} not acknowledged, {share:.0%} unusable{goal}"
         )
 
-    # --- What the server hears first, and when it is gone ---
+    # --- Connecting ---
 
     def _greet(self) -> Message:
         hello: Message = {
@@ -132,7 +132,7 @@ class SourceClient:
             "speed": self._feed.speed,
         }
         if self._feed.clock_s is not None:
-            # A clock that stands would make all that comes after it look late.
+            # A stopped clock would make all later strides look late.
             hello["clock_s"] = self._feed.clock_s
         if self._wanted_session is not None:
             hello["session"] = self._wanted_session
@@ -142,7 +142,7 @@ class SourceClient:
         self._follower.is_welcome = False
         self._notify(f"{reason}; dialing in again in {pause_s:.1f} s.")
 
-    # --- What the server says ---
+    # --- Receiving ---
 
     async def _receive(self) -> None:
         while True:
@@ -162,7 +162,7 @@ class SourceClient:
             else:
                 return
 
-    # --- What is walked and sent ---
+    # --- Playing and sending ---
 
     async def _walk(self) -> None:
         while True:
@@ -188,7 +188,7 @@ class SourceClient:
 
     def _wake_waiters(self) -> None:
         """Wake everything that waits for a change."""
-        # One event for each change: what was set stays set for those who have waited for it.
+        # A new event for each change: the old one stays set for the tasks that wait for it.
         self._changed.set()
         self._changed = asyncio.Event()
 

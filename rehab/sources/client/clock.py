@@ -8,7 +8,7 @@ from collections.abc import Callable
 class PlaybackClock:
     """Source time [s] that runs ``speed`` times as fast as ours and can be paused.
 
-    With ``speed`` None strides come as fast as they are taken: nothing is waited for, and the clock
+    With ``speed`` None strides come as fast as they are sent: nothing is waited for, and the clock
     shows what it was last set to.
     """
 
@@ -16,7 +16,7 @@ class PlaybackClock:
         self.speed = speed
         self._monotonic = monotonic
         self._time_s = 0.0  # what it showed when it was last set, started or stopped
-        self._since_s: float | None = None  # our clock then; None while it stands
+        self._since_s: float | None = None  # our clock then; None while it is paused
 
     @property
     def is_running(self) -> bool:
@@ -37,7 +37,7 @@ class PlaybackClock:
             self._since_s = self._monotonic()
 
     def start(self) -> None:
-        """Start it, or let it run on."""
+        """Start it, or go on."""
         if self._since_s is None:
             self._since_s = self._monotonic()
 

@@ -63,10 +63,10 @@ class SessionFollower:
 
     @property
     def may_send(self) -> bool:
-        """Whether the server would take the next stride."""
+        """Whether the server accepts the next stride now."""
         if not self.is_welcome or not self._queue.can_send:
             return False
-        # What was walked before a pause waits for its end: a paused session would not count it.
+        # Strides from before a pause wait for its end: a paused session would not count them.
         during_pause = self.state == State.PAUSED and self._queue.next_is_paused
         return self.state == State.RUNNING or during_pause
 
@@ -78,7 +78,7 @@ class SessionFollower:
         return self.is_over or (all_stored and not self._stay)
 
     def handle(self, message: Message) -> None:
-        """Follow a message of the server. Raises LinkRefused where it is not the protocol's."""
+        """Handle a message of the server. Raises LinkRefused where it breaks the protocol."""
         match message["type"]:
             case "welcome":
                 self._join(message)
@@ -124,7 +124,7 @@ class SessionFollower:
         try:
             side = Side(message.get("trained_side", Side.LEFT))
         except ValueError:
-            raise _misunderstood(message) from None
+            raise _unknown_message(message) from None
         self._feed.start_session(side, _read(message, "next", int) - 1)
         self._notify(f"Joined session {self._queue.session}.")
 
@@ -159,18 +159,18 @@ class SessionFollower:
 
     def _read_phase(self, message: Message) -> Phase:
         """Return the phase in a message; training where the server sends none."""
-        told = message.get("phase")
-        if not isinstance(told, dict):
+        phase = message.get("phase")
+        if not isinstance(phase, dict):
             return make_phase("training")
         try:
             return make_phase(
-                told["kind"],
-                str(told.get("name", "")),
-                feedback=told.get("feedback"),
-                gain=float(told.get("gain", 1.0)),
+                phase["kind"],
+                str(phase.get("name", "")),
+                feedback=phase.get("feedback"),
+                gain=float(phase.get("gain", 1.0)),
             )
         except (InvalidSetting, KeyError, TypeError, ValueError) as problem:
-            self._notify(f"The server told a phase that is not known here ({problem}).")
+            self._notify(f"The server phase a phase that is not known here ({problem}).")
             return self._feed.phase
 
 
@@ -178,7 +178,7 @@ def _read(message: Message, name: str, kind: type[Any]) -> Any:
     """Return a field of a message. Raises LinkRefused where it is missing or of another type."""
     value = message.get(name)
     if not isinstance(value, kind):
-        raise _misunderstood(message)
+        raise _unknown_message(message)
     return value
 
 
@@ -188,7 +188,7 @@ def _read_goal(message: Message) -> float | None:
     return goal if isinstance(goal, int | float) else None
 
 
-def _misunderstood(message: Message) -> LinkRefused:
+def _unknown_message(message: Message) -> LinkRefused:
     return LinkRefused(
         CloseCode.NOT_PROTOCOL,
         f"The server sent a {str(message['type'])[:40]!r} that this client does not understand. "

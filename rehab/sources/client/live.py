@@ -1,4 +1,4 @@
-"""Strides as they are measured: they cannot be asked for."""
+"""Strides of sources that measure: they come when they are walked."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from rehab.training.steps import InvalidReason, Measurement, Side
 
 
 class LiveFeed:
-    """Takes strides from a source that measures, and hands them to ``SourceClient``.
+    """Keeps the strides of a source that measures, until ``SourceClient`` sends them.
 
-    Strides of a session that runs are kept, whether or not the server can be reached. Those that
-    are walked while it is paused are kept with that reason; those before it starts, and without a
-    session, belong to none and are excluded.
+    Strides of a running session are kept, whether or not the server can be reached; those that are
+    walked while it is paused get that reason; those before it starts, and without a session, are
+    excluded.
 
     Attributes
     ----------
     phase
-        The session's, as far as is known.
+        The session's phase, as far as is known.
     trained_side
         The leg that the session trains, None before there was a session.
     excluded
@@ -44,8 +44,8 @@ class LiveFeed:
         self._monotonic = monotonic
         self._waiting: deque[Measurement] = deque()
         self._is_open = False  # there is a session
-        self._has_walked = False  # it has begun
-        self._runs = False
+        self._has_started = False  # the session has
+        self._is_running = False
         self._is_finished = False
         self._clock = RemoteClock()
 
@@ -60,7 +60,7 @@ class LiveFeed:
     @property
     def is_running(self) -> bool:
         """Whether the session runs, as far as is known."""
-        return self._runs
+        return self._is_running
 
     @property
     def is_over(self) -> bool:
@@ -76,23 +76,23 @@ class LiveFeed:
     def end_session(self) -> None:
         """Leave the session."""
         self._waiting.clear()
-        self._is_open = self._has_walked = self._runs = False
+        self._is_open = self._has_started = self._is_running = False
 
     def resume(self) -> None:
         """Note that the session runs."""
-        self._has_walked = self._runs = True
+        self._has_started = self._is_running = True
 
     def pause(self) -> None:
         """Note that the session is paused, or has not begun."""
-        self._runs = False
+        self._is_running = False
 
     def put(self, stride: Measurement) -> None:
         """Add a stride that was measured just now."""
         self._clock.observe(stride.time_s, self._monotonic())
-        if not (self._is_open and self._has_walked) or len(self._waiting) >= KEPT_MAX:
+        if not (self._is_open and self._has_started) or len(self._waiting) >= KEPT_MAX:
             self.excluded += 1
             return
-        if not self._runs:
+        if not self._is_running:
             stride = replace(stride, reasons=add_own_reason(stride.reasons, InvalidReason.PAUSED))
         self._waiting.append(stride)
         self.on_change()

@@ -11,18 +11,18 @@ from rehab.training.phases import Phase, make_phase
 from rehab.training.steps import Measurement, Side
 from robot.wire.limits import MAX_STEPS
 
-# Gives the next stride, walked in that phase; None at the end.
+# Returns the next stride, walked in that phase; None at the end.
 NextStride = Callable[[Phase], Measurement | None]
 
-# Nobody begins the next stride before this much of it has passed
-# (docs/reference/gait.md#plausible-strides): there is time to hear of a new phase.
+# No stride is shorter (docs/reference/gait.md#plausible-strides): there is time for the server to
+# announce a new phase.
 STRIDE_MIN_S = 0.5
-# Out of reach of the server somebody may walk on for hours (a day of it takes 80,000 strides).
+# Without a connection somebody may walk for hours (a whole day takes 80,000 strides).
 KEPT_MAX = 80_000
 
 
 class StridePlayback:
-    """Decides which stride is due, and how long none will be.
+    """Decides which stride is due, or how long none will be.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class StridePlayback:
     Attributes
     ----------
     phase
-        In which the next stride is walked.
+        The phase in which the next stride is walked.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class StridePlayback:
         self._walk = self._stride = None
 
     def resume(self) -> None:
-        """Play, or play on."""
+        """Start to play, or go on."""
         self._may_walk = True
         if self._stride is not None or self._last_s is not None:
             self._clock.start()
@@ -110,8 +110,8 @@ class StridePlayback:
         if not self._may_walk or unacknowledged >= limit:
             return math.inf
         if self._stride is None and self._walk is not None:
-            # The last stride may have ended the phase. What the server knows of that comes no later
-            # than its ack; the next stride is not begun without, unless it takes too long.
+            # The last stride may have ended the phase, which the server announces no later than its
+            # ack: the next stride is not begun before that, unless it takes too long.
             if unacknowledged and self._last_s is not None:
                 wait_s = self._clock.wait_s(self._last_s + STRIDE_MIN_S)
                 if wait_s > 0:

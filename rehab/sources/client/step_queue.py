@@ -13,7 +13,7 @@ from robot.wire.limits import MAX_EXTRA, MAX_FRAME_BYTES, MAX_REASONS, MAX_STEPS
 
 Message = dict[str, Any]
 
-FRAME_BYTES = MAX_FRAME_BYTES - 4 * 1024  # room for what stands around the steps
+FRAME_BYTES = MAX_FRAME_BYTES - 4 * 1024  # leaves room for the frame around the steps
 OWN_REASONS = (InvalidReason.PAUSED, InvalidReason.NOT_FINITE)  # reasons that are added here
 
 
@@ -32,7 +32,7 @@ class _QueuedStep(NamedTuple):
 
 
 def add_own_reason(reasons: tuple[str, ...], reason: str) -> tuple[str, ...]:
-    """Return a source's reasons with one of ours; the source's last ones make room for it."""
+    """Return a source's reasons with one of ours; its last ones are dropped beyond the limit."""
     ours = [one for one in OWN_REASONS if one in reasons or one == reason]
     others = [one for one in reasons if one not in OWN_REASONS]
     return (*others[: MAX_REASONS - len(ours)], *ours)
@@ -41,7 +41,7 @@ def add_own_reason(reasons: tuple[str, ...], reason: str) -> tuple[str, ...]:
 def write_step(measurement: Measurement, number: int) -> Message:
     """Return a stride as the protocol writes it. Raises UnsendableStride.
 
-    A value that is not finite becomes null with its reason: JSON has no word for it.
+    A value that is not finite becomes null with its reason: JSON cannot express it.
     """
     value, reasons = measurement.value, measurement.reasons
     if value is not None and not math.isfinite(value):
@@ -86,7 +86,7 @@ class StepQueue:
         self.last = 0  # the last number given in this session; 0 for none
         self._next = 1
         self._kept: deque[_QueuedStep] = deque()
-        self._sent = 0  # so many of the kept, from the oldest on, are on their way
+        self._sent = 0  # how many of the kept, from the oldest on, are in flight
 
     @property
     def unacknowledged(self) -> int:
@@ -110,7 +110,7 @@ class StepQueue:
         return waiting is not None and InvalidReason.PAUSED in waiting.step.get("reasons", ())
 
     def join(self, session: int, next_number: int) -> None:
-        """Follow a welcome: in which session to go on, and from which number.
+        """Apply a welcome: the session to go on in, and the number to go on from.
 
         Steps below ``next_number`` stay kept until an acknowledgment covers them: the server has
         received them, which is not yet stored. The last of them is sent once more, to be

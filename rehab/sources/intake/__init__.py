@@ -2,9 +2,9 @@
 
 A row is a stride (it has a value) or a sample of raw signals. ``rows`` reads the cells;
 ``alignment`` brings channels of different rates to one; ``pipeline`` makes strides of them with
-``rehab.gait``; ``quality`` summarizes how well the source is heard and ``recorder`` writes the raw
-signals to a file. ``intake`` is the entry to all of it. ``lines`` and ``addresses`` are for rows
-that come as text.
+``rehab.gait``; ``quality`` summarizes how well the source is received and ``recorder`` writes the
+raw signals to a file. ``intake`` is the entry to all of it. ``lines`` and ``addresses`` are for
+rows that come as text.
 """
 
 from rehab.sources.intake.addresses import Address, parse_address

@@ -11,14 +11,14 @@ KINDS = ("tcp", "udp", "ws")
 
 
 class Address(NamedTuple):
-    """A transport, and where it leads."""
+    """A transport with a host and a port."""
 
     kind: str
     host: str
     port: int
 
     def __str__(self) -> str:
-        """Return it as it is written."""
+        """Return the address as text."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{self.kind}://{host}:{self.port}"
 

@@ -13,9 +13,9 @@ Floats = NDArray[np.float64]
 Channel = tuple[str, str]  # side, and one of rehab.gait.recordings.columns.CHANNELS
 Samples = tuple[Floats, dict[Channel, Floats]]  # times, and as many values of each channel
 
-HOLD_S = 0.05  # between two samples nothing is known over more (docs/reference/gait.md#time-base)
+HOLD_S = 0.05  # the longest gap that is interpolated (docs/reference/gait.md#time-base)
 WAIT_S = 0.3  # by our clock, for a channel that has fallen silent
-KEEP_S = 60.0  # of samples that wait for others
+KEEP_S = 60.0  # how long samples wait for those of other channels
 
 
 class Alignment:
@@ -24,7 +24,7 @@ class Alignment:
     Rows that hold whole legs pass unchanged. As soon as some do not, channels are interpolated
     linearly at the times of the first force: a time is complete once all channels have come past
     it, or with NaN for those that have been silent for ``WAIT_S``. Where a channel has no samples
-    within ``HOLD_S`` of each other, it is NaN. A clock that is set back starts anew.
+    within ``HOLD_S`` of each other, it is NaN. A clock that is set back starts over.
     """
 
     def __init__(self) -> None:
@@ -82,7 +82,7 @@ class Alignment:
 
     def _collect(self, now_s: float) -> list[Samples]:
         if self._grid is None:
-            self._forget_before(-np.inf)
+            self._drop_before(-np.inf)
             return []
         grid, force = self._tracks[self._grid]
         if not len(grid):
@@ -102,10 +102,10 @@ class Alignment:
             for channel, track in self._tracks.items()
         }
         self._collected_s = float(at_s[-1])
-        self._forget_before(self._collected_s)
+        self._drop_before(self._collected_s)
         return [(at_s, values)]
 
-    def _forget_before(self, time_s: float) -> None:
+    def _drop_before(self, time_s: float) -> None:
         """Drop the samples before the last one at or before that time."""
         for channel, (times, known) in self._tracks.items():
             begin = max(0, int(np.searchsorted(times, time_s, "right")) - 1)

@@ -29,15 +29,15 @@ from rehab.sources.intake.settings import IntakeSettings
 from rehab.sources.reporting import Notify, SourceError
 from rehab.training.steps import Measurement, Side
 
-REPEAT_S = 10.0  # before the same complaint is said again
+REPEAT_S = 10.0  # before the same warning is shown again
 CURE_OF = {str(reason): text for reason, text in CURES.items()}
 
 
 class Intake:
     """Turns rows into strides, and puts these into a ``LiveFeed``.
 
-    Nothing that comes can stop it but raw signals of a walker whose mass is not known. Rows that
-    cannot be read are counted, and reported with the cure, each kind at most every ten seconds.
+    Rows that cannot be read are counted, and reported with the cure, each kind at most every ten
+    seconds. Only raw signals of a walker whose mass is unknown stop it.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Intake:
         self._problem: SourceError | None = None
         self._failed = asyncio.Event()
         self._number = 0
-        self._said: dict[str, float] = {}
+        self._warned_s: dict[str, float] = {}
         self._reported_reasons: set[str] = set()
 
     @property
@@ -85,17 +85,17 @@ class Intake:
 
     async def wait_for_start(self) -> None:
         """Return once the session runs."""
-        while not self._feed.is_running:  # noqa: ASYNC110 (nobody wakes us, and nothing hurries)
+        while not self._feed.is_running:  # noqa: ASYNC110 (there is no event for it, and no hurry)
             await asyncio.sleep(0.05)
 
     async def watch(self) -> None:
-        """Raise SourceError once something came that only a person at the machine can put right."""
+        """Raise SourceError once there is a problem that only a person at the machine can solve."""
         await self._failed.wait()
         if self._problem is not None:
             raise self._problem
 
     def expect_rate(self, rate_hz: float) -> None:
-        """Set the rate of the samples [Hz], as their sender says it; the command line's wins."""
+        """Set the rate of the samples [Hz] that their sender declares; the command line's wins."""
         self._rate_hz = self._rate_hz or rate_hz
 
     def add_rows(self, rows: Iterable[Mapping[str, Cell]]) -> None:
@@ -120,12 +120,12 @@ class Intake:
             self._add_samples(samples)
 
     def reject_row(self, text: str) -> None:
-        """Count a row that could not be used, and report why, but not again and again."""
+        """Count a row that cannot be used, and report why, at most every ten seconds."""
         self.quality.bad_rows += 1
         self._warn(text[-40:], text)  # the cure
 
     def describe(self) -> str:
-        """Return in one line how well the source is heard, and start counting anew."""
+        """Return in one line how well the source is received, and reset the counts."""
         return self.quality.describe()
 
     def finish(self) -> None:
@@ -261,8 +261,8 @@ class Intake:
 
     def _warn(self, kind: str, text: str) -> None:
         now_s = self._monotonic()
-        if now_s - self._said.get(kind, -REPEAT_S) >= REPEAT_S:
-            if len(self._said) > 100:
-                self._said.clear()
-            self._said[kind] = now_s
+        if now_s - self._warned_s.get(kind, -REPEAT_S) >= REPEAT_S:
+            if len(self._warned_s) > 100:
+                self._warned_s.clear()
+            self._warned_s[kind] = now_s
             self._notify(text)

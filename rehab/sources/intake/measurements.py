@@ -8,7 +8,7 @@ from rehab.gait import Stride
 from rehab.training.steps import Measurement, Side
 from robot.wire.limits import MAX_REASONS
 
-# What travels with a step beside its A2, under the names that rehab.gait gives.
+# Figures that are sent with a step beside its A2, named as in ``rehab.gait.strides.Stride``.
 EXTRA = (
     *("initial_contact_s", "stance_s", "swing_s", "stride_s", "step_s"),
     *("first_double_support_s", "second_double_support_s"),
@@ -21,8 +21,7 @@ EXTRA = (
 def to_measurement(stride: Stride, number: int, side: Side) -> Measurement | None:
     """Return a stride as a measurement: A2 at its terminal contact, other figures as extras.
 
-    ``side`` is for strides whose leg is not named. None for a stride without a time: no clock could
-    place it.
+    ``side`` is for strides whose leg is not named. None for a stride without a finite time.
     """
     time_s = stride.terminal_contact_s
     if not math.isfinite(time_s):

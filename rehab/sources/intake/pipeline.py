@@ -1,4 +1,4 @@
-"""From samples to strides: finds out rate and legs, then feeds the detectors of ``rehab.gait``."""
+"""From samples to strides: detects rate and legs, then feeds the detectors of ``rehab.gait``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rehab.gait.settings import RATE_MIN_HZ, check_rate
 from rehab.sources.intake.alignment import Channel, Floats, Samples
 from rehab.sources.reporting import Notify
 
-FIRST_SAMPLES = 100  # show which legs are sent, and how fast
+FIRST_SAMPLES = 100  # from which legs and rate are detected
 CHECK_S = 30.0
 
 
@@ -28,13 +28,13 @@ class SignalPipeline:
     Parameters
     ----------
     mass_kg
-        Body mass of the walker.
+        Body mass of the walker [kg].
     rate_hz
-        Samples per second; None to find out.
+        Samples per second; None to estimate it.
     look_ahead_s
-        How long strides wait after terminal contact.
+        How long strides wait after terminal contact [s].
     notify
-        Called with what has to be put right.
+        Called with lines for the person who runs the source.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class SignalPipeline:
         return strides + (self._detector.finish() if self._detector is not None else [])
 
     def check(self) -> tuple[Finding, ...]:
-        """Return what the self-check of the first half minute found, once; nothing before."""
+        """Return the findings of the self-check of the first half minute, once; else nothing."""
         held = self._checked
         if not held or self.rate_hz is None or held[-1][0][-1] - held[0][0][0] < CHECK_S:
             return ()
@@ -142,11 +142,11 @@ def estimate_rate(t_s: Floats) -> float:
     steps = steps[steps > 0]
     if not len(steps):
         raise GaitInputError("The times of the samples do not go on.")
-    usual_s = float(np.sort(steps)[len(steps) // 2])  # one of them, not between two
+    usual_s = float(np.sort(steps)[len(steps) // 2])  # an actual step, not a mean of two
     usual = steps[np.abs(steps - usual_s) < 0.5 * usual_s]
     if len(usual) <= len(steps) / 2:
         raise GaitInputError("The times of the samples tell no rate. Give it with --rate.")
-    # Their mean: jitter adds up to nothing, and A2 is as wrong as the rate.
+    # Their mean, in which jitter cancels out: an error of the rate is one of A2.
     rate_hz = float(1 / usual.mean())
     if rate_hz < RATE_MIN_HZ / 100:
         raise GaitInputError(

@@ -1,4 +1,4 @@
-"""How well a source is heard: rate, gaps, lag and the last stride, in one line."""
+"""How well a source is received: rate, gaps, lag and the last stride, in one line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ GAP_S = 0.05  # a longer one makes its stride invalid (docs/reference/gait.md#ti
 
 
 class SignalQuality:
-    """Counts what comes. Lag is a row's delay beyond that of the quickest one, by its own time."""
+    """Counts what is received. Lag is a row's delay beyond the shortest one, by its own time."""
 
     def __init__(self, monotonic: Callable[[], float] = time.monotonic) -> None:
         self.gaps = 0
@@ -42,7 +42,7 @@ class SignalQuality:
         self._update_lag(float(t_s[-1]), went_back)
 
     def record_stride(self, stride: Measurement, *, is_timed: bool) -> None:
-        """Remember a stride; one that came with its device's time also updates the lag."""
+        """Store a stride; one that came with its device's time also updates the lag."""
         self._stride, self._stride_at_s = stride, self._monotonic()
         if is_timed:
             last_s = self._last_s.get("strides")
@@ -52,7 +52,7 @@ class SignalQuality:
             self._update_lag(stride.time_s, went_back)
 
     def describe(self) -> str:
-        """Return the line, and start counting anew."""
+        """Return the line, and reset the counts."""
         now_s = self._monotonic()
         rate_hz = self._samples / max(now_s - self._since_s, 1e-9)
         rate = f"{rate_hz:.0f} samples/s, {self.gaps} gaps, " if self._last_s and rate_hz else ""

@@ -1,4 +1,4 @@
-"""Rows with named cells: what each of them is, and the strides among them."""
+"""Rows with named cells, and how a stride is read from one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Cell = float | str | None
 
 VALUE = "value"
 TIMES = ("time_s", "time", "t")
-# Cells of a stride that are no further named values.
+# Cells of a stride that are not sent as extra values.
 _KNOWN = frozenset({VALUE, "side", "valid", "reason", "number", *TIMES})
 _SIDES = {"l": Side.LEFT, "left": Side.LEFT, "r": Side.RIGHT, "right": Side.RIGHT}
 _NO = frozenset({"0", "0.0", "false", "no"})
@@ -95,7 +95,7 @@ def _read_side(cell: Cell, side: Side) -> Side:
 
 
 def _read_reasons(cells: Mapping[str, Cell]) -> tuple[str, ...]:
-    """Return why the sender doubts the stride."""
+    """Return the reasons why the sender calls the stride invalid."""
     reasons = tuple(str(cells.get("reason") or "").split())
     if not all(NAME.fullmatch(reason) for reason in reasons):
         raise BadRow("A reason is a word of letters, digits or _, with blanks between several.")

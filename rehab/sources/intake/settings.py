@@ -1,4 +1,4 @@
-"""What has to be known of signals that cannot be read from them."""
+"""Settings of an intake that cannot be derived from the signals."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rehab.gait.settings import LOOK_AHEAD_MAX_S, MASS_MAX_KG, MASS_MIN_KG
 from rehab.sources.reporting import SourceError
 from rehab.training.steps import Side
 
-LOOK_AHEAD_S = 0.05  # takes the error of A2 from 1.0 to 0.14 % (moore2013)
+LOOK_AHEAD_S = 0.05  # reduces the error of A2 from 1.0 to 0.14 % (moore2013)
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +22,9 @@ class IntakeSettings:
     Attributes
     ----------
     mass_kg
-        Of the walker; raw signals cannot be used without.
+        Body mass of the walker [kg]; raw signals cannot be used without it.
     rate_hz
-        Samples per second; None to find out.
+        Samples per second; None to estimate it.
     look_ahead_s
         How long to wait after terminal contact for a better A2, 0-0.2 s.
     columns

@@ -1,8 +1,8 @@
 """Recorded sessions: CSV files with one row a stride, in one of the known layouts.
 
-``csv_text`` and ``table`` read text and know nothing of walking; ``layout`` defines what columns
-can mean, ``hebb`` and ``plain`` what they do mean; ``reading`` makes a ``recorded`` session of it
-all. docs/recordings.md describes the layouts and every error.
+``csv_text`` and ``table`` read text and know nothing of walking; ``layout`` defines what a layout
+is, ``hebb`` and ``plain`` are the known ones; ``reading`` makes a ``recorded`` session of it all.
+docs/recordings.md describes the layouts and every error.
 """
 
 from rehab.sources.recording.layouts import LAYOUTS

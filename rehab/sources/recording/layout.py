@@ -1,4 +1,4 @@
-"""What a layout defines: which columns hold what, and how to read what no name can tell."""
+"""What a layout defines: which columns hold what, and how to read reasons and phases."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rehab.training.steps import Side
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Which columns hold what, and two functions for what a column's name cannot tell.
+    """Which columns hold what, and two functions that read reasons and phase of a row.
 
     ``required`` columns must be there; any other that is named here may be missing. Without a
     column ``time_s``, strides lie ``stride_s`` [s] apart. ``extra`` columns are kept as further

@@ -1,4 +1,4 @@
-"""The layout for everybody else: time and value, and optional columns for the rest."""
+"""The general layout: time and value, and optional columns for the rest."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _read_plain_reasons(row: Row) -> tuple[str, ...]:
         raise row.error("a valid stride has no reason. Write valid 0 or no reason.", "valid")
     if valid is False and not reasons:
         return (InvalidReason.FLAGGED,)
-    # Scoring finds a missing value by itself; said twice, it would count as another fault.
+    # Scoring finds a missing value by itself; given twice, it would count as another fault.
     missing = row.number_in("value") is None
     return tuple(reason for reason in reasons if not (missing and reason == InvalidReason.MISSING))
 

@@ -26,7 +26,7 @@ class RecordedStride:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A recorded session. Iterating gives its measurements.
+    """A recorded session. Iterating yields its measurements.
 
     ``trained_side`` is None where neither the file nor the caller says which leg was trained; the
     measurements then carry the left one. ``goal`` is in the unit of the value.
@@ -43,5 +43,5 @@ class Recording:
         return (stride.measurement for stride in self.strides)
 
     def phases_at_gain_one(self) -> tuple[Phase, ...]:
-        """Return the same phases with the real value shown in each."""
+        """Return the same phases with a gain of 1, so that real values are shown."""
         return tuple(replace(phase, gain=1.0) for phase in self.phases)

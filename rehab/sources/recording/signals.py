@@ -20,7 +20,7 @@ def measure_file(
     look_ahead_s: float,
     side: Side | None,
 ) -> tuple[list[Measurement], list[str]]:
-    """Return the strides of a file in the order walked, and what its self-check found.
+    """Return the strides of a file in the order walked, and the messages of its self-check.
 
     ``side`` selects a leg; None returns both. Raises RecordingError for a file that cannot be read
     and GaitInputError for signals that nothing can be measured from.

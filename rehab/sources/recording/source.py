@@ -1,7 +1,7 @@
 """Plays a recording: a session with one row a stride, or raw signals with one row a sample.
 
 Signals (layouts moore2013 and garry, or --columns) are measured whole before the first stride is
-sent, with the same numbers as while somebody walks.
+sent, with the same result as while somebody walks.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def holds_signals(path: Path) -> bool:
         return False
     header = next(csv.reader([first], delimiter=max(",;\t", key=first.count)), [])
     names = {name.strip() for name in header}
-    # What tells them from strides: a time, and forces that vary within each.
+    # Unlike strides they have a time and forces.
     return {"time", "LeftGRF_y"} <= names or (
         "time_s" in names and bool({"left_force_n", "right_force_n"} & names)
     )

@@ -1,4 +1,4 @@
-"""A table of text whose cells know their place and can be read as numbers."""
+"""A table of text whose cells can be read as numbers, with errors that name their place."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?", re.ASCII | r
 _INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE)
 _MISSING = frozenset({"", "nan", "-nan"})  # MATLAB writes a missing number as NaN
 _FLAGS = {"1": True, "1.0": True, "true": True, "0": False, "0.0": False, "false": False}
-_LARGEST_WHOLE = 2**53  # from here on, floats skip whole numbers
+_LARGEST_WHOLE = 2**53  # floats above do not have every whole number
 
 
 class RecordingError(ValueError):

@@ -1,7 +1,7 @@
 """How synthetic walkers walk: what varies, what is learned, what tires and what fails.
 
 Every figure comes from docs/reference/gait.md#dynamics (dynamics of three recorded sessions, in
-units of the baseline) unless its place says otherwise.
+units of the baseline) unless a comment beside it says otherwise.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class WalkerProfile:
     trained_level, learning_strides
         What ``1 - exp(-n / learning_strides)`` then leads up to.
     fatigue_per_100_strides, recovery
-        Change of the level within a trial, and which part of it a pause takes away.
+        Decrease of the level within a trial, and the share of it that a pause restores.
     after_effect, after_effect_strides
         What remains of a learned level as soon as feedback stops, and how many strides of washout
         take it down to 1/e (S1: 1.14 in the first minute, 1.09 in the tenth).

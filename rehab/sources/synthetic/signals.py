@@ -20,8 +20,8 @@ from rehab.training.steps import Measurement
 Floats = NDArray[np.float64]
 
 GRAVITY_M_S2 = 9.81
-# By share of stance: vertical and forward force (N/kg, the vertical one before it is scaled to the
-# body's weight), moment (of its peak).
+# Functions of the share of stance: vertical and forward force (N/kg, the vertical one before it is
+# scaled to the body's weight), moment (of its peak).
 FORCE = PchipInterpolator(
     [0, 0.03, 0.1, 0.22, 0.35, 0.5, 0.65, 0.78, 0.88, 0.95, 0.98, 1],
     [0, 1.6, 5, 10.2, 8.8, 7.8, 8.6, 10.4, 7.5, 2.6, 0.8, 0],
@@ -84,13 +84,13 @@ class Sensors:
     rate_hz
         Samples per second.
     jitter_s
-        Sd of the samples' times, which are told truly.
+        Sd of the samples' times, which are sent as they are.
     force_noise_n, moment_noise_nm, angle_noise_rad
         White sd.
     force_offset_n, force_drift_n_min
-        The plates' zero at the start, and its change per minute.
+        The plates' zero at the start [N], and its change [N/min].
     angle_delay_s
-        By how much the angle comes too late.
+        By how much the angle is late [s].
     """
 
     rate_hz: float = 100.0

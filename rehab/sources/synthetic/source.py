@@ -66,7 +66,7 @@ class SyntheticSource(PlayedSource):
 
 
 def make_opener(options: Namespace, notify: Notify) -> Callable[[SyntheticWalker], SignalWalker]:
-    """Return what adds signals to a walker. Raises SourceError or GaitInputError."""
+    """Return a function that adds signals to a walker. Raises SourceError or GaitInputError."""
     from rehab.gait import TwoLegDetector
     from rehab.sources.intake import IntakeSettings
     from rehab.sources.intake.recorder import SignalRecorder

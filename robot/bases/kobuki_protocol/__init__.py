@@ -54,9 +54,9 @@ from robot.bases.kobuki_protocol.wheels import (
     TICK_M,
     WHEEL_MAX_M_S,
     WHEELBASE_M,
-    control_of,
+    control_to_twist,
     slow_to_wheels,
-    twist_of,
+    twist_to_control,
     wheel_speeds,
 )
 
@@ -100,13 +100,13 @@ __all__ = [
     "Udid",
     "Version",
     "Wheel",
-    "control_of",
+    "control_to_twist",
     "decode_commands",
     "decode_feedback",
     "encode_commands",
     "encode_feedback",
     "frame",
     "slow_to_wheels",
-    "twist_of",
+    "twist_to_control",
     "wheel_speeds",
 ]

@@ -10,7 +10,7 @@ from robot.bases.kobuki_protocol.frames import frame, split, sub_payload, unpack
 
 
 class Extra(IntFlag):
-    """What ``RequestExtra`` asks for."""
+    """Flags of ``RequestExtra``: the parts that it requests."""
 
     HARDWARE = 0x01
     FIRMWARE = 0x02
@@ -46,7 +46,7 @@ class Melody(IntEnum):
 
 
 class BaseControl(NamedTuple):
-    """The setpoint, until the next one: ``wheels.control_of`` makes it from a twist."""
+    """The setpoint, until the next one: ``wheels.twist_to_control`` makes it from a twist."""
 
     speed_mm_s: int  # of the outer wheel
     radius_mm: int  # above 0: around a point on the left; 1: on the spot; 0: straight

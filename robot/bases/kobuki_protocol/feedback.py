@@ -1,4 +1,4 @@
-"""Feedback of a Kobuki, as it sends it; properties give SI (docs/reference/kobuki.md#feedback)."""
+"""Feedback of a Kobuki as it is sent; properties are in SI (docs/reference/kobuki.md#feedback)."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ class ControllerInfo(NamedTuple):
 
 
 class Feedback(NamedTuple):
-    """One frame of a base; None where it did not say."""
+    """One frame of a base; None for parts that it does not have."""
 
     core: CoreSensors | None = None
     dock: DockIr | None = None
@@ -181,7 +181,7 @@ _LAYOUTS: dict[int, tuple[str, Any, Struct]] = {
 }
 _HARDWARE, _FIRMWARE, _GYRO = 10, 11, 13
 _SAMPLE = Struct("<hhh")
-# As firmware 1.0.0 calls itself, in two bytes (docs/reference/kobuki.md#feedback).
+# What firmware 1.0.0 reports as its version, in two bytes (docs/reference/kobuki.md#feedback).
 FIRST_FIRMWARE = Version(1, 2, 3)
 _NUMBERS = (1, 3, 4, 5, 6, _HARDWARE, _FIRMWARE, _GYRO, 15, 16, 19, 21)  # of Feedback's fields
 
@@ -233,9 +233,9 @@ def decode_feedback(payload: bytes) -> Feedback:
         elif number == _HARDWARE:
             parts["hardware"] = _read_version(data)
         elif number == _FIRMWARE:
-            said = _read_version(data)
-            is_first = len(data) == 2 and said == FIRST_FIRMWARE
-            parts["firmware"] = Version(1, 0, 0) if is_first else said
+            version = _read_version(data)
+            is_first = len(data) == 2 and version == FIRST_FIRMWARE
+            parts["firmware"] = Version(1, 0, 0) if is_first else version
     return Feedback(**parts)
 
 

@@ -27,7 +27,7 @@ T = TypeVar("T")
 
 
 class Malformed(ValueError):
-    """A payload that is not one, though its checksum may be right."""
+    """A payload that cannot be decoded, though its checksum may be right."""
 
 
 def frame(payload: bytes) -> bytes:
@@ -41,8 +41,8 @@ def frame(payload: bytes) -> bytes:
 class FrameReader(Generic[T]):
     """Finds frames in a stream of bytes, however it is cut up and whatever else is in it.
 
-    A frame that does not hold is searched for another one from its second byte on: the header may
-    have been false, and behind it stands a true one (docs/reference/kobuki.md#lost-bytes).
+    A frame that is not valid is searched for another one from its second byte on: the header may
+    have been false, with a true one behind it (docs/reference/kobuki.md#lost-bytes).
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ class FrameReader(Generic[T]):
     Attributes
     ----------
     frames
-        Frames that held.
+        How many frames were valid.
     bad_checksums, malformed
-        Those that did not, and why.
+        How many were not, by cause.
     skipped_bytes
-        Bytes that belong to no frame that held.
+        How many bytes belong to no valid frame.
     """
 
     def __init__(self, decode: Callable[[bytes], T]) -> None:
@@ -65,7 +65,7 @@ class FrameReader(Generic[T]):
         self._buffer = bytearray()
 
     def feed(self, data: bytes) -> list[T]:
-        """Add the next bytes, and return what the frames hold that are complete now.
+        """Add the next bytes, and return the contents of the frames that they complete.
 
         Parameters
         ----------
@@ -104,15 +104,16 @@ class FrameReader(Generic[T]):
             self.bad_checksums += 1
             raise Malformed("The checksum is wrong.")
         try:
-            said = self._decode(body[1:-1])
+            content = self._decode(body[1:-1])
         except Malformed:
             self.malformed += 1
             raise
         self.frames += 1
-        return said
+        return content
 
 
 def sub_payload(number: int, data: bytes) -> bytes:
+    """Return a sub-payload: its id, its length and its data."""
     return bytes((number, len(data))) + data
 
 
@@ -128,6 +129,7 @@ def split(payload: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def unpack(layout: Struct, number: int, data: bytes) -> tuple[Any, ...]:
+    """Return the fields of a sub-payload. Raises Malformed where its length is wrong."""
     if len(data) != layout.size:
         raise Malformed(f"Sub-payload {number} has {layout.size} bytes, not {len(data)}.")
     return layout.unpack(data)

@@ -11,12 +11,12 @@ from robot.motion.twist import STILL, Twist
 # (docs/reference/kobuki.md#odometry-and-gyro).
 WHEELBASE_M = 0.23
 TICK_M = 8.5292090497737556558e-5
-# Neither wheel goes faster [m/s] (docs/reference/kobuki.md#limits).
+# Largest speed of a wheel [m/s] (docs/reference/kobuki.md#limits).
 WHEEL_MAX_M_S = 0.70
 
 HALF_MM = 1000 * WHEELBASE_M / 2
 RADIUS_MAX_MM = 32767
-ON_THE_SPOT = 1  # the radius that says so
+ON_THE_SPOT = 1  # the radius [mm] that means a turn on the spot
 
 STOP = BaseControl(0, 0)
 
@@ -36,7 +36,7 @@ def slow_to_wheels(twist: Twist) -> Twist:
     return Twist(twist.v_m_s / too_fast, twist.w_rad_s / too_fast)
 
 
-def control_of(twist: Twist) -> BaseControl:
+def twist_to_control(twist: Twist) -> BaseControl:
     """Return the command that comes nearest to a twist.
 
     Parameters
@@ -69,7 +69,7 @@ def control_of(twist: Twist) -> BaseControl:
     return BaseControl(round(outer_mm_s), radius_mm)
 
 
-def twist_of(control: BaseControl) -> Twist:
+def control_to_twist(control: BaseControl) -> Twist:
     """Return the twist that a command means, as the firmware reads it.
 
     Source: docs/reference/kobuki.md#speed-and-radius.

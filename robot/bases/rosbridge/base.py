@@ -23,7 +23,7 @@ from robot.bases.rosbridge.topics import (
 from robot.motion.twist import STILL, Twist
 from robot.ros.bridge import Bridge, find_bridge
 
-GREETING_S = 3.0  # a bridge that is there has said by then where the base is
+GREETING_S = 3.0  # a bridge that is there has sent odometry by then
 
 
 class RosbridgeBase(MobileBase):
@@ -42,7 +42,7 @@ class RosbridgeBase(MobileBase):
         self._monotonic = monotonic
         self._lock = threading.Lock()  # the bridge has a thread of its own
         self._bridge: Bridge | None = None
-        self._choose(topics)
+        self._set_topics(topics)
 
     @classmethod
     def add_arguments(cls, group: ArgumentParser | _ArgumentGroup) -> None:
@@ -52,7 +52,7 @@ class RosbridgeBase(MobileBase):
     def configure(self, options: Namespace) -> None:
         """Apply the bridge's address and the base's topics. Raises BadOption."""
         self.port = options.ros_url
-        self._choose(read_topics(options))
+        self._set_topics(read_topics(options))
 
     def __enter__(self) -> Self:
         """Connect, and wait a moment for the base's odometry."""
@@ -75,14 +75,14 @@ class RosbridgeBase(MobileBase):
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """Count what went wrong with the connection, with orders, and with odometry."""
+        """How often something went wrong with the connection, with orders, and with odometry."""
         with self._lock:
             counts = dict(self._client.counters)
         return counts if self._bridge is None else counts | self._bridge.counters
 
     @property
     def problem(self) -> str:
-        """Return why the base cannot be reached; empty where it can."""
+        """Why the base cannot be reached; empty where it can."""
         if self._bridge is None:
             return ""
         with self._lock:
@@ -115,6 +115,6 @@ class RosbridgeBase(MobileBase):
         with self._lock:
             self._client.odometry.set_home()
 
-    def _choose(self, topics: Topics) -> None:
+    def _set_topics(self, topics: Topics) -> None:
         self.abilities = topics.abilities
         self._client = BaseClient(topics, self._monotonic())

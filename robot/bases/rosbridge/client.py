@@ -12,11 +12,11 @@ from robot.bases.rosbridge.perception import DeadReckoning, HazardSensors, Repor
 from robot.bases.rosbridge.topics import Topics
 from robot.motion.twist import STILL
 from robot.ros.frames import (
-    Answer,
     BadRosFrame,
     Frame,
     Incoming,
     Publication,
+    ServiceResponse,
     advertise,
     call_service,
     publish,
@@ -36,12 +36,12 @@ from robot.ros.messages import (
 ODOMETRY_EVERY_MS = 20  # as often as orders go out
 LAST_STOPS = 3  # one may be lost (docs/reference/kobuki.md#orders)
 
-# rosapi tells whether anybody is there, where it runs; asked so often [s], while the base stands.
+# Where rosapi runs, it knows who uses a topic; called this often [s], while the base stands.
 SUBSCRIBERS, PUBLISHERS = "/rosapi/subscribers", "/rosapi/publishers"
-ASK_EVERY_S = 2.0
-LATE_S = 1.0  # then somebody who looks on should know
+CALL_EVERY_S = 2.0
+LATE_S = 1.0  # after this it is reported as a problem
 
-# Why it must not move; bases/base.py, SensorState.
+# Refusals, see ``SensorState``.
 NOBODY_LISTENS = "nobody_listens"
 SENSOR_MISSING = "feeler_missing"
 # Hazards of its own.
@@ -61,7 +61,7 @@ class BaseClient:
         self.sensors = HazardSensors()
         self._is_open = False
         self._opened_s = now_s
-        self._asked_s = -math.inf
+        self._called_s = -math.inf
         self._missing: dict[str, str] = {}  # topic: why it must not move
 
     @property
@@ -71,8 +71,8 @@ class BaseClient:
 
     def open(self, now_s: float) -> Iterator[Frame]:
         """Yield the first frames of a new connection. Its first order is to stand still."""
-        self.lose(now_s)
-        self._is_open, self._opened_s, self._asked_s = True, now_s, -math.inf
+        self.disconnect(now_s)
+        self._is_open, self._opened_s, self._called_s = True, now_s, -math.inf
         topics = self.topics
         yield advertise(topics.order)
         yield subscribe(topics.order)
@@ -87,43 +87,43 @@ class BaseClient:
         if twist is not None:
             self.odometry.order(twist, now_s)
             yield publish(self.topics.order, write_twist(twist))
-        if self.orders.sent.is_still and now_s - self._asked_s >= ASK_EVERY_S:
-            self._asked_s = now_s
+        if self.orders.sent.is_still and now_s - self._called_s >= CALL_EVERY_S:
+            self._called_s = now_s
             name = self.topics.order.name
             yield call_service(SUBSCRIBERS, {"topic": name}, name)
             for topic in self.topics.sensors.values():
                 yield call_service(PUBLISHERS, {"topic": topic.name}, topic.name)
 
-    def hear(self, heard: Incoming, now_s: float) -> None:
+    def handle(self, incoming: Incoming, now_s: float) -> None:
         """Handle a frame of the bridge. Raises BadRosFrame for impossible values."""
-        if isinstance(heard, Answer):
-            self._take_answer(heard)
+        if isinstance(incoming, ServiceResponse):
+            self._handle_response(incoming)
             return
         odometry = self.topics.odometry
-        if heard.topic == self.topics.order.name:
-            if self.orders.come_back(read_twist(heard.message)):
-                self.sensors.note(OTHER_DRIVER, now_s)
-        elif odometry is not None and heard.topic == odometry.name:
-            pose, twist = read_odometry(heard.message)
-            if isinstance(self.odometry, ReportedOdometry) and self.odometry.take(
+        if incoming.topic == self.topics.order.name:
+            if self.orders.handle_echo(read_twist(incoming.message)):
+                self.sensors.record(OTHER_DRIVER, now_s)
+        elif odometry is not None and incoming.topic == odometry.name:
+            pose, twist = read_odometry(incoming.message)
+            if isinstance(self.odometry, ReportedOdometry) and self.odometry.update(
                 pose, twist, now_s
             ):
                 self.sensors.counters["jumped"] += 1
-                self.sensors.note(RESTARTED, now_s)
+                self.sensors.record(RESTARTED, now_s)
         else:
-            self._feel(heard, now_s)
+            self._handle_event(incoming, now_s)
 
-    def lose(self, now_s: float) -> None:
+    def disconnect(self, now_s: float) -> None:
         """Reset orders and hazards: the connection is lost."""
         self._is_open = False
-        self.orders.forget()
+        self.orders.reset()
         self.odometry.order(STILL, now_s)
-        self.sensors.forget()
+        self.sensors.reset()
         self._missing.clear()
 
     def end(self, now_s: float) -> Iterator[Frame]:
         """Yield the last frames: stand still, unsubscribe, unadvertise."""
-        self.lose(now_s)
+        self.disconnect(now_s)
         topics = self.topics
         for _ in range(LAST_STOPS):
             yield publish(topics.order, write_twist(STILL))
@@ -143,42 +143,42 @@ class BaseClient:
         return BaseState(self.odometry.pose, self.odometry.twist, sensors)
 
     def silent_s(self, now_s: float) -> float:
-        """Return how long it has been unknown whether orders arrive, or where it is [s]."""
-        if not self._is_open or not self.orders.is_answered:
+        """Return for how long it is unknown whether orders arrive, or where the base is [s]."""
+        if not self._is_open or not self.orders.is_confirmed:
             return math.inf
-        return max(0.0, self.orders.unanswered_s(now_s), now_s - self.odometry.seen_s)
+        return max(0.0, self.orders.unconfirmed_s(now_s), now_s - self.odometry.seen_s)
 
     def problem(self, now_s: float) -> str:
         """Return what is wrong at a bridge that answers; empty where nothing is."""
         order, odometry = self.topics.order.name, self.topics.odometry
         if not self._is_open or now_s - self._opened_s < LATE_S:
             return ""
-        if not self.orders.is_answered or self.orders.unanswered_s(now_s) > LATE_S:
+        if not self.orders.is_confirmed or self.orders.unconfirmed_s(now_s) > LATE_S:
             return f"Nothing that is sent on {order} comes back: is it of the type {TWIST}?"
         if odometry is not None and now_s - self.odometry.seen_s > LATE_S:
             return f"No {ODOMETRY} comes on {odometry.name}: does its driver run?"
         for topic, reason in self._missing.items():
             if reason == NOBODY_LISTENS:
                 return f"No driver listens on {topic}: start it, or choose another --cmd-topic."
-            return f"Nobody tells on {topic}: start what does, or say that there is none."
+            return f"Nobody publishes on {topic}: start its driver, or give none for that topic."
         return ""
 
-    def _feel(self, heard: Publication, now_s: float) -> None:
+    def _handle_event(self, incoming: Publication, now_s: float) -> None:
         for hazard, topic in self.topics.sensors.items():
-            if topic.name == heard.topic:
-                which, is_felt = read_event(topic.kind, heard.message)
-                self.sensors.take(hazard, which, is_felt, now_s)
+            if topic.name == incoming.topic:
+                which, is_detected = read_event(topic.kind, incoming.message)
+                self.sensors.update(hazard, which, is_detected, now_s)
                 return
         raise BadRosFrame("Nobody asked for that topic.")
 
-    def _take_answer(self, answer: Answer) -> None:
+    def _handle_response(self, response: ServiceResponse) -> None:
         """Store who uses a topic. Without rosapi that is unknown, and nothing is refused."""
-        is_order = answer.question == self.topics.order.name
-        there = (answer.values or {}).get("subscribers" if is_order else "publishers")
+        is_order = response.call_id == self.topics.order.name
+        there = (response.values or {}).get("subscribers" if is_order else "publishers")
         if not isinstance(there, list):
             return
         # The bridge itself listens to what we order.
         if len(there) >= (2 if is_order else 1):
-            self._missing.pop(answer.question, None)
+            self._missing.pop(response.call_id, None)
         else:
-            self._missing[answer.question] = NOBODY_LISTENS if is_order else SENSOR_MISSING
+            self._missing[response.call_id] = NOBODY_LISTENS if is_order else SENSOR_MISSING

@@ -9,11 +9,11 @@ from robot.motion.limits import ORDER_HOLDS_S
 from robot.motion.pose import HOME, Pose, advance, wrap
 from robot.motion.twist import STILL, Twist
 
-# From one odometry to the next a base comes no further [m, rad], at our ceilings and with a second
-# between them: it was restarted, or another program has set its odometry.
+# From one odometry message to the next a base moves no further [m, rad], at our ceilings and with a
+# second between them. Beyond that it was restarted, or another program has set its odometry.
 JUMP_M, JUMP_RAD = 0.3, 1.8
 
-FELT_S = 0.1  # what was felt counts for so long [s]: no look in between misses it
+HAZARD_HOLD_S = 0.1  # a hazard counts for this long after it was detected: no tick misses it
 
 
 class ReportedOdometry:
@@ -24,33 +24,33 @@ class ReportedOdometry:
     pose, twist
         Where it is from home, and how it moves.
     seen_s
-        When that was last told [s].
+        When that was last reported [s].
     """
 
     def __init__(self) -> None:
         self.pose, self.twist, self.seen_s = HOME, STILL, -math.inf
         self._home: Pose | None = None
-        self._last = HOME  # as the base tells it
+        self._last = HOME  # as the base reports it
         self._heading_rad = 0.0  # likewise, full turns included
 
-    def take(self, told: Pose, twist: Twist, now_s: float) -> bool:
+    def update(self, reported: Pose, twist: Twist, now_s: float) -> bool:
         """Store a reported pose, and return whether it has jumped."""
-        turned_rad = wrap(told.heading_rad - self._last.heading_rad)
+        turned_rad = wrap(reported.heading_rad - self._last.heading_rad)
         jumped = self._home is not None and (
-            told.distance_m(self._last) > JUMP_M or abs(turned_rad) > JUMP_RAD
+            reported.distance_m(self._last) > JUMP_M or abs(turned_rad) > JUMP_RAD
         )
         self._heading_rad += turned_rad
-        self._last, self.twist, self.seen_s = told, twist, now_s
+        self._last, self.twist, self.seen_s = reported, twist, now_s
         if self._home is None:
             self.set_home()
-        self._look()
+        self._update_pose()
         return jumped
 
     def set_home(self) -> None:
         """Make the present place home."""
         last = self._last
         self._home = Pose(last.x_m, last.y_m, self._heading_rad)
-        self._look()
+        self._update_pose()
 
     def move(self, now_s: float) -> None:
         """Do nothing: the base reports how it moves."""
@@ -58,7 +58,7 @@ class ReportedOdometry:
     def order(self, twist: Twist, now_s: float) -> None:
         """Do nothing: the base reports how it follows."""
 
-    def _look(self) -> None:
+    def _update_pose(self) -> None:
         home = self._home or HOME
         x_m, y_m = self._last.x_m - home.x_m, self._last.y_m - home.y_m
         cos, sin = math.cos(home.heading_rad), math.sin(home.heading_rad)
@@ -70,7 +70,7 @@ class ReportedOdometry:
 class DeadReckoning:
     """Where a base without odometry is, if it does what it is sent: an open loop.
 
-    Gestures that are closed on this are profiles of speed over time, with their ramps.
+    A gesture that is played on this is a profile of speed over time, with its ramps.
     """
 
     def __init__(self) -> None:
@@ -83,7 +83,7 @@ class DeadReckoning:
         self.twist, self._ordered_s = twist, now_s
 
     def move(self, now_s: float) -> None:
-        """Bring it to where it should be now; no further than what was sent holds."""
+        """Advance its pose to the present, at most for as long as the last order holds."""
         moved_s = min(now_s, self._ordered_s + ORDER_HOLDS_S) - self._until_s
         if moved_s > 0 and not self.twist.is_still:
             self.pose = advance(self.pose, self.twist, moved_s)
@@ -99,31 +99,31 @@ class DeadReckoning:
 class HazardSensors:
     """Hazards: what bumpers, cliff sensors and wheels report, and what happened to it.
 
-    Events come when something changes. One that was missed while the connection was lost is not
-    known; that stops it anyhow.
+    Events come when something changes. Those of a lost connection are missed; the loss itself
+    stops the base.
     """
 
     def __init__(self) -> None:
         self.counters: Counter[str] = Counter(jumped=0)
         self._pressed: dict[str, set[int]] = {}
-        self._felt_s: dict[str, float] = {}
+        self._detected_s: dict[str, float] = {}
 
-    def take(self, hazard: str, which: int, is_felt: bool, now_s: float) -> None:
+    def update(self, hazard: str, which: int, is_detected: bool, now_s: float) -> None:
         """Store an event of one sensor."""
         pressed = self._pressed.setdefault(hazard, set())
-        (pressed.add if is_felt else pressed.discard)(which)
-        if is_felt:
-            self._felt_s[hazard] = now_s
+        (pressed.add if is_detected else pressed.discard)(which)
+        if is_detected:
+            self._detected_s[hazard] = now_s
 
-    def note(self, hazard: str, now_s: float) -> None:
+    def record(self, hazard: str, now_s: float) -> None:
         """Store something that happened."""
-        self._felt_s[hazard] = now_s
+        self._detected_s[hazard] = now_s
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Reset what is pressed: the connection is lost."""
         self._pressed.clear()
 
     def hazards(self, now_s: float) -> frozenset[str]:
         """Return the hazards of now and of a moment ago."""
-        recent = {name for name, felt_s in self._felt_s.items() if now_s - felt_s <= FELT_S}
+        recent = {name for name, at_s in self._detected_s.items() if now_s - at_s <= HAZARD_HOLD_S}
         return frozenset(recent | {name for name, pressed in self._pressed.items() if pressed})

@@ -1,4 +1,4 @@
-"""Which topics a base has, and what it can do by them."""
+"""Which topics a base has, and the abilities that follow from them."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class Topics:
     Parameters
     ----------
     order
-        Takes geometry_msgs/Twist.
+        Accepts geometry_msgs/Twist.
     odometry
-        Gives nav_msgs/Odometry; None for an open loop.
+        Publishes nav_msgs/Odometry; None for an open loop.
     sensors
-        What stops it, as a hazard's code, and the topic that tells so.
+        Topics of its hazards, by the hazard's code.
     """
 
     order: Topic

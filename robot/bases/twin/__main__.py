@@ -114,7 +114,7 @@ def make_parser() -> ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the twin of the command line until told to end, and return the exit status."""
+    """Run the twin of the command line until it is stopped, and return the exit status."""
     parser = make_parser()
     options = parser.parse_args(arguments)
     if options.camera and not (find_spec("pybullet") and find_spec("PIL")):

@@ -66,7 +66,7 @@ class Body(Protocol):
 
 
 class KinematicBody:
-    """Rolls as it is told on an endless empty floor, for frames of a length [s]."""
+    """Rolls exactly as ordered on an endless empty floor, for frames of a length [s]."""
 
     def __init__(self, frame_s: float) -> None:
         self._frame_s = frame_s

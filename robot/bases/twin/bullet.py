@@ -20,7 +20,7 @@ TORQUE_MAX_N_M = 1.0
 FRICTION = {"base": 0.3, "left_wheel": 1.0, "right_wheel": 1.0}  # casters: 0
 CENTER_OF_MASS_M = (0.01, 0.0, 0.0102)
 SENSOR_HEIGHT_M = 0.0316
-# From these points rays look down: from the floor sensors right, center and left, and the axles of
+# Rays are cast down from these points: the floor sensors right, center and left, and the axles of
 # the wheels right and left.
 FLOOR_SENSORS_M = (
     (0.085, -0.136, SENSOR_HEIGHT_M),
@@ -28,9 +28,9 @@ FLOOR_SENSORS_M = (
     (0.087, 0.136, SENSOR_HEIGHT_M),
 )
 AXLES_M = ((0.0, -0.115, WHEEL_M), (0.0, 0.115, WHEEL_M))
-SEEN_M = 0.15  # how far the floor sensors see
+SENSOR_RANGE_M = 0.15  # how far the floor sensors see
 LEVEL, LEVEL_M = 0.9999, 0.002  # standing like this (cosine of 0.8°, height), no wheel hangs
-DROP_M = 0.01  # a wheel that hangs lower than this under its place has dropped; ours do not spring
+DROP_M = 0.01  # a wheel that hangs lower than this under its place has dropped; ours have no spring
 # The bumper's three thirds of the front half; touched by what is nearer than 1 mm (both our own).
 THIRD_RAD = math.pi / 6
 TOUCH_M = 0.001
@@ -74,7 +74,7 @@ class BulletBody:
         self._step = self._world.stepSimulation
         self._locate = self._world.getBasePositionAndOrientation
         self._rotate = self._world.getMatrixFromQuaternion
-        self._look_at_joints = self._world.getJointStates
+        self._read_joints = self._world.getJointStates
         self._find_contacts = self._world.getContactPoints
         self._cast_rays = self._world.rayTestBatch
         self._frame_s, self._walls = frame_s, list[int]()
@@ -102,15 +102,15 @@ class BulletBody:
         for _ in range(STEPS):
             self._step()
         was_rad = self.pose.heading_rad
-        self._look()
+        self._update_state()
         self.turn_rad_s = (self.pose.heading_rad - was_rad) / self._frame_s
 
     def touch(self) -> Touch:
         """Return what it touches now."""
         right_m, center_m, left_m = self._measure_down(FLOOR_SENSORS_M)
         return Touch(
-            self._press() if self._walls else 0,
-            0 if self._is_level else self._drop(),
+            self._bumper_bits() if self._walls else 0,
+            0 if self._is_level else self._wheel_drop_bits(),
             (right_m, center_m, left_m),
             self._torque_n_m,
         )
@@ -121,23 +121,23 @@ class BulletBody:
             self._robot, CENTER_OF_MASS_M, (0.0, 0.0, 0.0, 1.0)
         )
         self._world.resetBaseVelocity(self._robot, (0, 0, 0), (0, 0, 0))
-        self._look()
+        self._update_state()
         self.pose = HOME
 
     def put_wall(self, ahead_m: float) -> None:
         """Put a wall so far in front of its middle [m]."""
         away_m = ahead_m + WALL_SIZE_M[0] / 2
-        middle_m = self._ahead(away_m, WALL_SIZE_M[2] / 2)
+        middle_m = self._place_ahead(away_m, WALL_SIZE_M[2] / 2)
         self._walls.append(self._put_box(WALL_SIZE_M, middle_m, self.pose.heading_rad))
 
     def put_edge(self, ahead_m: float) -> None:
         """End the floor so far in front of its middle [m]."""
         self._world.removeBody(self._floor)
         away_m = ahead_m - FLOOR_SIZE_M[0] / 2
-        middle_m = self._ahead(away_m, -FLOOR_SIZE_M[2] / 2)
+        middle_m = self._place_ahead(away_m, -FLOOR_SIZE_M[2] / 2)
         self._floor = self._put_box(FLOOR_SIZE_M, middle_m, self.pose.heading_rad)
 
-    def _look(self) -> None:
+    def _update_state(self) -> None:
         """Read where it is and how far its wheels have rolled."""
         (x_m, y_m, z_m), turned = self._locate(self._robot)
         self._axes = a = self._rotate(turned)
@@ -150,7 +150,7 @@ class BulletBody:
         )
         was_rad = self.pose.heading_rad
         self.pose = Pose(x_m, y_m, was_rad + wrap(math.atan2(a[3], a[0]) - was_rad))
-        left, right = self._look_at_joints(self._robot, self._wheels)
+        left, right = self._read_joints(self._robot, self._wheels)
         self.rolled_m = (left[0] * WHEEL_M, right[0] * WHEEL_M)
         self._torque_n_m = (left[3], right[3])
 
@@ -158,7 +158,7 @@ class BulletBody:
     def _is_level(self) -> bool:
         return self._axes[8] > LEVEL and abs(self._at_m[2]) < LEVEL_M
 
-    def _press(self) -> int:
+    def _bumper_bits(self) -> int:
         """Return the bits of the bumper that walls press."""
         bumper, a, (x_m, y_m, _) = 0, self._axes, self._at_m
         for contact in self._find_contacts(self._robot, linkIndexA=-1):
@@ -169,7 +169,7 @@ class BulletBody:
                 )
         return bumper
 
-    def _drop(self) -> int:
+    def _wheel_drop_bits(self) -> int:
         """Return the bits of the wheels that hang."""
         right_m, left_m = self._measure_down(AXLES_M)
         right = Wheel.RIGHT if right_m > WHEEL_M + DROP_M else 0
@@ -178,7 +178,7 @@ class BulletBody:
     def _measure_down(self, points_m: Sequence[tuple[float, float, float]]) -> list[float]:
         """Return the distance down from each of these points to anything [m]."""
         a, (x_m, y_m, z_m) = self._axes, self._at_m
-        down_x, down_y, down_z = SEEN_M * a[2], SEEN_M * a[5], SEEN_M * a[8]
+        down_x, down_y, down_z = SENSOR_RANGE_M * a[2], SENSOR_RANGE_M * a[5], SENSOR_RANGE_M * a[8]
         starts, ends = [], []
         for px, py, pz in points_m:
             x = x_m + a[0] * px + a[1] * py + a[2] * pz
@@ -187,9 +187,9 @@ class BulletBody:
             starts.append((x, y, z))
             ends.append((x - down_x, y - down_y, z - down_z))
         hits = self._cast_rays(starts, ends, collisionFilterMask=SURROUNDINGS)
-        return [SEEN_M * hit[2] for hit in hits]
+        return [SENSOR_RANGE_M * hit[2] for hit in hits]
 
-    def _ahead(self, away_m: float, z_m: float) -> tuple[float, float, float]:
+    def _place_ahead(self, away_m: float, z_m: float) -> tuple[float, float, float]:
         pose = self.pose
         return (
             pose.x_m + away_m * math.cos(pose.heading_rad),

@@ -1,7 +1,7 @@
 """A picture of the twin, five a second at most, drawn by a process of its own beside it.
 
-Drawing takes longer than the twin's frames last, so it is told where the twin is and looks there by
-itself; what it is told meanwhile is dropped but for the last.
+Drawing takes longer than one frame of the twin. So the process gets poses on standard input, and
+draws only the last of those that came while it drew.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from robot.motion.pose import Pose
 INTERVAL_S = 0.2
 WIDTH, HEIGHT = 320, 240  # 33 ms a picture on a core of 2026; 480 × 360 takes 78
 END_S = 2.0
-# Where it stands: so far from home and so high that the tether fits into the picture.
-AWAY_M, TURNED_DEG, TILTED_DEG, SEES_DEG = 1.6, 50.0, -35.0, 50.0
+# Where the camera stands: the whole tether is in the picture.
+DISTANCE_M, YAW_DEG, PITCH_DEG, FIELD_OF_VIEW_DEG = 1.6, 50.0, -35.0, 50.0
 
 
 class Camera:
@@ -38,23 +38,23 @@ class Camera:
     ----------
     file
         A PNG; always whole, since each picture takes the place of the last at once.
-    look
+    get_pose
         Returns the twin's pose.
     """
 
-    def __init__(self, file: Path, look: Callable[[], Pose]) -> None:
-        self._file, self._look = file, look
+    def __init__(self, file: Path, get_pose: Callable[[], Pose]) -> None:
+        self._file, self._get_pose = file, get_pose
         self._over = threading.Event()
 
     def __enter__(self) -> Self:
-        """Begin."""
-        self._drawing = subprocess.Popen(
+        """Start to draw."""
+        self._process = subprocess.Popen(
             [sys.executable, "-m", __name__, str(self._file)],
             stdin=subprocess.PIPE,
             start_new_session=True,
         )
-        self._telling = threading.Thread(target=self._tell, daemon=True)
-        self._telling.start()
+        self._sender = threading.Thread(target=self._send_poses, daemon=True)
+        self._sender.start()
         return self
 
     def __exit__(
@@ -63,20 +63,20 @@ class Camera:
         problem: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End. The last picture stays."""
+        """Stop. The last picture stays."""
         self._over.set()
-        self._telling.join(END_S)
+        self._sender.join(END_S)
         try:
-            self._drawing.wait(END_S)
+            self._process.wait(END_S)
         except subprocess.TimeoutExpired:
-            self._drawing.kill()
-            self._drawing.wait()
+            self._process.kill()
+            self._process.wait()
 
-    def _tell(self) -> None:
-        pipe = self._drawing.stdin
+    def _send_poses(self) -> None:
+        pipe = self._process.stdin
         with contextlib.suppress(OSError):  # it has ended before us
             while pipe is not None and not self._over.wait(INTERVAL_S):
-                pose = self._look()
+                pose = self._get_pose()
                 line = json.dumps([pose.x_m, pose.y_m, pose.heading_rad])
                 pipe.write(line.encode() + b"\n")
                 pipe.flush()
@@ -86,7 +86,7 @@ class Camera:
 
 
 class Renderer:
-    """The twin's looks in a world without physics. Raises ImportError without the twin extra."""
+    """Draws the twin in a world without physics. Raises ImportError without the twin extra."""
 
     def __init__(self) -> None:
         import pybullet
@@ -104,9 +104,11 @@ class Renderer:
         with as_file(files("robot.bases.twin") / "kobuki.urdf") as urdf:
             self._robot = self._world.loadURDF(str(urdf))
         self._view = self._world.computeViewMatrixFromYawPitchRoll(
-            (0, 0, 0.05), AWAY_M, TURNED_DEG, TILTED_DEG, 0, 2
+            (0, 0, 0.05), DISTANCE_M, YAW_DEG, PITCH_DEG, 0, 2
         )
-        self._lens = self._world.computeProjectionMatrixFOV(SEES_DEG, WIDTH / HEIGHT, 0.1, 10)
+        self._lens = self._world.computeProjectionMatrixFOV(
+            FIELD_OF_VIEW_DEG, WIDTH / HEIGHT, 0.1, 10
+        )
 
     def draw(self, pose: Pose) -> bytes:
         """Return a picture of the twin at a pose, as PNG."""
@@ -129,16 +131,16 @@ class Renderer:
 
 
 def main(file: Path) -> None:
-    """Draw wherever standard input says the twin is, until it closes."""
+    """Draw the twin at the newest pose of standard input, until that closes."""
     if hasattr(os, "nice"):
         os.nice(10)  # the twin and the server come first
     redirect_output()
-    studio, rest = Renderer(), b""
+    renderer, rest = Renderer(), b""
     new = file.with_name(f".{file.name}.new")
     while data := os.read(0, 65536):
         *lines, rest = (rest + data).split(b"\n")
         if lines:
-            new.write_bytes(studio.draw(Pose(*json.loads(lines[-1]))))
+            new.write_bytes(renderer.draw(Pose(*json.loads(lines[-1]))))
             new.replace(file)
 
 

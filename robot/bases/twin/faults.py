@@ -25,7 +25,7 @@ class Faults:
     battery_v
         Voltage of the battery [V]; 16.7 is full (docs/reference/kobuki.md#feedback).
     left_scale, right_scale
-        How much larger than it believes the wheels are: 1.02 rolls 2 % too far, either way.
+        Size of the wheels over what the firmware assumes: 1.02 rolls 2 % too far, either way.
     drift_deg_min
         How far the gyro turns by itself [°/min].
     drop, flip, duplicate
@@ -64,7 +64,7 @@ class Faults:
         return was
 
     def damage(self, data: bytes, chance: random.Random) -> bytes:
-        """Return what arrives of bytes that were sent."""
+        """Return the bytes that arrive of those that were sent."""
         if self.false_header and chance.random() < self.false_header:
             data = b"\xaa\x55" + data
         if not self.drop and not self.flip and not self.duplicate:

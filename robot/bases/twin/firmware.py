@@ -1,4 +1,4 @@
-"""The firmware of the twin: takes a Kobuki's commands, and sends a Kobuki's feedback."""
+"""The firmware of the twin: reads a Kobuki's commands, and sends a Kobuki's feedback."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ from robot.bases.kobuki_protocol import (
     SoundSequence,
     Udid,
     Version,
+    control_to_twist,
     decode_commands,
     encode_feedback,
-    twist_of,
     wheel_speeds,
 )
 from robot.bases.twin.bodies import Body
@@ -47,7 +47,7 @@ from robot.bases.twin.faults import Faults
 FIRMWARE = Version(1, 2, 0)
 HARDWARE = Version(1, 0, 4)
 LONG_VERSIONS = Version(1, 1, 2)  # from here on in four bytes
-GAINS = Version(1, 2, 0)  # from here on they can be set and asked for
+GAINS = Version(1, 2, 0)  # from here on they can be set and requested
 UDID = Udid(0x47415252, 0x59, 0x5457494E)
 
 # Floor that is further away than this is a cliff
@@ -79,7 +79,7 @@ class Firmware:
     faults
         What is wrong with it now.
     version
-        What it says it is. Before 1.1.2 it says so in two bytes, before 1.2.0 it has no gains.
+        The version that it reports: before 1.1.2 in two bytes; before 1.2.0 there are no gains.
     watchdog_s
         After so long without a setpoint it stops. None, as a real one, for which no watchdog is
         documented (docs/reference/kobuki.md#watchdogs).
@@ -93,7 +93,7 @@ class Firmware:
     output
         The word of its outputs; all power rails are on at first.
     sounds
-        How many it was asked for.
+        How many sounds were requested.
     reader
         Counts what came in damaged.
     """
@@ -120,17 +120,17 @@ class Firmware:
         self.output, self.sounds = int(Output.POWER), 0
         self._frames = 0
         self._gains = ControllerInfo()
-        self._asked: set[str] = set()
+        self._requested: set[str] = set()
         self._rolled_was_m = self.body.rolled_m
         self._counted = [0.0, 0.0]  # ticks, with what is not yet a whole one
         self._heading_from_rad = self.body.pose.heading_rad
         self._drifted_deg = 0.0
 
-    def take(self, data: bytes, now_s: float) -> None:
+    def receive(self, data: bytes, now_s: float) -> None:
         """Handle bytes of the driver, damaged as the line's faults say."""
         for commands in self.reader.feed(self.faults.damage(data, self._chance)):
             for command in commands:
-                self._obey(command, now_s)
+                self._execute(command, now_s)
 
     def step(self, now_s: float) -> bytes:
         """Simulate one frame's time, and return the frame as it arrives at the driver."""
@@ -148,7 +148,7 @@ class Firmware:
     @property
     def wheels_m_s(self) -> tuple[float, float]:
         """Speeds that the wheels are held at, left and right [m/s]; none is above its largest."""
-        left_m_s, right_m_s = wheel_speeds(twist_of(self.control))
+        left_m_s, right_m_s = wheel_speeds(control_to_twist(self.control))
         too_fast = max(abs(left_m_s) / WHEEL_MAX_M_S, abs(right_m_s) / WHEEL_MAX_M_S, 1.0)
         return left_m_s / too_fast, right_m_s / too_fast
 
@@ -158,20 +158,20 @@ class Firmware:
         self.body.carry_home()
         self._heading_from_rad = self.body.pose.heading_rad - turned_rad
 
-    def _obey(self, command: Command, now_s: float) -> None:
+    def _execute(self, command: Command, now_s: float) -> None:
         match command:
             case BaseControl():
                 self.control, self._ordered_s = command, now_s
                 self.orders.append(Order(now_s, command))
             case RequestExtra(flags):
                 names = {"hardware": Extra.HARDWARE, "firmware": Extra.FIRMWARE, "udid": Extra.UDID}
-                self._asked |= {name for name, flag in names.items() if flags & flag}
+                self._requested |= {name for name, flag in names.items() if flags & flag}
             case GpOutput(word):
                 self.output = word
             case SetGain(kind, p, i, d) if self.version >= GAINS:
                 self._gains = ControllerInfo(kind, p, i, d)
             case GetGain() if self.version >= GAINS:
-                self._asked.add("controller")
+                self._requested.add("controller")
             case Sound() | SoundSequence():
                 self.sounds += 1
 
@@ -183,7 +183,7 @@ class Firmware:
         angle = math.remainder(100 * (turned_deg + self._drifted_deg), 36_000)
         left_n_m, right_n_m = touch.torque_n_m
         sample = (0, 0, round(rate_deg_s / GYRO_DIGIT_DEG_S))
-        asked, self._asked = self._asked, set()
+        requested, self._requested = self._requested, set()
         return Feedback(
             core=CoreSensors(
                 time_ms=number * round(1000 * FRAME_S) % 65536,
@@ -207,14 +207,14 @@ class Firmware:
             # (docs/reference/kobuki.md#feedback).
             gyro=GyroRaw((5 * number - 4) // 2 % 256, (sample,) * (2 + number % 2)),
             gp=NO_INPUT,
-            hardware=HARDWARE if "hardware" in asked else None,
-            firmware=self.version if "firmware" in asked else None,
-            udid=UDID if "udid" in asked else None,
-            controller=self._gains if "controller" in asked else None,
+            hardware=HARDWARE if "hardware" in requested else None,
+            firmware=self.version if "firmware" in requested else None,
+            udid=UDID if "udid" in requested else None,
+            controller=self._gains if "controller" in requested else None,
         )
 
     def _count(self, *scales: float) -> None:
-        """Count on. A wheel that is larger than believed counts less for the same way."""
+        """Advance the encoders. A wheel that is larger than assumed counts less for a distance."""
         now_m, was_m = self.body.rolled_m, self._rolled_was_m
         for wheel, scale in enumerate(scales):
             self._counted[wheel] += (now_m[wheel] - was_m[wheel]) / scale / TICK_M

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
-# A pty that nobody reads for so many frames is emptied, so that who opens it hears the present:
-# what a real port receives while nobody has opened it is lost, too.
+# A pty that nobody reads for this many frames is emptied, so that a driver that opens it reads the
+# present: a real port loses what it receives while it is not open, too.
 UNREAD_FRAMES = 10
 READ_SIZE = 4096
 
@@ -111,25 +111,25 @@ class SocketLine:
 
     def __init__(self, port: int = 0) -> None:
         self._address = ("127.0.0.1", port)
-        self._door: socket.socket | None = None
+        self._listener: socket.socket | None = None
         self._driver: socket.socket | None = None
         self.plug_in()
         self.name = f"socket://127.0.0.1:{self._address[1]}"
 
     def plug_in(self) -> None:
         """Make the port appear, with the same number as before."""
-        if self._door is not None:
+        if self._listener is not None:
             return
-        self._door = socket.create_server(self._address, backlog=1)
-        self._door.setblocking(False)
-        self._address = self._door.getsockname()
+        self._listener = socket.create_server(self._address, backlog=1)
+        self._listener.setblocking(False)
+        self._address = self._listener.getsockname()
 
     def pull_out(self) -> None:
         """Make the port vanish."""
-        for end in (self._door, self._driver):
+        for end in (self._listener, self._driver):
             if end is not None:
                 end.close()
-        self._door = self._driver = None
+        self._listener = self._driver = None
 
     def write(self, data: bytes) -> None:
         """Send bytes; what does not fit is lost."""
@@ -139,7 +139,7 @@ class SocketLine:
             except BlockingIOError:
                 return
             except OSError:
-                self._leave()
+                self._disconnect()
 
     def read(self) -> bytes:
         """Return what came in, and accept the next driver where there is none."""
@@ -150,26 +150,26 @@ class SocketLine:
             except BlockingIOError:
                 pass
             except OSError:
-                self._leave()
+                self._disconnect()
             else:
                 if not data:
-                    self._leave()
-        self._let_in()
+                    self._disconnect()
+        self._accept()
         return data
 
     def wait(self, for_s: float) -> None:
         """Wait for bytes, or at most so long [s]."""
-        _wait_for([end for end in (self._door, self._driver) if end is not None], for_s)
+        _wait_for([end for end in (self._listener, self._driver) if end is not None], for_s)
 
     def close(self) -> None:
         """Remove the port for good."""
         self.pull_out()
 
-    def _let_in(self) -> None:
-        if self._door is None:
+    def _accept(self) -> None:
+        if self._listener is None:
             return
         with contextlib.suppress(BlockingIOError, ConnectionError):
-            driver, _ = self._door.accept()
+            driver, _ = self._listener.accept()
             if self._driver is not None:
                 driver.close()
                 return
@@ -177,7 +177,7 @@ class SocketLine:
             driver.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self._driver = driver
 
-    def _leave(self) -> None:
+    def _disconnect(self) -> None:
         if self._driver is not None:
             self._driver.close()
             self._driver = None

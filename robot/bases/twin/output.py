@@ -10,7 +10,7 @@ from pathlib import Path
 def redirect_output() -> int:
     """Return a file for answers alone in place of standard output, and import pybullet.
 
-    It prints past Python: when it was built on importing, and more on ending.
+    pybullet prints past Python: its build date when it is imported, and more when it ends.
     """
     answers, errors = os.dup(1), os.dup(2)
     with Path(os.devnull).open("w") as nowhere:

@@ -1,4 +1,4 @@
-"""A twin that lives by the clock: 50 frames a second, and what is done to it meanwhile."""
+"""A twin that runs by the clock: 50 frames a second, and what is done to it meanwhile."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from robot.bases.twin.lines import Line
 from robot.motion.pose import HOME
 
 HELD_BYTES = 4096  # of a stalled line, as many as a pty keeps; the oldest are lost
-LATE_S = 0.1  # behind its time by more than this it lets the time go, instead of catching up
+LATE_S = 0.1  # a twin that is later than this skips the time instead of catching up
 LONGEST_S = 3600.0
 
 
@@ -36,26 +36,26 @@ class Twin:
         self.firmware, self.line = firmware, line
         self.frames = 0
         self.farthest_m = 0.0  # from home, since the last look
-        self.latest_s = 0.0  # a frame over its time, since the last look
+        self.max_delay_s = 0.0  # of a frame, since the last look
         # What is to be undone, and when; a newer order of the same kind takes its place.
-        self._later: dict[str, tuple[float, Callable[[], object]]] = {}
+        self._scheduled: dict[str, tuple[float, Callable[[], object]]] = {}
         self._stalled_until_s = self._off_until_s = -math.inf
         self._held = b""
-        self._looked_s = -math.inf
+        self._described_s = -math.inf
 
-    def listen(self, now_s: float) -> None:
+    def receive(self, now_s: float) -> None:
         """Read what the driver has sent, at a time [s]."""
         if now_s < self._stalled_until_s:
             return
         data = self.line.read()
         if data and now_s >= self._off_until_s:
-            self.firmware.take(data, now_s)
+            self.firmware.receive(data, now_s)
 
-    def live(self, now_s: float) -> None:
-        """Live for one frame's time and say so, at a time [s]."""
-        for kind in [kind for kind, (at_s, _) in self._later.items() if at_s <= now_s]:
-            self._later.pop(kind)[1]()
-        self.listen(now_s)
+    def step(self, now_s: float) -> None:
+        """Simulate one frame's time at a time [s], and send the frame."""
+        for kind in [kind for kind, (at_s, _) in self._scheduled.items() if at_s <= now_s]:
+            self._scheduled.pop(kind)[1]()
+        self.receive(now_s)
         if now_s < self._off_until_s:
             self.firmware.body.roll(0.0, 0.0)
             return
@@ -67,26 +67,26 @@ class Twin:
             self._held = b""
         self._held = self._held[-HELD_BYTES:]
 
-    def do(self, order: Mapping[str, Any], now_s: float) -> dict[str, Any]:
+    def execute(self, order: Mapping[str, Any], now_s: float) -> dict[str, Any]:
         """Carry out an order to the twin at a time [s], and return the answer. Raises BadFault."""
         match order:
             case {"do": "set", "name": str(name), "value": value}:
                 for_s = _seconds(order) if "for_s" in order else None
                 was = self.firmware.faults.change(name, value)
                 undo: Callable[[], object] = partial(self.firmware.faults.change, name, was)
-                _, undo = self._later.pop(name, (now_s, undo))
+                _, undo = self._scheduled.pop(name, (now_s, undo))
                 if for_s is not None:
-                    self._later[name] = (now_s + for_s, undo)
+                    self._scheduled[name] = (now_s + for_s, undo)
             case {"do": "stall"}:
                 self._stalled_until_s = now_s + _seconds(order)
             case {"do": "vanish"}:
                 back_s = now_s + _seconds(order)
                 self.line.pull_out()
-                self._later["vanish"] = (back_s, self.line.plug_in)
+                self._scheduled["vanish"] = (back_s, self.line.plug_in)
             case {"do": "power_cycle"}:
                 self._off_until_s = now_s + _seconds(order)
                 self.firmware.switch_on()
-                self._later["power_cycle"] = (self._off_until_s, self.firmware.switch_on)
+                self._scheduled["power_cycle"] = (self._off_until_s, self.firmware.switch_on)
             case {"do": "wall" | "edge" as what}:
                 body = self.firmware.body
                 put = body.put_wall if what == "wall" else body.put_edge
@@ -98,7 +98,7 @@ class Twin:
                 self.firmware.carry_home()
                 self.farthest_m = 0.0
             case {"do": "look"}:
-                return self._look(now_s)
+                return self._describe(now_s)
             case _:
                 raise BadFault("What can be done to a twin: see python -m robot twin --help.")
         return {"done": order["do"]}
@@ -111,7 +111,7 @@ class Twin:
         monotonic: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Live by the clock until it is over."""
+        """Run by the clock until ``is_over``."""
         next_s = monotonic()
         while not is_over():
             now_s = monotonic()
@@ -121,23 +121,23 @@ class Twin:
                 else:
                     self.line.wait(next_s - now_s)
                 now_s = monotonic()
-                self.listen(now_s)
-            self.latest_s = max(self.latest_s, now_s - next_s)
+                self.receive(now_s)
+            self.max_delay_s = max(self.max_delay_s, now_s - next_s)
             next_s = next_s + FRAME_S if now_s - next_s < LATE_S else now_s + FRAME_S
             while not orders.empty():
                 answer(self._answer(orders.get(), now_s))
-            self.live(now_s)
+            self.step(now_s)
 
     def _answer(self, line: str, now_s: float) -> str:
         try:
             order = json.loads(line)
             if not isinstance(order, dict):
                 raise BadFault('An order is {"do": …}.')
-            return json.dumps(self.do(order, now_s))
+            return json.dumps(self.execute(order, now_s))
         except (ValueError, RecursionError) as problem:  # BadFault and what is no JSON
             return json.dumps({"error": str(problem)})
 
-    def _look(self, now_s: float) -> dict[str, Any]:
+    def _describe(self, now_s: float) -> dict[str, Any]:
         firmware = self.firmware
         pose, control, reader = firmware.body.pose, firmware.control, firmware.reader
         seen = {
@@ -151,16 +151,16 @@ class Twin:
             "orders": [
                 (order.at_s, *order.control)
                 for order in firmware.orders
-                if order.at_s > self._looked_s
+                if order.at_s > self._described_s
             ],
             "output": firmware.output,
             "sounds": firmware.sounds,
             "frames": self.frames,
-            "latest_s": self.latest_s,
+            "latest_s": self.max_delay_s,
             "commands": reader.frames,
             "bad_commands": reader.bad_checksums + reader.malformed,
         }
-        self._looked_s, self.farthest_m, self.latest_s = now_s, 0.0, 0.0
+        self._described_s, self.farthest_m, self.max_delay_s = now_s, 0.0, 0.0
         return seen
 
 

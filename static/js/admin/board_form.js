@@ -8,9 +8,9 @@ const COUNTED = ["attended", "target_met"];
 
 const form = document.querySelector("#leaderboard_form");
 const preview = document.querySelector(".preview");
-if (form && preview) build();
+if (form && preview) start();
 
-function build() {
+function start() {
   const facts = preview.querySelector(".facts");
 
   function value(name) {
@@ -28,44 +28,44 @@ function build() {
     if (field) field.hidden = !wanted;
   }
 
-  // What was just chosen stays; what no longer goes with it follows.
-  function follow(changed) {
+  // Keep what was just chosen, and adjust the settings that contradict it.
+  function adjustOthers(changed) {
     const own = value("among") === "self";
     const total = value("display") === "total";
     if (changed === "metric" && COUNTED.includes(value("metric"))) {
       if (own) set("among", "clinic");
-      set("entry", "sum");
+      set("aggregation", "sum");
     }
     if (changed === "display" && total && own) set("among", "clinic");
     if (changed === "display" && total) {
-      set("entry", "sum");
+      set("aggregation", "sum");
       if (!SUMS.includes(value("metric"))) set("metric", "active_minutes");
     }
     if (changed === "among") {
-      if (own) set("entry", "each");
-      else if (value("entry") === "each") set("entry", "best");
+      if (own) set("aggregation", "each");
+      else if (value("aggregation") === "each") set("aggregation", "best");
       if (own && total) set("display", "neighbors");
     }
     if (changed === "occasion" && value("occasion") === "waiting") {
       if (value("among") === "self") set("among", "clinic");
-      if (value("entry") === "each") set("entry", "best");
+      if (value("aggregation") === "each") set("aggregation", "best");
       if (!["top", "total"].includes(value("display"))) set("display", "top");
       if (value("types") === "same") set("types", "all");
     }
-    if (changed === "metric" && value("entry") === "sum" && !SUMS.includes(value("metric"))) {
-      set("entry", value("among") === "self" ? "each" : "best");
+    if (changed === "metric" && value("aggregation") === "sum" && !SUMS.includes(value("metric"))) {
+      set("aggregation", value("among") === "self" ? "each" : "best");
       if (total) set("display", "neighbors");
     }
   }
 
-  function hide() {
+  function updateVisibility() {
     const own = value("among") === "self";
-    const [display, entry] = [value("display"), value("entry")];
+    const [display, aggregation] = [value("display"), value("aggregation")];
     show("group", value("among") === "group");
-    show("entry", !own);
-    show("mean_of", entry === "mean");
+    show("aggregation", !own);
+    show("mean_of", aggregation === "mean");
     show("valences", value("types") === "chosen");
-    show("period_from", value("period") === "dates"); // a row of both dates
+    show("period_from", value("period") === "dates"); // the row of both dates
     show("top_n", display === "top" || display === "top_and_me");
     show("total_goal", display === "total");
     show("show_ranks", display !== "total");
@@ -74,10 +74,10 @@ function build() {
   }
 
   form.addEventListener("change", ({ target }) => {
-    follow(target.name);
-    hide();
+    adjustOthers(target.name);
+    updateVisibility();
   });
-  hide();
+  updateVisibility();
   showPreview(form, preview, (drawn) => {
     facts.textContent = drawn.body?.dataset.facts ?? "";
   });

@@ -1,5 +1,5 @@
 // The week in two drawings: minutes by day, hits by feedback type with what was wanted.
-// The figures stand as text beside them, so the drawings are for the eye alone.
+// The figures are text beside them, so screen readers skip the drawings.
 
 import { percent } from "garry/shared/format";
 import { fitViewBox, shape, text } from "garry/shared/svg";

@@ -1,4 +1,4 @@
-// The form of a feedback type: what a patient sees of each band follows every key.
+// The form of a feedback type: its preview shows what a patient sees in each band.
 
 import { showPreview } from "garry/admin/form_preview";
 

@@ -1,4 +1,4 @@
-// A protocol's phases in the admin: rows that move up and down, and a drawing that follows every change.
+// A protocol's phases in the admin: rows that move up and down, and a drawing that is updated after each change.
 
 import { drawProtocol } from "garry/admin/protocol_drawing";
 

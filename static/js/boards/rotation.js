@@ -1,5 +1,5 @@
-// A waiting tablet shows the clinic's boards, each for a while, as they are at that moment: patients who no
-// longer agree are gone with the next request.
+// A waiting tablet shows the clinic's boards in turn. Each is requested when it is shown, so that patients who
+// no longer agree disappear.
 
 import { guardLeaving } from "garry/walk/leave_guard";
 

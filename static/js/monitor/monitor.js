@@ -114,5 +114,5 @@ function draw() {
   leaveWhenEnded();
 }
 
-setInterval(() => state.session && connections.draw(state.session), 1_000); // what is silent sends no event
+setInterval(() => state.session && connections.draw(state.session), 1_000); // silence sends no event
 addEventListener("resize", draw);

@@ -6,8 +6,8 @@ import { cureOf, describeReason, describeState } from "garry/monitor/robot_text"
 import { drawTrail } from "garry/monitor/robot_trail";
 
 const KEPT_POSES = 240;
-const ANSWER_MS = 2_000; // after which a link that nobody has closed is not believed
-// Reasons in its status that somebody should know of; the others are expected.
+const ANSWER_MS = 2_000; // after which an open but silent connection counts as lost
+// Reasons in its status that a therapist should know of; the others are expected.
 const NOTABLE = new Set([
   "unwatched",
   "charging",
@@ -84,7 +84,7 @@ export class RobotPanel {
     if (this.#trail.length > KEPT_POSES) this.#trail.shift();
   }
 
-  // An order looks heard only while it may be: when it cannot be sent, or is not answered, the page says so.
+  // Show an order as sent while an answer may come; say so when it cannot be sent or is not answered.
   #order(order) {
     this.#forgetOrder();
     this.#orderFailure = "";
@@ -142,7 +142,7 @@ export class RobotPanel {
     drawTrail(this.#root.querySelector("svg"), this.#trail);
   }
 
-  // Whether it moves only after a person lets it.
+  // Whether a person has to arm it before it moves.
   get #isHeld() {
     if (this.#isStopped) return true;
     const { state, reason } = this.#status ?? {};

@@ -1,5 +1,5 @@
-// A form that the browser's passkeys fill in: [data-passkey] has the server's options, data-how is whether one is
-// made ("create") or used ("get").
+// A form that the browser's passkeys fill in: [data-passkey] has the server's options, data-how says whether a passkey
+// is created ("create") or used ("get").
 
 import { _ } from "garry/shared/language";
 

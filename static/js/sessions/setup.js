@@ -7,7 +7,7 @@ for (const step of document.querySelectorAll(".step")) {
   step.addEventListener("click", (event) => {
     const button = event.target.closest("button");
     if (!button) return;
-    // From one whole step to the next: 3.91 goes to 3.95, not to 3.96.
+    // Go to the next multiple of the step: 3.91 goes to 3.95, not to 3.96.
     const now = (Number(field.value.replace(",", ".")) || 0) / size,
       up = button.value === "1";
     const next = up ? Math.floor(now + 1 + 1e-6) : Math.ceil(now - 1 - 1e-6);
@@ -23,7 +23,7 @@ function showGoal() {
 choices.forEach((choice) => choice.addEventListener("change", showGoal));
 showGoal();
 
-// A protocol whose parts all end takes as long as it takes.
+// A protocol whose phases all have an end sets the minutes.
 const lengths = JSON.parse(document.getElementById("lengths").textContent);
 for (const choice of document.querySelectorAll("input[name=protocol]")) {
   choice.addEventListener("change", () => {

@@ -1,11 +1,11 @@
 // The page's buttons: start, pause, go on, end (asked twice) and the robot's stop; and where the
-// keyboard's focus goes when a button leaves.
+// keyboard's focus goes when a button disappears.
 
 import { _ } from "garry/shared/language";
 
-const GUARD_MS = 700; // a question that just appeared takes no answer: a second tap is not a yes
+const GUARD_MS = 700; // a question that just appeared takes no answer: the tap may be a double tap
 const NOTE_MS = 6_000;
-const ANSWER_MS = 2_000; // after which a link that nobody has closed is not believed
+const ANSWER_MS = 2_000; // after which an open but silent connection counts as lost
 
 export function createControls(body, socket, showQuestion) {
   const note = body.querySelector(".note");
@@ -39,7 +39,7 @@ export function createControls(body, socket, showQuestion) {
     if (asked) setTimeout(() => (yes.disabled = false), GUARD_MS);
   }
 
-  // Show at once that the tap was taken; whether the robot is stopped, the server tells.
+  // Show at once that the tap was registered; the server says when the robot is stopped.
   function stopRobot() {
     const sent = socket.send({ type: "robot", order: "stop" });
     if (!sent) notify(_("No connection. Use the robot's own button."));

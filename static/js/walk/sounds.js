@@ -39,7 +39,7 @@ export function createSounds(button) {
     voice.stop(at_s + LASTS_S);
   }
 
-  // The first touch anywhere wakes the sound; the button itself turns it on and off.
+  // The first touch anywhere starts the audio; the button turns sounds on and off.
   document.addEventListener("pointerdown", ({ target }) => button.contains(target) || wake());
   button.addEventListener("click", () => {
     on = !(on && audio?.state === "running");

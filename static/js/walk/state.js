@@ -14,7 +14,7 @@ export function applyEvent(session, event) {
     case "step":
     case "missing":
       session.steps = [...session.steps, { performance: null, ...event }].slice(-KEPT_STRIDES);
-      // What came late alters totals and strides, nothing else. Steps of a pause are not shown at all.
+      // A late step changes totals and strides only. Steps of a pause are not shown at all.
       if (event.live && session.state === "running") session.last = event;
       break;
     case "calm":
@@ -25,7 +25,7 @@ export function applyEvent(session, event) {
       session.pause_reason = event.pause_reason;
       break;
     case "phase":
-      if (event.phase.theme !== session.phase.theme) session.last = null; // it meant something else
+      if (event.phase.theme !== session.phase.theme) session.last = null; // the last step was answered in another theme
       session.phase = event.phase;
       break;
     case "presence":

@@ -1,4 +1,4 @@
-// The page's own texts. What a step means comes as text from the server.
+// The page's own texts. The feedback of a step comes as text from the server.
 
 import { clock } from "garry/shared/format";
 import { _, fill, n_, number } from "garry/shared/language";

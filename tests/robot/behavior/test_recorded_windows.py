@@ -22,7 +22,7 @@ CUE = {
 
 
 def recompute(times_s, performances):
-    """Give the decisions by numpy alone: the whole array at once, gestures in a second pass."""
+    """Return the decisions by numpy alone: the whole array at once, gestures in a second pass."""
     number = np.floor((times_s - times_s[0]) / 5).astype(int)
     windows = np.unique(number)
     decisions, last_start_s = [], -np.inf

@@ -35,7 +35,7 @@ class Watch:
         self.safety.start_gesture(self.now_s, FINE)
 
     def look(self, state=FINE, ordered=STILL, *, performing=True, for_s=0.02):
-        """Give the first latch within a time, and when it came."""
+        """Return the first latch within a time, and when it came."""
         for tick in range(round(for_s / 0.02)):
             self.now_s += 0.02
             found = self.safety.check(self.now_s, state, ordered, performing=performing)
@@ -266,7 +266,7 @@ OPEN = Abilities(simulated=False, moves=True, closed_loop=False)
 def test_an_open_loop_refuses_long_gestures_and_halves_the_others(gesture):
     closed, opened = Safety(REAL), Safety(OPEN)
     assert (closed.rejection_reason(gesture), closed.share) == ("", 1.0)
-    assert opened.rejection_reason(gesture) == ("open_loop" if gesture.least_s > 4.0 else "")
+    assert opened.rejection_reason(gesture) == ("open_loop" if gesture.min_duration_s > 4.0 else "")
     assert opened.share == 0.5
 
 

@@ -14,7 +14,7 @@ from robot.motion.dry_run import dry_run, validate_gesture
 from robot.motion.gesture import REACH_M, TETHER_M
 from robot.motion.gesture_errors import BadGesture
 from robot.motion.gesture_spec import (
-    MOVES_MAX,
+    MAX_MOVES,
     NUMBERS,
     Move,
     build_gesture,
@@ -70,7 +70,7 @@ def test_three_sides_come_home_although_they_are_rounded():
     ("moves", "cure"),
     [
         ([], "1 to 16 steps"),
-        ([Move(hold_s=0.1)] * (MOVES_MAX + 1), "1 to 16 steps"),
+        ([Move(hold_s=0.1)] * (MAX_MOVES + 1), "1 to 16 steps"),
         (
             [Move(forward_m=0.52), Move(forward_m=-0.52)],
             "Step 1 goes 0.52 m away .* Make it shorter",
@@ -182,7 +182,7 @@ def test_what_is_admitted_stays_near_and_comes_home_at_any_intensity(moves, inte
         return
     assert validate_gesture(json.loads(json.dumps(data(*moves)))) == gesture
     scaled = gesture.scaled(intensity)
-    assert scaled.least_s <= gesture.least_s + 1e-9
+    assert scaled.min_duration_s <= gesture.min_duration_s + 1e-9
     outcome, truth, ordered = perform(scaled, pace)
     assert outcome == DONE
     assert truth.farthest_m <= REACH_M + 0.01 < TETHER_M

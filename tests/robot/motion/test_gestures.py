@@ -33,7 +33,7 @@ def test_every_cue_names_gestures_that_exist():
 
 @pytest.mark.parametrize("gesture", GESTURES.values(), ids=lambda gesture: gesture.name)
 def test_each_is_short_near_and_never_goes_out_backwards(gesture):
-    assert gesture.least_s <= 4
+    assert gesture.min_duration_s <= 4
     assert max(waypoint.pose.distance_m(HOME) for waypoint in gesture.waypoints) <= REACH_M
     farthest_m, start = 0.0, HOME
     for waypoint in gesture.waypoints:
@@ -47,7 +47,7 @@ def test_each_is_short_near_and_never_goes_out_backwards(gesture):
 @pytest.mark.parametrize("gesture", GESTURES.values(), ids=lambda gesture: gesture.name)
 @pytest.mark.parametrize("intensity", [0.1, 0.5, 1])
 def test_a_smaller_one_is_still_one(gesture, intensity):
-    assert gesture.scaled(intensity).least_s <= gesture.least_s + 1e-9
+    assert gesture.scaled(intensity).min_duration_s <= gesture.min_duration_s + 1e-9
 
 
 @pytest.mark.parametrize("intensity", [0, -1, 1.1, math.nan])

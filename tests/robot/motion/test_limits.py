@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, LONGEST_STEP_S, Limits, least_time_s
+from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, LONGEST_STEP_S, Limits, min_time_s
 from robot.motion.pose import HOME, Pose, advance, wrap
 from robot.motion.twist import STILL, Twist
 
@@ -122,4 +122,4 @@ def test_the_shortest_time_of_a_trapezoid(distance, time_s):
         time_s = math.sqrt(2 * 0.5 * (1 / 2 + 1 / 1))
     elif distance:
         time_s = 0.5 + 1 + (abs(distance) - 0.75)
-    assert least_time_s(distance, 1.0, 2.0, 1.0) == pytest.approx(time_s)
+    assert min_time_s(distance, 1.0, 2.0, 1.0) == pytest.approx(time_s)

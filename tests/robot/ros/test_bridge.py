@@ -39,7 +39,7 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture
 def ros():
-    """Give a served bridge, with a base behind it."""
+    """Return a served bridge, with a base behind it."""
     bridge = FakeRosbridge()
     robot = FakeBase(bridge.graph, time.monotonic)
     with ServedRos(bridge) as served, Ticking(robot):
@@ -186,10 +186,10 @@ class Silent:
     def end(self, now_s):
         return ()
 
-    def hear(self, heard, now_s):
+    def handle(self, incoming, now_s):
         pass
 
-    def lose(self, now_s):
+    def disconnect(self, now_s):
         pass
 
 
@@ -250,11 +250,11 @@ def test_what_the_original_s_nodes_hear(ros):
         graph.subscribe(topic, kind, lambda message, topic=topic: heard.append((topic, message)))
     with OriginalTopics(ros.url) as originals:
         wait_until(lambda: originals.problem == "")
-        originals.follow({"type": "welcome", "session": 7, "valence": "binary"})
+        originals.handle_message({"type": "welcome", "session": 7, "valence": "binary"})
         wait_until(lambda: heard == [("/garry/feedback_type", {"data": "Binary"})])
         heard.clear()
-        originals.follow({"type": "step", "shown": 0.93, "goal": 1.1})
-        originals.decide(True)
+        originals.handle_message({"type": "step", "shown": 0.93, "goal": 1.1})
+        originals.publish_decision(True)
         wait_until(lambda: len(heard) == 2)
     assert heard == [
         ("/garry/data", {"a2": 0.93, "goal": 1.1}),

@@ -10,9 +10,9 @@ from hypothesis import given
 from robot.motion.pose import Pose
 from robot.motion.twist import Twist
 from robot.ros.frames import (
-    Answer,
     BadRosFrame,
     Publication,
+    ServiceResponse,
     Topic,
     advertise,
     call_service,
@@ -89,12 +89,12 @@ def test_no_number_is_said_that_json_has_not():
         (
             '{"values": {"subscribers": ["/a"]}, "result": true, "id": "who", '
             '"service": "/rosapi/subscribers", "op": "service_response"}',
-            Answer("who", {"subscribers": ["/a"]}),
+            ServiceResponse("who", {"subscribers": ["/a"]}),
         ),
         (
             '{"values": "Service does not exist", "result": false, "id": "who", '
             '"service": "/x", "op": "service_response"}',
-            Answer("who", None),
+            ServiceResponse("who", None),
         ),
     ],
     ids=["publish", "answer", "failure"],

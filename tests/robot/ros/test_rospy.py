@@ -43,7 +43,7 @@ def master():
 
 @pytest.fixture(scope="module")
 def ros(master):
-    """Give a bridge of which the graph is a node of rospy, and a base that is another one."""
+    """Return a bridge of which the graph is a node of rospy, and a base that is another one."""
     node = master.node("base")
     bridge = FakeRosbridge(master.node("rosbridge"), has_rosapi=False)
     robot = FakeBase(node, time.monotonic)
@@ -102,7 +102,7 @@ def test_the_original_s_nodes_hear_what_they_expect(ros, master):
     heard = []
     with OriginalTopics(ros.url) as originals:
         wait_until(lambda: originals.problem == "")
-        originals.follow({"type": "welcome", "session": 7, "valence": "positive"})
+        originals.handle_message({"type": "welcome", "session": 7, "valence": "positive"})
         # As gesture_generation.py and data_processing.py subscribe.
         for topic, kind in (
             ("/garry/good_step", "std_msgs/Bool"),
@@ -129,8 +129,8 @@ def test_the_original_s_nodes_hear_what_they_expect(ros, master):
 def _tell(originals, heard, topic):
     """Tell an event; nodes that have just met may lose it."""
     if topic == "/garry/data":
-        originals.follow({"type": "step", "shown": 0.93, "goal": 1.1})
+        originals.handle_message({"type": "step", "shown": 0.93, "goal": 1.1})
     else:
-        originals.decide(True)
+        originals.publish_decision(True)
     time.sleep(0.1)
     return any(name == topic for name, _ in heard)

@@ -272,7 +272,7 @@ async def test_composed_gestures_travel_in_the_cue(place, ready):
 
 
 def compose(clinic: Clinic) -> Message:
-    """Make a gesture; give it as it travels."""
+    """Make a gesture; return it as it travels."""
     gesture = Gesture.everywhere.create(clinic=clinic, name="wave")
     for position, degrees in enumerate((30, -60, 30), start=1):
         gesture.steps.create(position=position, turn_deg=degrees)

@@ -31,14 +31,14 @@ export function createFeedbackType({ state, show, change }) {
       choice.replaceChildren(...session.types.map(({ slug }) => new Option(label(session, slug), slug)));
     }
     const wanted = session.next_valence || session.valence;
-    if (choice.dataset.of !== wanted) choice.value = choice.dataset.of = wanted; // not while somebody chooses
+    if (choice.dataset.of !== wanted) choice.value = choice.dataset.of = wanted; // leaves an open select alone
     const nextPhase = session.phases.slice(session.phase.index + 1).find(({ feedback }) => feedback);
     choice.disabled = session.types.length < 2 || !nextPhase;
     show("type-when", describeNext(session, nextPhase));
   }
 
   choice.addEventListener("change", () => {
-    choice.dataset.of = ""; // what was refused goes back to what holds
+    choice.dataset.of = ""; // so that a refused choice is reset to the type in force
     if (state.session) change("valence", choice.value).finally(() => draw(state.session));
   });
 

@@ -45,14 +45,14 @@ from robot.bases.kobuki_protocol import (
     SoundSequence,
     Udid,
     Version,
-    control_of,
+    control_to_twist,
     decode_commands,
     decode_feedback,
     encode_commands,
     encode_feedback,
     frame,
     slow_to_wheels,
-    twist_of,
+    twist_to_control,
     wheel_speeds,
 )
 from robot.motion.twist import STILL, Twist
@@ -268,7 +268,7 @@ def test_a_frame_that_cannot_be_is_not_made():
     ],
 )
 def test_orders_are_the_references_but_for_four_faults(twist, control):
-    assert control_of(twist) == control
+    assert twist_to_control(twist) == control
 
 
 TWISTS = st.builds(Twist, st.floats(-1, 1), st.floats(-8, 8))
@@ -278,7 +278,7 @@ TWISTS = st.builds(Twist, st.floats(-1, 1), st.floats(-8, 8))
 @given(TWISTS)
 def test_an_order_means_the_twist_it_was_made_from(twist):
     possible = slow_to_wheels(twist)
-    meant = twist_of(control_of(twist))
+    meant = control_to_twist(twist_to_control(twist))
     # Half a millimeter per second of the outer wheel, half a millimeter of radius, the spot.
     radius_m = abs(possible.v_m_s / possible.w_rad_s) if possible.w_rad_s else math.inf
     tight = 0.0005 / max(radius_m, 0.0015)
@@ -291,7 +291,7 @@ def test_an_order_means_the_twist_it_was_made_from(twist):
 def test_no_wheel_is_ordered_to_go_too_fast(twist):
     speeds = wheel_speeds(slow_to_wheels(twist))
     assert max(map(abs, speeds)) <= WHEEL_MAX_M_S + 1e-9
-    assert abs(control_of(twist).speed_mm_s) <= 1000 * WHEEL_MAX_M_S
+    assert abs(twist_to_control(twist).speed_mm_s) <= 1000 * WHEEL_MAX_M_S
 
 
 @settings(deadline=None)
@@ -304,16 +304,16 @@ def test_a_twist_that_is_slowed_keeps_its_curve(twist):
 @settings(deadline=None)
 @given(st.builds(BaseControl, I16, I16))
 def test_any_order_means_something(control):
-    assert twist_of(control).is_finite
+    assert control_to_twist(control).is_finite
 
 
 def test_a_radius_of_minus_one_is_a_curve():
-    assert twist_of(BaseControl(-116, -1)) == Twist(-0.001, 1.0)
+    assert control_to_twist(BaseControl(-116, -1)) == Twist(-0.001, 1.0)
 
 
 @pytest.mark.parametrize("twist", [STILL, Twist(0.0001, 0), Twist(0, 0.001)])
 def test_what_is_slower_than_a_millimeter_stands(twist):
-    assert twist_of(control_of(twist)) == STILL
+    assert control_to_twist(twist_to_control(twist)) == STILL
 
 
 # --- the frame filter ----------------------------------------------------------------------------
@@ -328,7 +328,7 @@ class Line:
 
     def hear(self, said, after_s=FRAME_S):
         self.now_s += after_s
-        return self.frame_filter.take(said, self.now_s)
+        return self.frame_filter.update(said, self.now_s)
 
 
 @pytest.fixture
@@ -348,7 +348,7 @@ def still(number, angle=0, rate=0, **core):
 def test_it_begins_with_two_frames():
     line = Line()
     assert line.hear(still(0)) is None
-    assert line.hear(still(1)) == Estimate(battery_v=16.7, began_anew=True)
+    assert line.hear(still(1)) == Estimate(battery_v=16.7, restarted=True)
     assert line.hear(still(2)) == Estimate(battery_v=16.7)
 
 
@@ -362,7 +362,7 @@ def test_distances_and_headings_do_not_wrap():
             right_ticks=60 * number % 65536,
         )
         seen = line.hear(said)
-        assert seen is None or not seen.began_anew or number == 1
+        assert seen is None or not seen.restarted or number == 1
     assert seen.left_m == pytest.approx(-47 * (count - 1) * TICK_M)
     assert seen.right_m == pytest.approx(60 * (count - 1) * TICK_M)
     assert seen.heading_rad == pytest.approx(math.radians(2 * (count - 1)))
@@ -371,7 +371,7 @@ def test_distances_and_headings_do_not_wrap():
 
 
 def test_an_angle_may_also_wrap_as_a_number_of_16_bits(line):
-    line.frame_filter.forget()
+    line.frame_filter.reset()
     for number, angle in enumerate((32_700, 32_750, -32_736, -32_686)):
         seen = line.hear(still(number, angle=angle))
     assert seen.heading_rad == pytest.approx(math.radians(1.5))
@@ -417,7 +417,7 @@ def test_a_wrong_time_stamp_changes_nothing(line, ahead_ms):
     wrong = Feedback(core=CoreSensors((40 + ahead_ms) % 65536), inertia=Inertia(0, 0))
     line.hear(wrong)
     after = line.hear(still(3, left_ticks=20, right_ticks=20))
-    assert not after.began_anew
+    assert not after.restarted
     assert after.left_m == 20 * TICK_M
 
 
@@ -432,14 +432,14 @@ def test_a_base_that_was_switched_off_goes_on_from_where_it_was(line):
     there = line.hear(still(2, left_ticks=40, right_ticks=40))
     assert line.hear(still(0, left_ticks=30_000, angle=9000)) is None
     again = line.hear(still(1, left_ticks=30_000, angle=9000))
-    assert again.began_anew
+    assert again.restarted
     assert (again.left_m, again.heading_rad) == (there.left_m, there.heading_rad)
-    assert not line.hear(still(2, left_ticks=30_000, angle=9000)).began_anew
+    assert not line.hear(still(2, left_ticks=30_000, angle=9000)).restarted
 
 
 def test_after_a_long_silence_it_begins_anew(line):
     assert line.hear(still(2), after_s=2) is None
-    assert line.hear(still(3)).began_anew
+    assert line.hear(still(3)).restarted
 
 
 def test_versions_count_once_two_replies_agree(line):

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from robot.behavior.safety import OPEN_LOOP_MOST
+from robot.behavior.safety import OPEN_LOOP_MAX_GESTURES
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.play_gesture import play_gesture
 from tests.support.robot_stage import CUE
@@ -64,12 +64,12 @@ def test_an_open_loop_refuses_what_is_long(name):
 def test_an_open_loop_has_to_be_looked_at_after_so_many_gestures():
     stage = Stage(OPEN).perform()
     told = [stage.performer.decision]
-    for number in range(6, 5 * OPEN_LOOP_MOST + 6):
+    for number in range(6, 5 * OPEN_LOOP_MAX_GESTURES + 6):
         stage.wait(1)
         step = {"type": "step", "time_s": float(number), "performance": 1.2}
         stage.performer.handle(step, stage.now_s)
         told += [stage.performer.decision] * (stage.performer.decision is not told[-1])
-    assert len(told) == OPEN_LOOP_MOST + 1
+    assert len(told) == OPEN_LOOP_MAX_GESTURES + 1
     assert len(moving(stage)) > 0
     assert stage.of("decision")[-1]["reason"] == "place_unknown"
     assert stage.of("decision")[-2]["reason"] == ""

@@ -179,7 +179,7 @@ def test_it_can_be_looked_at(simple):
 )
 def test_what_cannot_be_done_is_refused(simple, wrong):
     with pytest.raises(BadFault):
-        simple.twin.do(wrong, 0.0)
+        simple.twin.execute(wrong, 0.0)
 
 
 def test_each_fault_has_limits_and_an_option():

@@ -95,7 +95,7 @@ def test_odometry_tells_the_truth(bench):
     ]:
         for _ in range(round(for_s / FRAME_S)):
             (payload,) = bench.live(FRAME_S, order(speed, radius))
-            was, seen = seen, frame_filter.take(decode_feedback(payload), bench.now_s)
+            was, seen = seen, frame_filter.update(decode_feedback(payload), bench.now_s)
             if was is not None and seen is not None:
                 way_m = (seen.left_m + seen.right_m - was.left_m - was.right_m) / 2
                 along_rad = (seen.heading_rad + was.heading_rad) / 2

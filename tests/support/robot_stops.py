@@ -6,7 +6,7 @@ import signal
 import time
 from collections.abc import Callable
 
-from tests.robot_room import Room
+from tests.support.robot_room import Room
 
 LINK_S, WORKER_S, STOP_S = 0.75, 0.35, 0.1  # issue 5, "Must show"
 

@@ -134,7 +134,7 @@ class Room:
         self.server.process.send_signal(what)
 
     def end_worker(self) -> str:
-        """End the worker; give what it said."""
+        """End the worker; return what it said."""
         self.worker.send_signal(signal.SIGCONT)
         self.worker.terminate()
         _, said = self.worker.communicate(timeout=10)
