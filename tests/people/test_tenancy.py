@@ -218,7 +218,7 @@ def test_a_picker_of_every_row_is_caught(worlds, monkeypatch):
 
 def test_a_chooser_of_whose_eyes_a_board_is_seen_with_is_caught(worlds, monkeypatch):
     everybody = Patient.everywhere.annotate(alone=Q(boards="own")).order_by("pk")
-    monkeypatch.setattr(LeaderboardAdmin, "_walkers", lambda self, request: everybody)
+    monkeypatch.setattr(LeaderboardAdmin, "_patients_who_walked", lambda self, request: everybody)
     leaks, _ = find_leaks(worlds, all_actors(*worlds), under="/admin/rehab/leaderboard/")
     assert "pt of amber: /admin/rehab/leaderboard/add/ shows Patient of birch" in leaks
 
