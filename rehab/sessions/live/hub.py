@@ -10,7 +10,7 @@ import asyncio
 from collections import deque
 from collections.abc import Awaitable, Callable
 
-from rehab.sessions.events import LiveEvent
+from rehab.sessions.events.event import LiveEvent
 from rehab.training.controls import Audience
 
 RING = 512  # events a session; at two steps a second four minutes

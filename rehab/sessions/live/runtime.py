@@ -19,7 +19,7 @@ from django.db import DatabaseError, connection
 from django.utils import timezone
 
 from rehab.people.models import User
-from rehab.sessions.events import to_text
+from rehab.sessions.events.event import to_text
 from rehab.sessions.live import owners, sources
 from rehab.sessions.live.audit_queue import AuditQueue
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized

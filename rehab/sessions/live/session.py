@@ -9,19 +9,16 @@ from datetime import datetime
 from typing import NamedTuple, Protocol
 
 from rehab.people.models import User
-from rehab.sessions.events import (
+from rehab.sessions.events.change import change_event, phase_event, source_message
+from rehab.sessions.events.event import (
     LiveEvent,
-    StepContext,
-    change_event,
-    phase_event,
     presence_event,
     remark_event,
     robot_report_event,
     robot_stopped_event,
-    snapshot,
-    source_message,
-    step_event,
 )
+from rehab.sessions.events.snapshot import snapshot
+from rehab.sessions.events.step import StepContext, step_event
 from rehab.sessions.live.aggregate import Row, SessionAggregate
 from rehab.sessions.live.hub import EventFeed, Subscriber
 from rehab.sessions.live.lateness import Lateness

@@ -8,7 +8,7 @@ import pytest
 from asgiref.sync import sync_to_async
 
 from rehab.people.models import Clinic, User
-from rehab.sessions.events import snapshot
+from rehab.sessions.events.snapshot import snapshot
 from rehab.sessions.live import runtime
 from rehab.sessions.live import session as sessions
 from rehab.sessions.log import SessionEvent

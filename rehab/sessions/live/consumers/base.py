@@ -11,7 +11,7 @@ from typing import Any
 from channels.exceptions import StopConsumer
 from channels.generic.websocket import AsyncWebsocketConsumer
 
-from rehab.sessions.events import to_text
+from rehab.sessions.events.event import to_text
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.auth import Actor
 from rehab.sessions.live.session import LiveSession, NotStored

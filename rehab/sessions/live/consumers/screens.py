@@ -18,7 +18,8 @@ from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.web.language import language_of
 from rehab.people.web.refusals import format_refusal
-from rehab.sessions.events import history_entry, to_text
+from rehab.sessions.events.event import to_text
+from rehab.sessions.events.snapshot import history_entry
 from rehab.sessions.live.auth import Actor, authenticate, may_open, may_watch
 from rehab.sessions.live.backlog import read_backlog
 from rehab.sessions.live.consumers.base import CloseSocket, Socket

@@ -6,7 +6,7 @@ import time
 
 from django.utils import timezone
 
-from rehab.sessions.events import source_goal_event
+from rehab.sessions.events.event import source_goal_event
 from rehab.sessions.live.backlog import is_duplicate
 from rehab.sessions.live.consumers.base import CloseSocket
 from rehab.sessions.live.consumers.device import DeviceSocket

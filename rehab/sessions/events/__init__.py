@@ -1,0 +1,1 @@
+"""The events of a live session as messages for each audience. Pure: nothing is sent here."""

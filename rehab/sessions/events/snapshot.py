@@ -1,0 +1,112 @@
+"""The snapshot with which a page begins, and past steps as its charts need them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from rehab.sessions.events.event import presence_for_patient
+from rehab.sessions.events.step import StepContext, StoredStep, patient_step
+from rehab.sessions.payloads import (
+    Message,
+    describe_now,
+    describe_phase,
+    describe_state,
+    describe_types,
+)
+from rehab.training.controls import CONTROLS, Audience
+from rehab.training.fold import SessionFold
+from rehab.training.plans import SessionPlan
+from rehab.training.steps import InvalidReason
+
+
+def history_entry(audience: Audience, plan: SessionPlan, step: StoredStep) -> Message | None:
+    """Return a past step as a chart needs it; None where this audience sees none."""
+    if audience is Audience.PATIENT and not plan.phases[step.phase].feedback:
+        return None
+    if step.side != plan.trained_side:
+        return None
+    return {
+        "number": step.number,
+        "performance": step.performance,
+        "hit": step.hit,
+        "points": step.points,
+        "valid": step.valid,
+        "phase": step.phase,
+    }
+
+
+def snapshot(
+    audience: Audience,
+    fold: SessionFold,
+    about: Message,
+    presence: Message,
+    recent: Iterable[StoredStep],
+    *,
+    robot: Message,
+    robot_stopped: bool,
+    marks: Iterable[Message],
+) -> Message:
+    """Return all that a page of this audience shows, as of the last committed step.
+
+    ``about`` says whose session it is; ``recent`` are the latest steps, oldest first; ``robot`` has
+    the robot's latest status and decision; ``marks`` are changes and remarks.
+    """
+    plan, recent = fold.plan, list(recent)
+    entries = (history_entry(audience, plan, step) for step in recent)
+    message: Message = {
+        "type": "snapshot",
+        "number": fold.last_number,
+        **describe_state(fold),
+        "completed": fold.completed,
+        "about": about,
+        **describe_now(fold),
+        "unit": plan.measure.unit,
+        "streak": fold.feedback.streak
+        if fold.valence.rewards or audience is Audience.MONITOR
+        else None,
+        **_controls_for(audience, fold),
+        "target": {"hit_rate": plan.target.hit_rate, "duration_s": plan.target.duration_s},
+        "presence": presence if audience is Audience.MONITOR else presence_for_patient(presence),
+        "robot_stopped": robot_stopped,
+        "steps": [entry for entry in entries if entry is not None],
+    }
+    if audience is Audience.PATIENT:
+        message["last"] = _last_step(fold, recent)
+    if audience is Audience.MONITOR:
+        message |= {
+            **describe_types(fold),
+            "trained_side": plan.trained_side,
+            "marks": list(marks),
+            "hit_rate": fold.feedback.hit_rate,
+            "hits": fold.feedback.hits,
+            "judged": fold.feedback.judged,
+            "obstacle": fold.obstacle,
+            "robot": dict(robot),
+            "phases": [
+                describe_phase(plan, index, fold.valence) for index in range(len(plan.phases))
+            ],
+        }
+    return message
+
+
+def _controls_for(audience: Audience, fold: SessionFold) -> Message:
+    return {
+        control.snapshot_field: control.value_in_force(fold)
+        for control in CONTROLS.values()
+        if control.snapshot_field and audience in control.snapshot_for
+    }
+
+
+def _last_step(fold: SessionFold, recent: Sequence[StoredStep]) -> Message | None:
+    """Return what the patient was last shown of a step; None before the first."""
+    plan, context = fold.plan, StepContext.of(fold)
+    switched_after = fold.switches[-1][0] if fold.switches else 0
+    for step in reversed(recent):
+        if step.number <= switched_after:
+            return None  # it meant something else
+        if step.side == plan.trained_side and InvalidReason.PAUSED not in step.reasons:
+            score, streak = fold.score, fold.feedback.streak
+            context = replace(context, phase=plan.phases[step.phase])
+            return patient_step(plan, context, step, score, streak, live=False)
+    return None

@@ -1,0 +1,157 @@
+"""Events of steps: the feedback of each, as each audience gets it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from rehab.sessions.events.event import LiveEvent
+from rehab.sessions.payloads import (
+    Message,
+    describe_walked,
+)
+from rehab.training.controls import Audience
+from rehab.training.fold import SessionFold
+from rehab.training.phases import Phase
+from rehab.training.plans import SessionPlan
+from rehab.training.steps import ScoredStep
+from rehab.training.valences import Valence
+
+
+class StoredStep(Protocol):
+    """What a scored step and its row in the log have in common."""
+
+    @property
+    def number(self) -> int: ...
+    @property
+    def performance(self) -> float | None: ...
+    @property
+    def hit(self) -> bool | None: ...
+    @property
+    def points(self) -> int | None: ...
+    @property
+    def shown(self) -> float | None: ...
+    @property
+    def valid(self) -> bool: ...
+    @property
+    def phase(self) -> int: ...
+    @property
+    def side(self) -> str: ...
+    @property
+    def reasons(self) -> Sequence[str]: ...
+
+
+@dataclass(frozen=True, slots=True)
+class StepContext:
+    """What a step's feedback follows from, as it was when the step came."""
+
+    phase: Phase
+    valence: Valence
+    words_shown: bool
+    chart_style: str
+
+    @classmethod
+    def of(cls, fold: SessionFold) -> StepContext:
+        """Return the context of the next step."""
+        return cls(fold.phase, fold.valence, fold.words_shown, fold.chart_style.value)
+
+
+def step_event(
+    fold: SessionFold, context: StepContext, step: ScoredStep, *, live: bool
+) -> LiveEvent:
+    """Return the event of a step that was just scored.
+
+    ``live`` is False for a step that came too late to be shown as one.
+    """
+    tally, score, plan, walked = fold.feedback, fold.score, fold.plan, describe_walked(fold)
+    streak, hits, judged = tally.streak, tally.hits, tally.judged
+
+    def build(audience: Audience) -> Message | None:
+        match audience:
+            case Audience.PATIENT:
+                shown = patient_step(plan, context, step, score, streak, live=live)
+                return None if shown is None else shown | walked
+            case Audience.MONITOR:
+                rate = {
+                    "hit_rate": hits / judged if judged else None,
+                    "hits": hits,
+                    "judged": judged,
+                }
+                totals = {"score": score, "streak": streak, **rate, **walked}
+                return _monitor_step(step, live=live) | totals
+            case Audience.ROBOT:
+                return _robot_step(context.phase, step, live=live)
+            case Audience.SOURCE:
+                return None
+
+    return LiveEvent(step.number, build)
+
+
+def patient_step(
+    plan: SessionPlan,
+    context: StepContext,
+    step: StoredStep,
+    score: int | None,
+    streak: int,
+    *,
+    live: bool,
+) -> Message | None:
+    if step.side != plan.trained_side:
+        return None
+    if not context.phase.feedback:
+        return {"kind": "calm", "number": step.number}
+    if step.performance is None or step.hit is None:
+        return {"kind": "missing", "number": step.number, "live": live}
+    valence, band = context.valence, context.valence.band(step.performance)
+    return {
+        "kind": "step",
+        "number": step.number,
+        "live": live,
+        "performance": round(step.performance, 4),
+        "hit": step.hit,
+        "words": band.words if context.words_shown else "",
+        "chart": context.chart_style,
+        "emblem": valence.emblem(step.hit),
+        "confetti": band.confetti,
+        "points": step.points,
+        "score": score,
+        "streak": streak if valence.rewards else None,
+        # What is measured is shown where it is the feedback itself.
+        "shown": None if valence.has_points or step.shown is None else round(step.shown, 2),
+    }
+
+
+def _monitor_step(step: ScoredStep, *, live: bool) -> Message:
+    return {
+        "kind": "step",
+        "number": step.number,
+        "live": live,
+        "time_s": step.time_s,
+        "side": step.side,
+        "value": step.value,
+        "gain": step.gain,
+        "shown": step.shown,
+        "goal": step.goal,
+        "performance": step.performance,
+        "hit": step.hit,
+        "points": step.points,
+        "valid": step.valid,
+        "reasons": step.reasons,
+        "phase": step.phase,
+        "extra": dict(step.extra),
+    }
+
+
+def _robot_step(phase: Phase, step: ScoredStep, *, live: bool) -> Message | None:
+    if not live or not phase.feedback or step.performance is None:
+        return None
+    return {
+        "type": "step",
+        "number": step.number,
+        "time_s": step.time_s,
+        "performance": step.performance,
+        # For the original's ROS topics (robot/original_topics.py).
+        "shown": step.shown,
+        "goal": step.goal,
+    }
