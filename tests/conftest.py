@@ -108,8 +108,10 @@ def django_db_setup(
     yield
     from django.db import connection
 
-    if "rows" in SHARED:
-        SHARED.pop("rows")[1]()
+    # Chromium first: beside the loop of its driver Django refuses to touch a database.
+    for name in ("chromium", "rows"):
+        if name in SHARED:
+            SHARED.pop(name)[1]()
     if connection.vendor != "postgresql":
         return
     with django_db_blocker.unblock(), connection.cursor() as cursor:
