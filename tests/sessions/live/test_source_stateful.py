@@ -104,6 +104,9 @@ FAULTS = {
 }
 
 
+# A fault ends the walk while writers may be at work: what their threads then raise is no fault.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize(
     ("fault", "places"), FAULTS.items(), ids=lambda one: getattr(one, "__name__", "")
 )
