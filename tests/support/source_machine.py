@@ -21,6 +21,7 @@ from hypothesis.stateful import (
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.live.session import NotStored
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
@@ -418,7 +419,7 @@ class FirstFault(Sources):
     def go(self, work: Any) -> Any:
         try:
             return super().go(work)
-        except (AssertionError, TimeoutError) as fault:  # HungUp is an assertion, too
+        except (AssertionError, TimeoutError, NotStored) as fault:  # HungUp is an assertion, too
             self.found = self.found or Found(fault)
             raise self.found from fault
 
