@@ -98,7 +98,7 @@ def forget_where_a_change_stood(monkeypatch: pytest.MonkeyPatch) -> None:
 # Each with the rules or checks of the machine that may trip over it.
 FAULTS = {
     acknowledge_before_the_commit: {"_connect", "_lose_all_but", "_note_acks", "_look_at_the_log"},
-    check_no_epoch: {"_look_at_the_log"},
+    check_no_epoch: {"_change", "_look_at_the_log", "wait_until_committed"},
     take_other_content_for_the_same: {"contradict"},
     forget_where_a_change_stood: {"_look_at_the_log"},
 }
