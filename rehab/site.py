@@ -41,14 +41,16 @@ HEADINGS = (
         _("Places & devices"),
         {
             "Station": _("Places with a tablet, a source of steps and a robot."),
-            "Device": _("What dials in from a station, and the token it does so with."),
+            "Device": _(
+                "Tablets, sources of steps and robots, each with the token that it connects by."
+            ),
         },
     ),
     (
         _("People"),
         {
             "User": _("Who works here, and what their role lets them do."),
-            "ApiToken": _("What lets programs read and steer."),
+            "ApiToken": _("Tokens with which programs use the API."),
             "Clinic": _("Name, language, clock, second factor, how long data is kept."),
         },
     ),

@@ -11,5 +11,6 @@ urlpatterns = [
     path("", include("rehab.sessions.urls")),
     path("", include("rehab.patients.urls")),
     path("", include("rehab.boards.urls")),
+    path("", include("rehab.studies.urls")),
     path("", include("rehab.exports.urls")),
 ]

@@ -1,11 +1,14 @@
 """`python -m robot --base NAME …`: lets a base perform for the sessions of its station.
 
 `python -m robot gesture NAME --base NAME` plays one gesture, without a server;
+`python -m robot calibrate --base NAME` measures how a base answers, once for each;
 `python -m robot doctor` finds a Kobuki's port and says what is wrong on the way to it;
+`python -m robot replay FILE --base NAME` gives a simulated base the orders of an incident again;
 `python -m robot twin` is a simulated one at a port of its own.
 
-Exit status: 0 ended by SIGTERM (--child: standard input closed); 1 the base does not answer any
-more; 2 the command line cannot be used; 3 the server refuses this robot; 130 stopped by Ctrl-C.
+Exit status: 0 ended by SIGTERM or SIGHUP (--child: standard input closed); 1 the base does not
+answer any more; 2 the command line cannot be used; 3 the server refuses this robot; 130 stopped by
+Ctrl-C.
 However it ends, the base stands still.
 """
 
@@ -19,13 +22,17 @@ import sys
 import threading
 import time
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
+from hashlib import sha256
+from pathlib import Path
 
-from robot import doctor, play_gesture
+from robot import calibrate, doctor, play_gesture, replay
 from robot.base_options import add_base_arguments, make_base
-from robot.bases import BadOption, BaseLost, MobileBase
+from robot.bases import BadOption, BaseLost
 from robot.bases.twin.__main__ import main as run_twin
+from robot.black_box.recorder import BlackBox
+from robot.calibration import BadCalibration, apply_calibration
 from robot.connection_args import (
     BadConnectionArgs,
     add_connection_arguments,
@@ -37,6 +44,8 @@ from robot.original_topics import TOPICS, OriginalTopics
 from robot.worker import Worker
 
 ROBOT_PATH = "/ws/robot/"
+
+BLACK_BOX = "~/.local/state/garry/black_box"
 
 DONE, LOST, UNUSABLE, REFUSED, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -57,8 +66,22 @@ def make_parser() -> ArgumentParser:
         help="publish on these of the original's topics at the rosbridge, beside any base "
         "(without a name: on all)",
     )
+    parser.add_argument(
+        "--black-box",
+        default=os.environ.get("GARRY_ROBOT_BLACK_BOX", BLACK_BOX),
+        metavar="FOLDER",
+        help="where to record the last minutes, and keep those around a stop; off for nowhere "
+        "(default: GARRY_ROBOT_BLACK_BOX, or ~/.local/state/garry/black_box)",
+    )
     add_connection_arguments(parser)
     return parser
+
+
+def find_black_box(named: str, token: str) -> Path | None:
+    """Return a robot's own folder in that of the option; None where it is off."""
+    if named in ("", "off"):
+        return None
+    return Path(named).expanduser() / sha256(token.encode()).hexdigest()[:12]
 
 
 def print_notice(text: str) -> None:
@@ -67,11 +90,14 @@ def print_notice(text: str) -> None:
 
 
 async def wait_for_end(is_child: bool) -> None:
-    """Wait for SIGTERM, and for the end of standard input where a server supervises us."""
+    """Wait for SIGTERM, SIGHUP, and for the end of standard input where a server supervises us."""
     loop = asyncio.get_running_loop()
     ended = asyncio.Event()
-    with contextlib.suppress(NotImplementedError):  # Windows has no such signals
-        loop.add_signal_handler(signal.SIGTERM, ended.set)
+    for name in ("SIGTERM", "SIGHUP"):
+        with contextlib.suppress(
+            NotImplementedError, AttributeError
+        ):  # Windows has no such signals
+            loop.add_signal_handler(getattr(signal, name), ended.set)
 
     def read_to_the_end() -> None:
         with contextlib.suppress(OSError):
@@ -85,11 +111,9 @@ async def wait_for_end(is_child: bool) -> None:
     await ended.wait()
 
 
-async def run_worker(
-    url: str, token: str, base: MobileBase, originals: OriginalTopics | None, is_child: bool
-) -> None:
+async def run_worker(make_worker: Callable[[], Worker], is_child: bool) -> None:
     """Run a worker until the process is to end. Raises LinkRefused and BaseLost."""
-    worker = Worker(partial(Link, url, token), base, originals=originals, notice=print_notice)
+    worker = make_worker()
     tasks = [asyncio.create_task(worker.run()), asyncio.create_task(wait_for_end(is_child))]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -104,7 +128,7 @@ async def run_worker(
 def run(options: Namespace) -> int:
     """Run a robot to its end, and return the exit status.
 
-    Raises BadConnectionArgs and BadOption.
+    Raises BadConnectionArgs, BadCalibration and BadOption.
     """
     url = websocket_url(options.server, ROBOT_PATH)
     token = find_token(options, "GARRY_ROBOT_TOKEN", "a robot")
@@ -113,9 +137,21 @@ def run(options: Namespace) -> int:
     base, originals = make_base(options, time.monotonic), None
     if options.original_topics is not None:
         originals = OriginalTopics(options.ros_url, options.original_topics or TOPICS)
-    with base, originals or contextlib.nullcontext():
+    folder = find_black_box(options.black_box, token)
+    box = None if folder is None else BlackBox(folder)
+    with base, originals or contextlib.nullcontext(), box or contextlib.nullcontext():
+        if apply_calibration(base):
+            print_notice(f"{base.identity} answers as it was measured to.")
+        make_worker = partial(
+            Worker,
+            partial(Link, url, token),
+            base,
+            originals=originals,
+            black_box=box,
+            notice=print_notice,
+        )
         try:
-            asyncio.run(run_worker(url, token, base, originals, options.child))
+            asyncio.run(run_worker(make_worker, options.child))
         except KeyboardInterrupt:
             print_notice("Stopped.")
             return INTERRUPTED
@@ -133,14 +169,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words[:1] == ["doctor"]:
         return doctor.main(words[1:])
+    if words[:1] == ["calibrate"]:
+        return calibrate.main(words[1:])
     if words[:1] == ["gesture"]:
         return play_gesture.main(words[1:])
+    if words[:1] == ["replay"]:
+        return replay.main(words[1:])
     if words[:1] == ["twin"]:
         return run_twin(words[1:])
     options = make_parser().parse_args(words)
     try:
         return run(options)
-    except (BadConnectionArgs, BadOption) as problem:
+    except (BadCalibration, BadConnectionArgs, BadOption) as problem:
         print_notice(f"{problem}")
         return UNUSABLE
     except KeyboardInterrupt:

@@ -3,6 +3,10 @@
 Types and values are those that its nodes of 2024 expect (docs/reference/original.md#robot). Events,
 which are steps and windows, are published at once or never; the feedback type is a state, and is
 published again on every connection.
+
+Its gesture node acts on the last ``True`` for as long as no ``False`` comes. So where our own robot
+may not act, ``False`` is all that is published, again and again; so it is on each new connection,
+at the end, and where no decision follows a ``True``.
 """
 
 from __future__ import annotations
@@ -50,6 +54,10 @@ FRESH_S = 1.0  # an event that could not be sent for this long is dropped
 KEPT = 8
 LATE_S = 2.0  # a message without an echo by then has not arrived
 NUMBER_MAX = 1e6
+FALSE_EVERY_S = 0.5  # a new subscriber, or one that ROS has not connected yet, misses some
+FIRST_FALSES = LAST_FALSES = 3
+# Without another decision after so many windows there are no steps: a True is taken back.
+HOLDS_WINDOWS = 1.5
 
 
 class OriginalTopicClient:
@@ -67,14 +75,28 @@ class OriginalTopicClient:
         self._published = ""  # the feedback type, on this connection
         self._events: deque[tuple[float, Topic, Mapping[str, Any]]] = deque(maxlen=KEPT)
         self._unconfirmed: dict[str, float] = {}  # topic: since when its echo is missing
-        self._is_open = False
+        self._is_open = self._is_allowed = False
+        self._falses = FIRST_FALSES  # so many are still to come on this connection
+        self._false_s = -math.inf  # the last one
+        self._true_until_s = math.inf
+
+    @property
+    def is_allowed(self) -> bool:
+        """Whether anything that moves a robot is published."""
+        return self._is_allowed
+
+    def allow(self, is_allowed: bool) -> None:
+        """Allow ``True`` and data where our own robot may act; else take back what was said."""
+        if self._is_allowed and not is_allowed:
+            self._take_back()
+        self._is_allowed = is_allowed
 
     def handle_message(self, message: Mapping[str, Any], now_s: float) -> None:
         """Handle a message of the server; a step without finite numbers is not published."""
         match message:
             case {"type": "welcome" | "cue", "valence": str(valence)}:
                 self._valence = valence
-            case {"type": "step"}:
+            case {"type": "step"} if self._is_allowed:
                 with suppress(BadFrame):
                     a2, goal = (
                         read_number(message, name, -NUMBER_MAX, NUMBER_MAX)
@@ -82,10 +104,12 @@ class OriginalTopicClient:
                     )
                     self._add(now_s, DATA, {"a2": a2, "goal": goal})
 
-    def publish_decision(self, above: bool, now_s: float) -> None:
-        """Publish a decision: whether the window was above."""
-        if self._valence in WITH_GOOD_STEP:
+    def publish_decision(self, above: bool, window_s: float, now_s: float) -> None:
+        """Publish a decision: whether the window, of a length [s], was above."""
+        if self._valence in WITH_GOOD_STEP and self._is_allowed:
             self._add(now_s, GOOD_STEP, {"data": above})
+            self._falses = 0
+            self._true_until_s = now_s + HOLDS_WINDOWS * window_s if above else math.inf
 
     def open(self, now_s: float) -> Iterator[Frame]:
         """Yield the first frames of a new connection."""
@@ -101,6 +125,12 @@ class OriginalTopicClient:
         if FEEDBACK_TYPE in self._topics and feedback_type and feedback_type != self._published:
             self._published = feedback_type
             yield self._publish(FEEDBACK_TYPE, {"data": feedback_type}, now_s)
+        if now_s > self._true_until_s:
+            self._take_back()
+        is_false_due = self._falses > 0 or not self._is_allowed
+        if GOOD_STEP in self._topics and is_false_due and now_s - self._false_s >= FALSE_EVERY_S:
+            self._false_s, self._falses = now_s, max(self._falses - 1, 0)
+            yield self._publish(GOOD_STEP, {"data": False}, now_s)
         while self._events:
             made_s, topic, message = self._events.popleft()
             if now_s - made_s <= FRESH_S:
@@ -114,11 +144,14 @@ class OriginalTopicClient:
     def disconnect(self, now_s: float) -> None:
         """Drop what was to be sent: it would be out of date on the next connection."""
         self._is_open, self._published = False, ""
-        self._events.clear()
+        self._take_back()
         self._unconfirmed.clear()
 
     def end(self, now_s: float) -> Iterator[Frame]:
         """Yield the last frames."""
+        if GOOD_STEP in self._topics:
+            for _ in range(LAST_FALSES):
+                yield publish(GOOD_STEP, {"data": False})
         for topic in self._topics:
             yield unsubscribe(topic)
             yield unadvertise(topic)
@@ -133,6 +166,11 @@ class OriginalTopicClient:
                     f"{topic.kind}, and no other program may use another{cure}."
                 )
         return ""
+
+    def _take_back(self) -> None:
+        """Drop what waits, and publish ``False`` at once and some more times."""
+        self._events.clear()
+        self._falses, self._false_s, self._true_until_s = FIRST_FALSES, -math.inf, math.inf
 
     def _add(self, now_s: float, topic: Topic, message: Mapping[str, Any]) -> None:
         if self._is_open and topic in self._topics:
@@ -185,11 +223,19 @@ class OriginalTopics:
             self._client.handle_message(message, self._monotonic())
         self._wake()
 
-    def publish_decision(self, above: bool) -> None:
-        """Publish a decision: whether the window was above."""
+    def publish_decision(self, above: bool, window_s: float) -> None:
+        """Publish a decision: whether the window, of a length [s], was above."""
         with self._lock:
-            self._client.publish_decision(above, self._monotonic())
+            self._client.publish_decision(above, window_s, self._monotonic())
         self._wake()
+
+    def allow(self, is_allowed: bool) -> None:
+        """Allow what moves a robot, or take back what was said."""
+        with self._lock:
+            is_new = self._client.is_allowed != is_allowed
+            self._client.allow(is_allowed)
+        if is_new:
+            self._wake()
 
     def _wake(self) -> None:
         if self._bridge is not None:

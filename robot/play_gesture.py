@@ -2,23 +2,28 @@
 
 For trying a base and its place. Running it arms a real base: stand at its switch.
 Exit status: 0 it was played; 1 it ended otherwise, or the base does not answer; 2 the command line
-cannot be used; 130 Ctrl-C.
+cannot be used; 128 + N ended by signal N (Ctrl-C: 130). However it ends, the base is stopped; one
+whose connection was lost meanwhile as soon as it is back.
 """
 
 from __future__ import annotations
 
 import json
+import signal
 import sys
 import time
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
-from typing import Any
+from typing import Any, TextIO
 
 from robot.base_options import add_base_arguments, make_base
 from robot.bases import BASES, BadOption, BaseLost, MobileBase
 from robot.behavior.control_loop import control_loop
 from robot.behavior.performer import Performer
+from robot.behavior.safety import BASE_SILENT, BASE_SILENT_S
+from robot.calibration import BadCalibration, apply_calibration
 from robot.motion.gesture import Gesture
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.limits import TICK_S
@@ -26,6 +31,45 @@ from robot.motion.player import DONE
 from robot.motion.pose import HOME
 
 REST_S = 0.3  # until wheels, odometry and true pose have come to rest
+LOST_S = 60.0  # a base that was lost is waited for so long; somebody has switched it off by then
+ENDINGS = ("SIGTERM", "SIGHUP", "SIGBREAK", "SIGINT")  # those that this system has
+
+
+class Ended(BaseException):
+    """A signal ended the program; its number is the argument."""
+
+
+@contextmanager
+def ending_by_signals() -> Iterator[None]:
+    """Let each signal that ends a program raise Ended, so that its base is stopped."""
+
+    ended: list[int] = []
+
+    def end(number: int, _frame: object) -> None:
+        ended.append(number)
+        if len(ended) == 1:  # what follows would disturb the stopping
+            raise Ended(number)
+
+    names = [getattr(signal, name) for name in ENDINGS if hasattr(signal, name)]
+    had = {name: signal.signal(name, end) for name in names}
+    try:
+        yield
+    finally:
+        for name, handler in had.items():
+            signal.signal(name, handler)
+
+
+def wait_for_stop(
+    base: MobileBase, monotonic: Callable[[], float], sleep: Callable[[float], object]
+) -> bool:
+    """Order a base that does not answer to stand until it does; return whether it did."""
+    until_s = monotonic() + LOST_S
+    while base.read().sensors.silent_s > BASE_SILENT_S:
+        if monotonic() >= until_s:
+            return False
+        base.stop()
+        sleep(TICK_S)
+    return True
 
 
 class VirtualClock:
@@ -63,8 +107,8 @@ def play_gesture(
     Returns
     -------
     dict
-        The outcome, how long it took [s], the pose by odometry, and the true pose, which only a
-        simulation knows.
+        Whether it began, its outcome, how long it took [s], the pose by odometry, and the true
+        pose, which only a simulation knows.
 
     Raises
     ------
@@ -78,7 +122,7 @@ def play_gesture(
     if not refused:
         performer.tick(began_s)
     for pause_s in control_loop(performer, monotonic, lambda: not performer.player.is_busy):
-        farthest_m = max(farthest_m, base.read().pose.distance_m(HOME))
+        farthest_m = max(farthest_m, performer.senses.state.pose.distance_m(HOME))
         sleep(pause_s)
     took_s = monotonic() - began_s
     outcome = refused or performer.player.outcome
@@ -90,6 +134,7 @@ def play_gesture(
         "gesture": gesture.name,
         "base": base.name,
         "abilities": asdict(base.abilities),
+        "began": not refused,
         "outcome": outcome,
         "took_s": round(took_s, 3),
         "pose": asdict(base.read().pose),
@@ -127,26 +172,37 @@ def main(arguments: Sequence[str] | None = None) -> int:
     outcome = DONE
     try:
         base = make_base(options, monotonic)
-        with base:
+        with ending_by_signals(), base:
+            apply_calibration(base)
             for _ in range(options.times):
                 played = play_gesture((GESTURES | ORIGINALS)[options.name], base, monotonic, sleep)
                 text = json.dumps(played) if options.json else format_result(played)
-                sys.stdout.write(f"{text}\n")
-                sys.stdout.flush()
+                print_line(text, sys.stdout)
                 outcome = played["outcome"]
                 if outcome != DONE:
-                    if base.problem:
-                        sys.stderr.write(f"{base.problem}\n")
+                    print_line(base.problem, sys.stderr)
                     break
+            if outcome == BASE_SILENT and played["began"]:
+                print_line(
+                    "It may be moving: switch it off. Waiting for it, to stop it.", sys.stderr
+                )
+                if wait_for_stop(base, monotonic, sleep):
+                    print_line("It answers again, and was stopped.", sys.stderr)
     except BaseLost as problem:
-        sys.stderr.write(f"{problem}\n")
+        print_line(str(problem), sys.stderr)
         return 1
-    except BadOption as problem:
-        sys.stderr.write(f"{problem}\n")
+    except (BadCalibration, BadOption) as problem:
+        print_line(str(problem), sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        return 130
+    except Ended as end:
+        return 128 + int(end.args[0])
     return 0 if outcome == DONE else 1
+
+
+def print_line(text: str, file: TextIO) -> None:
+    """Print a line, unless it is empty."""
+    if text:
+        print(text, file=file, flush=True)
 
 
 if __name__ == "__main__":

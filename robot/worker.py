@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections import deque
 from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
-from robot.bases import MobileBase
+from robot.bases import BaseLost, MobileBase
 from robot.behavior.control_loop import control_loop
 from robot.behavior.performer import NO_LINK, Performer
+from robot.black_box.recorder import BlackBox, Incident
+from robot.black_box.witness import Witness
 from robot.link import Link, LinkRefused, Message
 from robot.motion.limits import DEFAULT_LIMITS, Limits
 from robot.original_topics import OriginalTopics
@@ -29,6 +32,8 @@ class Worker:
         Speeds and accelerations of every gesture.
     originals
         Publishes on the original's topics; open.
+    black_box
+        Records; open.
     notice
         Called with lines for people who watch.
     monotonic, sleep
@@ -42,13 +47,15 @@ class Worker:
         *,
         limits: Limits = DEFAULT_LIMITS,
         originals: OriginalTopics | None = None,
+        black_box: BlackBox | None = None,
         notice: Callable[[str], None] = lambda _text: None,
         monotonic: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
     ) -> None:
         self.performer = Performer(base, limits)
         self._link = dial(greet=self._greet, on_lost=self._handle_lost_link)
-        self._base, self._originals = base, originals
+        self._base, self._originals, self._black_box = base, originals, black_box
+        self._witness = Witness(black_box, self.performer, base)
         self._notice = notice
         self._monotonic = monotonic
         self._sleep = sleep
@@ -65,6 +72,9 @@ class Worker:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
                 task.result()
+        except BaseLost:
+            self._witness.lose("base_lost")
+            raise
         finally:
             self._base.stop()
             for task in tasks:
@@ -77,6 +87,7 @@ class Worker:
 
     def _handle_lost_link(self, reason: str, pause_s: float) -> None:
         self.performer.disconnect(NO_LINK)
+        self._allow_originals()
         self._notice(f"{reason}; standing still, dialing in again in {pause_s:.1f} s.")
 
     async def _listen(self) -> None:
@@ -98,26 +109,37 @@ class Worker:
         was_linked, bad = self.performer.is_linked, self.performer.bad_messages
         decided = self.performer.decision
         self.performer.handle(message, self._monotonic())
+        self._witness.hear(message)
         if self._originals is not None:
+            self._allow_originals()
             self._originals.handle_message(message)
             decision = self.performer.decision
             if decision is not None and decision is not decided:
-                self._originals.publish_decision(decision.above)
+                self._originals.publish_decision(
+                    decision.above, self.performer.decider.cue.window_s
+                )
         if self.performer.is_linked and not was_linked:
             self._notice(f"Joined session {message.get('session')}.")
         if self.performer.bad_messages > bad:
             self._notice(f"A message was not understood: {self.performer.last_bad_message}")
         self._reported.set()
 
+    def _allow_originals(self) -> None:
+        """Let the original's nodes act where our own robot may, and only there."""
+        if self._originals is not None:
+            self._originals.allow(self.performer.may_act)
+
     async def _drive(self) -> None:
-        problem = topics_problem = ""
+        problem = topics_problem = box_problem = ""
         was_linked = False
         for pause_s in control_loop(self.performer, self._monotonic):
+            self._witness.see(self._monotonic())
             if was_linked and not self.performer.is_linked:
                 # Messages that are still on their way would come too late.
                 self._notice("The server is silent; standing still, dialing in again.")
                 self._link.hang_up()
-            if self.performer.reports:
+            self._allow_originals()
+            if self.performer.reports or (self._black_box and self._black_box.incidents):
                 self._reported.set()
             if problem != self._base.problem:
                 problem = self._base.problem
@@ -125,6 +147,9 @@ class Worker:
             if self._originals is not None and topics_problem != self._originals.problem:
                 topics_problem = self._originals.problem
                 self._notice(topics_problem or "The original's topics are published.")
+            if self._black_box is not None and box_problem != self._black_box.problem:
+                box_problem = self._black_box.problem
+                self._notice(box_problem or "The black box records.")
             await self._sleep(pause_s)
             was_linked = self.performer.is_linked
 
@@ -141,3 +166,23 @@ class Worker:
                     break
                 if reports and reports[0] is report:
                     reports.popleft()
+            await self._send_incidents()
+
+    async def _send_incidents(self) -> None:
+        """Send what was kept, each to the session that it is of; the others stay on this disk."""
+        incidents = self._black_box.incidents if self._black_box is not None else deque[Incident]()
+        while incidents and self.performer.is_linked:
+            incident = incidents[0]
+            is_of_this = incident.session is not None and incident.session == self.performer.session
+            if is_of_this and not await self._link.send(
+                {
+                    "type": "incident",
+                    "session": incident.session,
+                    "reason": incident.reason,
+                    "ago_s": round(self._monotonic() - incident.at_s, 3),
+                    "recording": incident.recording,
+                }
+            ):
+                return
+            if incidents and incidents[0] is incident:
+                incidents.popleft()

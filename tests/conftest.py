@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 from collections.abc import Callable, Generator, Iterator
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from unittest import mock
 
 import hypothesis
 import pytest
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 
 TESTS = Path(__file__).parent
 DATABASE_FIXTURES = {"db", "transactional_db", "live_server"}
+# What robots that tests start record stays out of this computer's own folder.
+os.environ["GARRY_ROBOT_BLACK_BOX"] = "off"
 MARKED_BY_FOLDER = {"bench", "screenshots"}
 # What tests in a row share, by who is one of them: ended before a test that is not.
 SHARED: dict[str, tuple[Callable[[pytest.Item], bool], Callable[[], None]]] = {}
@@ -45,6 +49,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("database")
         if item.get_closest_marker("browser") and not chromium and "CI" not in os.environ:
             item.add_marker(pytest.mark.skip(reason="no Chromium: apt-get install chromium"))
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_finish() -> None:
+    """Look for garbage seldom, and not in what was imported and collected: it stays to the end,
+    and looking took a tenth of the tests' time.
+    """
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -85,28 +98,66 @@ def django_db_modify_db_settings(tmp_path_factory: pytest.TempPathFactory) -> No
 
 @pytest.fixture(scope="session")
 def _without_durability() -> Iterator[None]:
-    """Wait for no disk and hash passwords quickly: rows of this process need not outlive a power
-    cut. Servers and commands that tests start keep the product's own settings.
+    """Wait for no disk, hash passwords quickly and build boards in no thread, which would outlive
+    its test: rows of this process need not outlive a power cut. Servers and commands that tests
+    start keep the product's own settings.
     """
     from django.conf import settings
     from django.test import override_settings
 
+    from rehab.boards.building.scheduler import board_builder
+
+    board_builder.wake = lambda: None  # type: ignore[method-assign]
+
     options = settings.DATABASES["default"].get("OPTIONS", {})
     if "init_command" in options:
         options["init_command"] += "PRAGMA synchronous=OFF;"
-    with override_settings(PASSWORD_HASHERS=["django.contrib.auth.hashers.MD5PasswordHasher"]):
+    from rehab.people.sign_in import recovery_codes
+
+    quick = {"PASSWORD_HASHERS": ["django.contrib.auth.hashers.MD5PasswordHasher"]}
+    with override_settings(**quick), mock.patch.object(recovery_codes, "SCRYPT_N", 2):
+        yield
+
+
+@pytest.fixture(scope="session")
+def _logs_can_be_flushed() -> Iterator[None]:
+    """Lift the triggers of append-only logs where tests empty the tables after themselves."""
+    from django.db import connection
+
+    from rehab.people.audit import guards
+
+    flush = connection.ops.execute_sql_flush
+
+    def flush_all(statements: list[str]) -> None:
+        with guards.lifted(connection.alias):
+            flush(statements)
+
+    with mock.patch.object(connection.ops, "execute_sql_flush", flush_all):
         yield
 
 
 @pytest.fixture(scope="session")
 def django_db_setup(
-    _without_durability: None, django_db_setup: None, django_db_blocker: Any
+    _without_durability: None,
+    _logs_can_be_flushed: None,
+    django_db_setup: None,
+    django_db_blocker: Any,
 ) -> Iterator[None]:
-    """Hang up, before the test database goes, whatever a thread or a pool still holds of it:
-    PostgreSQL drops no database that somebody is in, and autovacuum may be.
+    """Bring first rows back quickly. Hang up, before the test database goes, whatever a thread or
+    a pool still holds of it: PostgreSQL drops no database that somebody is in, and autovacuum may
+    be.
     """
-    yield
     from django.db import connection
+    from django.test import TransactionTestCase
+
+    from tests.support.first_rows import FirstRows
+
+    with pytest.MonkeyPatch.context() as patch:
+        if connection.vendor == "sqlite":  # whose values go back as they came
+            with django_db_blocker.unblock():
+                first = FirstRows()
+            patch.setattr(TransactionTestCase, "_fixture_teardown", lambda _: first.restore())
+        yield
 
     # Chromium first: beside the loop of its driver Django refuses to touch a database.
     for name in ("chromium", "rows"):

@@ -146,6 +146,7 @@ print(count)
 
 
 @pytest.mark.parametrize("package", ["rehab.gait", "rehab.sources", "rehab.training", "robot"])
+@pytest.mark.server
 def test_imports_without_django_posix_and_pybullet(package: str) -> None:
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", IMPORT_EVERYTHING, package],

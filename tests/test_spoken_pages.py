@@ -21,7 +21,7 @@ from tests.support.world import World, fill_board, signed_in
 
 pytestmark = pytest.mark.django_db
 
-MACHINE = {"healthz", "catalog", "tablet-state", "tablet-app", "sign-out"}
+MACHINE = {"healthz", "readyz", "catalog", "tablet-state", "tablet-app", "sign-out"}
 # What nobody translates: names of ours, units, codes, what people typed, and how dates are told.
 AS_IT_IS = re.compile(
     r"[Zz]q\w+qz[\w-]*|\bzq\b|GARRY|W/kg|\b(?:kg|min|s|m)\b|(?:localhost|testserver|http)\S*|"
@@ -174,7 +174,13 @@ def pages(world: World, admin: bool = False) -> Iterator[tuple[str, Page]]:
             yield f"{name} {path}", Page(answer.content.decode())
 
 
-@pytest.mark.parametrize("admin", [False, True], ids=["pages", "admin"])
+@pytest.mark.parametrize(
+    "admin",
+    [
+        pytest.param(False, id="pages"),
+        pytest.param(True, id="admin", marks=pytest.mark.long),
+    ],
+)
 def test_no_word_of_a_page_is_left_in_english(world, bracketed, admin):
     found = {}
     for name, page in pages(world, admin):
@@ -184,7 +190,13 @@ def test_no_word_of_a_page_is_left_in_english(world, bracketed, admin):
     assert not found, json.dumps({name: sorted(left) for name, left in found.items()}, indent=1)
 
 
-@pytest.mark.parametrize("admin", [False, True], ids=["pages", "admin"])
+@pytest.mark.parametrize(
+    "admin",
+    [
+        pytest.param(False, id="pages"),
+        pytest.param(True, id="admin", marks=pytest.mark.long),
+    ],
+)
 def test_numbers_of_drawings_fields_and_scripts_are_the_same_in_every_language(world, admin):
     seen = 0
     for name, page in pages(world, admin):

@@ -23,7 +23,7 @@ from rehab.boards.panels.viewer import BoardViewer
 from rehab.boards.ranking.eligibility import find_group
 from rehab.boards.ranking.results import Result, read_results
 from rehab.people.access import user_of
-from rehab.people.models import Boards, Patient
+from rehab.people.models import BoardsConsent, Patient
 from rehab.people.roles import Role
 from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors
 from rehab.sessions.models import TrainingSession
@@ -183,5 +183,5 @@ class LeaderboardAdmin(PreviewAdmin):
             sessions__state=State.FINISHED.value
         )
         return walked.annotate(
-            alone=Q(boards=Boards.OWN), last_here=Max("sessions__started_at")
+            alone=Q(boards=BoardsConsent.OWN), last_here=Max("sessions__started_at")
         ).order_by("alone", "-last_here")

@@ -71,9 +71,14 @@ def list_boards(request: HttpRequest, paging: Query[Paging]) -> dict[str, Any]:
 @router.get("/boards/{board_id}/rows", response=responses(BoardPanelOut, 404))
 @for_roles(Role.LEAD, Role.PT)
 def show_board(request: HttpRequest, board_id: Path[Key]) -> BoardPanel:
-    """Show a board as tablets show it to anybody, with the patients who agreed to be on it."""
+    """Show a board as tablets show it to anybody, with the patients who agreed to be on it.
+
+    Of a board that shows each patient their neighbors, its first rows; of one with a list for each
+    feedback type, the longest list.
+    """
     boards = Leaderboard.objects.visible_to(caller(request)).select_related("clinic")
-    return BoardViewer(get_object_or_404(boards, pk=board_id), timezone.now()).make_panel()
+    board = get_object_or_404(boards, pk=board_id)
+    return BoardViewer(board, timezone.now(), staff=True).make_panel()
 
 
 @router.get("/sessions/{session_id}/boards", response=responses(list[BoardPanelOut], 404))

@@ -23,7 +23,7 @@ from rehab.boards.choices import (
     metric_choices,
 )
 from rehab.boards.validation import find_invalid_settings
-from rehab.people.models import Boards, Clinic, Patient
+from rehab.people.models import BoardsConsent, Clinic, Patient
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.training.valences import VALENCES
 
@@ -202,6 +202,25 @@ class Leaderboard(ClinicModel):
         """Refuse boards that would mislead or expose somebody, with the cure at the field."""
         if errors := dict(find_invalid_settings(self)):
             raise ValidationError(errors)
+        if (other := self._find_reverse()) is not None:
+            message = _(
+                "“%(board)s” ranks by the same measure the other way round: together they would "
+                "show everybody, the last half too. Choose the same order, or switch that one off."
+            )
+            raise ValidationError({"higher_is_better": message % {"board": other.name}})
+
+    def _find_reverse(self) -> Leaderboard | None:
+        """Return a board that shows the half of the patients that this one does not."""
+        if self.is_own or not self.active or self.display == DisplayMode.TOTAL:
+            return None
+        others = Leaderboard.everywhere.filter(
+            Q(clinic=self.clinic_id) | Q(clinic__isnull=True),
+            active=True,
+            metric=self.metric,
+            higher_is_better=not self.higher_is_better,
+        )
+        ranked = others.exclude(among=Participants.SELF).exclude(display=DisplayMode.TOTAL)
+        return ranked.exclude(pk=self.pk).first()
 
     @property
     def is_being_built(self) -> bool:
@@ -222,9 +241,9 @@ class Leaderboard(ClinicModel):
     def accepted_levels(self) -> list[str]:
         """The levels of agreement (`Patient.boards`) with which a patient may be on it."""
         if self.among == Participants.ACROSS:
-            return [Boards.ACROSS]
-        total = [Boards.TOTAL] if self.display == DisplayMode.TOTAL else []
-        return [*total, Boards.CLINIC, Boards.ACROSS]
+            return [BoardsConsent.ACROSS]
+        total = [BoardsConsent.TOTAL] if self.display == DisplayMode.TOTAL else []
+        return [*total, BoardsConsent.CLINIC, BoardsConsent.ACROSS]
 
     @property
     def defining_fields(self) -> list[Any]:

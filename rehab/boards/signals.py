@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
-from functools import partial, wraps
+from functools import wraps
 from typing import Any
 
-from django.db import transaction
 from django.db.models import Model
 from django.db.models.signals import m2m_changed, post_delete, post_save, pre_save
 from django.utils import timezone
@@ -21,8 +19,6 @@ from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
 
 ELIGIBILITY_FIELDS = frozenset({"boards", "blinded", "simulated"})  # of a patient
-
-log = logging.getLogger(__name__)
 
 PREVIOUS = "row before the save, for boards"
 
@@ -54,22 +50,9 @@ def unless_restored(receiver: Callable[..., None]) -> Callable[..., None]:
     return receive
 
 
-def on_figures(sessions: set[int], **_signal: Any) -> None:
-    """Update boards after sessions have ended, in the transaction that stores their metrics.
-
-    Where that fails, the metrics are stored all the same, and the boards are rebuilt.
-    """
-    patients, now = patients_of(sessions), timezone.now()
-    try:
-        with transaction.atomic():
-            entries.refresh_patients(patients, now=now)
-    except Exception:
-        log.exception(
-            "Boards could not be updated after sessions %s. They are rebuilt in the background; if "
-            "that fails too, run manage.py rebuildboards",
-            sessions,
-        )
-        transaction.on_commit(partial(scheduler.rebuild_after_failure, patients, now), robust=True)
+def on_figures(**_signal: Any) -> None:
+    """Let boards follow the sessions that have ended, in their thread."""
+    scheduler.board_builder.wake()
 
 
 def patients_of(sessions: set[int]) -> set[int]:

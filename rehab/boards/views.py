@@ -46,6 +46,7 @@ def show_scores(request: HttpRequest, session_id: int) -> HttpResponse:
         "session": session,
         "boards": boards,
         "tablet": not request.user.is_authenticated,
+        "early": State(session.state) is State.ABORTED,
         "ranked": not boards or any(board.has_you for board in boards),
     }
     return render(request, "boards/scores.html", context)

@@ -23,6 +23,7 @@ from django.db.migrations.recorder import MigrationRecorder
 from pyrage.x25519 import Identity, Recipient
 
 from rehab.exports.encryption import decrypt, encrypt
+from rehab.people.audit import guards
 from rehab.people.models import User
 
 FORMAT = 1
@@ -34,7 +35,6 @@ EXCLUDED_MODELS = {
     "rehab.pairing",
     "sessions.session",
 }
-EXCLUDED_APPS = {"axes"}  # failed sign-ins of the last hours
 BATCH_ROWS = 2000  # rows held in memory
 GZIP_WBITS = 31  # makes zlib write the gzip format
 
@@ -55,7 +55,6 @@ def _is_included(model: type[models.Model]) -> bool:
     return (
         model._meta.managed
         and not model._meta.proxy
-        and model._meta.app_label not in EXCLUDED_APPS
         and EXCLUDED_MODELS.isdisjoint(meta.label_lower for meta in (model._meta, *joined))
     )
 
@@ -138,7 +137,7 @@ def restore_backup(file: BinaryIO, identities: Sequence[Identity]) -> dict[str, 
             "that version, restore, and then update."
         )
     included_models = backup_models()
-    with transaction.atomic():
+    with transaction.atomic(), guards.lifted(connection.alias):
         for model in included_models:  # migrations have created measures and protocols
             model._base_manager.all()._raw_delete(connection.alias)  # noqa: SLF001
         for row in serializers.deserialize("jsonl", lines):

@@ -19,6 +19,7 @@ from rehab.people.audit.history import HistoryEntry
 from rehab.people.consent.models import Consent
 from rehab.people.models import Patient, User
 from rehab.sessions.models import TrainingSession
+from rehab.studies.participants import Enrollment
 from rehab.training.scoring import RULES_VERSION
 
 FILES = {
@@ -27,11 +28,13 @@ FILES = {
     "consent.json": _("what was agreed to, to which words, and when"),
     "visits.json": _("the days on which a visit is or was planned"),
     "boards.json": _("the rows on leaderboards, and the groups of boards"),
+    "studies.json": _("the part in studies; the arm once a study is closed"),
     "changes.json": _("when details were changed, each with its value before and after"),
     "sessions.csv": _("a row for each session"),
     "steps.csv": _("a row for each step"),
     "events.csv": _("a row for each thing done or noted during a session"),
     "corrections.csv": _("a row for each correction of a session after its end"),
+    "incidents.csv": _("what the robot recorded around its stops"),
     "codebook.csv": _("what every column means, with its unit"),
 }
 README_TEXT = _("""\
@@ -39,8 +42,9 @@ The tables open in any spreadsheet, R or Python: text in UTF-8, commas between c
 the columns in the first line, an empty cell where there is nothing. Times are in UTC. Numbers have
 a decimal point and all their digits: read back, they are what GARRY computes with.
 
-A text that a spreadsheet could take for a formula has a ' before it; so has one that begins with '.
-Take one ' off to get what was written.
+Where a spreadsheet could take text for a formula it has a ' before it: at its beginning and behind
+each semicolon, tab and line end. So has a ' that stands there. Take one ' off to get what was
+written.
 
 A step's verdict follows from rules that have versions; the newest here is %(version)d. The column
 rules_version of steps.csv says which one judged each step.
@@ -64,6 +68,7 @@ def _patient_tables(user: User, patient: Patient) -> Iterator[tuple[str, Any]]:
     yield "consent.json", write_json(list_consents(user, patient))
     yield "visits.json", write_json(list_visits(user, patient))
     yield "boards.json", write_json(list_boards(user, patient))
+    yield "studies.json", write_json(list_studies(user, patient))
     yield "changes.json", write_json(list_changes(user, patient))
     yield from _session_tables(Selection(user, sessions, named=True))
 
@@ -148,6 +153,28 @@ def list_boards(user: User, patient: Patient) -> list[dict[str, Any]]:
         }
         for row in rows
     ] + [{"in_the_group_of_the_board": board.name} for board in grouped]
+
+
+def list_studies(user: User, patient: Patient) -> list[dict[str, Any]]:
+    """Return the patient's part in studies: visits, what happened, the arm once it is no secret."""
+    rows = Enrollment.objects.visible_to(user).filter(patient=patient).select_related("study")
+    return [
+        {
+            "study": row.study.title,
+            "participant": row.code,
+            "levels": row.levels,
+            "enrolled_at": row.enrolled_at,
+            "withdrawn_at": row.withdrawn_at,
+            "data_kept_after_withdrawal": row.keep_data,
+            "group": row.allocation.group if row.study.closed_at else None,
+            "visits": [
+                {"day": visit.day, "number": visit.number, "session": visit.session_id}
+                for visit in row.visits.all()
+            ],
+            "events": [{"at": event.at, "what": event.kind} for event in row.events.all()],
+        }
+        for row in rows.order_by("pk")
+    ]
 
 
 def list_changes(user: User, patient: Patient) -> list[dict[str, Any]]:

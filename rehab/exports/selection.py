@@ -14,14 +14,16 @@ from typing import Any
 
 from django.db.models import QuerySet
 
-from rehab.exports.tables import CORRECTIONS, EVENTS, SESSIONS, STEPS, Table
+from rehab.exports.tables import CORRECTIONS, EVENTS, INCIDENTS, SESSIONS, STEPS, Table
 from rehab.people.models import User
 from rehab.sessions.corrections import SessionCorrection
+from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import fold_log
 from rehab.training.fold import SessionFold
 from rehab.training.metrics import METRICS
+from rehab.training.plans import SessionPlan
 
 PAGE_ROWS = 2_000  # rows held in memory
 SESSIONS_PAGE = 200
@@ -87,6 +89,7 @@ class Selection:
                 session.active_s,
                 session.protocol and session.protocol.name,
                 session.plan["activation_threshold"],
+                *_read_answers(session.to_plan()),
                 session.simulated,
                 session.legacy_id is not None,
                 session.source if self.named else "",
@@ -132,6 +135,15 @@ class Selection:
             for _, *row, by in _read_pages(corrections.filter(session=session), names, "pk"):
                 yield (*head, *row, by if self.named or not by else "person")
 
+    def incident_rows(self) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of ``INCIDENTS``."""
+        names = ("pk", "at", "reason", "recording")
+        incidents = RobotIncident.objects.visible_to(self.user).order_by("pk")
+        for session in self.read_sessions():
+            head = (session.pk, session.patient.pseudonym)
+            for _, *row in _read_pages(incidents.filter(session=session), names, "pk"):
+                yield (*head, *row)
+
     def read(self, table: Table) -> Iterator[tuple[Any, ...]]:
         """Return the rows of a table."""
         rows = {
@@ -139,6 +151,7 @@ class Selection:
             STEPS.file: self.step_rows,
             EVENTS.file: self.event_rows,
             CORRECTIONS.file: self.correction_rows,
+            INCIDENTS.file: self.incident_rows,
         }
         return rows[table.file]()
 
@@ -161,3 +174,13 @@ def _read_pages(rows: QuerySet[Any], names: Sequence[str], key: str) -> Iterator
         if len(page) < PAGE_ROWS:
             return
         after = page[-1][place]
+
+
+def _read_answers(plan: SessionPlan) -> tuple[Any, ...]:
+    """Return when robot and page answered, and whether the goal followed."""
+    timing, schedule = plan.cue_timing, plan.schedule
+    return (
+        *(timing.rule.value, timing.window_s, timing.count, timing.rest_s),
+        *(schedule.kind.value, schedule.interval, schedule.band),
+        plan.adaptation.mode.value,
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -48,6 +49,14 @@ SESSIONS = Table(
         Column("walked", "s", "Time of walking, without pauses."),
         Column("protocol", "", "Name of the list of phases it was built from."),
         Column("activation_threshold", "ratio", "Mean performance from which the robot answers."),
+        Column("robot_rule", "", "What its gestures answer: windows, streaks or steps."),
+        Column("robot_window", "s", "Length of a window."),
+        Column("robot_count", "", "Steps of a streak, or of which each last one is answered."),
+        Column("robot_rest", "s", "Least time between the starts of two gestures."),
+        Column("schedule", "", "When the patient was told: every, bandwidth, faded or summary."),
+        Column("schedule_steps", "", "Steps from one time to the next (of faded: at most)."),
+        Column("schedule_band", "ratio", "Half of the band about the goal without feedback."),
+        Column("goal_follows", "", "off, suggest or automatic, as it began."),
         Column("simulated", "", "true: no person walked."),
         Column("imported", "", "true: from the original GARRY, which kept no steps."),
         Column("source", "", "Where its steps came from; empty for researchers."),
@@ -112,7 +121,17 @@ CORRECTIONS = Table(
         Column("by", "", "Who did it; for researchers only that it was a person."),
     ),
 )
-TABLES = (SESSIONS, STEPS, EVENTS, CORRECTIONS)
+INCIDENTS = Table(
+    "incidents.csv",
+    (
+        Column("session", "", "Number of the session in which the robot was stopped."),
+        Column("patient", "", "Pseudonym."),
+        Column("at", "UTC", "When."),
+        Column("reason", "", "Why, as a code (docs/safety.md)."),
+        Column("recording", "", "What it heard, ordered and did: base64 of zlib of JSON lines."),
+    ),
+)
+TABLES = (SESSIONS, STEPS, EVENTS, CORRECTIONS, INCIDENTS)
 
 
 def codebook_rows() -> Iterator[tuple[str, ...]]:
@@ -121,11 +140,16 @@ def codebook_rows() -> Iterator[tuple[str, ...]]:
         yield from ((table.file, *column) for column in table.columns)
 
 
+# Where a cell may begin for a spreadsheet, before what begins a formula (also in East Asian width).
+FORMULA_START = re.compile(r"(?:^|(?<=[;\t\r\n]))(?=[=+\-@＝＋－＠\t\r\n'])")
+
+
 def format_cell(value: Any) -> Any:
     """Return a value as it is written to a file: floats exactly, text never as a formula.
 
-    A text that a spreadsheet could take for a formula gets a ' before it, and so does one that
-    begins with ': taking one ' off gives back the original.
+    A text that a spreadsheet could take for a formula gets a ' before it, at its beginning and,
+    since some split lines there, behind each semicolon, tab and line end; so does a '. Taking these
+    off gives back the original.
     """
     if value is None or (isinstance(value, (int, float)) and not isinstance(value, bool)):
         return value  # csv writes a float by repr: read back, it is the same
@@ -134,7 +158,7 @@ def format_cell(value: Any) -> Any:
     if isinstance(value, datetime):
         return value.isoformat()
     text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
-    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r", "\n", "'")) else text
+    return FORMULA_START.sub("'", text)
 
 
 def format_cells(rows: Iterable[Sequence[Any]]) -> Iterator[list[Any]]:

@@ -19,10 +19,12 @@ from rehab.people.audit.audit_log import Act
 from rehab.people.models import Patient
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
+from rehab.people.sign_in import step_up
 from rehab.sessions.models import TrainingSession
 
 
 @for_roles(Role.LEAD, Role.PT, patients=False)  # audited here, before the first byte
+@step_up.required_for_download
 @require_GET
 def download_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Return everything stored of one patient as a file."""
@@ -34,6 +36,7 @@ def download_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
 
 
 @for_roles(Role.LEAD, Role.RESEARCHER, patients=False)
+@step_up.required
 @require_safe
 def show_export(request: HttpRequest) -> HttpResponse:
     """Show what the export of all sessions contains."""
@@ -48,6 +51,7 @@ def show_export(request: HttpRequest) -> HttpResponse:
 
 
 @for_roles(Role.LEAD, Role.RESEARCHER, patients=False)  # audited here, before the first byte
+@step_up.required_for_download
 @require_GET
 def download_sessions(request: HttpRequest) -> HttpResponse:
     """Return all sessions that the user may see as a file, by pseudonyms."""

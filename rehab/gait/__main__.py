@@ -1,4 +1,4 @@
-"""``python -m rehab.gait FILE …``: the strides of recorded signals.
+"""``python -m rehab.gait FILE …``: the strides of recorded signals; ``check FILE``: its set-up.
 
 Files are CSV with a header and one row a sample. Known layouts are found by their header; others
 are mapped with ``--columns``. With ``--json``, one line is printed for each file: an object with
@@ -18,10 +18,16 @@ from pathlib import Path
 import numpy as np
 
 from rehab.gait.offline import measure_both_legs, measure_strides
-from rehab.gait.recordings.columns import CHANNELS
-from rehab.gait.recordings.csv_files import estimate_rate, read_mass, read_signals
+from rehab.gait.recordings.columns import CHANNELS, read_column, read_column_map
+from rehab.gait.recordings.csv_files import apply_columns, read_mass, save_signals
+from rehab.gait.recordings.limits import limit_resources
 from rehab.gait.recordings.plot import load_pyplot, plot_strides
+from rehab.gait.recordings.tables import read_any_table, read_signals
 from rehab.gait.selfcheck.checks import check_signals
+from rehab.gait.setup.check import check_setup, compare_with_setup
+from rehab.gait.setup.gyroscope import measure_gyroscope
+from rehab.gait.setup.report import describe_setup, setup_to_json
+from rehab.gait.signals.clock import estimate_rate
 from rehab.gait.strides import GaitInputError, Stride
 
 LOOK_AHEAD_S = 0.05
@@ -39,7 +45,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     -------
     The exit status: 0, or 2 after input that cannot be measured.
     """
-    options = _read_options(arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if words[:1] == ["check"]:
+        return check_files(words[1:])
+    if words[:1] == ["gyroscope"]:
+        return measure_gyroscopes(words[1:])
+    options = _read_options(words)
     try:
         if options.plot:
             load_pyplot()
@@ -53,9 +64,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _read_options(arguments: Sequence[str] | None) -> argparse.Namespace:
+def _read_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog="python -m rehab.gait", description="Strides and A2 of recorded signals."
+        prog="python -m rehab.gait",
+        description="Strides and A2 of recorded signals; 'check FILE' finds out what its columns "
+        "are.",
     )
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
     parser.add_argument("--json", action="store_true", help="one JSON object a file")
@@ -67,7 +80,7 @@ def _read_options(arguments: Sequence[str] | None) -> argparse.Namespace:
         nargs="+",
         metavar="CHANNEL=COLUMN",
         help="time=… and {left,right}.{" + ",".join(CHANNELS) + "}=…; COLUMN*FACTOR changes "
-        "unit or sign",
+        "unit or sign, COLUMN@DELAY takes out a delay [s]",
     )
     parser.add_argument("--plot", type=Path, metavar="out.png", help="draw it (needs matplotlib)")
     return parser.parse_args(arguments)
@@ -75,7 +88,7 @@ def _read_options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 def _measure_file(path: Path, options: argparse.Namespace) -> None:
     time, legs = read_signals(path, options.columns)
-    rate_hz = estimate_rate(time, path) if options.rate is None else options.rate
+    rate_hz = estimate_rate(time) if options.rate is None else options.rate
     mass_kg = read_mass(path) if options.mass is None else options.mass
     if len(legs) == 2:
         strides = measure_both_legs(
@@ -112,8 +125,7 @@ def _measure_file(path: Path, options: argparse.Namespace) -> None:
     else:
         _print_summary(path, strides, [finding.message for finding in check.findings])
     if options.plot:
-        forces = {side: np.asarray(leg.force_n) for side, leg in legs.items()}
-        plot_strides(options.plot, time, forces, strides)
+        plot_strides(options.plot, time, legs, strides, rate_hz=rate_hz, mass_kg=mass_kg)
 
 
 def _print_summary(path: Path, strides: list[Stride], messages: list[str]) -> None:
@@ -131,6 +143,99 @@ def _print_summary(path: Path, strides: list[Stride], messages: list[str]) -> No
     print(f"{len(strides)} strides, {len(valid)} valid{mean}")
     for message in messages:
         print(f"! {message}")
+
+
+def check_files(arguments: Sequence[str]) -> int:
+    """Print what the columns of each file are thought to be, for a person to confirm.
+
+    Returns
+    -------
+    The exit status: 0 where all is sure, 1 where a person has to look at something, 2 where nothing
+    is recognized or what was given is wrong.
+    """
+    parser = argparse.ArgumentParser(
+        prog="python -m rehab.gait check",
+        description="What columns, units, signs, legs, mass and delays are, from walking.",
+    )
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
+    parser.add_argument("--mass", type=float, help="body mass [kg]; else measured with the plates")
+    parser.add_argument(
+        "--columns",
+        nargs="+",
+        metavar="CHANNEL=COLUMN",
+        help="what you take them for: wrong ones are refused with what was seen",
+    )
+    parser.add_argument("--json", action="store_true", help="one JSON object a file")
+    parser.add_argument("--save", type=Path, metavar="NEW.csv",
+                        help="write the signals in SI units, if nothing is wrong")  # fmt: skip
+    parser.add_argument("--bounded", action="store_true",
+                        help="for files of strangers: a minute of processor, 4 GiB")  # fmt: skip
+    options = parser.parse_args(arguments)
+    if options.bounded:
+        limit_resources()
+    status = 0
+    for path in options.files:
+        try:
+            status = max(status, _check_file(path, options))
+        except (GaitInputError, OSError) as error:
+            print(f"{path.name}: {error}", file=sys.stderr)
+            return 2
+    return status
+
+
+def _check_file(path: Path, options: argparse.Namespace) -> int:
+    """Print what a file's columns are; return the exit status."""
+    table = read_any_table(path)
+    given = read_column_map(options.columns) if options.columns else None
+    check = check_setup(table, options.mass)
+    if options.json:
+        print(json.dumps(setup_to_json(check, list(table)), allow_nan=False))
+    else:
+        print(path, *describe_setup(check), sep="\n")
+    wrong = compare_with_setup(check, given) if given else []
+    for text in wrong:
+        print(text, file=sys.stderr)
+    if options.save and not wrong:
+        save_signals(options.save, *apply_columns(table, given or check.columns))
+    return 2 if wrong else 0 if check.is_certain else 1
+
+
+def measure_gyroscopes(arguments: Sequence[str]) -> int:
+    """Print the strides of a gyroscope on foot or shank; return the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="python -m rehab.gait gyroscope",
+        description="Contacts, stride time and cadence by a gyroscope; its sign is found.",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE")
+    parser.add_argument("--time", default="time", help="column of times [s] (default: time)")
+    parser.add_argument("--rate-column", required=True, metavar="COLUMN[*FACTOR]",
+                        help="sagittal rate in rad/s; *0.01745 for degrees")  # fmt: skip
+    parser.add_argument("--segment", choices=("foot", "shank"), default="foot")
+    options = parser.parse_args(arguments)
+    try:
+        column = read_column(options.rate_column)
+        table = read_any_table(options.file)
+        missing = [name for name in (options.time, column.name) if name not in table]
+        if missing:
+            raise GaitInputError(
+                f"{options.file.name} has no column {', '.join(missing)}. It has: "
+                f"{', '.join(table)}."
+            )
+        strides, sign = measure_gyroscope(
+            table[options.time], table[column.name] * column.factor, segment=options.segment
+        )
+    except (GaitInputError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    print(f"{'contact':>9} {'leaves':>9} {'stride s':>9} {'stance s':>9} {'steps/min':>9}")
+    for one in strides:
+        print(
+            f"{one.initial_contact_s:9.3f} {one.terminal_contact_s:9.3f} {one.stride_s:9.3f} "
+            f"{one.stance_s:9.3f} {one.cadence_min:9.1f}"
+        )
+    turned = "" if sign > 0 else "; its sign is turned"
+    print(f"{len(strides)} strides{turned}")
+    return 0
 
 
 if __name__ == "__main__":

@@ -12,17 +12,15 @@ from rehab.gait.signals.buffer import LegBuffer
 from rehab.gait.signals.filters import find_maximum, find_minimum
 from rehab.gait.signals.samples import FORCE, TIME
 from rehab.gait.stances.analysis import Stance, StanceAnalyzer
-from rehab.gait.stances.plausibility import STANCE_MAX_S, STANCE_MIN_S
+from rehab.gait.stances.plausibility import FULL_LOAD, STANCE_MAX_S, STANCE_MIN_S
 from rehab.gait.strides import Flag, RejectionReason, Stride
 
 GRAVITY_M_S2 = 9.81
-KEEP_S = 8.0  # the longest cycle, the longest stance after it, and the piece that they end in
+KEEP_S = 12.0  # the longest cycle, the longest stance after it, and the piece that they end in
 LONGEST_CHUNK_S = 1.0  # longer chunks are processed in pieces of this length
-STRIDE_MAX_S = 4.0
+STRIDE_MAX_S = 6.0
 LONGEST_GAP_S = 0.25  # in a cycle; longer ones may hide a contact
 OFFSET_N = 15.0
-# A leg that never bears 80 % of the weight has help: even slow walking reaches 95 %.
-FULL_LOAD = 0.8
 USUAL_STANCES = 9
 USUAL_MIN, USUAL_MAX = 0.6, 1.5  # of the median of the last stances
 
@@ -122,13 +120,13 @@ class LegDetector:
 
     def advance(self, start: int, stop: int) -> list[OneLegStride]:
         """Process samples ``start:stop``, a second at most; return the strides they complete."""
-        ended = self.contacts.advance(start, stop)
-        if not ended and not self._pending:
-            return []
-        self._pending.extend(ended)
-        strides = []
+        self._pending.extend(self.contacts.advance(start, stop))
+        strides: list[OneLegStride] = []
+        if not self._pending:
+            return strides
         while self._pending:
-            due = (self._pending[0].end_index or 0) + self._wait
+            ended = self._pending[0]
+            due = max((ended.end_index or 0) + self._wait, ended.known_index or 0)
             if due >= stop:
                 break
             contact = self._pending.popleft()
@@ -151,9 +149,11 @@ class LegDetector:
     def complete(self, stride: OneLegStride, other_leg: OtherLeg) -> Stride:
         """Return the whole stride, from its own leg's part and the other leg's."""
         contact, stance, push_off = stride.contact, stride.stance, stride.stance.push_off
-        reasons, flags = stride.reasons + other_leg.reasons, other_leg.flags
+        reasons = stride.reasons + other_leg.reasons
+        flags = [*stance.flags, *other_leg.flags]
         if abs(contact.offset_n) > OFFSET_N:
             flags = [Flag.OFFSET, *flags]
+        # A leg that never bears its weight has help.
         if contact.peak_n < FULL_LOAD * self.weight_n and Flag.SUPPORTED not in flags:
             flags = [*flags, Flag.SUPPORTED]
         begin_s, end_s = contact.begin_s, contact.end_s or 0.0
@@ -177,6 +177,9 @@ class LegDetector:
             propulsion_n_kg=stance.propulsion_n_kg,
             position_m=stance.position_m,
             offset_n=contact.offset_n,
+            late_s=stance.late_s,
+            lost_s=stance.lost_s,
+            a2_sd_w_kg=stance.a2_sd_w_kg,
             side=self.side,
             step_s=other_leg.step_s,
             step_length_m=other_leg.step_length_m,

@@ -28,6 +28,7 @@ class DetectorSettings:
     contact_n: float
     release_n: float
     is_velocity: bool
+    is_overground: bool = False
 
     def __post_init__(self) -> None:
         check_mass(self.mass_kg)

@@ -14,7 +14,8 @@ class RejectionReason(StrEnum):
     """Why a stride is invalid. A stride without a reason is valid."""
 
     TIME_BACKWARDS = "time_backwards"  # the clock stood still or jumped back
-    GAP = "gap"  # samples are missing
+    GAP = "gap"  # samples are lost where A2 is made, or more than can be bridged
+    LATE = "late"  # samples came late where A2 is made, and moment or angle was made then
     RATE = "rate"  # samples come at another rate than the given one
     FORCE_LOST = "force_lost"  # the vertical force vanished or was not finite
     FORCE_TOO_LARGE = "force_too_large"  # more than anybody's weight: unit, or mass
@@ -44,6 +45,9 @@ class Flag(StrEnum):
 
     OFFSET = "offset"  # the plate's zero has moved by more than 15 N; taken out of the contacts
     SUPPORTED = "supported"  # a handrail or harness carries more than 5 % of the weight
+    CLONUS = "clonus"  # the ankle beats in stance
+    LATE = "late"  # samples came late and were put back to when they were taken
+    LOST = "lost"  # samples are missing where A2 does not notice
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +80,12 @@ class Stride:
         Where the foot was at initial contact, if a position is sent [m, forward].
     offset_n
         What the plate read in swing and was taken off [N].
+    late_s, lost_s
+        By how much a sample of the stance came late at most [s], and the longest time without a
+        sample in it, beyond the usual.
+    a2_sd_w_kg
+        Standard deviation of the A2 by noise, look-ahead and clock [W/kg]
+        (``stances.uncertainty``).
     side
         "left" or "right" where both legs are measured, else None.
     step_s, step_length_m, step_symmetry
@@ -105,6 +115,9 @@ class Stride:
     propulsion_n_kg: float | None
     position_m: float | None
     offset_n: float
+    late_s: float = 0.0
+    lost_s: float = 0.0
+    a2_sd_w_kg: float | None = None
     side: str | None = None
     step_s: float | None = None
     step_length_m: float | None = None

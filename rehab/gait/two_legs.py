@@ -5,24 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from numpy.typing import ArrayLike
 
-from rehab.gait.contacts.force_plate import CONTACT_N, RELEASE_N, STEP_PEAK, Contact
-from rehab.gait.one_leg import KEEP_S, LegDetector, OneLegStride, OtherLeg
-from rehab.gait.settings import DetectorSettings
-from rehab.gait.signals.buffer import SampleBuffer
+from rehab.gait.contacts.force_plate import STEP_PEAK, Contact
+from rehab.gait.detector import Detector
+from rehab.gait.one_leg import LegDetector, OneLegStride, OtherLeg
 from rehab.gait.signals.filters import find_maximum
-from rehab.gait.signals.samples import (
-    CHANNEL_NAMES,
-    FORCE,
-    POSITION,
-    LegSamples,
-    read_chunk,
-    split_chunk,
-)
+from rehab.gait.signals.samples import CHANNEL_NAMES, FORCE, POSITION, LegSamples
 from rehab.gait.stances.analysis import Stance
-from rehab.gait.stances.kinetics import CUTOFF_HZ
+from rehab.gait.stances.plausibility import check_whole_foot
 from rehab.gait.strides import Flag, RejectionReason, Stride
 
 CHUNK_NAMES = ("t_s", *(f"{side} {name}" for side in ("left", "right") for name in CHANNEL_NAMES))
@@ -35,48 +28,22 @@ WEIGHT_MIN, WEIGHT_MAX = 0.5, 1.1
 ALONE_MAX = 0.8  # of stance; 0.5-0.72 from slow to fast walking, 1 at its change to running
 
 
-class TwoLegDetector:
+class TwoLegDetector(Detector):
     """Detects the strides of both legs on a split treadmill, in order of their completion.
 
     Adds to each stride what takes two legs: step time, length and symmetry, double support, the
-    share of body weight on the plates, and whether the feet alternated as in walking.
+    share of body weight on the plates, and whether the feet alternated as in walking. The settings
+    are those of ``Detector``.
 
     Parameters
     ----------
-    rate_hz, mass_kg, look_ahead_s, cutoff_hz, contact_n, release_n, is_velocity
-        As in ``StrideDetector``; chunks and memory, too.
-
-    Raises
-    ------
-    GaitInputError
-        For settings that nothing can be measured with.
+    rate_hz, mass_kg, settings
+        As in ``Detector``.
     """
 
-    def __init__(
-        self,
-        rate_hz: float,
-        mass_kg: float,
-        *,
-        look_ahead_s: float = 0.0,
-        cutoff_hz: float = CUTOFF_HZ,
-        contact_n: float = CONTACT_N,
-        release_n: float = RELEASE_N,
-        is_velocity: bool = False,
-    ) -> None:
-        settings = DetectorSettings(
-            rate_hz=rate_hz,
-            mass_kg=mass_kg,
-            look_ahead_s=look_ahead_s,
-            cutoff_hz=cutoff_hz,
-            contact_n=contact_n,
-            release_n=release_n,
-            is_velocity=is_velocity,
-        )
-        self._samples = SampleBuffer(int(KEEP_S * rate_hz), legs=2)
-        self._left, self._right = (
-            LegDetector(buffer, settings, side)
-            for buffer, side in zip(self._samples.legs, ("left", "right"), strict=True)
-        )
+    def __init__(self, rate_hz: float, mass_kg: float, **settings: Any) -> None:
+        super().__init__(rate_hz, mass_kg, sides=("left", "right"), **settings)
+        self._left, self._right = self._legs
         self._steps_m: dict[str | None, float | None] = {}
 
     def feed(
@@ -99,23 +66,13 @@ class TwoLegDetector:
         GaitInputError
             For channels of different lengths.
         """
-        chunk = read_chunk(CHUNK_NAMES, (t_s, *_pad_channels(left), *_pad_channels(right)))
-        strides: list[Stride] = []
-        for piece, count in split_chunk(chunk, self._left.longest_chunk):
-            first = self._samples.end
-            self._samples.append(piece, count)
-            stop = self._samples.end
-            left_found = self._left.advance(first, stop)
-            right_found = self._right.advance(first, stop)
-            if left_found or right_found:
-                strides += self._complete(left_found, right_found)
-        return strides
+        return self._feed(CHUNK_NAMES, (t_s, *_pad_channels(left), *_pad_channels(right)))
 
-    def finish(self) -> list[Stride]:
-        """Return the strides that still wait for samples.
+    def _detect(self, start: int, stop: int) -> list[Stride]:
+        left, right = self._left.advance(start, stop), self._right.advance(start, stop)
+        return self._complete(left, right) if left or right else []
 
-        Stances that the end of the samples cuts off are among them, invalid.
-        """
+    def _complete_last(self) -> list[Stride]:
         return self._complete(self._left.finish(), self._right.finish())
 
     def _complete(self, left: list[OneLegStride], right: list[OneLegStride]) -> list[Stride]:
@@ -127,6 +84,15 @@ class TwoLegDetector:
             leg.complete(stride, self._compare_with_other_leg(stride, leg, other))
             for stride, leg, other in found
         ]
+
+    def _is_alone(self, first: Contact | None, this: Contact, second: Contact | None) -> bool:
+        """Return whether the other foot is on the floor beside the plates, before or after."""
+        if not self._is_overground or (first is not None and second is not None):
+            return False
+        other = first or second
+        return other is None or not (
+            other.begin_index >= this.begin_index and _end(other) <= _end(this)
+        )
 
     def _compare_with_other_leg(
         self, stride: OneLegStride, leg: LegDetector, other: LegDetector
@@ -140,8 +106,12 @@ class TwoLegDetector:
         others = [c for c in known if c.begin_index < _end(this) and _end(c) > since]
         first = others[0] if others else None
         second = others[1] if len(others) == 2 else None
-        if is_whole and (
-            first is None or second is None or not _is_alternating(first, this, second)
+        if self._is_overground:
+            reasons += check_whole_foot(this.peak_n, leg.weight_n)
+        if (
+            is_whole
+            and not self._is_alone(first, this, second)
+            and (first is None or second is None or not _is_alternating(first, this, second))
         ):
             if RejectionReason.LONG_STANCE not in stride.reasons:
                 reasons.append(RejectionReason.CROSS_STEP)
@@ -151,9 +121,13 @@ class TwoLegDetector:
         if ratio is None and second is not None:
             # No whole cycle was seen: a step is accurate enough to find a wrong mass.
             carried = _find_weight_ratio(this.begin_index, second.begin_index, plates, zeros_n)
-        if carried is not None and not WEIGHT_MIN <= carried <= WEIGHT_MAX:
+        if (
+            not self._is_overground
+            and carried is not None
+            and not WEIGHT_MIN <= carried <= WEIGHT_MAX
+        ):
             reasons.append(RejectionReason.WEIGHT)
-        elif ratio is not None and ratio < SUPPORTED_BELOW:
+        elif not self._is_overground and ratio is not None and ratio < SUPPORTED_BELOW:
             flags.append(Flag.SUPPORTED)
         length = None if first is None else _find_length(stride.stance, other, this.begin_index)
         symmetry = _find_symmetry(length, self._steps_m.get(other.side))
@@ -210,7 +184,7 @@ def _find_contacts(leg: LegDetector, index: int) -> list[Contact]:
     """Return a leg's contacts as they were known at sample ``index``, whatever came later."""
     contacts = []
     for contact in leg.contacts.recent:
-        end = contact.end_index
+        end = contact.known_index
         if contact.begin_index > index:
             break
         if end is None or end > index:
@@ -219,7 +193,7 @@ def _find_contacts(leg: LegDetector, index: int) -> list[Contact]:
             if not peak_n >= STEP_PEAK * leg.weight_n:
                 continue
             if end is not None:
-                contact = replace(contact, end_index=None, end_s=None)  # noqa: PLW2901
+                contact = replace(contact, end_index=None, end_s=None, known_index=None)  # noqa: PLW2901
         contacts.append(contact)
     return contacts
 

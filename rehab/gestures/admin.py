@@ -2,26 +2,49 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 from django import forms
 from django.contrib import admin
-from django.core.exceptions import ValidationError
-from django.http import HttpRequest
-from django.utils.html import format_html
+from django.core.exceptions import PermissionDenied, ValidationError
+from django.http import HttpRequest, JsonResponse
+from django.urls import path
+from django.utils.text import slugify
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.gestures.models import Gesture, GestureStep
-from rehab.gestures.path_drawing import draw_path
-from rehab.people.web.admin_base import LabeledFormSet, ScopedAdmin, ScopedOptions
+from rehab.gestures.tracks import read_tracks
+from rehab.people.web.admin_base import ClinicForm, LabeledFormSet, ScopedAdmin, ScopedOptions
 from rehab.people.web.refusals import format_refusal
 from robot.motion.dry_run import DryRun, dry_run, validate_gesture
-from robot.motion.gesture import TETHER_M
+from robot.motion.gesture import REACH_M, TETHER_M
 from robot.motion.gesture_errors import BadGesture
-from robot.motion.gesture_spec import MAX_MOVES, to_data
+from robot.motion.gesture_spec import MAX_MOVES, NAME, to_data
+from robot.motion.gestures import GESTURES, ORIGINALS
+from robot.motion.preview import preview
 
+TEXT_MAX = 4000  # characters of a preview's steps, lights or notes
+STEP_FIELDS = ("turn_deg", "forward_m", "hold_s", "pace", "within_s")
 WINDOW_S = 5.0  # of the robot's decisions; a longer gesture still runs at the next one
+
+
+class GestureForm(ClinicForm):
+    """A gesture, under a name as people write it: it becomes `slow-wave`."""
+
+    name = forms.CharField(
+        label=_("name"), max_length=32, help_text=_("A word or two, such as slow wave.")
+    )
+
+    def clean_name(self) -> str:
+        """Return the name as robots know it. Refuses one without a letter or digit."""
+        name = str(self.cleaned_data["name"]).strip()
+        if not NAME.fullmatch(name):
+            name = slugify(name)
+        if not name:
+            raise ValidationError(gettext("Give a name with letters or digits."))
+        return name
 
 
 class StepFormSet(LabeledFormSet):
@@ -71,6 +94,23 @@ class StepInline(ScopedOptions, admin.TabularInline):
         return 0 if obj else 4
 
 
+def show_steps(data: str, lights: str, notes: str) -> dict[str, Any]:
+    """Return what a gesture with these steps (JSON) and tracks would do, or what is wrong."""
+    try:
+        steps = [
+            GestureStep(**{name: step[name] for name in STEP_FIELDS}) for step in json.loads(data)
+        ]
+        moves = to_data("composed", [step.to_move() for step in steps])
+        gesture = validate_gesture(moves | read_tracks(lights, notes))
+    except BadGesture as problem:
+        return {"problem": format_refusal(problem)}
+    except ValidationError as problem:
+        return {"problem": " ".join(problem.messages)}
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return {"problem": gettext("Each step has numbers.")}
+    return {"preview": preview(gesture), "words": describe_dry_run(dry_run(gesture))}
+
+
 def describe_dry_run(run: DryRun) -> str:
     """Return how long a gesture takes and how far it goes, in words."""
     words = gettext(
@@ -88,9 +128,51 @@ class GestureAdmin(ScopedAdmin):
 
     list_display = ("name", "simulated")
     search_fields = ("name",)
-    fields = ("name", "picture")
-    readonly_fields = ("picture",)
+    form = GestureForm
+    fields = ("name", "lights", "notes")
     inlines = (StepInline,)
+    change_form_template = "gestures/admin_form.html"
+    change_list_template = "gestures/admin_list.html"
+
+    def get_urls(self) -> list[Any]:
+        """Add the address of the floor's preview."""
+        shown = path(
+            "preview/", self.admin_site.admin_view(self.preview), name="rehab_gesture_preview"
+        )
+        return [shown, *super().get_urls()]
+
+    def preview(self, request: HttpRequest) -> JsonResponse:
+        """Answer what the steps of a form would do."""
+        if not self.has_view_permission(request):
+            raise PermissionDenied
+        given = (request.GET.get(name, "")[:TEXT_MAX] for name in ("steps", "lights", "notes"))
+        return JsonResponse(show_steps(*given))
+
+    def changeform_view(
+        self,
+        request: HttpRequest,
+        object_id: str | None = None,
+        form_url: str = "",
+        extra_context: dict[str, Any] | None = None,
+    ) -> Any:
+        """Tell the floor how far a robot may go, and in how many steps."""
+        extra = {"reach_m": REACH_M, "most_steps": MAX_MOVES} | (extra_context or {})
+        return super().changeform_view(request, object_id, form_url, extra)
+
+    def changelist_view(
+        self, request: HttpRequest, extra_context: dict[str, Any] | None = None
+    ) -> Any:
+        """Show the gestures that every robot knows below those of the clinic."""
+        known = [*GESTURES.values(), *ORIGINALS.values()]
+        shown = [
+            {
+                "label": _(gesture.label),
+                "preview": json.dumps(preview(gesture)),
+                "words": describe_dry_run(dry_run(gesture)),
+            }
+            for gesture in known
+        ]
+        return super().changelist_view(request, {"built_in": shown} | (extra_context or {}))
 
     @admin.display(description=_("simulated"))
     def simulated(self, gesture: Gesture) -> str:
@@ -99,15 +181,3 @@ class GestureAdmin(ScopedAdmin):
             return describe_dry_run(dry_run(validate_gesture(gesture.to_data())))
         except BadGesture as problem:
             return format_refusal(problem)
-
-    @admin.display(description=_("where it goes"))
-    def picture(self, gesture: Gesture) -> str:
-        """Return the drawing of the stored gesture's path, or why there is none."""
-        if not gesture.pk:
-            return gettext("Save it to see where it goes. Its last step has to end at home.")
-        try:
-            run = dry_run(validate_gesture(gesture.to_data()))
-        except BadGesture as problem:
-            return format_refusal(problem)
-        words = describe_dry_run(run)
-        return format_html("{}<p>{}</p>", draw_path(gesture.to_moves(), run, words), words)

@@ -9,6 +9,7 @@ from django.core.exceptions import ValidationError
 from django.db import models
 from django.utils.translation import gettext_lazy as _
 
+from rehab.gestures.tracks import read_tracks
 from rehab.people.models import Clinic
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.web.refusals import format_refusal
@@ -26,6 +27,23 @@ class Gesture(ClinicModel):
     )
     name = models.SlugField(
         _("name"), max_length=32, help_text=_("Letters, digits and hyphens: slow-wave.")
+    )
+    lights = models.TextField(
+        _("lights"),
+        blank=True,
+        help_text=_(
+            "A line each: second, first and second light (off, green, orange): 0.5 green off. The "
+            "robot moves from 0.5 s on. Empty: one orange light."
+        ),
+    )
+    notes = models.TextField(
+        _("notes"),
+        blank=True,
+        help_text=_(
+            "A line each: second, pitch in Hz and duration in s, or one of the robot's melodies: "
+            "0.5 440 0.2, or 1 button. Nothing sounds where the robot is gentle. With both empty: "
+            "one note."
+        ),
     )
 
     class Meta(ClinicModel.Meta):
@@ -45,6 +63,7 @@ class Gesture(ClinicModel):
             check_name(self.name)
         except BadGesture as problem:
             raise ValidationError({"name": format_refusal(problem)}) from problem
+        read_tracks(self.lights, self.notes)
 
     def to_moves(self) -> list[Move]:
         """Return the steps as the robot's moves."""
@@ -52,7 +71,7 @@ class Gesture(ClinicModel):
 
     def to_data(self) -> dict[str, Any]:
         """Return the gesture as it is sent to a robot."""
-        return to_data(self.name, self.to_moves())
+        return to_data(self.name, self.to_moves()) | read_tracks(self.lights, self.notes)
 
 
 class GestureStep(ScopedModel):

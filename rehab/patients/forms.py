@@ -14,7 +14,7 @@ from rehab.people.access import clinic_of
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import offered_purposes, record_boards_consent, record_consent
 from rehab.people.forms import PatientFieldsForm
-from rehab.people.models import Boards, EndReason, ErasureReason, Patient, User
+from rehab.people.models import BoardsConsent, EndReason, ErasureReason, Patient, User
 
 
 class PatientForm(PatientFieldsForm):
@@ -56,7 +56,7 @@ class PatientForm(PatientFieldsForm):
             patient = super().save(commit)
             for purpose in map(Purpose, self.cleaned_data.get("agrees", [])):
                 if purpose is Purpose.BOARDS:
-                    record_boards_consent(patient, Boards.CLINIC, self._by, self._now)
+                    record_boards_consent(patient, BoardsConsent.CLINIC, self._by, self._now)
                 else:
                     record_consent(patient, purpose, self._by, self._now)
         return patient

@@ -2,7 +2,7 @@
 
 from django.urls import path
 
-from rehab.patients.pages import records, start, visits
+from rehab.patients.pages import ending, records, start, visits
 
 urlpatterns = [
     path("start/", start.choose_patient, name="start"),
@@ -11,6 +11,7 @@ urlpatterns = [
     path("patients/<int:patient_id>/", start.show_patient, name="patient"),
     path("patients/<int:patient_id>/details/", start.edit_patient, name="edit-patient"),
     path("patients/<int:patient_id>/screen/", start.set_screen, name="screen"),
+    path("sessions/<int:session_id>/ending/", ending.show_ending, name="ending"),
     path("patients/<int:patient_id>/visits/", visits.change_visits, name="visits"),
     path("patients/<int:patient_id>/records/", records.show_records, name="records"),
     path("patients/<int:patient_id>/end/", records.end_patient_program, name="end-program"),

@@ -36,7 +36,11 @@ def public(view: ViewT) -> ViewT:
 
 
 def for_roles(
-    *roles: Role, tablets: bool = False, enrolling: bool = False, patients: bool = True
+    *roles: Role,
+    tablets: bool = False,
+    enrolling: bool = False,
+    patients: bool = True,
+    exports: bool = False,
 ) -> Callable[[ViewT], ViewT]:
     """Open a view to signed-in people of these roles.
 
@@ -48,6 +52,8 @@ def for_roles(
         So may people who have to enroll a second factor before they are signed in.
     patients
         It may show data of patients, so opening it is recorded in the audit log.
+    exports
+        It is a call of the API that takes data out, step by step; a token must allow that.
     """
 
     def declare(view: ViewT) -> ViewT:
@@ -55,6 +61,7 @@ def for_roles(
         view.tablets = tablets  # type: ignore[attr-defined]
         view.enrolling = enrolling  # type: ignore[attr-defined]
         view.patients = patients  # type: ignore[attr-defined]
+        view.exports = exports  # type: ignore[attr-defined]
         return view
 
     return declare

@@ -6,6 +6,7 @@ from typing import Any
 from zoneinfo import ZoneInfo
 
 from django.contrib import admin, messages
+from django.contrib.admin.utils import unquote
 from django.contrib.auth.admin import UserAdmin
 from django.contrib.auth.forms import AdminUserCreationForm
 from django.contrib.auth.models import Group
@@ -13,7 +14,7 @@ from django.contrib.auth.views import redirect_to_login
 from django.core.exceptions import ValidationError
 from django.db import connection, transaction
 from django.db.models import Count, Max, QuerySet
-from django.http import HttpRequest, HttpResponseBase
+from django.http import HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import redirect
 from django.urls import reverse
 from django.utils import timezone
@@ -25,10 +26,11 @@ from rehab.people.access import user_of
 from rehab.people.aliases import format_alias
 from rehab.people.audit.audit_log import Act, record_security_change
 from rehab.people.models import Clinic, Patient, User
+from rehab.people.models.blinding import RUNNING
 from rehab.people.networks import client_address
 from rehab.people.pages.sign_in import sign_out
 from rehab.people.roles import Role
-from rehab.people.sign_in import factors, lockout
+from rehab.people.sign_in import attempts, factors, resets, step_up
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.people.web.admin_base import (
     ScopedAdmin,
@@ -115,16 +117,24 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
             with transaction.atomic():
                 by, address = user_of(request), client_address(request)
                 record_security_change(Act.UNLOCK, by, account, address, timezone.now())
-                lockout.reset_attempts(account)
+                attempts.forget_all(account)
         message = gettext("Accounts that may try again: %(count)s.")
         messages.success(request, message % {"count": accounts.count()})
 
     @admin.action(
         description=_("Remove second factors (lost phone or key)"), permissions=["change"]
     )
-    def remove_second_factors(self, request: HttpRequest, accounts: QuerySet[User]) -> None:
-        """Remove all second factors of the chosen accounts."""
+    def remove_second_factors(
+        self, request: HttpRequest, accounts: QuerySet[User]
+    ) -> HttpResponse | None:
+        """Remove all second factors of the chosen accounts, but not one's own."""
+        if not step_up.is_confirmed(request, timezone.now()):
+            return step_up.ask(request)
+        removed = 0
         for account in accounts:
+            if not self._may_reset(request, account):
+                continue
+            removed += 1
             with transaction.atomic():
                 by, address = user_of(request), client_address(request)
                 record_security_change(Act.FACTORS, by, account, address, timezone.now())
@@ -133,7 +143,41 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
             "%(count)s account(s) sign in by password alone now, or set up a new second "
             "factor where the clinic asks for one. If a phone was stolen, give a new password too."
         )
-        messages.warning(request, message % {"count": accounts.count()})
+        if removed:
+            messages.warning(request, message % {"count": removed})
+        return None
+
+    def user_change_password(
+        self,
+        request: HttpRequest,
+        id: str,  # noqa: A002 (Django's name)
+        form_url: str = "",
+    ) -> HttpResponse:
+        """Change another account's password. One's own takes the old one, on its own page."""
+        account = self.get_object(request, unquote(id))
+        if account is not None and account.pk == user_of(request).pk:
+            return redirect("own-password")
+        if not step_up.is_confirmed(request, timezone.now()):
+            return step_up.ask(request)
+        sent = request.method == "POST"
+        if sent and account is not None and not self._may_reset(request, account):
+            return redirect("admin:rehab_user_change", account.pk)
+        return super().user_change_password(request, id, form_url)
+
+    def _may_reset(self, request: HttpRequest, account: User) -> bool:
+        """Return whether this person may reset how an account signs in; where not, say why."""
+        user = user_of(request)
+        if account.pk == user.pk:
+            messages.error(request, gettext("Your own you change on the page Your account."))
+            return False
+        if resets.may_reset(user, account, timezone.now()):
+            return True
+        message = gettext(
+            "First %(account)s or another host has to confirm this, on the page Your account. Then "
+            "do it again within an hour."
+        )
+        messages.error(request, message % {"account": account})
+        return False
 
     def has_module_permission(self, request: HttpRequest) -> bool:
         """Return whether accounts are on the front page."""
@@ -175,12 +219,41 @@ class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
 
 @admin.register(ApiToken)
 class ApiTokenAdmin(TokenAdmin):
-    """API tokens of programs."""
+    """API tokens of programs. Everybody makes the own ones; a lead revokes any of the clinic."""
 
-    list_display = ("name", "user", "role", "created_at", "last_seen_at", "revoked_at")
+    list_display = ("name", "user", "role", "expires_at", "last_seen_at", "revoked_at")
     list_filter = ("role", "last_seen_at", "revoked_at")
     search_fields = ("name", "user__username")
-    fields = ("name", "user", "role", "created_at", "last_seen_at", "revoked_at")
+    fields = (
+        *("name", "user", "role", "may_read", "may_steer", "may_export", "expires_at"),
+        *("created_at", "last_seen_at", "revoked_at"),
+    )
+    readonly_fields = ("user", *TokenAdmin.readonly_fields)
+
+    def get_readonly_fields(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Return the fixed fields: what a token may do is set when it is made."""
+        if obj is None:
+            return self.readonly_fields
+        return tuple(name for name in self.fields if name != "name")
+
+    def get_form(
+        self, request: HttpRequest, obj: Any = None, change: bool = False, **kwargs: Any
+    ) -> Any:
+        """Return the form; a new token speaks for whoever makes it."""
+        form: Any = super().get_form(request, obj, change=change, **kwargs)
+        maker = user_of(request)
+
+        class OwnTokenForm(form):  # type: ignore[misc]
+            def __init__(self, *args: Any, **kwargs: Any) -> None:
+                super().__init__(*args, **kwargs)
+                if self.instance.pk is None:
+                    self.instance.user = maker
+
+        return OwnTokenForm
+
+    def may_issue(self, request: HttpRequest, holder: Any) -> bool:
+        """Return whether this person may have the token: it is the own one."""
+        return bool(holder.user_id == user_of(request).pk)
 
 
 @admin.register(Patient)
@@ -228,6 +301,12 @@ class PatientAdmin(ScopedAdmin):
             .annotate(sessions_total=Count("sessions"), last_visit=Max("sessions__created_at"))
         )
         return rows
+
+    def get_readonly_fields(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Return what follows from elsewhere; of a study's participant also the blinding."""
+        fields = super().get_readonly_fields(request, obj)
+        in_study = obj is not None and obj.enrollments.filter(study__state=RUNNING).exists()
+        return (*fields, "blinded") if in_study else fields
 
     def get_object(self, request: HttpRequest, object_id: str, from_field: Any = None) -> Any:
         """Return a patient, locked before a change, so that no erasure is undone."""

@@ -8,11 +8,11 @@ from django.apps import apps
 from django.contrib import admin
 from django.contrib.admin import RelatedOnlyFieldListFilter
 from django.http import HttpRequest
-from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
+from rehab.people.audit.history_text import describe_actor
 from rehab.people.roles import Role
 from rehab.people.web.admin_base import ReadOnlyAdmin, rights_for
 
@@ -38,16 +38,14 @@ class LogAdmin(ReadOnlyAdmin):
     @admin.display(description=gettext_lazy("who"), ordering="by")
     def who(self, entry: Any) -> str:
         """Return the person, and the program or device used."""
-        names = [str(entry.by)] if entry.by else []
-        names += [entry.through] if entry.through else []
-        return " · ".join(names) or _("the server")
+        return describe_actor(entry)
 
 
 @admin.register(AuditEntry)
 class AuditAdmin(LogAdmin):
     """Who looked at or exported patients' data, or commanded a robot."""
 
-    list_display = ("at", "who", "act", "patient", "about", "address")
+    list_display = ("at", "who", "act", "count", "patient", "about", "address")
     list_filter: ClassVar[Any] = (
         "act",
         ("by", RelatedOnlyFieldListFilter),

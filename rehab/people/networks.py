@@ -50,7 +50,8 @@ def client_address(request: HttpRequest) -> str:
 def resolve_client_address(forwarded: str, remote: str) -> str:
     """Return the address of a client, as the outermost of our own proxies saw it.
 
-    Entries further left in X-Forwarded-For were written by the client and are not trusted.
+    Entries further left in X-Forwarded-For were written by the client and are not trusted. None is
+    where the peer comes from the internet: our own proxies stand in our own network.
     Of an IPv6 address the /64 network is returned: a client has all 2^64 addresses of it.
 
     Parameters
@@ -61,7 +62,7 @@ def resolve_client_address(forwarded: str, remote: str) -> str:
         The address of the peer that connected to the server.
     """
     hops = [word.strip() for word in forwarded.split(",") if word.strip()]
-    hops.append(remote)
+    hops = [remote] if _is_of_the_internet(remote) else [*hops, remote]
     try:
         address = ip_address(hops[max(0, len(hops) - 1 - settings.PROXIES)])
     except ValueError:
@@ -71,3 +72,10 @@ def resolve_client_address(forwarded: str, remote: str) -> str:
             return str(address.ipv4_mapped)
         return str(ip_network((address, IPV6_PREFIX_LENGTH), strict=False).network_address)
     return str(address)
+
+
+def _is_of_the_internet(remote: str) -> bool:
+    try:
+        return ip_address(remote).is_global
+    except ValueError:  # a socket of the machine itself
+        return False

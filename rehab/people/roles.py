@@ -38,11 +38,14 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "ApiToken": {Role.LEAD: Right.EDIT},
     "Authenticator": {},
     "RecoveryCode": {},
+    "ResetRequest": {},
+    "SignInAttempts": {},
     "Patient": {Role.LEAD: Right.EDIT, Role.PT: Right.EDIT},
     "Consent": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
     "ConsentText": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
     "ImportTombstone": {},
     "AuditEntry": {Role.LEAD: Right.VIEW},
+    "LogSeal": {},
     "HistoryEntry": dict.fromkeys(Role, Right.VIEW),
     "Station": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
     "Device": {Role.LEAD: Right.ALL, Role.PT: Right.VIEW},
@@ -80,11 +83,21 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Step": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "SessionEvent": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "SessionMetric": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
+    "RobotIncident": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "SessionCorrection": {
         Role.LEAD: Right.VIEW | Right.ADD,
         Role.PT: Right.VIEW | Right.ADD,
         Role.RESEARCHER: Right.VIEW,
     },
+    # Changed by their pages alone, which know how far a study is.
+    "Study": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
+    "StudyVersion": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
+    "Arm": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
+    "StudyMark": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
+    "Enrollment": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
+    "Allocation": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
+    "StudyVisit": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
+    "StudyEvent": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
     "Leaderboard": {
         Role.HOST: Right.ALL,
         Role.LEAD: Right.ALL,
@@ -101,6 +114,20 @@ def rights_of(role: str, model_name: str) -> Right:
     if role not in Role.values:
         return Right.NONE
     return RIGHTS.get(model_name, {}).get(Role(role), Right.NONE)
+
+
+# Models whose rows are persons.
+PERSONS = frozenset({"Patient", "User"})
+
+
+def may_see_names(role: str) -> bool:
+    """Return whether a role may learn who patients and staff are: a researcher never does."""
+    return role != Role.RESEARCHER
+
+
+def is_hidden_beside(role: str, model_name: str) -> bool:
+    """Return whether a row of this model is hidden where a row that the role reads refers to it."""
+    return model_name in PERSONS and not may_see_names(role)
 
 
 # The roles that a person may delegate to a program: the own one, or one with fewer rights.

@@ -64,6 +64,14 @@ class Scope:
         """Return a further condition for a member with this role. Usually none."""
         return Q()
 
+    def member_filter(self, user: Any) -> Q:
+        """Return a further condition for one account. Usually none."""
+        return Q()
+
+    def device_filter(self, device: Any) -> Q:
+        """Return a further condition for a device of the station. Usually none."""
+        return Q()
+
 
 def visible_rows(model: type[models.Model], actor: Any) -> Q | None:
     """Return the condition on the rows that an actor may see; None for no rows at all.
@@ -89,13 +97,14 @@ def _visible_to_user(scope: Scope, user: Member, model_name: str) -> Q | None:
         return scope.host
     if not user.clinic_id:
         return None
-    return scope.clinic_filter(user.clinic_id) & scope.role_filter(Role(user.role))
+    role = scope.role_filter(Role(user.role))
+    return scope.clinic_filter(user.clinic_id) & role & scope.member_filter(user)
 
 
 def _visible_to_device(scope: Scope, device: Any) -> Q | None:
     if device.is_revoked or scope.station is None:
         return None
-    return Q(**{scope.station: device.station_id})
+    return Q(**{scope.station: device.station_id}) & scope.device_filter(device)
 
 
 class ScopedManager(models.Manager[M]):

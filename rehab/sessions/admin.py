@@ -13,10 +13,11 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import user_of
-from rehab.people.roles import Role
+from rehab.people.roles import may_see_names
 from rehab.people.web.admin_base import ReadOnlyAdmin, ScopedAdmin
 from rehab.sessions.corrections import SessionCorrection, can_correct, describe_corrections
 from rehab.sessions.formatting import clinic_time
+from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.search import SessionSearchFilter
@@ -92,14 +93,14 @@ class TrainingSessionAdmin(ScopedAdmin):
 
     def get_search_fields(self, request: HttpRequest) -> Any:
         """Return what can be searched: for researchers nothing that identifies a person."""
-        if user_of(request).role == Role.RESEARCHER:
+        if not may_see_names(user_of(request).role):
             return ("patient__pseudonym",)
         return self.search_fields
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Return links to the session's own pages, and to the form that corrects it."""
         links = [(reverse("session", args=[row.pk]), _("Every stride"))]
-        if user_of(request).role == Role.RESEARCHER:
+        if not may_see_names(user_of(request).role):
             return links
         if State(row.state) in OPEN_STATES:
             links.append((reverse("monitor", args=[row.pk]), _("Monitor")))
@@ -108,7 +109,7 @@ class TrainingSessionAdmin(ScopedAdmin):
         return links
 
     def _for(self, request: HttpRequest, names: tuple[str, ...]) -> tuple[str, ...]:
-        if user_of(request).role != Role.RESEARCHER:
+        if may_see_names(user_of(request).role):
             return names
         # A source may be a file that is named after a person.
         shown = (name for name in names if name != "source")
@@ -187,7 +188,7 @@ class TrainingSessionAdmin(ScopedAdmin):
                     entry.row.get_field_display(),
                     entry.old or "–",
                     entry.new or "–",
-                    entry.row.by or "–",
+                    entry.by or "–",
                     f"{entry.at:%Y-%m-%d %H:%M}",
                     entry.row.reason,
                 )
@@ -239,6 +240,16 @@ class SessionMetricAdmin(SessionLogAdmin):
 
     list_display = ("session", "slug", "value")
     list_filter = ("slug",)
+    list_select_related = ("session",)
+
+
+@admin.register(RobotIncident)
+class RobotIncidentAdmin(SessionLogAdmin):
+    """What robots recorded around their stops."""
+
+    list_display = ("session", "at", "reason")
+    list_filter = ("reason",)
+    exclude = ("recording",)
     list_select_related = ("session",)
 
 

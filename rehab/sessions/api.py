@@ -23,7 +23,8 @@ from rehab.people.web.api_base import (
     paginate,
     responses,
 )
-from rehab.sessions.forms.session import SessionForm, initial_choices
+from rehab.sessions.forms.initial import initial_choices
+from rehab.sessions.forms.session import SessionForm
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import NotStored
 from rehab.sessions.log import SessionMetric, Step
@@ -31,6 +32,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.trend import with_metrics
 from rehab.sessions.schemas import (
     ChangeRequestBody,
+    MeasureOut,
     MetricOut,
     NamedRow,
     SessionFilter,
@@ -40,7 +42,7 @@ from rehab.sessions.schemas import (
     StepPage,
 )
 from rehab.sessions.services import change_session
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Station
 from rehab.training.changes import NotAllowed
@@ -75,6 +77,13 @@ def list_protocols(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any
     return paginate(Protocol.objects.visible_to(caller(request)).order_by("pk"), wanted)
 
 
+@router.get("/measures", response=responses(Page[MeasureOut]))
+@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
+def list_measures(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
+    """List what sessions may train."""
+    return paginate(Measure.objects.visible_to(caller(request)).order_by("pk"), wanted)
+
+
 @router.get("/stations", response=responses(Page[NamedRow]))
 @for_roles(Role.LEAD, Role.PT, patients=False)
 def list_stations(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]:
@@ -82,11 +91,13 @@ def list_stations(request: HttpRequest, wanted: Query[Paging]) -> dict[str, Any]
     return paginate(Station.objects.visible_to(caller(request)).order_by("pk"), wanted)
 
 
-@router.get("/sessions", response=responses(Page[SessionOut]))
+@router.get("/sessions", response=responses(Page[SessionOut], 404))
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
 def list_sessions(request: HttpRequest, wanted: Query[SessionFilter]) -> dict[str, Any]:
     """List the clinic's sessions; `order=best` is by non-ascending score."""
     user = caller(request)
+    if wanted.patient is not None:  # of a number that says nothing to the caller no pseudonym
+        get_object_or_404(Patient.objects.visible_to(user), pk=wanted.patient)
     conditions: dict[str, Any] = {
         "patient": wanted.patient,
         "patient__pseudonym": wanted.pseudonym,
@@ -149,7 +160,7 @@ def change(
 
 
 @router.get("/sessions/{session_id}/steps", response=responses(StepPage, 404))
-@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
+@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, exports=True)
 def list_steps(
     request: HttpRequest, session_id: Path[Key], wanted: Query[StepFilter]
 ) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.consent.models import PatientScope
 from rehab.people.models import Patient, User
+from rehab.people.roles import may_see_names
 from rehab.people.scope import ScopedModel
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
@@ -78,11 +79,12 @@ class SessionCorrection(ScopedModel):
 
 @dataclass(frozen=True, slots=True)
 class DescribedCorrection:
-    """A correction with its values as a reader may see them."""
+    """A correction with its values, and who made it, as a reader may see them."""
 
     row: SessionCorrection
     old: str
     new: str
+    by: str
 
     @property
     def at(self) -> datetime:
@@ -177,7 +179,7 @@ def _describe_conflict(
     for field in (field for field in CorrectedField if before[field] != expected[field]):
         newest = next((one for one in corrections if one.row.field == field), None)
         if newest is not None:
-            found.append(f"{field.label}: {newest.new or '–'} ({newest.row.by or '–'})")
+            found.append(f"{field.label}: {newest.new or '–'} ({newest.by or '–'})")
     message = gettext(
         "Somebody else has corrected this session meanwhile. %(what)s. Below stands what holds "
         "now, with your changes. Look it over and correct it again."
@@ -204,6 +206,13 @@ def describe_corrections(session: TrainingSession, reader: User) -> list[Describ
     def describe(row: SessionCorrection, value: str) -> str:
         return value if row.field == CorrectedField.NOTE else labels.get(value, value)
 
+    named = may_see_names(reader.role)
     return [
-        DescribedCorrection(row, describe(row, row.old), describe(row, row.new)) for row in rows
+        DescribedCorrection(
+            row,
+            old=describe(row, row.old),
+            new=describe(row, row.new),
+            by=str(row.by or "") if named else "",
+        )
+        for row in rows
     ]

@@ -36,6 +36,12 @@ def format_number(value: float | None, places: int = 2) -> str:
     return written.replace("-", "−")
 
 
+def format_significant(value: float) -> str:
+    """Return a number of unknown unit, with about three figures that say something."""
+    size = abs(value)
+    return format_number(value, 0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else 3)
+
+
 def format_quantity(value: float | None, unit: str) -> str:
     """Return a value with its unit."""
     return MISSING if value is None else f"{format_number(value)}{NBSP}{unit}"

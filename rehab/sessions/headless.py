@@ -43,8 +43,10 @@ class Pace:
 def simulate_strides(
     walker: SyntheticWalker, fold: SessionFold, count: int
 ) -> Iterator[Measurement]:
-    """Return a simulated patient's strides, each made for the phase that the session is in."""
-    return (walker.next_stride(fold.phase) for _ in range(count))
+    """Yield a simulated patient's strides, each made for the session's phase and goal."""
+    for _ in range(count):
+        walker.goal_w_kg = fold.goal
+        yield walker.next_stride(fold.phase)
 
 
 async def run_session(
@@ -84,8 +86,8 @@ async def _send_strides(live: LiveSession, strides: Iterator[Measurement], pace:
 
 def robot_steps(session: TrainingSession, fold: SessionFold) -> Iterator[tuple[float, float]]:
     """Yield the steps of a stored session that its robot scores: time [s] and performance."""
-    feedback = [index for index, phase in enumerate(fold.plan.phases) if phase.feedback]
-    steps = Step.everywhere.filter(session=session, phase__in=feedback).order_by("number")
+    sent = [i for i, phase in enumerate(fold.plan.phases) if phase.feedback and phase.robot]
+    steps = Step.everywhere.filter(session=session, phase__in=sent).order_by("number")
     for time_s, performance in steps.values_list("time_s", "performance").iterator():
         if performance is not None:
             yield time_s, performance

@@ -6,14 +6,15 @@ from enum import StrEnum
 from typing import ClassVar
 
 from django.db import models
+from django.db.models import OuterRef, Subquery
+from django.db.models.functions import Coalesce, Greatest
 from django.dispatch import Signal
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.consent.models import PatientScope
 from rehab.people.models import SIDES, User
 from rehab.people.scope import ScopedModel
-from rehab.sessions.models import TrainingSession
+from rehab.sessions.models import SessionScope, TrainingSession
 from rehab.training.controls import CONTROLS
 from rehab.training.metrics import METRICS
 
@@ -21,12 +22,16 @@ from rehab.training.metrics import METRICS
 class Step(ScopedModel):
     """A scored stride. Rows are only ever added."""
 
-    scope = PatientScope(
+    scope = SessionScope(
         clinic="session__clinic", station="session__station", patient="session__patient"
     )
 
     session = models.ForeignKey(
-        TrainingSession, on_delete=models.PROTECT, related_name="steps", verbose_name=_("session")
+        TrainingSession,
+        on_delete=models.PROTECT,
+        related_name="steps",
+        db_index=False,  # the constraint's index begins with it
+        verbose_name=_("session"),
     )
     number = models.PositiveIntegerField(_("number"))
     time_s = models.FloatField(_("time (s)"), help_text=_("The source's clock."))
@@ -59,6 +64,15 @@ class Step(ScopedModel):
         return gettext("Step %(number)d") % {"number": self.number}
 
 
+def noted_end() -> Greatest:
+    """Return what a session's ``last_number`` becomes: its log's end, and never less than it was.
+
+    So a log that has lost its end since then is found out (``replay.check_log``).
+    """
+    steps = Step.everywhere.filter(session=OuterRef("pk")).order_by("-number").values("number")
+    return Greatest("last_number", Coalesce(Subquery(steps[:1]), 0))
+
+
 class RobotEntry(StrEnum):
     """Events of a session's robot. They change no score: folding skips them."""
 
@@ -68,21 +82,53 @@ class RobotEntry(StrEnum):
     GESTURE = "robot_gesture"
 
 
+class RuleEntry(StrEnum):
+    """What followed from the steps by the plan's own rules. Folding finds it again and skips it."""
+
+    GOAL_FOLLOWED = "goal_followed"  # the staircase moved the goal
+    PLANNED_REST = "planned_rest"  # the session paused for the rest after a phase
+
+
 class Remark(StrEnum):
-    """What a PT notes with one tap while somebody walks. It changes no score either."""
+    """What a PT notes with one tap while somebody walks. It changes no score either.
+
+    How badly somebody was hurt, and that it was no fall after all, are said of the last fall.
+    """
 
     REST = "rest"
     PAIN = "pain"
     DIZZINESS = "dizziness"
     NEAR_FALL = "near_fall"
     FALL = "fall"
+    FALL_SEVERITY = "fall_severity"  # in ``value``, a `FallSeverity`
+    FALL_WITHDRAWN = "fall_withdrawn"
     HANDRAIL = "handrail"
     VERBAL_CUE = "verbal_cue"
     BORG = "borg"  # felt exertion, Borg CR10: 0 to 10 in ``value``
 
 
+class FallSeverity(models.IntegerChoices):
+    """How badly somebody was hurt by a fall: the levels of the National Database of Nursing
+    Quality Indicators, short of death.
+    """
+
+    NONE = 0, _("not hurt")
+    MINOR = 1, _("slightly hurt")
+    MODERATE = 2, _("moderately hurt")
+    MAJOR = 3, _("badly hurt")
+
+
+# Remarks with a value: the lowest and highest.
+REMARK_RANGES = {
+    Remark.BORG: (0, 10),  # CR10
+    Remark.FALL_SEVERITY: (FallSeverity.NONE.value, FallSeverity.MAJOR.value),
+}
+
+
 EVENTS = {
     **{kind: _(control.log_label) for kind, control in CONTROLS.items()},
+    RuleEntry.GOAL_FOLLOWED: _("goal followed"),
+    RuleEntry.PLANNED_REST: _("planned rest"),
     RobotEntry.STOP: _("robot stop"),
     RobotEntry.ARM: _("robot arm"),
     RobotEntry.DECISION: _("robot decision"),
@@ -92,6 +138,8 @@ EVENTS = {
     Remark.DIZZINESS: _("dizziness"),
     Remark.NEAR_FALL: _("near fall"),
     Remark.FALL: _("fall"),
+    Remark.FALL_SEVERITY: _("hurt by the fall"),
+    Remark.FALL_WITHDRAWN: _("it was no fall"),
     Remark.HANDRAIL: _("handrail"),
     Remark.VERBAL_CUE: _("verbal cue"),
     Remark.BORG: _("borg"),
@@ -106,7 +154,7 @@ class SessionEvent(ScopedModel):
     ``value`` (and ``old``) of a change that is no number: a name, or texts with their valence.
     """
 
-    scope = PatientScope(
+    scope = SessionScope(
         clinic="session__clinic", station="session__station", patient="session__patient"
     )
 
@@ -136,14 +184,14 @@ class SessionEvent(ScopedModel):
         return self.get_kind_display()
 
 
-# Sent with ``sessions`` (a set of keys) in the transaction that stores their figures.
+# Sent once figures of sessions are committed; their ``boards_due`` is set.
 figures_stored = Signal()
 
 
 class SessionMetric(ScopedModel):
     """A figure of an ended session: what boards and reports rank and compare."""
 
-    scope = PatientScope(
+    scope = SessionScope(
         clinic="session__clinic", station="session__station", patient="session__patient"
     )
 

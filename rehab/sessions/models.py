@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from datetime import datetime
-from typing import ClassVar
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any, ClassVar
 
 from django.db import models
+from django.db.models import Exists, OuterRef, Q, QuerySet
 from django.utils import timezone
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
@@ -14,8 +17,8 @@ from rehab.people.consent.models import PatientScope
 from rehab.people.models import SIDES, Clinic, Patient, User
 from rehab.people.scope import ClinicModel
 from rehab.sessions.setup.protocols import Measure, Protocol
-from rehab.stations.models import Station
-from rehab.training.changes import State
+from rehab.stations.models import Device, Station
+from rehab.training.changes import ENDED_STATES, OPEN_STATES, State
 from rehab.training.plans import SessionPlan
 from rehab.training.valences import VALENCES
 
@@ -28,6 +31,48 @@ STATES = {
 }
 
 
+SCORES_SHOWN_FOR = timedelta(minutes=15)
+
+
+@dataclass(frozen=True)
+class SessionScope(PatientScope):
+    """Rows of sessions: of its station's, a tablet sees those open and the one just ended.
+
+    Everybody at the treadmill can use the tablet, also after a patient has left. ``session`` is the
+    lookup of the session's key.
+    """
+
+    session: str = "session"
+
+    def device_filter(self, device: Any) -> Q:
+        """Return the condition for a device, besides that of its station.
+
+        Sources and robots have no pages, and are told of an ended session that it has ended.
+        """
+        if device.kind != Device.Kind.TABLET:
+            return Q()
+        open_or_ended = Q(**_in_states(OPEN_STATES)) | Q(pk__in=_just_ended(device, timezone.now()))
+        here = TrainingSession.everywhere.filter(open_or_ended, station=device.station_id)
+        return Q(**{f"{self.session}__in": here.values("pk")})
+
+
+def _in_states(states: Iterable[State]) -> dict[str, Any]:
+    return {"state__in": [state.value for state in states]}
+
+
+def _just_ended(tablet: Device, now: datetime) -> QuerySet[TrainingSession, Any]:
+    """Return the key of the last session that ended at a tablet's station.
+
+    It counts until the next one starts there, and for a quarter of an hour at most.
+    """
+    here = TrainingSession.everywhere.filter(station=tablet.station_id)
+    last = here.filter(**_in_states(ENDED_STATES), ended_at__isnull=False).order_by("-ended_at")
+    others = here.exclude(pk=OuterRef("pk"))
+    started_since = others.filter(started_at__gte=OuterRef("ended_at"))
+    recent = here.filter(pk__in=last.values("pk")[:1], ended_at__gt=now - SCORES_SHOWN_FOR)
+    return recent.exclude(Exists(started_since)).values("pk")
+
+
 class TrainingSession(ClinicModel):
     """One session of one patient.
 
@@ -38,7 +83,7 @@ class TrainingSession(ClinicModel):
     ``patient`` and ``excluded`` (``corrections.py``).
     """
 
-    scope = PatientScope(clinic="clinic", station="station")
+    scope = SessionScope(clinic="clinic", station="station", session="pk")
 
     clinic = models.ForeignKey(
         Clinic, on_delete=models.PROTECT, related_name="sessions", verbose_name=_("clinic")
@@ -52,6 +97,7 @@ class TrainingSession(ClinicModel):
         related_name="sessions",
         null=True,
         blank=True,
+        db_index=False,  # an index below begins with it
         verbose_name=_("station"),
     )
     protocol = models.ForeignKey(
@@ -117,9 +163,15 @@ class TrainingSession(ClinicModel):
     # Of an imported session, which has no steps: its key and row in the original GARRY's database.
     legacy_id = models.BigIntegerField(_("imported session"), null=True, editable=False)
     legacy_row = models.JSONField(null=True, editable=False)
+    # The log's end as it was last noted: with changes and checkpoints, and when its owner left it.
+    last_number = models.PositiveIntegerField(default=0, editable=False)
+    # Of an open session: the fold of its first steps, so that the rest is quickly folded.
+    checkpoint = models.JSONField(null=True, editable=False)
+    # Its figures are stored, and leaderboards have not followed yet.
+    boards_due = models.BooleanField(default=False, editable=False)
     # The process that writes the log; a new owner raises the epoch, which locks the old one out.
     epoch = models.PositiveIntegerField(default=0, editable=False)
-    owner = models.CharField(max_length=200, blank=True, editable=False)
+    owner = models.CharField(max_length=200, blank=True, editable=False, db_index=True)
 
     class Meta(ClinicModel.Meta):
         verbose_name = _("session")
@@ -128,6 +180,8 @@ class TrainingSession(ClinicModel):
         indexes: ClassVar = [
             models.Index(fields=["clinic", "-created_at"], name="session_by_clinic_and_date"),
             models.Index(fields=["patient", "-created_at"], name="session_by_patient_and_date"),
+            models.Index(fields=["station", "state"], name="session_by_station_and_state"),
+            models.Index(fields=["id"], condition=Q(boards_due=True), name="session_boards_due"),
         ]
         constraints: ClassVar = [
             models.UniqueConstraint(

@@ -9,6 +9,7 @@ from django.utils.translation import gettext, override
 from rehab.training.changes import ChangeValue, State
 from rehab.training.controls import CONTROLS
 from rehab.training.fold import SessionFold
+from rehab.training.goals import MIN_BASELINE_STRIDES
 from rehab.training.phases import find_phase_kind
 from rehab.training.plans import SessionPlan
 from rehab.training.valences import VALENCES, Valence
@@ -79,25 +80,56 @@ def describe_types(fold: SessionFold) -> Message:
 
 def describe_cue(fold: SessionFold) -> Message:
     """Return the robot's order for this session, as of now."""
-    cue = fold.valence.cue
+    cue, timing = fold.valence.cue, fold.plan.cue_timing
     named = {cue.above, cue.below}
     return {
         "above": cue.above,
         "below": cue.below,
         "threshold": fold.activation_threshold,
-        "window_s": 5.0,
-        "rest_s": 5.0,
+        "rule": timing.rule.value,
+        "window_s": timing.window_s,
+        "count": timing.count,
+        "rest_s": timing.rest_s,
         "intensity": fold.robot_intensity,
         "gestures": [one for one in fold.plan.gestures if one.get("name") in named],
     }
 
 
 def describe_state(fold: SessionFold) -> Message:
-    """Return where the session stands, and who paused it."""
+    """Return where the session stands, who paused it, and how long a planned rest should be."""
     paused = fold.state is State.PAUSED and fold.pause_reason is not None
     return {
         "state": fold.state.value,
         "pause_reason": fold.pause_reason.value if paused and fold.pause_reason else "",
+        "rest_s": fold.rest_s,
+    }
+
+
+def describe_coaching(fold: SessionFold) -> Message:
+    """Return what helps a PT to set a goal: one from the latest strides, or from the baseline.
+
+    ``suggested_goal`` is rounded as buttons round goals; ``baseline`` is there while it is walked.
+    """
+    suggested, places = fold.suggested_goal, fold.plan.measure.goal_places
+    return {
+        "wanted_hit_rate": fold.wanted_hit_rate,
+        "suggested_goal": None if suggested is None else round(suggested, places),
+        "baseline": _describe_baseline(fold) if fold.phase.kind == "baseline" else None,
+    }
+
+
+def _describe_baseline(fold: SessionFold) -> Message:
+    walked, percent = fold.tally_of("baseline"), fold.plan.goal.percent_of_baseline
+    goal = None
+    if walked.mean_value is not None and percent is not None:
+        goal = walked.mean_value * percent / 100
+    return {
+        "mean": walked.mean_value,
+        "sd": walked.sd_value,
+        "count": walked.valid,
+        "needed": MIN_BASELINE_STRIDES,
+        "goal": goal,
+        "asks": fold.plan.goal.asks,
     }
 
 

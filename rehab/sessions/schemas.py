@@ -21,9 +21,12 @@ from rehab.people.web.api_base import (
 )
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
+from rehab.training.adaptation import AdaptationMode
 from rehab.training.changes import State
 from rehab.training.controls import requestable_kinds
+from rehab.training.cueing import CueRule
 from rehab.training.metrics import METRICS
+from rehab.training.schedules import ScheduleKind
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES, find_valence
 
@@ -110,11 +113,27 @@ class SessionFilter(Paging):
     order: Literal["newest", "oldest", "best"] = "newest"
 
 
+class MeasureOut(Schema):
+    """A quantity of a stride that can be trained."""
+
+    id: int
+    slug: str
+    name: str
+    unit: str
+    value_min: float
+    value_max: float
+    goal_min: float
+    goal_max: float
+    higher_is_better: bool
+    channel: str = Field(description="The extra value that holds it; empty: the step's value.")
+
+
 class SessionRequestBody(RequestBody):
     """A new session. What is left out is like the patient's last time."""
 
     patient: Key
     feedback_type: FeedbackType = optional()
+    measure: Key = optional(description="What is trained, as `GET /measures` lists it.")
     goal: float = optional(description="In the measure's unit, or give `goal_percent`.")
     goal_percent: float = optional(description="Percent of the baseline.")
     wanted_hits: StrictInt | None = Field(None, description="Percent of the steps.")
@@ -126,6 +145,24 @@ class SessionRequestBody(RequestBody):
     robot: TextLine = optional(description="As in the set-up: `off`, `gentle`, `normal`.")
     robot_above: TextLine = optional(description="Gesture after a window above the threshold.")
     robot_below: TextLine = optional(description="Gesture after a window below it.")
+    robot_threshold: StrictInt = optional(description="Percent of the goal, 1 to 200.")
+    robot_answers: CueRule = optional(strict=False, description="What a gesture answers.")
+    robot_window: float = optional(description="Seconds of a window, 2 to 60.")
+    robot_count: StrictInt = optional(description="Steps of a streak or group, 1 to 100.")
+    robot_rest: float = optional(description="Least seconds between two gestures, 0 to 600.")
+    schedule: ScheduleKind = optional(strict=False, description="When the patient is told.")
+    schedule_steps: StrictInt = optional(
+        description="Told after each so many steps; of `faded` the most, of `summary` the block."
+    )
+    schedule_band: StrictInt = optional(
+        description="`bandwidth`: told outside of ± so many percent of the goal, 1 to 50."
+    )
+    goal_follows: AdaptationMode = optional(
+        strict=False, description="Whether the goal stays, is suggested or follows by itself."
+    )
+    goal_asks: bool = optional(
+        description="Whether a therapist accepts the baseline's goal before it counts."
+    )
 
 
 class ChangeRequestBody(RequestBody):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from asgiref.sync import async_to_sync
 from django.db import transaction
@@ -12,16 +13,20 @@ from django.utils.translation import gettext
 from rehab.feedback.clinic_valences import valences_of
 from rehab.people.consent.services import is_care_allowed
 from rehab.people.models import Patient, User
+from rehab.people.models.blinding import hidden_patients
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.gestures import composed_gestures, silence_cue
 from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.models import Station
+from rehab.training.adaptation import GoalAdaptation
 from rehab.training.changes import OPEN_STATES, ChangeKind, ChangeValue, PauseReason
+from rehab.training.cueing import DEFAULT_ACTIVATION_THRESHOLD, CueTiming
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import Phase
-from rehab.training.plans import DEFAULT_ACTIVATION_THRESHOLD, SessionPlan
+from rehab.training.plans import SessionPlan
+from rehab.training.schedules import Schedule
 from rehab.training.steps import Side
 from rehab.training.valences import CueGestures, Valence, find_valence
 
@@ -50,6 +55,9 @@ class SessionRequest:
     target: Target = field(default_factory=Target)
     activation_threshold: float = DEFAULT_ACTIVATION_THRESHOLD
     cue: CueGestures | None = None
+    cue_timing: CueTiming = field(default_factory=CueTiming)
+    schedule: Schedule = field(default_factory=Schedule)
+    adaptation: GoalAdaptation = field(default_factory=GoalAdaptation)
     robot_intensity: float = 1.0
     station: Station | None = None
     created_by: User | None = None
@@ -100,15 +108,21 @@ def create_session(request: SessionRequest) -> TrainingSession:
     with transaction.atomic():
         patient.lock()  # so that the patient is not erased meanwhile
         _check_patient_may_train(patient)
+        _check_not_blinded(patient, request.created_by)
         if station is not None and station.clinic_id == patient.clinic_id:
             # Of two set-ups at once, the second waits here and then finds the first one's session.
             Station.everywhere.select_for_update(no_key=True).get(pk=station.pk)
             check_station_is_free(station)
         session.save()
+        transaction.on_commit(partial(_announce, session))
+    return session
+
+
+def _announce(session: TrainingSession) -> None:
+    """Tell the tablet and devices of the station."""
     live = runtime.peek()
     if live is not None:
         live.loop.call_soon_threadsafe(live.announce, session.pk, session.station_id)
-    return session
 
 
 def _make_plan(request: SessionRequest, measure: Measure) -> SessionPlan:
@@ -146,6 +160,9 @@ def _make_plan(request: SessionRequest, measure: Measure) -> SessionPlan:
         target=request.target,
         activation_threshold=request.activation_threshold,
         robot_intensity=request.robot_intensity,
+        cue_timing=request.cue_timing,
+        schedule=request.schedule,
+        adaptation=request.adaptation,
         gestures=tuple(gestures.values()),
         alternatives=tuple(alternatives),
         language=patient.language,
@@ -167,6 +184,16 @@ def _check_patient_may_train(patient: Patient) -> None:
         "“Consent and data” first."
     )
     raise InvalidSetting(message % names)
+
+
+def _check_not_blinded(patient: Patient, by: User | None) -> None:
+    """Raise InvalidSetting where somebody would learn what a study hides."""
+    if by is not None and hidden_patients(by).filter(pk=patient.pk).exists():
+        message = gettext(
+            "You assess %(patient)s without knowing the study's arm. Ask a colleague who treats "
+            "to set this session up."
+        )
+        raise InvalidSetting(message % {"patient": patient.nickname})
 
 
 def change_session(

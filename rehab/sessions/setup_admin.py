@@ -18,7 +18,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import user_of
 from rehab.people.web.admin_base import LabeledFormSet, ScopedAdmin, ScopedOptions
-from rehab.sessions.forms.session import STRIDE_S, protocol_minutes
+from rehab.sessions.forms.initial import STRIDE_S, protocol_minutes
 from rehab.sessions.setup.gestures import robot_gesture_choices
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase, display_name
@@ -91,7 +91,18 @@ class PhaseInline(ScopedOptions, admin.TabularInline):
     form = PhaseForm
     formset = PhaseFormSet
     ordering = ("position",)
-    fields = ("position", "kind", "name", "feedback", "gain", "strides", "seconds")
+    fields = (
+        "position",
+        "kind",
+        "name",
+        "feedback",
+        "gain",
+        "strides",
+        "seconds",
+        "goal_percent",
+        "robot",
+        "rest_s",
+    )
 
     def get_extra(self, request: HttpRequest, obj: Any = None, **options: Any) -> int:
         """Return one empty row for a new protocol."""
@@ -175,6 +186,7 @@ class ProtocolAdmin(SharedAdmin):
             clinic=user_of(request).clinic,
             name=next(name for name in names if name not in taken),
             description=protocol.description,
+            wanted_hits=protocol.wanted_hits,
         )
         copy.save()
         for position, phase in enumerate(protocol.to_rules(), 1):
@@ -188,7 +200,7 @@ class PresetAdmin(ScopedAdmin):
 
     list_display = ("name", "valence", "goal_label", "wanted_hits", "minutes", "protocol", "robot")
     list_filter = ("valence", "robot")
-    list_select_related = ("protocol",)
+    list_select_related = ("protocol", "measure")
     search_fields = ("name", "protocol__name")
     radio_fields = {"valence": admin.HORIZONTAL, "goal_by": admin.HORIZONTAL}
     fieldsets = (
@@ -197,15 +209,32 @@ class PresetAdmin(ScopedAdmin):
             _("Goal"),
             {
                 "fields": (
-                    "goal_by",
+                    ("measure", "goal_by"),
                     ("goal_value", "goal_percent"),
                     ("wanted_hits", "minutes"),
                 )
             },
         ),
         (
+            _("Feedback and goal"),
+            {
+                "fields": (
+                    ("schedule", "schedule_steps", "schedule_band"),
+                    ("goal_follows", "goal_asks"),
+                )
+            },
+        ),
+        (
             _("Robot and source"),
-            {"fields": ("robot", ("robot_above", "robot_below"), "source")},
+            {
+                "fields": (
+                    "robot",
+                    ("robot_above", "robot_below"),
+                    ("robot_threshold", "robot_answers"),
+                    ("robot_window", "robot_count", "robot_rest"),
+                    "source",
+                )
+            },
         ),
     )
 

@@ -2,12 +2,30 @@
 
 from django.urls import path
 
-from rehab.sessions.pages import history, monitor, report, session, setup, tablet, takehome, walk
+from rehab.sessions.pages import (
+    health,
+    history,
+    incident,
+    metrics,
+    monitor,
+    recording,
+    report,
+    session,
+    setup,
+    tablet,
+    takehome,
+    walk,
+)
 
 urlpatterns = [
+    path("healthz", health.healthz, name="healthz"),
+    path("readyz", health.readyz, name="readyz"),
+    path("metrics", metrics.metrics, name="metrics"),
     path("patients/<int:patient_id>/new/", setup.set_up, name="setup"),
     path("patients/<int:patient_id>/sessions/", history.list_sessions, name="history"),
     path("patients/<int:patient_id>/home/", takehome.show_take_home, name="take-home"),
+    path("recordings/check/", recording.check_recording, name="check-recording"),
+    path("recordings/part/", recording.add_recording_part, name="add-recording-part"),
     path("tablet/", tablet.show_tablet, name="tablet"),
     path("tablet/app.webmanifest", tablet.web_app_manifest, name="tablet-app"),
     path("tablet/state/", tablet.tablet_state, name="tablet-state"),
@@ -15,5 +33,7 @@ urlpatterns = [
     path("sessions/<int:session_id>/monitor/", monitor.show_monitor, name="monitor"),
     path("sessions/<int:session_id>/report/", report.show_report, name="report"),
     path("sessions/<int:session_id>/details/", session.show_session, name="session"),
+    path("incidents/<int:incident_id>/", incident.show_incident, name="incident"),
+    path("incidents/<int:incident_id>/file/", incident.download_incident, name="incident-file"),
     path("sessions/<int:session_id>/correct/", session.correct, name="correct"),
 ]

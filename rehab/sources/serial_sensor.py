@@ -42,7 +42,7 @@ class Port(Protocol):
     def close(self) -> None: ...
 
 
-class FrameReader:
+class SensorFrameReader:
     """Reads frames from bytes that may begin, break off and be damaged anywhere."""
 
     def __init__(self) -> None:
@@ -182,7 +182,7 @@ class SerialSensorSource(LiveSource):
                 continue
             last_problem = ""
             call_in_loop(self._notify, f"Reading {self.port}.")
-            frames = FrameReader()
+            frames = SensorFrameReader()
             try:
                 while not stopped.is_set():
                     data = port.read(max(1, port.in_waiting))

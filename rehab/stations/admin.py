@@ -93,8 +93,11 @@ class StationAdmin(ScopedAdmin):
         return super().get_queryset(request).prefetch_related(Prefetch("devices", devices))
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
-        """Return links to pair a tablet and to add a device."""
-        links = [(reverse("pair"), _("Let a tablet in"))]
+        """Return links to pair a tablet, to check a recording and to add a device."""
+        links = [
+            (reverse("pair"), _("Let a tablet in")),
+            (reverse("check-recording"), _("Check a recording")),
+        ]
         if self.has_change_permission(request, row):
             url = reverse("admin:rehab_device_add")
             links.append((f"{url}?station={row.pk}", _("Add a source or robot")))

@@ -22,6 +22,8 @@ class Station(ClinicModel):
         Clinic, on_delete=models.PROTECT, related_name="stations", verbose_name=_("clinic")
     )
     name = models.CharField(_("name"), max_length=64)
+    # The latest order to its robot, of any session's log: stop, until a person arms it.
+    robot_stopped = models.BooleanField(_("robot stopped"), default=False, editable=False)
     pin_hash = models.CharField(max_length=128, blank=True, editable=False)
 
     class Meta(ClinicModel.Meta):

@@ -8,13 +8,16 @@ from datetime import datetime, timedelta
 from django.core.cache import cache
 from django.utils.translation import gettext as _
 
+from rehab.people.audit.audit_log import Act, AuditEntry, truncate_address
 from rehab.people.random_codes import random_code
 from rehab.people.sign_in.tokens import hash_token
 from rehab.stations.models import Device, Pairing, Station
 
 LIFETIME = timedelta(minutes=5)
 CODE_LENGTH = 6  # of 31 characters: one in 900 million, with ten attempts in five minutes
-MAX_PENDING = 500  # codes at a time on one server, against floods
+MAX_PENDING = 500  # codes at a time on one server, against floods from many addresses
+MAX_PENDING_KNOWN = 1000  # with those of networks where somebody has signed in lately
+KNOWN_FOR = timedelta(days=30)
 MAX_PENDING_PER_ADDRESS = 20  # a clinic's tablets may share an address
 MAX_STARTED_PER_ADDRESS = 100  # within the lifetime of a code; a tablet keeps its own
 MAX_ATTEMPTS = 10
@@ -33,7 +36,7 @@ def start_pairing(address: str, now: datetime) -> tuple[Pairing, str]:
 
     The oldest pairing of an address with too many pending ones is removed. Raises
     PairingRateLimited where an address starts too many, PairingRefused where the server has too
-    many pending.
+    many pending: strangers, however many their addresses, leave room for the clinics' networks.
     """
     Pairing.everywhere.filter(expires_at__lte=now).delete()
     if _count(f"pairing-started-{address}") > MAX_STARTED_PER_ADDRESS:
@@ -44,14 +47,26 @@ def start_pairing(address: str, now: datetime) -> tuple[Pairing, str]:
     own = Pairing.everywhere.filter(pk__in=cache.get(pending, []), device__isnull=True)
     kept = list(own.order_by("-pk").values_list("pk", flat=True)[: MAX_PENDING_PER_ADDRESS - 1])
     own.exclude(pk__in=kept).delete()
-    if Pairing.everywhere.count() >= MAX_PENDING:
-        raise PairingRefused(_("Too many tablets are being paired. Try again in five minutes."))
+    count = Pairing.everywhere.count()
+    if count >= MAX_PENDING and (count >= MAX_PENDING_KNOWN or not _is_known(address, now)):
+        raise PairingRefused(
+            _(
+                "Too many tablets are being paired. Sign in on any device in this network first, "
+                "or try again in five minutes."
+            )
+        )
     secret = secrets.token_urlsafe(32)
     code = random_code(CODE_LENGTH)
     pairing = Pairing(code=code, secret_hash=hash_token(secret), expires_at=now + LIFETIME)
     pairing.save()
     cache.set(pending, [*kept, pairing.pk], LIFETIME.total_seconds())
     return pairing, secret
+
+
+def _is_known(address: str, now: datetime) -> bool:
+    """Return whether somebody has signed in lately from the network of an address."""
+    sign_ins = AuditEntry.everywhere.filter(act=Act.SIGN_IN, at__gt=now - KNOWN_FOR)
+    return bool(sign_ins.filter(address=truncate_address(address)).exists())
 
 
 def _count(name: str) -> int:

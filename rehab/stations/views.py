@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import segno
+from django.conf import settings
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import get_object_or_404, redirect, render
@@ -12,6 +14,7 @@ from django.views.decorators.http import require_http_methods, require_POST
 
 from rehab.people.access import actor_of, clinic_of, for_roles, tablet_of, user_of
 from rehab.people.roles import Role
+from rehab.stations.addresses import reachable_host
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Station
 from rehab.stations.pairing import PairingRefused, approve_pairing
@@ -42,7 +45,17 @@ def pair(request: HttpRequest) -> HttpResponse:
             messages.success(request, _("%(tablet)s belongs to %(station)s now.") % names)
             return redirect("start")
     context = {"stations": stations, "code": code, "problem": problem}
-    return render(request, "stations/pair.html", context)
+    return render(request, "stations/pair.html", context | _tablet_address(request))
+
+
+def _tablet_address(request: HttpRequest) -> dict[str, str]:
+    """Return the address that a tablet opens, and its drawing to scan; empty without one."""
+    host = reachable_host(request.get_host(), [settings.HOST, *settings.ALLOWED_HOSTS])
+    if host is None:
+        return {"address": "", "qr": ""}
+    address = f"{request.scheme}://{host}{reverse('tablet')}"
+    drawing = segno.make(address, micro=False).svg_inline(omitsize=True, border=2)
+    return {"address": address, "qr": drawing}
 
 
 @for_roles(Role.LEAD, Role.PT, tablets=True)

@@ -38,6 +38,7 @@ class ChangeKind(StrEnum):
     FEEDBACK_TEXT = gettext_noop("feedback_text")
     WORDS_SHOWN = gettext_noop("words_shown")
     CHART_STYLE = gettext_noop("chart_style")
+    GOAL_ADAPTATION = gettext_noop("goal_adaptation")
 
 
 class PauseReason(StrEnum):
@@ -46,6 +47,7 @@ class PauseReason(StrEnum):
     THERAPIST = "therapist"
     PATIENT = "patient"
     RESTART = "restart"  # of the server
+    REST = "rest"  # that the plan has after a phase
 
 
 ChangeValue = float | str | Mapping[str, Any] | None
@@ -61,8 +63,8 @@ class Change:
         What changes: a key of ``rehab.training.controls.CONTROLS``.
     value
         The new goal, gain, threshold, intensity or phase index; 1 or 0 for words shown or not; the
-        slug of a valence, a chart style or the reason of a pause; for feedback text, the valence
-        and its bands. None for the others.
+        slug of a valence, a chart style, a way of goals to adapt or the reason of a pause; for
+        feedback text, the valence and its bands. None for the others.
     """
 
     kind: str

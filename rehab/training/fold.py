@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from rehab.training.adaptation import (
+    DEFAULT_HIT_RATE,
+    SUGGESTION_STRIDES,
+    AdaptationMode,
+    Staircase,
+    suggest_goal,
+)
 from rehab.training.changes import (
     STATE_LABELS,
     Change,
@@ -15,18 +23,21 @@ from rehab.training.changes import (
     State,
 )
 from rehab.training.controls import CONTROLS
-from rehab.training.goals import MIN_BASELINE_STRIDES
-from rehab.training.marking import Marked
+from rehab.training.goals import MIN_BASELINE_STRIDES, GoalRule
+from rehab.training.marking import Marked, gettext_noop
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import ChartStyle, SessionPlan
-from rehab.training.scoring import score_measurement
+from rehab.training.schedules import Untold
+from rehab.training.scoring import RULES_VERSION, score_measurement
 from rehab.training.steps import (
     InvalidMeasurement,
     InvalidReason,
     Measurement,
     ScoredStep,
+    Side,
     add_reason,
     find_invalid_reasons,
+    select_value,
 )
 from rehab.training.tallies import Block, Tally
 from rehab.training.valences import Valence, bands_from_json
@@ -35,13 +46,16 @@ from rehab.training.valences import Valence, bands_from_json
 # so much counts as walked. Recorded strides last 1-2 s, gaps between recorded trials 3.2-5.2 s
 # (docs/reference/gait.md#protocol).
 MAX_GAP_S = 10.0
+# Strides of which it is known whether the patient was told of them: as many as a page begins with.
+KEPT_TOLD = 60
+ASKS_FOR_GOAL = gettext_noop("The baseline is walked. Go to the next phase to accept its goal.")
 
 
 class SessionFold:
     """State of a session after the steps and changes of its log so far, in constant memory.
 
-    ``step`` scores a measurement and advances through the phases; ``change`` applies what a person
-    decided, effective from the next step. Neither reads a clock.
+    ``step`` scores a measurement, by the rules of its version, and advances through the phases;
+    ``change`` applies what a person decided, effective from the next step. Neither reads a clock.
 
     Parameters
     ----------
@@ -54,6 +68,7 @@ class SessionFold:
         self.state = State.READY
         self.last_number = 0
         self.last_time_s: float | None = None
+        self.last_times_s: dict[Side, float] = {}  # by leg
         self.active_s = 0.0
         self.goal: float | None = plan.goal.resolve(plan.measure, None)
         self.settings: dict[str, Any] = {
@@ -72,7 +87,16 @@ class SessionFold:
         self.next_valence = ""
         self.switches: list[tuple[int, str]] = []
         self.pause_reason: PauseReason | None = None
-        self._was_walking = False  # whether the time since the last step was walked
+        self.rest_s: float | None = None  # how long the rest should be that is under way
+        self.was_walking = False  # whether the time since the last step was walked
+        self.staircase = Staircase()
+        self.latest: deque[float] = deque(maxlen=SUGGESTION_STRIDES)  # values that goals may follow
+        self.adapted = False  # whether the last step moved the goal
+        # By the feedback schedule: what the patient does not know yet; of what the last step told;
+        # the latest steps that were told (unused where all are).
+        self.untold = Untold()
+        self.answer: Untold | None = None
+        self.told: deque[int] = deque(maxlen=KEPT_TOLD)
         self._begin_phase(0)
 
     @classmethod
@@ -115,6 +139,29 @@ class SessionFold:
         """How the patient's page draws the latest strides."""
         style: ChartStyle = self.settings[ChangeKind.CHART_STYLE]
         return style
+
+    @property
+    def adaptation_mode(self) -> AdaptationMode:
+        """What becomes of the goal while somebody walks."""
+        mode: AdaptationMode = self.settings[ChangeKind.GOAL_ADAPTATION]
+        return mode
+
+    @property
+    def wanted_hit_rate(self) -> float:
+        """The share of hits that goals are to give."""
+        wanted = self.plan.target.hit_rate
+        return DEFAULT_HIT_RATE if wanted is None else wanted
+
+    @property
+    def suggested_goal(self) -> float | None:
+        """The goal that the latest strides would have reached as often as is wanted, if any.
+
+        Nothing while goals may not follow: in a phase without feedback, and while the mode is off.
+        """
+        if self.adaptation_mode is AdaptationMode.OFF or not self.phase.adapts:
+            return None
+        shown = [self.gain * value for value in self.latest]
+        return suggest_goal(self.plan.measure, shown, self.wanted_hit_rate)
 
     @property
     def score(self) -> int | None:
@@ -165,9 +212,12 @@ class SessionFold:
                 f"Step {measurement.number} does not follow step {self.last_number}; "
                 f"send {self.last_number + 1}."
             )
-        time_s = measurement.time_s
+        version = measurement.rules_version or RULES_VERSION
+        time_s, side = measurement.time_s, measurement.side
+        before_s = self.last_time_s if version == 1 else self.last_times_s.get(side)
+        backwards = before_s is not None and time_s < before_s
         elapsed_s = 0.0 if self.last_time_s is None else time_s - self.last_time_s
-        backwards = elapsed_s < 0
+        measurement = select_value(measurement, self.plan.measure)
         reasons = find_invalid_reasons(measurement, self.plan.measure)
         if backwards:
             reasons = add_reason(reasons, InvalidReason.TIME_BACKWARDS)
@@ -182,17 +232,22 @@ class SessionFold:
             gain=self.gain,
             goal=self.goal,
             valence=self.valence if self.phase.feedback else None,
+            rules_version=version,
         )
         self.last_number = scored.number
+        self.adapted, self.answer = False, None
         if scored.side == self.plan.trained_side:
             self._count(scored, running)
-        if self._was_walking and not backwards:
-            walked_s = min(elapsed_s, MAX_GAP_S)
+        if self.was_walking and not backwards:
+            walked_s = min(max(elapsed_s, 0.0), MAX_GAP_S)
             self.active_s += walked_s
             self.phase_s += walked_s
         # Later steps follow a clock that was set back (a source that began anew): one step is lost.
-        self.last_time_s = time_s
-        self._was_walking = running and not backwards
+        # A leg may end its stride a little before the other one, whose stride came first.
+        is_overtaken = elapsed_s < 0 and not backwards
+        self.last_time_s = self.last_time_s if is_overtaken else time_s
+        self.last_times_s[side] = time_s
+        self.was_walking = running and not backwards
         if running and self.phase.is_over(self.phase_strides, self.phase_s):
             self._advance_phase()
         return scored
@@ -206,23 +261,65 @@ class SessionFold:
             self.blocks.setdefault(block, Tally()).add(step)
             if self.phase.feedback:
                 self.feedback.add(step)
+                self._tell(step)
+            if self.phase.adapts and step.valid and step.value is not None:
+                self.latest.append(step.value)
+                self._adapt(step)
             self.phase_strides += 1
+
+    def _tell(self, step: ScoredStep) -> None:
+        """Keep whether the schedule tells the patient of a step, and of which ones with it."""
+        if step.performance is None or step.hit is None or step.shown is None:
+            return
+        self.untold.add(step.performance, step.shown, step.hit)
+        if self.plan.schedule.tells(self.feedback.judged, step.performance):
+            self.answer, self.untold = self.untold, Untold()
+            if not self.plan.schedule.tells_all:
+                self.told.append(step.number)
+
+    def _adapt(self, step: ScoredStep) -> None:
+        """Move the goal as the staircase has it, where goals are automatic."""
+        if self.adaptation_mode is not AdaptationMode.AUTOMATIC:
+            return
+        if step.goal is None or step.hit is None:
+            return
+        goal = self.staircase.add(
+            self.plan.adaptation,
+            self.plan.measure,
+            self.wanted_hit_rate,
+            goal=step.goal,
+            gain=step.gain,
+            hit=step.hit,
+        )
+        if goal is not None:
+            self.goal, self.adapted = goal, True
 
     def _advance_phase(self) -> None:
         """Begin the next phase, or note why that cannot be."""
         if self.phase_index + 1 == len(self.plan.phases):
             self.completed = True
             return
+        ended = self.phase
+        if self.plan.goal.asks and self.goal is None and ended.kind == "baseline":
+            self.obstacle = ASKS_FOR_GOAL
+            return
         try:
             self.enter_phase(self.phase_index + 1)
         except InvalidSetting as problem:
             self.obstacle = str(problem)
+            return
+        if ended.rest_s is not None:
+            self.state, self.rest_s = State.PAUSED, ended.rest_s
+            self.pause(PauseReason.REST)
 
     def enter_phase(self, index: int) -> None:
         """Begin a phase. Raises InvalidSetting where its goal should be known and cannot be."""
         kinds = [phase.kind for phase in self.plan.phases]
-        if self.goal is None and kinds[index] != "baseline" and "baseline" in kinds[:index]:
-            self.goal = self._goal_from_baseline()
+        percent = self.plan.phases[index].goal_percent
+        if percent is not None:
+            self.goal = self._goal_from_baseline(GoalRule(percent_of_baseline=percent))
+        elif self.goal is None and kinds[index] != "baseline" and "baseline" in kinds[:index]:
+            self.goal = self._goal_from_baseline(self.plan.goal)
         self._begin_phase(index)
 
     def _begin_phase(self, index: int) -> None:
@@ -238,7 +335,7 @@ class SessionFold:
             self.next_valence = ""
             self.switches.append((self.last_number, self.valence.slug))
 
-    def _goal_from_baseline(self) -> float | None:
+    def _goal_from_baseline(self, rule: GoalRule) -> float | None:
         if self.baseline_mean is None:
             raise NotAllowed(
                 "The goal needs {needed} valid baseline strides and has {had}. Walk on, or set the "
@@ -246,7 +343,7 @@ class SessionFold:
                 needed=MIN_BASELINE_STRIDES,
                 had=self.tally_of("baseline").valid,
             )
-        return self.plan.goal.resolve(self.plan.measure, self.baseline_mean)
+        return rule.resolve(self.plan.measure, self.baseline_mean)
 
     def change(self, change: Change) -> None:
         """Apply a change from the next step on.
@@ -265,12 +362,12 @@ class SessionFold:
 
     def pause(self, reason: PauseReason | None) -> None:
         """Note that the time from here on is not walked, and why; None where nobody knows."""
-        self._was_walking = False
+        self.was_walking = False
         self.pause_reason = reason
 
     def resume(self) -> None:
         """Forget why the session was paused."""
-        self.pause_reason = None
+        self.pause_reason = self.rest_s = None
 
     def schedule_valence(self, slug: object) -> None:
         """Schedule the valence of the next phase with feedback; the current one cancels that."""

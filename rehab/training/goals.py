@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rehab.training.measures import InvalidSetting, Measure
+from rehab.training.measures import InvalidSetting, Measure, check_baseline_percent
 
 # The lab's goal is the mean of the 54-55 usable baseline strides of a session
 # (docs/reference/gait.md#protocol).
@@ -22,6 +22,9 @@ class GoalRule:
         The goal, in the measure's unit.
     percent_of_baseline
         50 to 200 % of the mean baseline value.
+    asks
+        Whether the baseline goes on until the PT, who sees its mean, SD and number of strides,
+        accepts the goal by going to the next phase.
 
     Raises
     ------
@@ -31,16 +34,13 @@ class GoalRule:
 
     value: float | None = None
     percent_of_baseline: float | None = None
+    asks: bool = False
 
     def __post_init__(self) -> None:
         if (self.value is None) == (self.percent_of_baseline is None):
             raise InvalidSetting("Give a goal either as a value or as percent of baseline.")
-        percent = self.percent_of_baseline
-        if percent is not None and not 50 <= percent <= 200:
-            raise InvalidSetting(
-                "A goal of {percent:g} % of baseline cannot be used. Give 50 to 200 %.",
-                percent=percent,
-            )
+        if self.percent_of_baseline is not None:
+            check_baseline_percent(self.percent_of_baseline)
 
     @property
     def needs_baseline(self) -> bool:

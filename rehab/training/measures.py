@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from rehab.training.marking import Marked, gettext_noop
@@ -42,6 +43,10 @@ class Measure:
         Goals lie in (goal_min, goal_max], above 0, since a performance is a share of them.
     higher_is_better
         False for quantities that training should lower.
+    channel
+        The extra value of a step that holds it; "" for the step's own value.
+    first_goal
+        The goal that is offered where a patient has none yet.
 
     Raises
     ------
@@ -57,6 +62,8 @@ class Measure:
     goal_min: float
     goal_max: float
     higher_is_better: bool = True
+    channel: str = ""
+    first_goal: float | None = None
 
     def __post_init__(self) -> None:
         if not -BOUND_MAX <= self.value_min < self.value_max <= BOUND_MAX:
@@ -65,6 +72,26 @@ class Measure:
             )
         if not 0 <= self.goal_min < self.goal_max <= BOUND_MAX:
             raise InvalidSetting("{name}: goals need a range above 0.", name=Marked(self.name))
+        if self.first_goal is not None:
+            self.check_goal(self.first_goal)
+
+    @property
+    def goal_step(self) -> float:
+        """By how much buttons raise a goal: 1, 2 or 5 of a decimal place, of 300 or more steps."""
+        place = 10.0 ** math.floor(math.log10(self.goal_max / 300))
+        return max(n * place for n in (1, 2, 5) if n * place <= self.goal_max / 300 * (1 + 1e-9))
+
+    @property
+    def goal_places(self) -> int:
+        """Decimal places that a goal is given with."""
+        return max(0, -math.floor(math.log10(self.goal_step)))
+
+    @property
+    def offered_goal(self) -> float:
+        """The goal that is offered first: ``first_goal``, or the middle of the range."""
+        if self.first_goal is not None:
+            return self.first_goal
+        return round((self.goal_min + self.goal_max) / 2, self.goal_places)
 
     def check_goal(self, goal: float) -> float:
         """Return the goal as a float. Raises InvalidSetting outside (goal_min, goal_max]."""
@@ -81,9 +108,19 @@ class Measure:
         return float(goal)
 
 
+def check_baseline_percent(percent: float) -> float:
+    """Return a goal in percent of the baseline as a float. Raises InvalidSetting outside 50-200."""
+    if not 50 <= percent <= 200:
+        raise InvalidSetting(
+            "A goal of {percent:g} % of baseline cannot be used. Give 50 to 200 %.",
+            percent=percent,
+        )
+    return float(percent)
+
+
 # These bounds are those of docs/reference/scoring.md#bounds. Healthy A2 lies at 2-6 W/kg; recorded
 # outliers reach 13.75 W/kg (HEBB_03, force-plate faults), so 20 W/kg is a bound that only a wrong
-# unit passes.
+# unit passes. The first goal is the mean of a healthy walk (docs/reference/gait.md#protocol).
 A2 = Measure(
     slug="a2",
     name=gettext_noop("ankle push-off power A2"),
@@ -92,6 +129,7 @@ A2 = Measure(
     value_max=20.0,
     goal_min=0.0,
     goal_max=15.0,
+    first_goal=3.9,
 )
 
 MEASURES: dict[str, Measure] = {A2.slug: A2}

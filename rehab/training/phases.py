@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass
 
 from rehab.training.marking import gettext_noop
-from rehab.training.measures import InvalidSetting, check_gain
+from rehab.training.measures import InvalidSetting, check_baseline_percent, check_gain
+
+REST_MAX_S = 3600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,12 +23,15 @@ class PhaseKind:
         Whether its phases give feedback, unless they say otherwise.
     calm_words
         Text of the patient's screen in a phase without feedback.
+    adapts
+        Whether goals may follow the patient in its phases, where they have feedback.
     """
 
     slug: str
     label: str
     feedback: bool
     calm_words: str = gettext_noop("Just keep walking.")
+    adapts: bool = False
 
 
 # The lab's protocol (HEBB_03): baseline, familiarization, training blocks with catch blocks between
@@ -41,7 +46,7 @@ PHASE_KINDS: dict[str, PhaseKind] = {
             gettext_noop("Just walk as you usually do."),
         ),
         PhaseKind("familiarization", gettext_noop("Familiarization"), True),
-        PhaseKind("training", gettext_noop("Training"), True),
+        PhaseKind("training", gettext_noop("Training"), True, adapts=True),
         PhaseKind(
             "catch", gettext_noop("Catch"), False, gettext_noop("Just walk as you usually do.")
         ),
@@ -81,6 +86,12 @@ class Phase:
         recorded protocols is a gain of 0.85 (docs/reference/gait.md#protocol).
     strides, seconds
         Its limits; None without.
+    goal_percent
+        The goal from its beginning on, in percent of the baseline; None for the goal that is there.
+    robot
+        Whether the robot gets its steps.
+    rest_s
+        The rest after it, which the PT ends: how long it should be [s]; None for none.
 
     Raises
     ------
@@ -94,6 +105,9 @@ class Phase:
     gain: float = 1.0
     strides: int | None = None
     seconds: float | None = None
+    goal_percent: float | None = None
+    robot: bool = True
+    rest_s: float | None = None
 
     def __post_init__(self) -> None:
         find_phase_kind(self.kind)
@@ -106,6 +120,20 @@ class Phase:
             raise InvalidSetting(
                 "Phase {name!r} needs more than 0 seconds, or no limit.", name=self.name
             )
+        if self.goal_percent is not None:
+            check_baseline_percent(self.goal_percent)
+        if self.rest_s is not None and not 0 < self.rest_s <= REST_MAX_S:
+            raise InvalidSetting(
+                "Phase {name!r}: a rest lasts more than 0 and up to {most:g} seconds; leave it "
+                "empty for none.",
+                name=self.name,
+                most=REST_MAX_S,
+            )
+
+    @property
+    def adapts(self) -> bool:
+        """Whether goals may follow the patient in it."""
+        return self.feedback and PHASE_KINDS[self.kind].adapts
 
     def is_over(self, strides: int, seconds: float) -> bool:
         """Return whether a phase of so many strides and seconds has reached a limit."""
@@ -122,6 +150,9 @@ def make_phase(
     gain: float = 1.0,
     strides: int | None = None,
     seconds: float | None = None,
+    goal_percent: float | None = None,
+    robot: bool = True,
+    rest_s: float | None = None,
 ) -> Phase:
     """Return a phase; name and feedback are its kind's unless given. Raises InvalidSetting."""
     known = find_phase_kind(kind)
@@ -132,4 +163,7 @@ def make_phase(
         gain=gain,
         strides=strides,
         seconds=seconds,
+        goal_percent=goal_percent,
+        robot=robot,
+        rest_s=rest_s,
     )

@@ -6,25 +6,23 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from rehab.training.adaptation import AdaptationMode, GoalAdaptation, check_adaptation_mode
+from rehab.training.cueing import (
+    DEFAULT_ACTIVATION_THRESHOLD,
+    CueTiming,
+    check_activation_threshold,
+    check_cue_rule,
+)
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import InvalidSetting, Measure
 from rehab.training.phases import Phase
+from rehab.training.schedules import Schedule, check_schedule_kind
 from rehab.training.steps import Side
 from rehab.training.valences import CueGestures, Valence, bands_from_json
-
-# The paper's default (P 3.4.1): the robot responds to windows of at least 90 % of the goal.
-DEFAULT_ACTIVATION_THRESHOLD = 0.90
 
 # How lively the robot is: the share of a gesture's size. The robot itself makes half of it gentle
 # (no sounds, half the speed).
 ROBOT_LEVELS = {"normal": 1.0, "gentle": 0.5, "off": 0.0}
-
-
-def check_activation_threshold(threshold: float) -> float:
-    """Return the threshold as a float. Raises InvalidSetting outside (0, 2]."""
-    if not 0 < threshold <= 2:
-        raise InvalidSetting("The activation threshold lies above 0 and up to 2 (0.9 for 90 %).")
-    return float(threshold)
 
 
 def check_robot_intensity(intensity: float) -> float:
@@ -69,12 +67,17 @@ class SessionPlan:
         The leg whose steps are scored.
     goal, target
         What a step should reach, and what is wanted of the whole session.
-    activation_threshold, robot_intensity
-        Mean performance at which the robot celebrates, and the share of its gestures' size.
+    activation_threshold, robot_intensity, cue_timing
+        Mean performance at which the robot celebrates, the share of its gestures' size, and what
+        they answer.
     gestures
         Composed gestures that a cue names, as they are sent to the robot.
     alternatives
         Valences that the session may be changed to, as they are then.
+    schedule
+        After which steps the patient is told.
+    adaptation
+        Whether goals follow the patient.
     language
         Of the plan's texts.
 
@@ -82,7 +85,8 @@ class SessionPlan:
     ------
     InvalidSetting
         For a plan that cannot be walked: no phase, a goal outside the measure's bounds, a goal from
-        a baseline that does not come before the first feedback.
+        a baseline that does not come before the first feedback, an automatic goal that would have
+        no misses or no hits to go by.
     """
 
     measure: Measure
@@ -95,6 +99,9 @@ class SessionPlan:
     robot_intensity: float = 1.0
     gestures: tuple[dict[str, Any], ...] = ()
     alternatives: tuple[Valence, ...] = ()
+    cue_timing: CueTiming = field(default_factory=CueTiming)
+    schedule: Schedule = field(default_factory=Schedule)
+    adaptation: GoalAdaptation = field(default_factory=GoalAdaptation)
     language: str = "en"
 
     def __post_init__(self) -> None:
@@ -103,13 +110,21 @@ class SessionPlan:
         self.goal.resolve(self.measure, None)
         check_activation_threshold(self.activation_threshold)
         check_robot_intensity(self.robot_intensity)
+        self.adaptation.check_hit_rate(self.target.hit_rate)
+        kinds = [phase.kind for phase in self.phases]
         if self.goal.needs_baseline:
-            kinds = [phase.kind for phase in self.phases]
             first_feedback = next((i for i, p in enumerate(self.phases) if p.feedback), len(kinds))
             if "baseline" not in kinds[:first_feedback]:
                 raise InvalidSetting(
                     "A goal in percent of baseline needs a baseline phase before the first "
                     "feedback. Put one first, or give the goal as a value."
+                )
+        for index, phase in enumerate(self.phases):
+            if phase.goal_percent is not None and "baseline" not in kinds[:index]:
+                raise InvalidSetting(
+                    "Phase {name!r} has a goal in percent of the baseline, and no baseline comes "
+                    "before it. Put one first, or let the goal stay.",
+                    name=phase.name,
                 )
 
     def check_phase(self, index: float) -> int:
@@ -140,8 +155,26 @@ class SessionPlan:
             robot_intensity=data["robot_intensity"],
             gestures=tuple(data["gestures"]),
             alternatives=tuple(_read_valence(one) for one in data.get("alternatives", ())),
+            cue_timing=_read_cue_timing(data.get("cue_timing", {})),
+            schedule=_read_schedule(data.get("schedule", {})),
+            adaptation=_read_adaptation(data.get("adaptation")),
             language=data.get("language", "en"),
         )
+
+
+def _read_cue_timing(data: dict[str, Any]) -> CueTiming:
+    return CueTiming(**data | {"rule": check_cue_rule(data["rule"])} if data else {})
+
+
+def _read_schedule(data: dict[str, Any]) -> Schedule:
+    return Schedule(**data | {"kind": check_schedule_kind(data["kind"])} if data else {})
+
+
+def _read_adaptation(data: dict[str, Any] | None) -> GoalAdaptation:
+    """Return how goals follow; off for a plan from before there was a choice."""
+    if data is None:
+        return GoalAdaptation(mode=AdaptationMode.OFF)
+    return GoalAdaptation(**data | {"mode": check_adaptation_mode(data["mode"])})
 
 
 def _read_valence(data: dict[str, Any]) -> Valence:

@@ -10,8 +10,11 @@ from rehab.training.steps import Measurement, ScoredStep, Side
 from rehab.training.valences import Valence
 from robot.wire.limits import PERFORMANCE_MAX
 
-# Rises with every change that could alter a stored verdict; every step keeps the one it had.
-RULES_VERSION = 1
+# Rises with every change that could alter a stored verdict; every step keeps the one it had, and is
+# folded by it again. Versions:
+# 1: a step before the last one, whichever leg, has a clock that ran backwards.
+# 2: a step before the last one of its leg (the legs' strides may overtake each other).
+RULES_VERSION = 2
 
 
 class Verdict(NamedTuple):
@@ -70,6 +73,7 @@ def score_measurement(
     gain: float,
     goal: float | None,
     valence: Valence | None,
+    rules_version: int = RULES_VERSION,
 ) -> ScoredStep:
     """Return a measurement with its verdict and points.
 
@@ -87,6 +91,8 @@ def score_measurement(
         In the measure's unit; None while it is unknown.
     valence
         What rewards it; None in a phase without feedback.
+    rules_version
+        Of the rules that it is scored by.
     """
     value = measurement.value
     shown = performance = hit = points = None
@@ -112,5 +118,5 @@ def score_measurement(
         reasons=reasons,
         phase=phase,
         extra=measurement.extra,
-        rules_version=RULES_VERSION,
+        rules_version=rules_version,
     )

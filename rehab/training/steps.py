@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from rehab.training.measures import Measure
 from robot.wire.limits import TIME_MAX_S
+
+# The extra value that keeps what a source sent as a step's value, where another one is trained.
+SENT_VALUE = "sent_value"
 
 
 class Side(StrEnum):
@@ -52,6 +55,8 @@ class Measurement:
         Why the source doubts it; they make the step invalid.
     extra
         Further named values.
+    rules_version
+        Of a stored stride: the rules that it was scored by. None for a new one.
 
     Raises
     ------
@@ -66,6 +71,7 @@ class Measurement:
     value: float | None
     reasons: tuple[str, ...] = ()
     extra: Mapping[str, float] = field(default_factory=dict)
+    rules_version: int | None = None
 
     def __post_init__(self) -> None:
         if self.number < 1:
@@ -79,6 +85,23 @@ class Measurement:
                 raise InvalidMeasurement(
                     f"Stride {self.number}: {name} is not finite; leave it out."
                 )
+
+
+def select_value(measurement: Measurement, measure: Measure) -> Measurement:
+    """Return the measurement with the value that is trained: that of the measure's channel.
+
+    The value that was sent stays as the extra value ``sent_value``. Without the channel there is no
+    value. A measurement that was selected already is returned as it is.
+    """
+    if not measure.channel:
+        return measurement
+    extra, named = measurement.extra, measurement.extra.get(measure.channel)
+    value = None if named is None else float(named)  # a whole number is kept whole, where it came
+    if value == measurement.value:
+        return measurement
+    if measurement.value is not None and math.isfinite(measurement.value):
+        extra = {SENT_VALUE: measurement.value, **extra}
+    return replace(measurement, value=value, extra=extra)
 
 
 @dataclass(frozen=True, slots=True)

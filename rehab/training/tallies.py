@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,6 +24,8 @@ class Tally:
         ``judged`` counts valid steps for which a goal was known.
     value_sum, performance_sum
         Of the valid and of the judged steps.
+    value_squares
+        Sum of the valid values' squared deviations from their mean (Welford 1962).
     streak, best_streak
         The run of hits that is under way, and the longest one.
     """
@@ -38,6 +41,7 @@ class Tally:
     points: int = 0
     streak: int = 0
     best_streak: int = 0
+    value_squares: float = 0.0
 
     def add(self, step: ScoredStep) -> None:
         """Count one more step. An invalid one only adds to the counts of strides."""
@@ -48,8 +52,12 @@ class Tally:
             else:
                 self.invalid += 1
             return
+        value = step.value or 0.0
+        if self.valid:
+            deviation = value - self.value_sum / self.valid
+            self.value_squares += deviation * deviation * self.valid / (self.valid + 1)
         self.valid += 1
-        self.value_sum += step.value or 0.0
+        self.value_sum += value
         self.points += step.points or 0
         if step.performance is None:
             return
@@ -65,6 +73,11 @@ class Tally:
 
     def merge(self, other: Tally) -> None:
         """Add the sums of another tally; streaks do not reach across."""
+        if self.valid and other.valid:  # Chan, Golub & LeVeque 1983
+            apart = other.value_sum / other.valid - self.value_sum / self.valid
+            share = self.valid * other.valid / (self.valid + other.valid)
+            self.value_squares += apart * apart * share
+        self.value_squares += other.value_squares
         for name in ("strides", "valid", "invalid", "missing", "judged", "hits", "points"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
         self.value_sum += other.value_sum
@@ -76,6 +89,11 @@ class Tally:
     def mean_value(self) -> float | None:
         """Mean of the valid values, in the measure's unit."""
         return self.value_sum / self.valid if self.valid else None
+
+    @property
+    def sd_value(self) -> float | None:
+        """Sample SD of the valid values, in the measure's unit; None of fewer than two."""
+        return math.sqrt(self.value_squares / (self.valid - 1)) if self.valid > 1 else None
 
     @property
     def mean_performance(self) -> float | None:

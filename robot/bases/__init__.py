@@ -1,7 +1,9 @@
 """The bases that can be driven: one module each."""
 
+from robot.bases.avatar import AvatarBase
 from robot.bases.base import (
     Abilities,
+    Answer,
     BadOption,
     BaseLost,
     BaseState,
@@ -18,6 +20,7 @@ from robot.bases.twinned import TwinBase
 
 # Name: its class, made with a monotonic clock [s].
 BASES: dict[str, type[MobileBase]] = {
+    "avatar": AvatarBase,
     "null": NullBase,
     "kinematic": KinematicBase,
     "twin": TwinBase,
@@ -28,6 +31,7 @@ BASES: dict[str, type[MobileBase]] = {
 __all__ = [
     "BASES",
     "Abilities",
+    "Answer",
     "BadOption",
     "BaseLost",
     "BaseState",

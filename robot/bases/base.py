@@ -11,6 +11,8 @@ from types import TracebackType
 from typing import ClassVar, Self
 
 from robot.motion.pose import Pose
+from robot.motion.response import Response
+from robot.motion.score import Color, Note
 from robot.motion.twist import Twist
 
 
@@ -34,6 +36,10 @@ class Abilities:
         Whether it can drive and turn, as gestures need.
     announces
         Whether it has lights and sounds, with which it tells that it is about to move.
+    notes
+        Whether it plays the notes of a gesture's score; else a sound of its own announces each.
+    answers
+        Whether it has a face, a voice or arms, by which it answers beside its motion.
     real_time
         Whether it runs by the computer's clock, so it cannot run on a virtual one.
     closed_loop
@@ -45,6 +51,8 @@ class Abilities:
     simulated: bool
     moves: bool
     announces: bool = False
+    notes: bool = False
+    answers: bool = False
     real_time: bool = False
     closed_loop: bool = True
     bumpers: bool = False
@@ -60,14 +68,36 @@ class Indication(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class Answer:
+    """How to answer a window beside motion: by a face, a voice, a head or arms.
+
+    Parameters
+    ----------
+    gesture
+        Name of the gesture that begins now.
+    is_glad
+        Whether the window was above the threshold; only then may it sound or look glad.
+    is_quiet
+        Whether it makes no sound.
+    strength
+        Share of the gesture's size, 0.1 to 1.
+    """
+
+    gesture: str
+    is_glad: bool
+    is_quiet: bool = False
+    strength: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
 class SensorState:
     """What a base reports beside its motion. By default nothing is wrong, and nothing known.
 
     Parameters
     ----------
     hazards
-        What must stop it at once and holds now, or held a moment ago, as codes: ``bump``,
-        ``cliff``, ``wheel_drop``, ``over_current``.
+        What must stop it at once and holds now, or has held since the last reading, as codes:
+        ``bump``, ``cliff``, ``wheel_drop``, ``over_current``, ``unordered_motion``.
     refusal
         Why it must not move at all, as a code; empty where it may.
     stop_pressed
@@ -80,6 +110,13 @@ class SensorState:
         Time since it last reported anything [s].
     slip_rad
         Heading by its wheels minus heading by its gyro, from home [rad].
+    doubt_rad
+        How far wheels and gyro disagree about its heading since home [rad], beyond what wheels of
+        unequal size explain.
+    drift_rad_s
+        How fast its gyro turns by itself, as far as is known [rad/s].
+    push_n
+        Force with which its motors push, by the current that they draw [N]; 0 where unknown.
     """
 
     hazards: frozenset[str] = frozenset()
@@ -89,6 +126,9 @@ class SensorState:
     is_charging: bool = False
     silent_s: float = 0.0
     slip_rad: float = 0.0
+    doubt_rad: float = 0.0
+    drift_rad_s: float = 0.0
+    push_n: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +157,8 @@ class MobileBase(ABC):
     name: ClassVar[str]
     abilities: Abilities  # of the class, or of an object with other topics
     port: str = ""  # address of its port or bridge, where it has one; set before it is opened
+    response: Response = Response()  # how late it answers
+    on_bytes: Callable[[bytes], None] | None = None  # told what it sent, where that is bytes
 
     @abstractmethod
     def __init__(self, monotonic: Callable[[], float]) -> None:
@@ -129,6 +171,15 @@ class MobileBase(ABC):
     def configure(self, options: Namespace) -> None:
         """Apply the options, before it is opened. Raises BadOption."""
         self.port = options.port
+
+    @property
+    def identity(self) -> str:
+        """Which base this is, once it is open: what was measured of it is stored under this."""
+        return self.name
+
+    def calibrate(self, response: Response) -> None:
+        """Take over how it was measured to answer. Where it stands is home then."""
+        self.response = response
 
     def __enter__(self) -> Self:
         """Open it."""
@@ -191,5 +242,14 @@ class MobileBase(ABC):
         """Return its true pose where that is known: in a simulation."""
         return None
 
+    def light(self, first: Color, second: Color) -> None:  # noqa: B027 (not every base can)
+        """Show colors of a gesture's score, until ``show`` or the next ones. Never raises."""
+
+    def play(self, note: Note) -> None:  # noqa: B027 (not every base can)
+        """Play a note of a gesture's score. Never raises."""
+
     def show(self, indication: Indication, *, aloud: bool) -> None:  # noqa: B027 (not every base can)
         """Show its state by lights, and by a sound where ``aloud``. Never raises."""
+
+    def answer(self, answer: Answer) -> None:  # noqa: B027 (not every base can)
+        """Begin to answer, in place of the last answer; ``show`` ends it. Never raises or waits."""

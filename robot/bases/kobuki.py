@@ -10,12 +10,14 @@ from types import TracebackType
 from typing import ClassVar, Self
 
 from robot.bases.base import Abilities, BaseLost, BaseState, Indication, MobileBase, SensorState
+from robot.bases.hazards import UNORDERED, StillWatch, UnreadHazards
 from robot.bases.kobuki_protocol.commands import (
     Extra,
     GpOutput,
     Melody,
     Output,
     RequestExtra,
+    Sound,
     SoundSequence,
     encode_commands,
 )
@@ -23,20 +25,21 @@ from robot.bases.kobuki_protocol.feedback import Button, decode_feedback
 from robot.bases.kobuki_protocol.frame_filter import Estimate, FrameFilter
 from robot.bases.kobuki_protocol.frames import BAUD, FrameReader
 from robot.bases.kobuki_protocol.wheels import STOP, WHEELBASE_M, control_to_twist, twist_to_control
-from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, Limits
+from robot.motion.limits import WHEEL_LIMITS
 from robot.motion.odometry import Odometry
+from robot.motion.response import Response
+from robot.motion.score import Color, Note
 from robot.motion.twist import STILL, Twist
 from robot.port.client import PortClient, ReceivedBytes
-from robot.port.usb import find_port
 
-WHEEL_LIMITS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
 STOP_FRAME = encode_commands(STOP)
 
 FIRMWARE_MAJOR = 1  # what the reference driver takes (docs/reference/kobuki.md#firmware)
 REQUEST_EVERY_S = 0.1  # for the versions, until they are known
 LIGHT_EVERY_S = 1.0  # lights again, for a base that was switched off meanwhile
-# A hazard counts for this long [s] after it was last detected, so that no tick misses it.
-HAZARD_HOLD_S = 0.1
+# Force of its motors for their current [N/A]: 1 N·m at 3 A on wheels of 35 mm
+# (docs/reference/kobuki.md#twin, #watchdogs); that it grows in proportion is our own.
+FORCE_N_A = 1.0 / 3.0 / 0.035
 GREETING_S = 1.5  # a base that is switched on has reported everything by then
 
 LIGHTS = {
@@ -45,14 +48,21 @@ LIGHTS = {
     Indication.MOVING: Output.LED1_ORANGE,
     Indication.STOPPED: Output.LED1_RED,
 }
-SOUNDS = {Indication.MOVING: Melody.BUTTON, Indication.STOPPED: Melody.ERROR}
+SOUNDS = {Indication.STOPPED: Melody.ERROR}
+COLORS = {
+    Color.OFF: (Output(0), Output(0)),
+    Color.GREEN: (Output.LED1_GREEN, Output.LED2_GREEN),
+    Color.ORANGE: (Output.LED1_ORANGE, Output.LED2_ORANGE),
+}
 
 
 class KobukiBase(MobileBase):
     """Drives a Kobuki and integrates its odometry. A lost port is reopened forever."""
 
     name: ClassVar[str] = "kobuki"
-    abilities = Abilities(simulated=False, moves=True, announces=True, real_time=True, bumpers=True)
+    abilities = Abilities(
+        simulated=False, moves=True, announces=True, notes=True, real_time=True, bumpers=True
+    )
 
     def __init__(self, monotonic: Callable[[], float]) -> None:
         self._monotonic = monotonic
@@ -64,15 +74,14 @@ class KobukiBase(MobileBase):
         self._estimate: Estimate | None = None
         self._opened = 0
         self._seen_s = self._begun_s = monotonic()
-        self._detected_s: dict[str, float] = {}
-        self._indication, self._sound = Indication.WAITING, b""
+        self._unread, self._still_watch = UnreadHazards(), StillWatch()
+        self._felt: frozenset[str] = frozenset()  # in the newest frame
+        self._lights, self._sound = LIGHTS[Indication.WAITING], b""
         self._requested_s = self._lit_s = monotonic() - LIGHT_EVERY_S
 
     def __enter__(self) -> Self:
         """Open the port, stop the base, and wait a moment for its firmware version."""
-        self._client = PortClient(
-            self.port or find_port(), BAUD, STOP_FRAME, self._receive, self._monotonic
-        )
+        self._client = PortClient(self.port, BAUD, STOP_FRAME, self._receive, self._monotonic)
         until_s = self._monotonic() + GREETING_S
         while self._monotonic() < until_s and not self._client.is_dead:
             self.stop()
@@ -124,11 +133,25 @@ class KobukiBase(MobileBase):
         """Why the port is not open; empty where it is."""
         return "" if self._client is None else self._client.problem
 
+    @property
+    def identity(self) -> str:
+        """Its name, and its own number once it has reported that."""
+        udid = self._filter.udid
+        return self.name if udid is None else f"{self.name}-{udid.a:08x}{udid.b:08x}{udid.c:08x}"
+
+    def calibrate(self, response: Response) -> None:
+        """Take over how it was measured to answer. Where it stands is home then."""
+        super().calibrate(response)
+        with self._lock:
+            self._odometry = Odometry(WHEELBASE_M, response.gyro_bias_rad_s, response.wheel_scale)
+
     def drive(self, twist: Twist) -> Twist:
         """Order a velocity; its speeds are clipped."""
         if self._client is None or self._client.is_dead:
             raise BaseLost("The process that owns the port does not run: see its messages above.")
         control = twist_to_control(WHEEL_LIMITS.clip(twist))
+        if control != STOP:
+            self._still_watch.order_motion(self._monotonic())
         self._client.order(encode_commands(control), self._extra_commands())
         return control_to_twist(control)
 
@@ -144,9 +167,7 @@ class KobukiBase(MobileBase):
         now_s = self._monotonic()
         with self._lock:
             estimate, odometry = self._estimate, self._odometry
-            detected = {
-                name for name, at_s in self._detected_s.items() if now_s - at_s <= HAZARD_HOLD_S
-            }
+            detected = self._unread.take() | self._felt
             silent_s, firmware = now_s - self._seen_s, self._filter.firmware
             if estimate is None:
                 return BaseState(
@@ -156,13 +177,16 @@ class KobukiBase(MobileBase):
             if firmware is not None and firmware.major != FIRMWARE_MAJOR:
                 refusal = "firmware_refused"
             sensors = SensorState(
-                hazards=frozenset(detected - {"stop_button"}),
+                hazards=detected - {"stop_button"},
                 refusal=refusal,
                 stop_pressed="stop_button" in detected,
                 battery_v=estimate.battery_v if estimate.battery_v > 0 else None,
                 is_charging=estimate.is_charging,
                 silent_s=silent_s,
                 slip_rad=odometry.slip_rad,
+                doubt_rad=odometry.doubt_rad,
+                drift_rad_s=odometry.drift_rad_s,
+                push_n=FORCE_N_A * estimate.current_a,
             )
             twist = Twist((estimate.left_m_s + estimate.right_m_s) / 2, estimate.turn_rad_s)
             return BaseState(odometry.pose, twist, sensors)
@@ -174,9 +198,23 @@ class KobukiBase(MobileBase):
 
     def show(self, indication: Indication, *, aloud: bool) -> None:
         """Show its state by the first light, and by a short sound."""
-        self._indication, self._lit_s = indication, self._monotonic() - LIGHT_EVERY_S
+        self._set_lights(LIGHTS[indication])
         if aloud and indication in SOUNDS:
             self._sound = encode_commands(SoundSequence(SOUNDS[indication]))
+
+    def light(self, first: Color, second: Color) -> None:
+        """Show colors of a gesture's score."""
+        self._set_lights(COLORS[first][0] | COLORS[second][1])
+
+    def play(self, note: Note) -> None:
+        """Play a note of a gesture's score."""
+        if note.melody is not None:
+            self._sound = encode_commands(SoundSequence(Melody[note.melody.name]))
+        else:
+            self._sound = encode_commands(Sound.at(note.frequency_hz, note.duration_s))
+
+    def _set_lights(self, lights: Output) -> None:
+        self._lights, self._lit_s = lights, self._monotonic() - LIGHT_EVERY_S
 
     def _extra_commands(self) -> bytes:
         """Return commands to send beside the next setpoint. External power stays on."""
@@ -184,7 +222,7 @@ class KobukiBase(MobileBase):
         extra, self._sound = self._sound, b""
         if now_s - self._lit_s >= LIGHT_EVERY_S:
             self._lit_s = now_s
-            extra += encode_commands(GpOutput(Output.POWER | LIGHTS[self._indication]))
+            extra += encode_commands(GpOutput(Output.POWER | self._lights))
         if self._filter.firmware is None and now_s - self._requested_s >= REQUEST_EVERY_S:
             self._requested_s = now_s
             extra += encode_commands(RequestExtra(Extra.HARDWARE | Extra.FIRMWARE | Extra.UDID))
@@ -192,6 +230,8 @@ class KobukiBase(MobileBase):
 
     def _receive(self, received: ReceivedBytes) -> None:
         """Handle bytes of the base, on the client's thread."""
+        if self.on_bytes is not None and received.data:
+            self.on_bytes(received.data)
         with self._lock:
             if received.opened != self._opened:
                 self._opened = received.opened
@@ -205,7 +245,7 @@ class KobukiBase(MobileBase):
         has_restarted = estimate.restarted and self._estimate is not None
         self._estimate, self._seen_s = estimate, at_s
         self._odometry.add(
-            estimate.left_m, estimate.right_m, estimate.heading_rad, estimate.turn_rad_s
+            estimate.left_m, estimate.right_m, estimate.heading_rad, estimate.turn_rad_s, at_s
         )
         detected = {
             "bump": estimate.bumper,
@@ -214,5 +254,9 @@ class KobukiBase(MobileBase):
             "over_current": estimate.over_current,
             "restarted": has_restarted,  # switched off or carried away: home is unknown
             "stop_button": estimate.buttons & Button.B0,
+            UNORDERED: self._still_watch.update(
+                max(estimate.left_m_s, estimate.right_m_s, key=abs), at_s
+            ),
         }
-        self._detected_s |= {name: at_s for name, is_felt in detected.items() if is_felt}
+        self._felt = frozenset(hazard for hazard, is_detected in detected.items() if is_detected)
+        self._unread.add(*self._felt)

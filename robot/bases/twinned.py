@@ -21,7 +21,9 @@ class TwinBase(KobukiBase):
     """Starts a twin, drives it over its port, and ends it with itself."""
 
     name: ClassVar[str] = "twin"
-    abilities = Abilities(simulated=True, moves=True, announces=True, real_time=True, bumpers=True)
+    abilities = Abilities(
+        simulated=True, moves=True, announces=True, notes=True, real_time=True, bumpers=True
+    )
 
     def __init__(self, monotonic: Callable[[], float], *options: str) -> None:
         super().__init__(monotonic)

@@ -6,8 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from robot.wire.frames import BadFrame, read_number
+from robot.wire.frames import BadFrame, read_number, read_whole
 from robot.wire.limits import MAX_CUE_GESTURES, MAX_NAME_CHARS
+
+# What a gesture answers: the mean of a window of time, so many steps in a row on one side of the
+# threshold, or the mean of so many steps.
+WINDOWS, STREAKS, STEPS = RULES = ("windows", "streaks", "steps")
 
 MIN_INTENSITY = 0.1
 # A cue of this intensity or less is performed quietly: without sounds, and at this share of every
@@ -25,7 +29,9 @@ class Cue:
     above, below
         The gesture after a window above or below the threshold; None for none.
     threshold
-        Mean performance that a window has to reach; 1 is the goal.
+        Performance that a window's mean, or each step of a streak, has to reach; 1 is the goal.
+    rule, count
+        What a gesture answers, one of ``RULES``; and how many steps that are, but for windows.
     window_s, rest_s
         Length of a window, and time from the start of one gesture to the start of the next, both
         on the source's clock [s], so that what a robot does follows from the log.
@@ -38,6 +44,8 @@ class Cue:
     above: str | None = None
     below: str | None = None
     threshold: float = 0.9
+    rule: str = WINDOWS
+    count: int = 1
     window_s: float = 5.0
     rest_s: float = 5.0
     intensity: float = 1.0
@@ -51,6 +59,9 @@ class Cue:
         intensity = read_number(cue, "intensity", 0.0, 1.0)
         if 0 < intensity < MIN_INTENSITY:
             raise BadFrame(f'"intensity" is 0, or a number from {MIN_INTENSITY:g} to 1.')
+        # A server from before there were rules names none.
+        if (rule := cue.get("rule", WINDOWS)) not in RULES:
+            raise BadFrame(f'"rule" is one of: {", ".join(RULES)}.')
         gestures = cue.get("gestures", [])
         if not isinstance(gestures, list) or len(gestures) > MAX_CUE_GESTURES:
             raise BadFrame(f'"gestures" is a list of up to {MAX_CUE_GESTURES}.')
@@ -58,6 +69,8 @@ class Cue:
             above=_read_gesture(cue, "above"),
             below=_read_gesture(cue, "below"),
             threshold=read_number(cue, "threshold", 0.0, 10.0),
+            rule=rule,
+            count=read_whole(cue, "count", low=1) if "count" in cue else 1,
             window_s=read_number(cue, "window_s", 1.0, 600.0),
             rest_s=read_number(cue, "rest_s", 0.0, 3600.0),
             intensity=intensity,

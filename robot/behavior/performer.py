@@ -11,17 +11,22 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from robot.bases import BaseState, MobileBase
+from robot.bases import Answer, BaseState, MobileBase
 from robot.behavior.cue import QUIET_PACE, Cue
+from robot.behavior.expression import Expression
 from robot.behavior.gesture_library import GestureLibrary
+from robot.behavior.placing import Placing
 from robot.behavior.reports import Report, decision_report, stop_report
 from robot.behavior.safety import ANNOUNCE_S, AWAY, STALLED, STOPPED, Safety
+from robot.behavior.senses import Senses
 from robot.behavior.status import StatusReporter
 from robot.behavior.window_decider import Decision, WindowDecider
 from robot.motion.gesture import Gesture
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.limits import DEFAULT_LIMITS, Limits
 from robot.motion.player import BAD_ODOMETRY, OUT_OF_TIME, Player
+from robot.motion.response import AT_ONCE
+from robot.motion.twist import STILL
 from robot.wire.frames import BadFrame, read_number
 from robot.wire.limits import PERFORMANCE_MAX, TIME_MAX_S
 
@@ -38,6 +43,8 @@ NO_SESSION = "no_session"
 NOT_RUNNING = "not_running"
 CANNOT_MOVE = "base_cannot_move"
 REPLACED = "replaced"  # a welcome to another session
+
+SAD = ("droop", "original_negative")  # of the gestures that are played alone
 
 
 class Performer:
@@ -56,6 +63,8 @@ class Performer:
     ----------
     decision
         The newest decision; None before there was one.
+    ordered
+        The base's present order.
     bad_messages, last_bad_message
         How many messages broke the protocol, and what was wrong with the last one.
     """
@@ -66,15 +75,19 @@ class Performer:
         limits: Limits = DEFAULT_LIMITS,
         gestures: Mapping[str, Gesture] = GESTURES | ORIGINALS,
     ) -> None:
-        self.base = base
-        self.player = Player(limits)
+        self.base, self.senses = base, Senses(base)
+        # Without odometry its pose is what was ordered, which is never late.
+        self.player = Player(limits, base.response if base.abilities.closed_loop else AT_ONCE)
         self.gestures = GestureLibrary(gestures, limits)
         self.decider = WindowDecider(Cue())
         self.status = StatusReporter(base)
+        self.expression = Expression(base)
         self.decision: Decision | None = None
+        self.ordered = STILL
         self.bad_messages = 0
         self.last_bad_message = ""
         self.safety = Safety(base.abilities)
+        self.placing = Placing()
         self._session: int | None = None
         self._is_welcome = False  # on this connection; nothing before it counts
         self._is_running = False
@@ -87,9 +100,28 @@ class Performer:
         return self.status.reports
 
     @property
+    def session(self) -> int | None:
+        """The session of the last welcome."""
+        return self._session
+
+    @property
     def is_linked(self) -> bool:
         """Whether the server has sent its welcome on this connection, which is not lost."""
         return self._is_welcome
+
+    @property
+    def may_act(self) -> bool:
+        """Whether a decision may move a robot, this one or another that acts on its decisions.
+
+        A page of the PT has to be open for that, also where our own base is simulated.
+        """
+        return (
+            self._is_welcome
+            and self._is_running
+            and self.safety.is_watched
+            and self.decider.cue.intensity > 0
+            and not self.safety.blocking_reason(self.senses.read())
+        )
 
     def handle(self, message: Message, now_s: float) -> None:
         """Handle a message of the server; one that breaks the protocol is only counted."""
@@ -128,7 +160,7 @@ class Performer:
         str
             Why the gesture may not start, as a code; empty where it has started.
         """
-        safety, state = self.safety, self.base.read()
+        safety, state = self.safety, self.senses.read()
         self._is_alone = safety.is_watched = True
         reason = (
             safety.rejection_reason(gesture)
@@ -139,6 +171,7 @@ class Performer:
             reason = AWAY
         if not reason:
             self._start(gesture.scaled(safety.share), now_s, state)
+            self.base.answer(Answer(gesture.name, gesture.name not in SAD))
         self.status.show(("stopped", reason) if reason else ("performing", ""), is_quiet=False)
         return reason
 
@@ -147,13 +180,20 @@ class Performer:
         # Without a session it does not move, and the server sends no heartbeat.
         if self._session is not None and self._is_welcome and now_s - self._heard_s > SILENCE_S:
             self.disconnect(NO_LINK)
-        state, player = self.base.read(), self.player
-        found = self.safety.check(now_s, state, player.twist, performing=player.is_busy)
+        state, player = self.senses.judge(), self.player
+        ordered = player.answered(now_s)
+        self.expression.tick(now_s)
+        found = self.safety.check(now_s, state, ordered, performing=player.is_busy)
         if found:
             self._stop_for(found)
-        was = player.gesture
-        self.base.drive(player.step(now_s, state.pose))
+        was, placed = player.gesture, self.placing.twist(now_s)
+        if placed.is_still or not self._may_be_placed(state):
+            self.ordered = self.base.drive(player.step(now_s, state.pose))
+        else:
+            self.ordered = self.base.drive(placed)
+            self.base.set_home()  # where it stands is home when the button is let go
         if was is not None and not player.is_busy:
+            self.expression.stop()
             self.status.report_gesture(was, "ended", player.outcome)
             if player.outcome in (OUT_OF_TIME, BAD_ODOMETRY):
                 # A base that did not get there is held or blocked, and would be again at once.
@@ -183,9 +223,11 @@ class Performer:
                 self._set_cue(Cue.read(message.get("cue")))
             case "arm":
                 self._handle_arm(now_s)
+            case "drive":
+                self.placing.order(message, now_s)
             case _:
                 raise BadFrame(
-                    "A robot understands welcome, step, state, cue, stop, arm, heartbeat."
+                    "A robot understands welcome, step, state, cue, stop, arm, drive, heartbeat."
                 )
 
     def _handle_welcome(self, message: Message) -> None:
@@ -232,10 +274,25 @@ class Performer:
             raise BadFrame('"watched" is true or false.')
         self.safety.is_watched = watched
 
+    def _may_be_placed(self, state: BaseState) -> bool:
+        """Whether a person may drive it to its mark: armed, nothing against it, nobody walks."""
+        return (
+            self._is_welcome
+            and not self._is_running
+            and not self.player.is_busy
+            and self.base.abilities.moves
+            and not self.base.abilities.simulated  # that is put back by itself
+            and self.safety.is_watched
+            and not self.safety.blocking_reason(state)
+        )
+
     def _halt(self, reason: str) -> None:
+        self.placing.end()
         gesture = self.player.gesture
         self.player.halt(reason)
+        self.expression.stop()
         self.base.stop()
+        self.ordered = STILL
         if gesture is not None:
             self.status.report_gesture(gesture, "ended", self.player.outcome)
 
@@ -247,11 +304,11 @@ class Performer:
     def _stop_for(self, reason: str) -> None:
         """Stand still for a fault that is latched, and report it."""
         self._halt(reason)
-        self.reports.append(stop_report(reason))
+        self.status.report(stop_report(reason))
 
     def _handle_arm(self, now_s: float) -> None:
         """Let it move again; where it stands is home now."""
-        problem = self.safety.arm(now_s, self.base.read())
+        problem = self.safety.arm(now_s, self.senses.read())
         if problem:
             self._stop_for(problem)
         elif not self.player.is_busy:
@@ -269,7 +326,7 @@ class Performer:
 
     def _respond(self, decision: Decision, now_s: float) -> None:
         """Report a decision, and start the gesture that follows from it."""
-        state, cue = self.base.read(), self.decider.cue
+        state, cue = self.senses.read(), self.decider.cue
         name, share = cue.gesture(decision.above), self.decider.share
         reason = self.decider.blocking_reason(decision, performing=self.player.is_busy)
         gesture = None
@@ -278,19 +335,22 @@ class Performer:
         if gesture is not None:
             reason = self._blocking_reason(gesture, state)
         if reason or gesture is None:
-            self.reports.append(decision_report(decision, None, None, reason, share))
+            self.status.report(decision_report(decision, None, None, reason, share))
             return
         # The paper's own gestures replicate it, and are the same every time.
         strength = 1.0 if gesture.name in ORIGINALS else decision.strength
         intensity = round(cue.intensity * strength * self.safety.share, 3)
-        self.reports.append(decision_report(decision, gesture.name, intensity, "", share))
+        self.status.report(decision_report(decision, gesture.name, intensity, "", share))
         self._start(gesture.scaled(intensity), now_s, state, QUIET_PACE if cue.is_quiet else 1.0)
+        self.base.answer(Answer(gesture.name, decision.above, cue.is_quiet, intensity))
         self.decider.mark_started(decision)
 
     def _start(self, gesture: Gesture, now_s: float, state: BaseState, pace: float = 1.0) -> None:
         after_s = ANNOUNCE_S if self.base.abilities.announces else 0.0
-        pose = self.base.read().pose  # a simulated base may have been put back
+        pose = self.senses.read().pose  # a simulated base may have been put back
         self.player.start(gesture, now_s, pose, after_s, pace)
+        is_quiet = self.decider.cue.is_quiet
+        self.expression.start(gesture.score.quiet if is_quiet else gesture.score, now_s)
         self.safety.start_gesture(now_s, state)
         self.status.report_gesture(gesture, "started", "")
 
@@ -317,6 +377,8 @@ class Performer:
             return "disarmed", reason
         if self.player.is_busy:
             return "performing", ""
+        if not self.base.abilities.simulated and not self.safety.is_at_home(there):
+            return "away", AWAY  # a simulated one is carried back as it is needed
         if self._session is None and not self._is_alone:
             return "idle", NO_SESSION
         return "idle", reason if self._is_running or self._is_alone else NOT_RUNNING
@@ -328,5 +390,11 @@ class Performer:
         if self._is_welcome:
             counts = {"refused_arms": self.safety.refused_arms, **self.base.counters}
             self.status.report_status(
-                now_s, state, there, player.gesture, self.bad_messages, counts
+                now_s,
+                state,
+                there,
+                player.gesture,
+                self.expression.lights,
+                self.bad_messages,
+                counts,
             )

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from robot.bases.base import Abilities, BaseState
+from robot.behavior.resistance import Resistance
 from robot.motion.gesture import TETHER_M, Gesture
 from robot.motion.limits import ORDER_HOLDS_S
 from robot.motion.pose import HOME
@@ -28,12 +29,10 @@ BASE_SILENT_S = 0.2
 # gesture that was interrupted is not resumed (ISO 13850).
 LAPSED_S = ORDER_HOLDS_S
 
-# A wheel that deviates this much from its order [m/s], for this long [s]: held, lifted or pushed.
-DEVIATION_M_S = 0.1
-DEVIATION_S = 0.5
-# From a Kobuki's middle to a wheel (docs/reference/kobuki.md#odometry-and-gyro).
-HALF_TRACK_M = 0.115
 SLIP_RAD = 0.175  # 10°: wheels and gyro disagree about a gesture's turns
+# Wheels and gyro disagree this much about where home's heading is [rad]: one of them is wrong, and
+# nobody knows which. 2°, as near as a gesture has to end.
+LOST_RAD = 0.035
 
 # Of four lithium cells [V] (docs/reference/kobuki.md#battery). A battery that was low has to come
 # back to WARN: at rest it recovers by itself, and would be low again with the next gesture.
@@ -117,6 +116,7 @@ class Safety:
         self._checked_s: float | None = None
         self._since: dict[str, float] = {}  # when each fault that holds now began
         self._slip_rad = 0.0  # when the gesture began
+        self._resistance = Resistance()
         self._gestures_started = 0  # gestures since it was armed
         self._battery_was_low = False
 
@@ -166,6 +166,7 @@ class Safety:
     def start_gesture(self, now_s: float, state: BaseState) -> None:
         """Store where and when a gesture begins."""
         self._checked_s, self._slip_rad = now_s, state.sensors.slip_rad
+        self._resistance = Resistance()
         self._gestures_started += 1
 
     def check(self, now_s: float, state: BaseState, ordered: Twist, *, performing: bool) -> str:
@@ -178,7 +179,7 @@ class Safety:
         state
             What the base reports.
         ordered
-            What it was ordered last.
+            The order that it should follow now, given how late it answers.
         performing
             Whether a gesture is played, its announcement included.
         """
@@ -222,9 +223,10 @@ class Safety:
 
     @staticmethod
     def is_at_home(state: BaseState) -> bool:
-        """Whether it stands where gestures begin."""
+        """Whether it stands where gestures begin, as far as wheels and gyro agree about that."""
         pose = state.pose
-        return pose.distance_m(HOME) <= AT_HOME_M and pose.turn_rad(HOME) <= AT_HOME_RAD
+        is_near = pose.distance_m(HOME) <= AT_HOME_M and pose.turn_rad(HOME) <= AT_HOME_RAD
+        return is_near and state.sensors.doubt_rad <= LOST_RAD
 
     def _base_fault(self, state: BaseState) -> str:
         """Return what keeps the base itself from moving, as a code."""
@@ -245,11 +247,7 @@ class Safety:
             yield LAPSED
         if state.pose.distance_m(HOME) > TETHER_M:
             yield TETHER
-        deviation_m_s = abs(ordered.v_m_s - state.twist.v_m_s)
-        deviation_m_s += HALF_TRACK_M * abs(ordered.w_rad_s - state.twist.w_rad_s)
-        if self._has_held(
-            STALLED, performing and deviation_m_s > DEVIATION_M_S, now_s, DEVIATION_S
-        ):
+        if performing and self._resistance.add(state, ordered, min(elapsed_s, LAPSED_S)):
             yield STALLED
         if performing and abs(state.sensors.slip_rad - self._slip_rad) > SLIP_RAD:
             yield SLIPPED

@@ -1,7 +1,8 @@
-"""When a robot responds: the mean performance of five seconds of walking against a threshold.
+"""When a robot responds: how some steps compare with a threshold, by the rule of its cue.
 
 The paper's rule (P 3.4.1), on the source's clock: windows of 5 s follow each other without a gap
-from the first step on; a window's mean is *above* where it reaches the threshold.
+from the first step on; a window's mean is *above* where it reaches the threshold. Two rules are
+ours: streaks, so many steps in a row on one side of the threshold; and steps, the mean of so many.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from robot.behavior.cue import Cue
+from robot.behavior.cue import STREAKS, WINDOWS, Cue
 
 MIN_STEPS = 2  # of a window; with fewer valid steps there is no decision
 # A window above gets a gesture of full size from this mean performance on, where the strong words
@@ -55,16 +56,17 @@ class Decision:
 
 
 class WindowDecider:
-    """Sorts steps into windows, and decides when a gesture may start.
+    """Sorts steps into windows, streaks or groups, and decides when a gesture may start.
 
     Windows are counted from the first step: the one with the number k has the steps of which
     ``(time - first) / window_s`` lies in [k, k + 1). A window ends with the first step of a later
-    one, since only steps carry the source's clock.
+    one, since only steps carry the source's clock. A streak ends with its last step, and the next
+    one begins after it; so does a group of steps.
     """
 
     def __init__(self, cue: Cue) -> None:
         self.cue = cue
-        self.windows = 0  # those with a decision
+        self.windows = 0  # those with a decision; streaks and groups count like windows
         self.activated = 0  # those above
         self._started_s: float | None = None  # when the last gesture started
         self.drop_window()
@@ -75,14 +77,16 @@ class WindowDecider:
         return self.activated / self.windows if self.windows else None
 
     def drop_window(self) -> None:
-        """Discard the open window, since some of its steps are missing."""
+        """Discard the open window, streak or group, since some of its steps are missing."""
         self._first_s: float | None = None
         self._window = 0
         self._steps, self._sum = 0, 0.0
+        self._is_above = False  # the side of the open streak
 
     def set_cue(self, cue: Cue) -> None:
         """Use another cue, from the open window on."""
-        if cue.window_s != self.cue.window_s:
+        ours = self.cue
+        if (cue.rule, cue.count, cue.window_s) != (ours.rule, ours.count, ours.window_s):
             self.drop_window()
         self.cue = cue
 
@@ -100,6 +104,8 @@ class WindowDecider:
             self._first_s = time_s
             if self._started_s is not None and self._started_s > time_s:
                 self._started_s = time_s  # the clock was set back: how long ago it was is unknown
+        if self.cue.rule != WINDOWS:
+            return self._add_to_group(time_s, performance)
         window = math.floor((time_s - self._first_s) / self.cue.window_s)
         if window < self._window:
             self.drop_window()
@@ -113,21 +119,44 @@ class WindowDecider:
         self._sum += performance
         return decision
 
+    def _add_to_group(self, time_s: float, performance: float) -> Decision | None:
+        """Add a step to the open streak or group of steps, and return the decision at its end."""
+        above = performance >= self.cue.threshold
+        if self.cue.rule == STREAKS and self._steps and above != self._is_above:
+            self.drop_window()
+        if self._first_s is None or time_s < self._first_s:
+            self.drop_window()
+            self._first_s = time_s
+            if self._started_s is not None:
+                self._started_s = min(self._started_s, time_s)
+        self._is_above = above
+        self._steps += 1
+        self._sum += performance
+        if self._steps < self.cue.count:
+            return None
+        mean = self._sum / self._steps
+        # Each step of a streak is on its side; their mean may be rounded to the other one.
+        above = above if self.cue.rule == STREAKS else mean >= self.cue.threshold
+        decision = self._conclude(self._first_s, time_s, time_s, above=above)
+        self.drop_window()
+        return decision
+
     def _decide(self, time_s: float) -> Decision | None:
         if self._first_s is None or self._steps < MIN_STEPS:
             return None
         from_s = self._first_s + self._window * self.cue.window_s
-        until_s = from_s + self.cue.window_s
-        mean = self._sum / self._steps
-        above = mean >= self.cue.threshold
+        above = self._sum / self._steps >= self.cue.threshold
+        return self._conclude(from_s, from_s + self.cue.window_s, time_s, above=above)
+
+    def _conclude(self, from_s: float, until_s: float, at_s: float, *, above: bool) -> Decision:
         self.windows += 1
         self.activated += above
         return Decision(
             from_s=from_s,
             until_s=until_s,
-            at_s=time_s,
+            at_s=at_s,
             steps=self._steps,
-            mean=mean,
+            mean=self._sum / self._steps,
             threshold=self.cue.threshold,
             above=above,
         )

@@ -14,6 +14,7 @@ from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadWaypoint
 from robot.motion.limits import DEFAULT_LIMITS, Limits
 from robot.motion.path import Drive, Segment, is_on_path, plan_path
 from robot.motion.pose import HOME, Pose
+from robot.motion.score import NEUTRAL, Score
 
 # A base never leaves this circle around its home [m]; gestures keep 5 cm away from its edge
 # (docs/reference/kobuki.md#beside-a-person).
@@ -24,6 +25,11 @@ REACH_M = 0.25
 # asks for 1 cm and 2°).
 NEAR_M = 0.004
 NEAR_RAD = 0.02
+
+# Less than this nobody sees from 2 m away [m, rad]: half a degree of the field of view, and 6°,
+# which a mast or a face on the base shows (docs/robot.md). (Ours.)
+VISIBLE_M = 0.02
+VISIBLE_RAD = 0.1
 
 GESTURE_MAX_S = 16.0  # the paper's longest, with slack
 MAX_WAYPOINTS = 32
@@ -64,7 +70,7 @@ class Waypoint:
 
 @dataclass(frozen=True, slots=True)
 class Gesture:
-    """What a base performs: waypoints in their order, of which the last is home.
+    """What a base performs: waypoints in their order, of which the last is home, and a score.
 
     Raises BadGesture for what no base with the default limits should or could perform.
     """
@@ -72,15 +78,31 @@ class Gesture:
     name: str
     label: str
     waypoints: tuple[Waypoint, ...]
+    score: Score = NEUTRAL
 
     def __post_init__(self) -> None:
         check_gesture(self)
+
+    @property
+    def reach_m(self) -> float:
+        """How far from home it goes [m]."""
+        return max(waypoint.pose.distance_m(HOME) for waypoint in self.waypoints)
+
+    @property
+    def turn_rad(self) -> float:
+        """How far it turns, one way or the other [rad]."""
+        return max(abs(waypoint.heading_rad) for waypoint in self.waypoints)
+
+    @property
+    def is_visible(self) -> bool:
+        """Whether somebody who walks 2 m away sees it."""
+        return self.reach_m >= VISIBLE_M - 1e-9 or self.turn_rad >= VISIBLE_RAD - 1e-9
 
     def scaled(self, intensity: float) -> Gesture:
         """Return the gesture at a share of its size, which never takes longer.
 
         Ways shrink, and turns too where it only drives on the line ahead of home. Where it drives
-        aside, its turns set the direction and stay as they are.
+        aside, its turns set the direction and stay as they are. Neither shrinks below what is seen.
 
         Parameters
         ----------
@@ -94,12 +116,14 @@ class Gesture:
         """
         if not 0 < intensity <= 1:
             raise BadGesture("An intensity lies above 0 and up to 1.")
-        turns = intensity if self._drives_ahead else 1.0
+        ways = _share_at_least(intensity, VISIBLE_M, self.reach_m)
+        turns = _share_at_least(intensity, VISIBLE_RAD, self.turn_rad)
+        turns = turns if self._drives_ahead else 1.0
         waypoints = tuple(
             replace(
                 waypoint,
-                x_m=waypoint.x_m * intensity,
-                y_m=waypoint.y_m * intensity,
+                x_m=waypoint.x_m * ways,
+                y_m=waypoint.y_m * ways,
                 heading_rad=waypoint.heading_rad * turns,
             )
             for waypoint in self.waypoints
@@ -124,6 +148,11 @@ class Gesture:
             hold_s + sum(segment.min_duration_s(limits) for segment in segments)
             for segments, limits, hold_s in stages(self.waypoints, DEFAULT_LIMITS)
         )
+
+
+def _share_at_least(share: float, least: float, size: float) -> float:
+    """Return a share of a size that does not come below a least size, nor makes it larger."""
+    return max(share, min(least / size, 1.0)) if size else share
 
 
 def check_gesture(gesture: Gesture) -> None:

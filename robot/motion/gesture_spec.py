@@ -14,6 +14,8 @@ from typing import Any
 
 from robot.motion.gesture import (
     GESTURE_MAX_S,
+    VISIBLE_M,
+    VISIBLE_RAD,
     Gesture,
     Waypoint,
     check_waypoint,
@@ -24,6 +26,7 @@ from robot.motion.gesture_errors import NOT_FINITE, BadGesture, BadWaypoint, Mar
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.limits import DEFAULT_LIMITS
 from robot.motion.pose import HOME, Pose
+from robot.motion.score import read_score
 
 NAME = re.compile(r"[A-Za-z0-9_-]{1,32}")
 MAX_MOVES = 16
@@ -79,7 +82,8 @@ def parse_gesture(data: Any) -> Gesture:
     Parameters
     ----------
     data
-        ``{"name": …, "steps": [{"turn_rad": …, "forward_m": …, …}]}``, as ``to_data`` writes it.
+        ``{"name": …, "steps": [{"turn_rad": …, "forward_m": …, …}]}``, as ``to_data`` writes it;
+        and tracks of lights and notes where it has any (``read_score``).
 
     Raises
     ------
@@ -91,9 +95,8 @@ def parse_gesture(data: Any) -> Gesture:
     steps = data.get("steps")
     if not isinstance(steps, list):
         raise BadGesture("A gesture has a list of steps.")
-    return build_gesture(
-        data.get("name"), [_read_move(n, step) for n, step in enumerate(steps, start=1)]
-    )
+    moves = [_read_move(n, step) for n, step in enumerate(steps, start=1)]
+    return replace(build_gesture(data.get("name"), moves), score=read_score(data))
 
 
 def _read_move(number: int, step: Any) -> Move:
@@ -145,9 +148,16 @@ def build_gesture(name: Any, moves: Sequence[Move]) -> Gesture:
         for number, waypoint in enumerate(waypoints, start=1):
             check_waypoint(number, waypoint)
         waypoints[-1] = _end_at_home(waypoints[-1])
-        return Gesture(name, name, tuple(_assign_times(waypoints, owners, moves)))
+        gesture = Gesture(name, name, tuple(_assign_times(waypoints, owners, moves)))
     except BadWaypoint as problem:
         raise problem.for_step(owners[problem.number - 1]) from None
+    if not gesture.is_visible:
+        raise BadGesture(
+            "Nobody would see it. Let it go {way:.0f} cm or turn by {turn:.0f}° at least.",
+            way=100 * VISIBLE_M,
+            turn=math.degrees(VISIBLE_RAD),
+        )
+    return gesture
 
 
 def _check_move(number: int, move: Move) -> None:

@@ -6,18 +6,21 @@ import math
 
 from robot.motion.gesture import Gesture, Waypoint
 from robot.motion.gesture_errors import gettext_noop
+from robot.motion.score import FALLING, RISING
 
-# Up to 4 s each, so that a base is home and still before the next window of 5 s ends. Out and back
-# is what a patient sees of a round base; it goes out ahead, never backwards (no rear bumper).
+# Up to 3 s each, so that a base that answers late is home and still before the next window of 5 s
+# ends, its announcement included. Out and back is what a patient sees of a round base; it goes out
+# ahead, never backwards (no rear bumper).
 CELEBRATE = Gesture(
     "celebrate",
     gettext_noop("Celebrate: a step ahead and a wiggle"),
     (
-        Waypoint(0.07, 0.0, 0.0, within_s=1.6),
-        Waypoint(0.07, 0.0, 0.28, within_s=1.2),
-        Waypoint(0.07, 0.0, -0.28, within_s=1.6),
-        Waypoint(0.0, 0.0, 0.0, within_s=2.5),
+        Waypoint(0.05, 0.0, 0.0, within_s=1.4),
+        Waypoint(0.05, 0.0, 0.17, within_s=1.2),
+        Waypoint(0.05, 0.0, -0.17, within_s=1.4),
+        Waypoint(0.0, 0.0, 0.0, within_s=2.2),
     ),
+    RISING,
 )
 DROOP = Gesture(
     "droop",
@@ -26,6 +29,7 @@ DROOP = Gesture(
         Waypoint(0.0, 0.0, -0.45, within_s=2.5, pace=0.5, hold_s=0.5),
         Waypoint(0.0, 0.0, 0.0, within_s=2.0, pace=0.5),
     ),
+    FALLING,
 )
 NOD = Gesture(
     "nod",
@@ -65,11 +69,13 @@ ORIGINAL_POSITIVE = Gesture(
         Waypoint(_OUT_M, 0.0, 0.0, within_s=4.5),
         Waypoint(0.0, 0.0, 0.0, within_s=2.5),
     ),
+    RISING,
 )
 ORIGINAL_NEGATIVE = Gesture(
     "original_negative",
     gettext_noop("The paper's negative: spin left, spin right"),
     (Waypoint(0.0, 0.0, _SPIN_RAD, within_s=4.5), Waypoint(0.0, 0.0, 0.0, within_s=4.5)),
+    FALLING,
 )
 ORIGINAL_BINARY = Gesture(
     "original_binary",

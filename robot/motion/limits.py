@@ -151,3 +151,6 @@ def min_time_s(distance: float, speed: float, speed_up: float, slow_down: float)
     if distance >= ramps:
         return speed / speed_up + speed / slow_down + (distance - ramps) / speed
     return math.sqrt(2 * distance * (1 / speed_up + 1 / slow_down))
+
+
+WHEEL_LIMITS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)  # what a base itself drives at most

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from robot.motion.pose import HOME, Pose
+from robot.motion.pose import HOME, advance
+from robot.motion.twist import Twist
 
 # A gyro that turns slower than this [rad/s] while both wheels stand still drifts: "a couple of
 # degrees a minute at worst" (docs/reference/kobuki.md#odometry-and-gyro), 30 times less. A base
@@ -12,33 +13,66 @@ from robot.motion.pose import HOME, Pose
 DRIFT_RAD_S = math.radians(1.0)
 WHEEL_STILL_M = 1e-9
 
+# The drift counts as learnt after so much rest [s], of which the first part [s] is not looked at:
+# wheels that creep stand still for a frame or two. What was learnt fades within a minute [s], for
+# it wanders with the sensor's temperature. (All ours.)
+LEARNT_S, COMING_TO_REST_S, FADES_S = 0.5, 0.2, 60.0
+# One wheel may be so much larger than the other, as a share; with every way ahead, wheels and gyro
+# then disagree a little more.
+UNEQUAL = 0.025
+GAP_S = 0.5  # a longer pause between two frames is none of rest: the base may have been off
+
 
 class Odometry:
-    """Integrates distances by the wheels and headings by the gyro.
+    """Integrates distances by the wheels and headings by the gyro, whose drift it learns at rest.
 
     Parameters
     ----------
     wheelbase_m
         Distance between the wheels [m].
+    drift_rad_s
+        How fast the gyro turns by itself, as long as no rest has told [rad/s].
+    wheel_scale
+        Distance by the wheels over the true one.
 
     Attributes
     ----------
     pose
         Pose from home.
     slip_rad
-        Heading by the wheels minus heading by the gyro [rad]: a wheel that slips, or a push.
+        Heading by the wheels minus heading by the gyro since home [rad]: a wheel that slips, a
+        push, or a gyro that wanders.
+    drift_rad_s
+        How fast the gyro turns by itself, as far as is known [rad/s].
     """
 
-    def __init__(self, wheelbase_m: float) -> None:
-        self._wheelbase_m = wheelbase_m
+    def __init__(
+        self, wheelbase_m: float, drift_rad_s: float = 0.0, wheel_scale: float = 1.0
+    ) -> None:
+        self._wheelbase_m, self._wheel_scale = wheelbase_m, wheel_scale
+        self.drift_rad_s = drift_rad_s
         self._last: tuple[float, float, float] | None = None
+        self._last_s = 0.0
+        self._still_s = 0.0  # for how long the wheels have stood
+        self._rest_s = self._rest_rad = 0.0  # what the gyro turned at rest, and in what time
         self.set_home()
 
     def set_home(self) -> None:
         """Make the present place home."""
-        self.pose, self.slip_rad = HOME, 0.0
+        self.pose, self.slip_rad, self._rolled_m = HOME, 0.0, 0.0
 
-    def add(self, left_m: float, right_m: float, heading_rad: float, turn_rad_s: float) -> None:
+    @property
+    def doubt_rad(self) -> float:
+        """How far wheels and gyro disagree about the heading since home [rad].
+
+        What wheels of unequal size explain is left out.
+        """
+        explained_rad = UNEQUAL * abs(self._rolled_m) / self._wheelbase_m
+        return max(abs(self.slip_rad) - explained_rad, 0.0)
+
+    def add(
+        self, left_m: float, right_m: float, heading_rad: float, turn_rad_s: float, at_s: float
+    ) -> None:
         """Add what wheels and gyro have measured since the last call.
 
         Parameters
@@ -49,8 +83,11 @@ class Odometry:
             Heading by the gyro [rad], full turns included; only differences count.
         turn_rad_s
             Turning rate by the gyro [rad/s].
+        at_s
+            When that was [s].
         """
         last, self._last = self._last, (left_m, right_m, heading_rad)
+        elapsed_s, self._last_s = max(0.0, at_s - self._last_s), at_s
         if last is None:
             return
         by_left_m, by_right_m, by_rad = (
@@ -58,12 +95,27 @@ class Odometry:
         )
         are_still = max(abs(by_left_m), abs(by_right_m)) < WHEEL_STILL_M
         if are_still and abs(turn_rad_s) < DRIFT_RAD_S:
+            self._learn_drift(by_rad, elapsed_s)
             by_rad = 0.0
-        along_rad = self.pose.heading_rad + by_rad / 2
+        else:
+            self._still_s = 0.0
+            by_rad -= self.drift_rad_s * min(elapsed_s, GAP_S)
+        by_left_m, by_right_m = by_left_m / self._wheel_scale, by_right_m / self._wheel_scale
         by_m = (by_left_m + by_right_m) / 2
+        self._rolled_m += by_m
         self.slip_rad += (by_right_m - by_left_m) / self._wheelbase_m - by_rad
-        self.pose = Pose(
-            self.pose.x_m + by_m * math.cos(along_rad),
-            self.pose.y_m + by_m * math.sin(along_rad),
-            self.pose.heading_rad + by_rad,
-        )
+        self.pose = advance(self.pose, Twist(by_m, by_rad), 1.0)
+
+    def _learn_drift(self, by_rad: float, elapsed_s: float) -> None:
+        """Add what the gyro turned while the wheels stood."""
+        if elapsed_s > GAP_S:
+            self._still_s = 0.0
+            return
+        self._still_s += elapsed_s
+        if self._still_s < COMING_TO_REST_S:
+            return
+        fading = math.exp(-elapsed_s / FADES_S)
+        self._rest_s = self._rest_s * fading + elapsed_s
+        self._rest_rad = self._rest_rad * fading + by_rad
+        if self._rest_s >= LEARNT_S:
+            self.drift_rad_s = self._rest_rad / self._rest_s

@@ -6,11 +6,13 @@ import math
 from collections import deque
 from dataclasses import replace
 
+from robot.motion.delay_meter import DelayMeter
 from robot.motion.gesture import MIN_PACE, NEAR_M, NEAR_RAD, Gesture, Waypoint
 from robot.motion.gesture_errors import gettext_noop
 from robot.motion.limits import Limits
 from robot.motion.path import Drive, Segment, Turn, plan_path
 from robot.motion.pose import HOME, Pose, wrap
+from robot.motion.response import AT_ONCE, OrdersInFlight, Response
 from robot.motion.twist import STILL, Twist
 
 DONE = "done"
@@ -23,8 +25,8 @@ BRAKING = 0.8
 # Speed for each meter or radian that is left [1/s]: no overshoot in the last centimeter with orders
 # every 20 ms and a base that follows within 100 ms.
 CLOSING_PER_S = 8.0
-# At home it waits this long [s] for orders that are still on their way, and turns once more if they
-# have carried it past.
+# At home it waits for the orders that are still on their way, and this much longer [s]; then it
+# turns once more if they have carried it past.
 SETTLE_S = 0.1
 # While driving: heading offset for each meter beside the line [rad/m], and its maximum [rad].
 STEER_RAD_M = 2.5
@@ -34,6 +36,10 @@ STEER_MAX_RAD = 0.3
 class Player:
     """Plays one gesture at a time, closed on odometry.
 
+    A base answers late. So each order is planned from the pose that the base will have once it has
+    answered the orders on their way, as if there were no delay (a Smith predictor); odometry then
+    corrects what the prediction missed. How late it is, is measured on while it moves.
+
     ``step`` is to be called some 50 times a second, whether a gesture is played or not; it never
     exceeds the limits, and slows down by itself after the last waypoint.
 
@@ -41,10 +47,14 @@ class Player:
     ----------
     limits
         Speeds and accelerations that every order keeps to.
+    response
+        How late the base answers, as far as is known before it moves.
     """
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: Limits, response: Response = AT_ONCE) -> None:
         self.limits = limits
+        self._in_flight = OrdersInFlight(response.delay_s)
+        self._meter = DelayMeter()
         self.gesture: Gesture | None = None
         self.outcome = ""  # of the gesture that was played last
         self.twist = STILL  # what was ordered last
@@ -120,15 +130,28 @@ class Player:
         self._time_s = time_s
         if not pose.is_finite:
             self.halt(BAD_ODOMETRY)
+            self._in_flight.add(STILL, time_s)
             return STILL
-        limits, wanted = self._wanted_twist(time_s, pose)
+        self._meter.add(self.twist, pose, time_s)
+        self._in_flight.delay_s = self._meter.delay_s or self._in_flight.delay_s
+        limits, wanted = self._wanted_twist(time_s, self._in_flight.predict(pose, time_s))
         self.twist = limits.approach(self.twist, wanted, elapsed_s)
         if self._verdict and self.twist.is_still:
             self._end(self._verdict)
+        self._in_flight.add(self.twist, time_s)
         return self.twist
 
+    @property
+    def measured_delay_s(self) -> float | None:
+        """How late the base answers [s], by its motion so far; None where that does not tell."""
+        return self._meter.delay_s
+
+    def answered(self, time_s: float) -> Twist:
+        """Return the order that the base should follow now, given how late it answers."""
+        return self._in_flight.answered(time_s)
+
     def _wanted_twist(self, time_s: float, pose: Pose) -> tuple[Limits, Twist]:
-        """Return the limits and the wanted twist for the present waypoint."""
+        """Return the limits and the wanted twist, given where the base will be."""
         here = replace(pose, heading_rad=pose.heading_rad - self._turns_rad)
         while self._waypoint is not None and not self._verdict:
             limits = self.limits.scaled(self._share(self._waypoint))
@@ -144,7 +167,7 @@ class Player:
             elif self._there_s is None:
                 self._there_s = time_s
             elif time_s - self._there_s < max(
-                self._waypoint.hold_s, 0 if self._waypoints else SETTLE_S
+                self._waypoint.hold_s, 0 if self._waypoints else self._settle_s
             ):
                 return limits, STILL
             elif (
@@ -164,9 +187,12 @@ class Player:
             return
         self._waypoint = self._waypoints.popleft()
         self._segments = deque(plan_path(start, self._waypoint.pose))
-        self._until_s = time_s + self._waypoint.within_s * self._waypoint.pace / self._share(
-            self._waypoint
-        )
+        slower = self._waypoint.pace / self._share(self._waypoint)
+        self._until_s = time_s + self._waypoint.within_s * slower + self._settle_s
+
+    @property
+    def _settle_s(self) -> float:
+        return self._in_flight.delay_s + SETTLE_S
 
     def _share(self, waypoint: Waypoint) -> float:
         """Return the share of the limits for a waypoint."""

@@ -7,9 +7,13 @@ no base, only bytes. Orders come on standard input, what was received goes to st
 a JSON line each:
 
     {"number": 7, "sent_s": 12.34, "frame": "aa55…", "once": "aa55…"}
-    {"at_s": 12.35, "opened": 1, "bytes": "aa55…", "problem": "", "counters": {…}}
+    {"at_s": 12.35, "opened": 1, "bytes": "aa55…", "problem": "", "owes_stop": false,
+     "counters": {…}}
 
 ``once`` is sent one time. Times are of the computer's monotonic clock, which its processes share.
+A port that is lost is opened again as soon as it is back, with stops first. Where it was lost while
+the base moved, this process outlives whoever started it until the base is stopped. A guard stops
+the base if this process dies, whether or not its parent lives to do so.
 """
 
 from __future__ import annotations
@@ -26,10 +30,11 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from robot.port.owner import READ_S, PortOwner, SerialPort
+from robot.port.guard import Guard
+from robot.port.opening import PortOpener
+from robot.port.owner import PortOwner
 from robot.port.setpoint import MAX_FRAME_BYTES
 
-WRITE_S = 0.1  # a port that accepts nothing for this long is lost
 LINES_KEPT = 25  # received ones, while nobody reads them: half a second
 
 
@@ -71,28 +76,27 @@ def listen(pipe: int, order: Callable[[bytes], None], on_end: Callable[[], None]
     on_end()
 
 
-def open_serial(url: str, baud: int) -> SerialPort:
-    """Open /dev/…, COM…, a pty or socket://host:port, for us alone. Raises OSError, ValueError."""
-    import serial
-
-    port = serial.serial_for_url(
-        url, baudrate=baud, timeout=READ_S, write_timeout=WRITE_S, exclusive=True
-    )
-    # Not every port has this mode: a pty and a socket have no chip with a timer.
-    with contextlib.suppress(OSError, ValueError, AttributeError, NotImplementedError):
-        port.set_low_latency_mode(True)
-    return port
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
     """Own the port of the command line until standard input closes or a signal ends it."""
     parser = ArgumentParser(prog="python -m robot.port", description=__doc__)
-    parser.add_argument("url", help="/dev/kobuki, COM3, a pty, or socket://host:port")
+    parser.add_argument(
+        "url",
+        nargs="?",
+        default="",
+        help="/dev/kobuki, COM3, a pty, or socket://host:port (default: a Kobuki that is plugged "
+        "in, now or later)",
+    )
     parser.add_argument("--baud", type=int, default=115200)
     parser.add_argument("--stop", type=bytes.fromhex, required=True, help="the frame that stops it")
+    parser.add_argument(
+        "--owes-stop", action="store_true", help="the process before this one lost a moving base"
+    )
     options = parser.parse_args(arguments)
+    opener = PortOpener(options.url, options.baud)
+    guard = Guard(opener, options.stop)  # before there are threads
     writer = PipeWriter(sys.stdout.fileno())
-    owner = PortOwner(partial(open_serial, options.url, options.baud), options.stop, writer.write)
+    owner = PortOwner(opener, options.stop, writer.write)
+    owner.owes_stop = options.owes_stop
     for name in ("SIGTERM", "SIGHUP", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), lambda *_: owner.end())
@@ -101,6 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for work in (orders, partial(writer.run, owner.end)):
         threading.Thread(target=work, daemon=True).start()
     owner.run()
+    guard.dismiss()
 
 
 if __name__ == "__main__":

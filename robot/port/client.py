@@ -1,7 +1,7 @@
 """The client of ``robot.port``: starts that process, sends it orders, reads it and supervises it.
 
-Each supervises the other: the process stops the base when our orders stop coming; when its reports
-stop coming it is replaced by a new process, which begins with stops.
+Each supervises the other: the process stops the base when our orders stop coming; when it dies, or
+its reports stop coming, we stop the base ourselves, and start a new process.
 """
 
 from __future__ import annotations
@@ -19,11 +19,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robot.motion.limits import ORDER_HOLDS_S
+from robot.port.opening import PortOpener, send_stops
 
 PACKAGES = Path(__file__).parents[2]
 OWNER_SILENT_S = 0.3  # it reports every 0.1 s
 START_S = 3.0  # a slow computer starts Python
 END_S = 1.0
+MAY_MOVE = " The base may be moving: switch it off at its side."
 MAX_DEATHS = 5  # in a row without a report from any: it cannot be run here
 
 
@@ -42,7 +44,7 @@ class PortClient:
     Parameters
     ----------
     url
-        /dev/kobuki, COM3, a pty, or socket://host:port.
+        /dev/kobuki, COM3, a pty, or socket://host:port; empty for a Kobuki, now or later.
     baud
         Speed of the line [bit/s].
     stop
@@ -72,11 +74,13 @@ class PortClient:
     ) -> None:
         self._command = [sys.executable, "-m", "robot.port", url]
         self._command += ["--baud", str(baud), "--stop", stop.hex()]
+        self._open_port, self._stop_frame = PortOpener(url, baud), stop
         self._on_data = on_data
         self._monotonic = monotonic
         self.problem = "The port has not been opened yet."
         self.counters: Counter[str] = Counter(restarts=0, junk=0)
         self.is_dead = False
+        self._owes_stop = False
         self._number = 0
         self._openings = self._openings_before = 0
         self._counted: Counter[str] = Counter()  # by the present process
@@ -105,7 +109,11 @@ class PortClient:
                 pipe.write(json.dumps(order).encode() + b"\n")
 
     def close(self) -> None:
-        """Stop the base, and end the process. Never raises."""
+        """Stop the base, and end the process. Never raises.
+
+        Where the port was lost while the base moved, the process outlives us, and stops the base
+        when it is back.
+        """
         self._closing.set()
         process = self._process
         with contextlib.suppress(OSError):
@@ -114,14 +122,24 @@ class PortClient:
         try:
             process.wait(END_S)
         except subprocess.TimeoutExpired:
+            if self._owes_stop and self._monotonic() - self._last_report_s < END_S:
+                process.returncode = 0  # so that nobody complains that it still runs
+                return
             process.kill()
             process.wait(END_S)
+            send_stops(self._open_port, self._stop_frame)
+            if self._owes_stop:
+                heir = self._start()
+                heir.returncode = 0
+                for pipe in (heir.stdin, heir.stdout):
+                    if pipe is not None:
+                        pipe.close()
         self._thread.join(END_S)
 
     def _start(self) -> subprocess.Popen[bytes]:
         paths = [str(PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])]
         return subprocess.Popen(
-            self._command,
+            self._command + ["--owes-stop"] * self._owes_stop,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             bufsize=0,
@@ -141,6 +159,7 @@ class PortClient:
             self._read_process(self._process)
             if self._closing.is_set():
                 return
+            send_stops(self._open_port, self._stop_frame)  # before a new process has started
             self._deaths = 0 if self._has_reported else self._deaths + 1
             if self._deaths >= MAX_DEATHS:
                 return
@@ -176,7 +195,8 @@ class PortClient:
                 float(report["at_s"]), int(report["opened"]), bytes.fromhex(report["bytes"])
             )
             self._counted = Counter(report["counters"])
-            self.problem = str(report["problem"])
+            self._owes_stop = bool(report["owes_stop"])
+            self.problem = str(report["problem"]) + MAY_MOVE * self._owes_stop
         except (ValueError, TypeError, KeyError):
             self.counters["junk"] += 1
             return

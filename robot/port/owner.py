@@ -15,7 +15,11 @@ SEND_EVERY_S = 0.02
 READ_S = 0.005  # how long a read waits; a stop is delayed by at most that
 REPORT_EVERY_S = 0.1  # also where nothing was received
 STOPS = 3  # frames; one may be damaged on its way (docs/reference/kobuki.md#orders)
-FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.2, 2.0  # before the port is opened again
+RETRY_S = 0.05  # a base whose port is lost may be moving: it is opened again as soon as it is back
+# A port may be lost unnoticed for a moment, and a stop with it: one that took motion less than so
+# many stop frames ago (half a second of them) is owed a stop when it is back.
+SURE_STOPS = 25
+LEAVE_S = 300.0  # how long that is tried after the end; a person has pulled the switch by then
 MAX_READ_BYTES = 4096
 
 
@@ -66,7 +70,8 @@ class PortOwner:
         self._port: SerialPort | None = None
         self._once: deque[bytes] = deque(maxlen=8)
         self._sent, self._sent_s, self._reported_s = b"", -math.inf, -math.inf
-        self._pause_s, self._open_at_s = FIRST_PAUSE_S, -math.inf
+        self._open_at_s = -math.inf
+        self._unsure = 0  # so many more stop frames, and the base has certainly heard one
         self._is_over = False
 
     def order(self, line: bytes) -> None:
@@ -75,21 +80,41 @@ class PortOwner:
         if once:
             self._once.append(once)
 
+    @property
+    def owes_stop(self) -> bool:
+        """Whether the port was lost while the base moved: it may be moving still."""
+        return self._port is None and self._unsure > 0
+
+    @owes_stop.setter
+    def owes_stop(self, owes: bool) -> None:
+        self._unsure = SURE_STOPS if owes else 0
+
     def end(self) -> None:
-        """Make ``run`` stop the base and return."""
+        """Make ``run`` stop the base and return; where it cannot be reached, for ``LEAVE_S``."""
         self._is_over = True
 
     def run(self) -> None:
         """Own the port until ``end`` is called. However it ends, the base is stopped."""
         try:
             while not self._is_over:
-                try:
-                    self._step()
-                except Exception as problem:  # whatever a driver may raise: the port is lost
-                    self._handle_failure(problem)
+                self._try(self._step)
+            leave_s = self._monotonic() + LEAVE_S
+            while self._port is not None or (self.owes_stop and self._monotonic() < leave_s):
+                self._try(self._step if self._port is None else self._leave)
         finally:
-            self._send_stops()
+            with contextlib.suppress(Exception):  # a port that is gone takes no stop
+                self._send_stops()
             self._close()
+
+    def _try(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except Exception as problem:  # whatever a driver may raise: the port is lost
+            self._handle_failure(problem)
+
+    def _leave(self) -> None:
+        self._send_stops()
+        self._close()
 
     def _step(self) -> None:
         """Read and write once, or try to open the port."""
@@ -97,8 +122,6 @@ class PortOwner:
         if self._port is not None:
             data = self._port.read(MAX_READ_BYTES)
             now_s = self._monotonic()
-            if data:
-                self._pause_s = FIRST_PAUSE_S
             self._send_due(self._port, now_s)
         elif now_s >= self._open_at_s:
             self._port = self._open_port()
@@ -116,6 +139,7 @@ class PortOwner:
                     "opened": self.opened,
                     "bytes": data.hex(),
                     "problem": self.problem,
+                    "owes_stop": self.owes_stop,
                     "counters": dict(self.setpoint.counters),
                 }
             )
@@ -127,18 +151,20 @@ class PortOwner:
         if frame != self._sent or now_s - self._sent_s >= SEND_EVERY_S - READ_S / 2:
             port.write(frame)
             self._sent, self._sent_s = frame, now_s
+            is_stop = frame == self.setpoint.stop
+            self._unsure = max(self._unsure - 1, 0) if is_stop else SURE_STOPS
 
     def _send_stops(self) -> None:
-        with contextlib.suppress(Exception):  # a port that is gone takes no stop
-            for _ in range(STOPS if self._port is not None else 0):
-                self._port.write(self.setpoint.stop)  # type: ignore[union-attr]
+        if self._port is not None:
+            for _ in range(STOPS):
+                self._port.write(self.setpoint.stop)
+            self._unsure = 0
 
     def _handle_failure(self, problem: Exception) -> None:
         self.problem = f"{problem}"[:300] or type(problem).__name__
         self._close()
         self.setpoint.hold()
-        self._open_at_s = self._monotonic() + self._pause_s
-        self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)
+        self._open_at_s = self._monotonic() + RETRY_S
         self._reported_s = -math.inf
 
     def _close(self) -> None:

@@ -30,7 +30,7 @@ PING_EVERY_S = PONG_WITHIN_S = 1.0
 SEND_WITHIN_S = 0.5  # a bridge that accepts nothing for this long is lost
 CONNECT_WITHIN_S = 3.0
 CLOSE_WITHIN_S = 0.5
-RETRY_FIRST_S, RETRY_LONGEST_S = 0.2, 5.0
+RETRY_FIRST_S, RETRY_LONGEST_S = 0.05, 1.0  # a base that was moving is to be stopped
 END_S = 2.0
 
 

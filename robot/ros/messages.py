@@ -1,8 +1,9 @@
-"""Messages of ROS 1 as JSON: written and read, with every number checked.
+"""Messages of ROS 1 and 2 as JSON: written and read, with every number checked.
 
 Every number that comes in is checked: a bridge passes on NaN, text and anything else that it gets
 (docs/reference/rosbridge.md#behavior). Axes are those of ``robot.motion``, which are those of ROS
-(REP 103).
+(REP 103). A type is ``package/Type`` in ROS 1 and ``package/msg/Type`` in ROS 2; a rosbridge of
+ROS 2 takes both (docs/reference/rosbridge.md#messages), and so do we.
 """
 
 from __future__ import annotations
@@ -16,17 +17,24 @@ from robot.motion.twist import Twist
 from robot.ros.frames import BadRosFrame
 
 TWIST = "geometry_msgs/Twist"
+TWIST_STAMPED = "geometry_msgs/TwistStamped"
+TWISTS = (TWIST, TWIST_STAMPED)
 ODOMETRY = "nav_msgs/Odometry"
 BOOL = "std_msgs/Bool"
 STRING = "std_msgs/String"
+HAZARDS = "irobot_create_msgs/HazardDetectionVector"
+DOCK = "irobot_create_msgs/DockStatus"
 # Type of an event: the name of its field that says which sensor it was. Its field ``state`` is 1
-# while it is pressed, sees an edge, or hangs free (kobuki_msgs).
+# while it is pressed, sees an edge, or hangs free (kobuki_msgs, kobuki_ros_interfaces).
+EVENT_FIELDS = {"BumperEvent": "bumper", "CliffEvent": "sensor", "WheelDropEvent": "wheel"}
 EVENTS = {
-    "kobuki_msgs/BumperEvent": "bumper",
-    "kobuki_msgs/CliffEvent": "sensor",
-    "kobuki_msgs/WheelDropEvent": "wheel",
+    f"{package}/{event}": field
+    for package in ("kobuki_msgs", "kobuki_ros_interfaces")
+    for event, field in EVENT_FIELDS.items()
 }
-SENSOR_TYPES = (*EVENTS, BOOL)
+SENSOR_TYPES = (*EVENTS, BOOL, HAZARDS)
+# What a Create 3 detects (irobot_create_msgs/HazardDetection); it has others, which stop nothing.
+CREATE_HAZARDS = {1: "bump", 2: "cliff", 3: "over_current", 4: "wheel_drop"}
 
 # Larger distances [m] and speeds [m/s, rad/s] are impossible for our bases, and refused.
 FARTHEST_M = 1e6
@@ -35,18 +43,26 @@ FASTEST = 100.0
 Message = Mapping[str, Any]
 
 
-def write_twist(twist: Twist) -> dict[str, Any]:
-    """Return a geometry_msgs/Twist."""
-    return {
+def without_msg(kind: str) -> str:
+    """Return a type as ROS 1 writes it."""
+    return kind.replace("/msg/", "/")
+
+
+def write_twist(twist: Twist, kind: str = TWIST) -> dict[str, Any]:
+    """Return a geometry_msgs/Twist, or a TwistStamped without a time: a base takes that as now."""
+    message = {
         "linear": {"x": twist.v_m_s, "y": 0.0, "z": 0.0},
         "angular": {"x": 0.0, "y": 0.0, "z": twist.w_rad_s},
     }
+    return {"twist": message} if without_msg(kind) == TWIST_STAMPED else message
 
 
-def read_twist(message: Message) -> Twist:
-    """Read a geometry_msgs/Twist. Raises BadRosFrame."""
+def read_twist(message: Message, kind: str = TWIST) -> Twist:
+    """Read a geometry_msgs/Twist, or a TwistStamped. Raises BadRosFrame."""
+    path = ("twist",) if without_msg(kind) == TWIST_STAMPED else ()
     return Twist(
-        _number(message, FASTEST, "linear", "x"), _number(message, FASTEST, "angular", "z")
+        _number(message, FASTEST, *path, "linear", "x"),
+        _number(message, FASTEST, *path, "angular", "z"),
     )
 
 
@@ -66,15 +82,32 @@ def read_odometry(message: Message) -> tuple[Pose, Twist]:
 
 def read_event(kind: str, message: Message) -> tuple[int, bool]:
     """Read an event: which sensor, and whether it detects a hazard. Raises BadRosFrame."""
+    kind = without_msg(kind)
     if kind == BOOL:
-        data = message.get("data")
-        if not isinstance(data, bool):
-            raise BadRosFrame('"data" of a Bool is true or false.')
-        return 0, data
+        return 0, read_flag(message, "data")
     which, state = message.get(EVENTS[kind]), message.get("state")
     if type(which) is not int or type(state) is not int or not 0 <= which <= 255:
         raise BadRosFrame("An event says which sensor it was, and its state.")
     return which, state != 0
+
+
+def read_hazards(message: Message) -> frozenset[str]:
+    """Read what a Create 3 detects now, as our codes. Raises BadRosFrame."""
+    detections = message.get("detections")
+    if not isinstance(detections, list):
+        raise BadRosFrame('"detections" is a list.')
+    types = [one.get("type") if isinstance(one, dict) else None for one in detections]
+    if not all(type(one) is int for one in types):
+        raise BadRosFrame("A detection has a type.")
+    return frozenset(CREATE_HAZARDS[one] for one in types if one in CREATE_HAZARDS)
+
+
+def read_flag(message: Message, name: str) -> bool:
+    """Read a field that is true or false. Raises BadRosFrame."""
+    value = message.get(name)
+    if not isinstance(value, bool):
+        raise BadRosFrame(f'"{name}" is true or false.')
+    return value
 
 
 def _number(message: Any, most: float, *path: str) -> float:

@@ -216,7 +216,7 @@ def test_every_choice_reaches_the_plan(world, pt, rosa):
 @pytest.mark.parametrize(
     ("body", "status", "field", "words"),
     [
-        ({"goal": 99}, 409, "goal", "less than or equal to 15"),
+        ({"goal": 99}, 409, "goal", "up to 15 W/kg"),
         ({"goal": 3, "goal_percent": 100}, 409, "goal", "either"),
         ({"goal_percent": 10}, 409, "goal_percent", "50"),
         ({"protocol": 10**9}, 409, "protocol", "valid choice"),

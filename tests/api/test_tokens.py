@@ -3,28 +3,48 @@
 from __future__ import annotations
 
 import re
+from datetime import timedelta
+from typing import Any
 
 import pytest
+from django.contrib.sessions.models import Session
+from django.core.exceptions import ValidationError
 from django.test import Client
+from django.utils import timezone
 
 from rehab.people.access import UndeclaredView
 from rehab.people.roles import Role
-from rehab.people.sign_in.tokens import ApiToken
+from rehab.people.sign_in.tokens import LIFETIME, ApiToken
 from rehab.people.web import api_base
 from tests.support.programs import ROOT, Program, bearer_token, program_of
-from tests.support.world import build_world, client_of
+from tests.support.world import NOW, build_world, client_of
 
 pytestmark = pytest.mark.django_db
 
 
+def filled(**fields: Any) -> dict[str, Any]:
+    """Return the form of a new token as a lead sends it."""
+    day = timezone.now() + LIFETIME
+    given = {"name": "Export", "role": "pt", "may_read": "on"}
+    given |= {"expires_at_0": f"{day:%Y-%m-%d}", "expires_at_1": f"{day:%H:%M:%S}"}
+    return given | fields
+
+
+def issued(answer: Any) -> str:
+    """Return the token that a page shows."""
+    return str(re.search(r'class="token">(\S+?)<', answer.content.decode()).group(1))
+
+
 def test_a_lead_makes_a_token_that_is_shown_once_and_works_until_it_is_revoked(world):
     client = client_of(world, Role.LEAD)
-    form = {"name": "Export", "user": world.people[Role.PT].pk, "role": "researcher"}
-    page = client.post("/admin/rehab/apitoken/add/", form, follow=True).content.decode()
-    token = re.search(r"one time only: (\S+?)<", page).group(1)
+    answer = client.post("/admin/rehab/apitoken/add/", filled(role="researcher"))
+    token = issued(answer)
+    assert token not in str(answer.cookies)
+    assert not any(token in str(row.get_decoded()) for row in Session.objects.all())
     assert token not in client.get("/admin/rehab/apitoken/").content.decode()
     row = ApiToken.everywhere.get(name="Export")
     assert (row.clinic, token in row.token_hash) == (world.clinic, False)
+    assert row.user == world.people[Role.LEAD]
     program = Program(token)
     assert program.get("/me")[1]["role"] == "researcher"
     row.refresh_from_db()
@@ -37,10 +57,97 @@ def test_a_lead_makes_a_token_that_is_shown_once_and_works_until_it_is_revoked(w
 
 def test_a_token_carries_no_role_that_its_account_lacks(world):
     client = client_of(world, Role.LEAD)
-    form = {"name": "Export", "user": world.people[Role.RESEARCHER].pk, "role": "pt"}
-    page = client.post("/admin/rehab/apitoken/add/", form).content.decode()
-    assert "choose that role, or one below" in page
+    token = ApiToken(clinic=world.clinic, user=world.people[Role.RESEARCHER], role="pt")
+    with pytest.raises(ValidationError, match="choose that role, or one below"):
+        token.clean()
+    page = client.post("/admin/rehab/apitoken/add/", filled(role="host")).content.decode()
+    assert "Select a valid choice" in page
     assert not ApiToken.everywhere.filter(name="Export").exists()
+
+
+def test_a_lead_makes_no_token_that_speaks_for_another_person(world):
+    client, pt = client_of(world, Role.LEAD), world.people[Role.PT]
+    client.post("/admin/rehab/apitoken/add/", filled(role="pt", user=pt.pk))
+    assert ApiToken.everywhere.get(name="Export").user == world.people[Role.LEAD]
+    others = world.rows[ApiToken]
+    before = others.token_hash
+    chosen = {"action": "renew_tokens", "_selected_action": others.pk}
+    page = client.post("/admin/rehab/apitoken/", chosen, follow=True).content.decode()
+    assert "Only its own person" in page
+    form = {"name": "Mine now", "user": world.people[Role.LEAD].pk, "may_export": "on"}
+    client.post(f"/admin/rehab/apitoken/{others.pk}/change/", form)
+    others.refresh_from_db()
+    assert (others.token_hash, others.user, not others.may_export) == (before, pt, True)
+
+
+def test_a_renewed_token_is_shown_once_and_in_no_cookie(world):
+    client = client_of(world, Role.LEAD)
+    client.post("/admin/rehab/apitoken/add/", filled())
+    row = ApiToken.everywhere.get(name="Export")
+    chosen = {"action": "renew_tokens", "_selected_action": row.pk}
+    answer = client.post("/admin/rehab/apitoken/", chosen)
+    token = issued(answer)
+    assert token not in str(client.cookies)
+    assert "no-store" in answer.headers["Cache-Control"]
+    assert Program(token).get("/me")[0] == 200
+
+
+def test_a_token_ends_after_ninety_days_and_never_later_than_a_year(world):
+    client = client_of(world, Role.LEAD)
+    program = Program(issued(client.post("/admin/rehab/apitoken/add/", filled())))
+    row = ApiToken.everywhere.get(name="Export")
+    assert timedelta(days=89) < row.expires_at - NOW < timedelta(days=91)
+    assert program.get("/me")[0] == 200
+    ApiToken.everywhere.filter(pk=row.pk).update(expires_at=timezone.now())
+    assert program.get("/me")[0] == 401
+    for days in (-1, 367):
+        day = NOW + timedelta(days=days)
+        given = filled(name="Late", expires_at_0=f"{day:%Y-%m-%d}", expires_at_1="10:00:00")
+        page = client.post("/admin/rehab/apitoken/add/", given).content.decode()
+        assert "within a year" in page
+    assert not ApiToken.everywhere.filter(name="Late").exists()
+
+
+@pytest.mark.parametrize(
+    ("scope", "call", "allowed"),
+    [
+        ("read", "GET /patients", 200),
+        ("read", "POST /patients", 403),
+        ("read", "GET /sessions/{session}/steps", 403),
+        ("steer", "GET /patients", 403),
+        ("steer", "POST /patients", 201),
+        ("export", "GET /sessions/{session}/steps", 200),
+        ("export", "GET /patients", 403),
+        ("", "GET /me", 403),
+    ],
+)
+def test_a_token_does_what_its_scopes_say(world, scope, call, allowed):
+    row = ApiToken(clinic=world.clinic, user=world.people[Role.LEAD], name="p", role=Role.PT)
+    row.may_read = scope == "read"
+    row.may_steer, row.may_export = scope == "steer", scope == "export"
+    program = Program(row.new_token())
+    row.save()
+    method, path = call.format(session=world.session.pk).split()
+    body = {"code": "K1", "nickname": "Rosa"} if method == "POST" else {}
+    status, told = getattr(program, method.lower())(path, **body)
+    assert status == allowed
+    if status == 403:
+        assert "lacks the scope" in told["message"]
+
+
+@pytest.mark.parametrize("change", ["password", "role", "nothing"])
+def test_a_token_ends_with_the_password_and_the_role_of_its_account(world, change):
+    lead = world.people[Role.LEAD]
+    program = Program(bearer_token(lead, Role.RESEARCHER))
+    if change == "password":
+        lead.set_password("another one 2026")
+    elif change == "role":
+        lead.role = Role.PT  # which may still lend a researcher's
+    else:
+        lead.first_name = "Rosa"
+    lead.save()
+    assert program.get("/me")[0] == (200 if change == "nothing" else 401)
+    assert ApiToken.everywhere.get(user=lead).is_revoked == (change != "nothing")
 
 
 def test_only_leads_see_tokens(world):

@@ -62,7 +62,7 @@ class Load:
                     self.delays.append(at - began)
             if confirm and '"frame":' in text[:40]:
                 frames = int(text[: text.index("[")].split('"frame":')[1].split(",", maxsplit=1)[0])
-                if frames % CONFIRM_EVERY == 0:
+                if frames % CONFIRM_EVERY == 0:  # as pages do (session_socket.js)
                     await socket.send(f'{{"type":"seen","frame":{frames}}}')
 
     async def hear_acks(self, index: int, socket: ClientConnection) -> None:

@@ -154,7 +154,7 @@ def test_a_preview_shows_the_clinics_own_rows_and_stores_nothing(world):
 
 def test_what_is_seen_in_the_preview_is_what_the_tablet_shows(world):
     fill_board(world)
-    board = Leaderboard.everywhere.get()
+    board = Leaderboard.everywhere.get(among="clinic")
     client = client_of(world)
     fields = filled(**{name: getattr(board, name) for name in filled()})
     preview = client.get(PREVIEW, fields | {"row": board.pk, "seen_as": world.patient.pk})
@@ -188,7 +188,7 @@ def test_a_saved_board_is_previewed_as_it_is_stored_until_its_rows_would_be_othe
     world, monkeypatch
 ):
     fill_board(world)
-    board = Leaderboard.everywhere.get()
+    board = Leaderboard.everywhere.get(among="clinic")
     Patient.everywhere.create(clinic=world.clinic, code="N", nickname="N", boards="clinic")
     people = list(Patient.everywhere.filter(clinic=world.clinic, boards="clinic"))
     board.among = "group"
@@ -237,6 +237,7 @@ def test_a_group_has_patients_of_the_own_clinic_and_enough_of_them(world):
     assert "not one of the available choices" in foreign
 
 
+@pytest.mark.long
 def test_a_group_of_a_thousand_is_saved_and_one_of_more_is_told_what_to_do(world):
     Patient.everywhere.bulk_create(
         Patient(clinic=world.clinic, code=f"g{n}", nickname="G", pseudonym=f"G-{n}")
@@ -305,3 +306,26 @@ def test_names_never_run_out():
         name = draw_alias(taken.__contains__)
         assert name not in taken
         taken.add(name)
+
+
+def test_two_boards_of_opposite_order_cannot_show_everybody(world):
+    """Each shows the first half of its own order: together these are all patients."""
+    board = Leaderboard.everywhere.get(among="clinic")
+    other = Leaderboard(clinic=world.clinic, name="Other", among="group", metric=board.metric)
+    other.aggregation, other.display = board.aggregation, board.display
+    other.clean()
+    other.higher_is_better = not board.higher_is_better
+    with pytest.raises(ValidationError, match="the other way round"):
+        other.clean()
+    changes: tuple[dict[str, Any], ...] = (
+        {"active": False},
+        {"metric": "active_minutes"},
+        {"among": "self", "aggregation": "each"},
+    )
+    for change in changes:
+        fine = Leaderboard(clinic=world.clinic, name="Other", among="group", metric=board.metric)
+        fine.aggregation, fine.display = board.aggregation, board.display
+        fine.higher_is_better = not board.higher_is_better
+        for name, value in change.items():
+            setattr(fine, name, value)
+        fine.clean()

@@ -11,7 +11,7 @@ from django.test.utils import CaptureQueriesContext
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rehab.boards.building import entries, scheduler
+from rehab.boards.building import entries
 from rehab.boards.choices import DisplayMode, TieRule
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.boards.panels.viewer import make_session_panels
@@ -78,7 +78,6 @@ def test_boards_that_did_not_follow_heal_by_themselves(
     frozen = board_of(clinic, name="Frozen", frozen_on=NOW.date() - timedelta(days=5))
     people = people_of(clinic, 6)
     sessions = walk_down(people)
-    monkeypatch.setattr(scheduler.board_builder, "wake", lambda: None)
     with monkeypatch.context() as patch, django_capture_on_commit_callbacks(execute=True):
         patch.setattr(entries, "read_results", lambda *_: 1 / 0)
         walk(people[5], "positive", strides(20, 0), days_ago=1)

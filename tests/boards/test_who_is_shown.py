@@ -11,15 +11,24 @@ from django.urls import reverse
 
 from rehab.boards.building import entries
 from rehab.boards.models import BoardEntry, Leaderboard
-from rehab.boards.panels.viewer import BoardViewer, make_session_panels, make_waiting_panels
+from rehab.boards.panels.viewer import BoardViewer, make_waiting_panels
 from rehab.boards.ranking.results import read_results
-from rehab.people.models import Clinic, Patient
+from rehab.people.models import Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
-from rehab.stations.models import Device, Station
+from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.phases import make_phase
-from tests.support.boards import board_of, patient_of, people_of, see, told, walk_down
+from tests.support.boards import (
+    board_of,
+    page_of,
+    patient_of,
+    people_of,
+    see,
+    tablet_at,
+    told,
+    walk_down,
+)
 from tests.support.walks import strides, walk
 from tests.support.world import NOW
 
@@ -58,21 +67,18 @@ def test_a_session_of_two_types_stands_on_no_board_of_points_or_of_one_type(clin
 @pytest.mark.parametrize("language", ["en", "es"])
 def test_a_session_of_two_types_is_compared_by_its_hits_alone(clinic, language):
     person = patient_of(clinic, "A", language=language)
-    device = Device(
-        clinic=clinic,
-        station=Station.everywhere.create(clinic=clinic, name="S"),
-        kind="tablet",
-        name="t",
-    )
-    token = device.new_token()
-    device.save()
+    station = Station.everywhere.create(clinic=clinic, name="S")
+    tablet = tablet_at(station)
     plain, mixed = walk(person, "positive", strides(9, 1)), walk_two_types(person)
-    TrainingSession.everywhere.update(station=device.station)
-    tablet = Client(headers={"Authorization": f"Bearer {token}"})
-    boards = tablet.get(reverse("scores", args=[mixed.pk])).context["boards"]
-    assert [(board.slug, len(board.rows)) for board in boards] == [("all", 2)]
-    boards = tablet.get(reverse("scores", args=[plain.pk])).context["boards"]
-    assert [(board.slug, len(board.rows)) for board in boards] == [("same", 1), ("all", 2)]
+
+    def boards_after(session: TrainingSession) -> list[tuple[str, int]]:
+        TrainingSession.everywhere.update(station=None)  # a tablet sees the one just ended alone
+        TrainingSession.everywhere.filter(pk=session.pk).update(station=station)
+        boards = tablet.get(reverse("scores", args=[session.pk])).context["boards"]
+        return [(board.slug, len(board.rows)) for board in boards]
+
+    assert boards_after(mixed) == [("all", 2)]
+    assert boards_after(plain) == [("same", 1), ("all", 2)]
 
 
 # --- who stands on a board ----------------------------------------------------------------------
@@ -271,214 +277,6 @@ def test_negative_points_are_told_as_kept_never_as_a_loss(clinic):
     assert "<small>kept</small> 288 <small>of 300</small>" in page
     assert "−" not in page
     assert 'class="rank"' not in page.split('id="board-')[1].split("</section>")[0]
-
-
-# --- agreeing, and no longer ----------------------------------------------------------------------
-
-
-def page_of(session: TrainingSession, client: Client | None = None) -> str:
-    if client is None:
-        station, _ = Station.everywhere.get_or_create(clinic=session.clinic, name="One")
-        TrainingSession.everywhere.filter(pk=session.pk).update(station=station)
-        client = tablet_at(station)
-    answer = client.get(reverse("scores", kwargs={"session_id": session.pk}))
-    assert answer.status_code == 200
-    return answer.content.decode()
-
-
-def tablet_at(station: Station) -> Client:
-    tablet = Device(clinic=station.clinic, station=station, kind="tablet", name="T")
-    token = tablet.new_token()
-    tablet.save()
-    return Client(headers={"Authorization": f"Bearer {token}"})
-
-
-def test_who_has_not_agreed_stands_on_none_and_sees_none(clinic):
-    board = board_of(clinic)
-    sessions = walk_down(people_of(clinic, 6))
-    alone = patient_of(clinic, "S", "own")
-    shown = see(walk(alone, "positive", strides(20, 0)))
-    assert (shown.shared, shown.note) == (False, "These are your own sessions.")
-    assert not BoardEntry.everywhere.filter(board=board, patient=alone).exists()
-    assert see(sessions[0]).rows[0].rank == 1
-    totals_only = patient_of(clinic, "T", "total")
-    assert not see(walk(totals_only, "positive", strides(20, 0))).shared
-
-
-def test_taken_back_on_the_tablet_it_is_gone_with_the_next_view_of_two_tablets(clinic):
-    board_of(clinic, display="top", top_n=3)
-    people = people_of(clinic, 7)
-    sessions = walk_down(people)
-    stations = [Station.everywhere.create(clinic=clinic, name=name) for name in ("East", "West")]
-    for session, station in zip(sessions, stations, strict=False):
-        TrainingSession.everywhere.filter(pk=session.pk).update(station=station)
-    tablets = [tablet_at(station) for station in stations]
-    east, west = (page_of(s, t) for s, t in zip(sessions, tablets, strict=False))
-    first, second = people[0].alias, people[1].alias
-    assert f"<b>You</b> {first}" in " ".join(east.split())
-    assert f"<b>You</b> {second}" in " ".join(west.split())
-    assert first in west
-    assert second in east
-    leave = reverse("leave-boards", kwargs={"session_id": sessions[0].pk})
-    assert tablets[1].post(leave).status_code == 404
-    assert tablets[0].post(leave).status_code == 302
-    assert first not in page_of(sessions[1], tablets[1])
-    own = page_of(sessions[0], tablets[0])
-    assert "These are your own sessions." in own
-    assert second not in own
-    assert see(sessions[1]).rows[0].you
-
-
-def test_taken_back_behind_our_back_the_row_is_not_shown_either(clinic):
-    board_of(clinic, display="top", top_n=3)
-    people = people_of(clinic, 8)
-    sessions = walk_down(people)
-    Patient.everywhere.filter(pk=people[0].pk).update(boards="own")
-    assert people[0].alias not in [row.title for row in see(sessions[1]).rows]
-
-
-def test_in_a_blinded_study_there_is_no_board_and_no_score(clinic):
-    board = board_of(clinic)
-    people = people_of(clinic, 6)
-    sessions = walk_down(people)
-    people[0].blinded = True
-    people[0].save()
-    sessions[0].refresh_from_db()
-    assert make_session_panels(sessions[0], NOW) == []
-    page = page_of(sessions[0])
-    assert "This walk is over." in page
-    assert 'class="value"' not in page
-    assert not BoardEntry.everywhere.filter(board=board, patient=people[0]).exists()
-
-
-def test_initials_and_codes_are_unique_on_what_is_shown(clinic):
-    board = board_of(clinic, names="initials", display="top", top_n=3)
-    people = people_of(clinic, 5)
-    sessions = walk_down(people)
-    assert [row.title for row in see(sessions[0]).rows] == ["N.C.", "N.C. 2", "N.C. 3"]
-    board.names = "code"
-    board.save()
-    assert [row.title for row in see(sessions[0]).rows] == ["C-0", "C-1", "C-2"]
-
-
-def test_a_new_animal_name_is_seen_at_once(clinic):
-    board_of(clinic, display="top", top_n=1)
-    people = people_of(clinic, 5)
-    sessions = walk_down(people)
-    old = people[0].alias
-    people[0].draw_alias()
-    people[0].save(update_fields=["alias"])
-    assert people[0].alias != old
-    assert see(sessions[1]).rows[0].title == people[0].alias
-
-
-# --- clinics --------------------------------------------------------------------------------------
-
-
-def test_clinic_a_never_sees_b(clinic):
-    other = Clinic.everywhere.create(name="Oak")
-    board_of(clinic, display="top")
-    board_of(other, display="top")
-    mine, theirs = walk_down(people_of(clinic, 5)), walk_down(people_of(other, 9))
-    assert len(see(mine[0]).rows) == 3
-    assert len(see(theirs[0]).rows) == 5
-    assert not {row.title for row in see(mine[0]).rows} & {row.title for row in see(theirs[0]).rows}
-
-
-def test_across_clinics_stand_those_who_agreed_of_clinics_that_take_part(clinic):
-    oak = Clinic.everywhere.create(name="Oak", boards_across=True)
-    elsewhere = Clinic.everywhere.create(name="Yew")
-    board = board_of(None, among="across", display="top")
-    for place in (clinic, oak, elsewhere):
-        walk_down(people_of(place, 3, boards="across"))
-    walk(patient_of(clinic, "X", "clinic"), "positive", strides(30, 0))
-    assert BoardEntry.everywhere.filter(board=board).count() == 6
-    session = TrainingSession.everywhere.filter(clinic=oak).first()
-    assert see(session).shared
-    assert (
-        make_session_panels(TrainingSession.everywhere.filter(clinic=elsewhere).first(), NOW) == []
-    )
-    oak.boards_across = False
-    oak.save()
-    assert BoardEntry.everywhere.filter(board=board).count() == 3
-
-
-def test_a_group_compares_the_chosen_alone(clinic):
-    people = people_of(clinic, 9)
-    sessions = walk_down(people)
-    board = board_of(clinic, among="group", display="top")
-    assert not see(sessions[0]).shared
-    board.group.set(people[2:8])
-    assert [row.title for row in see(sessions[2]).rows] == [one.alias for one in people[2:5]]
-    assert not see(sessions[0]).shared
-
-
-# --- figures --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("aggregation", "value"), [("best", "80%"), ("latest", "40%"), ("mean", "55%")]
-)
-def test_what_stands_in_a_row(clinic, aggregation, value):
-    board = board_of(clinic, aggregation=aggregation, mean_of=2)
-    person = patient_of(clinic, "A")
-    for days_ago, hits in ((3, 8), (2, 7), (1, 4)):
-        walk(person, "positive", strides(hits, 10 - hits), days_ago=days_ago)
-    (row,) = BoardEntry.everywhere.filter(board=board)
-    assert f"{row.figure}%" == value
-
-
-def test_only_sessions_that_are_long_enough_ended_and_walked_count(clinic):
-    board = board_of(
-        clinic, min_valid_strides=10, aggregation="sum", metric="attended", types="all"
-    )
-    person = patient_of(clinic, "A")
-    walk(person, "positive", strides(9, 0))
-    walk(person, "positive", strides(90, 0), simulated=True)
-    walk(person, "positive", strides(90, 0), end=ChangeKind.ABORT)
-    walk(person, "positive", strides(90, 0), end=None)
-    assert not BoardEntry.everywhere.exists()
-    walk(person, "binary", strides(10, 0))
-    assert BoardEntry.everywhere.get().figure == 1
-    board.min_minutes = 1
-    board.include_simulated = True
-    board.save()
-    assert BoardEntry.everywhere.get().figure == 2
-    walk(person, "positive", strides(70, 0), phases=(make_phase("washout"),))
-    assert BoardEntry.everywhere.get().figure == 3
-
-
-def test_minutes_of_a_day_are_counted_up_to_an_hour_and_targets_by_the_day(clinic):
-    minutes = board_of(clinic, aggregation="sum", metric="active_minutes", types="all")
-    days = board_of(clinic, name="Days", aggregation="sum", metric="target_met", types="all")
-    person = patient_of(clinic, "A")
-    for _ in range(2):
-        walk(person, "positive", strides(2400, 0), days_ago=2, wanted=0.5)
-    walk(person, "positive", strides(600, 0), days_ago=1, wanted=0.5)
-    walk(person, "positive", strides(0, 600), wanted=0.5)
-    assert BoardEntry.everywhere.get(board=minutes).figure == 60 + 10 + 10
-    assert BoardEntry.everywhere.get(board=days).figure == 2
-
-
-def test_a_total_is_reached_together_and_hidden_below_five(clinic):
-    board_of(
-        clinic, display="total", aggregation="sum", metric="steps", types="all", total_goal=200
-    )
-    people = people_of(clinic, 5, boards="total")
-    sessions = walk_down(people[:4])
-    alone = see(sessions[1])
-    assert (alone.total, alone.rows[0].value, alone.rows[0].you) == (None, "20", True)
-    walk(people[4], "positive", strides(20, 0))
-    total = see(sessions[0]).total
-    assert (total.value, total.goal, total.bar, total.people) == ("100", "200", 50, 5)
-    assert total.mine == "20"
-
-
-def test_lower_may_be_better(clinic):
-    board_of(clinic, higher_is_better=False, display="top")
-    people = people_of(clinic, 5)
-    sessions = walk_down(people)
-    assert told(see(sessions[4])) == [(1, "80%", True), (2, "85%", False), (3, "90%", False)]
 
 
 # --- tablets --------------------------------------------------------------------------------------

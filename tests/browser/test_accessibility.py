@@ -25,6 +25,7 @@ CHECK = """async ([rules, standards]) => {
     [`${id}: ${help}`, ...nodes.map(({ target, html }) => `  ${target.join(" ")} ${html}`)];
   return violations.flatMap(tell).join("\\n");
 }"""
+COLORS_HAVE_CHANGED = "Promise.all(document.getAnimations().map((one) => one.finished))"
 WALKED = """
 from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
@@ -61,6 +62,7 @@ PT_PAGES = [
     "/tablets/pair/",
     "/account/",
     "/account/password/",
+    "/account/sign-ins/",
     "/account/second-factor/",
     "/account/second-factor/app/",
     "/nowhere/",
@@ -83,7 +85,12 @@ ADMIN_PAGES = [
     "/admin/rehab/leaderboard/",
     "/admin/rehab/leaderboard/add/",
 ]
-PATIENT_PAGES = ["/sessions/{session}/scores/", "/sessions/{kept}/scores/", "/tablet/"]
+PATIENT_PAGES = [
+    "/sessions/{session}/ending/",
+    "/sessions/{session}/scores/",
+    "/sessions/{kept}/scores/",
+    "/tablet/",
+]
 
 
 @pytest.fixture(scope="module")
@@ -133,26 +140,18 @@ def open_page(context: BrowserContext, path: str, size: str) -> Page:
     return page
 
 
-@pytest.mark.parametrize("path", PT_PAGES)
-def test_therapists_pages(context: BrowserContext, places: dict[str, str], path: str) -> None:
+@pytest.mark.parametrize("path", [*PT_PAGES, *ADMIN_PAGES])
+def test_pages_of_the_staff(context: BrowserContext, places: dict[str, str], path: str) -> None:
+    """Light on a laptop, then dark on a phone: the same page, recolored and laid out anew."""
     page = open_page(context, path.format(**places), "laptop")
     page.wait_for_load_state("networkidle")
     assert "/sign-in/" not in page.url
     check(page)
-
-
-@pytest.mark.parametrize("path", ADMIN_PAGES)
-def test_the_admin(context: BrowserContext, places: dict[str, str], path: str) -> None:
-    """Light on a laptop, then dark on a phone: the same page, laid out anew."""
-    page = open_page(context, path.format(**places), "laptop")
-    page.wait_for_load_state("networkidle")
-    assert "/sign-in/" not in page.url
-    check(page)
-    page.evaluate("localStorage.setItem('theme', 'dark')")
     width, height = SIZES["phone"]
     page.set_viewport_size({"width": width, "height": height})
-    page.reload(wait_until="networkidle")
-    assert page.evaluate("document.documentElement.dataset.pt") == "dark"
+    page.evaluate("document.documentElement.dataset.theme = 'dark'")  # as the header's button does
+    page.wait_for_selector("html[data-pt=dark]")
+    page.evaluate(COLORS_HAVE_CHANGED)
     check(page)
 
 
@@ -168,6 +167,11 @@ def test_signing_in(browser: Browser, server: Server) -> None:
         page = stranger.new_page()
         page.goto("/start/")
         assert page.locator("[type=password]").is_visible()
+        check(page)
+        page.goto("/")
+        check(page)
+        page.emulate_media(color_scheme="dark")
+        page.wait_for_selector("html[data-pt=dark]")
         check(page)
 
 

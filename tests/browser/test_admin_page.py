@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Locator, Page, expect
 
 from tests.support.servers import ROOT, Server, clean_environment
 from tests.support.walk_seed import make_walks
@@ -57,8 +57,8 @@ def page(browser: Browser, server: Server, protocol: str) -> Iterator[Page]:
     assert complaints == []
 
 
-def names(page: Page) -> list[str]:
-    return page.locator(".protocol-drawing text.name").all_text_contents()
+def drawn_names(page: Page) -> Locator:
+    return page.locator(".protocol-drawing text.name")
 
 
 def test_phases_move_are_added_and_are_drawn_as_they_will_be_walked(page, protocol):
@@ -68,22 +68,23 @@ def test_phases_move_are_added_and_are_drawn_as_they_will_be_walked(page, protoc
     expect(drawing.locator("text.length")).to_have_text(["66 s", "until you move on"])
     expect(drawing.locator("text.gain")).to_have_text("×0.85")
     page.get_by_role("button", name="Move down").first.click()
-    assert names(page) == ["Push", "Look"]
+    expect(drawn_names(page)).to_have_text(["Push", "Look"])
     page.locator("#phases-group .add-row a").click()
     row = page.locator("#phases-group tr.form-row:not(.empty-form)").last
     row.locator("[name$=-kind]").select_option("washout")
     row.locator("[name$=-name]").fill("Cool")
     row.locator("[name$=-seconds]").fill("120")
-    assert names(page) == ["Push", "Look", "Cool"]
+    expect(drawn_names(page)).to_have_text(["Push", "Look", "Cool"])
     expect(drawing.locator(".total")).to_have_text("3 min +")
     page.get_by_role("button", name="Save", exact=True).click()
+    expect(page.locator(".messagelist .success")).to_be_visible()
     page.goto(url)
-    assert names(page) == ["Push", "Look", "Cool"]
+    expect(drawn_names(page)).to_have_text(["Push", "Look", "Cool"])
 
 
 def test_a_shared_protocol_is_drawn_for_who_may_not_change_it(page):
     page.goto("/admin/rehab/protocol/1/change/")
-    assert names(page)
+    expect(drawn_names(page)).not_to_have_count(0)
     assert not page.get_by_role("button", name="Move down").count()
 
 

@@ -10,7 +10,7 @@ import sys
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.support.browsers import SIZES, can_be_read
+from tests.support.browsers import SIZES, can_be_read, go_on_to_scores
 from tests.support.servers import ROOT, clean_environment, serve
 
 pytestmark = pytest.mark.browser
@@ -141,4 +141,4 @@ def walk_a_demo(pt: Page, tablet: Page) -> None:
     tablet.wait_for_function("() => document.body.dataset.step >= 6")
     pt.click("[data-end]")
     pt.click("text=End session")
-    tablet.wait_for_url("**/scores/")
+    go_on_to_scores(tablet)

@@ -324,7 +324,7 @@ def test_a_session_by_keys_alone(server: Server, browser: Browser) -> None:
         tab_to(pt, f"a[href='{walk.path}report/']")
         pt.keyboard.press("Enter")
         pt.wait_for_url("**/report/")
-        patient.wait_for_url("**/scores/")
+        patient.wait_for_url("**/ending/")
 
 
 # --- paper --------------------------------------------------------------------------------------
@@ -343,7 +343,7 @@ session = visit(long, "negative", 1, 0, 1600, timezone.now())
 SessionEvent.everywhere.bulk_create(
     SessionEvent(
         session=session, kind=kind, after_number=n, at=timezone.now(),
-        value=n % 11 if kind == Remark.BORG else 4.0, old=3.9,
+        value=n % 11 if kind == Remark.BORG else 1.0, old=3.9,
         data={"phase": "started", "above": True},
     )
     for n in range(40)

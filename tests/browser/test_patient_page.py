@@ -182,7 +182,7 @@ def test_a_session_from_start_to_scores(server, browser):
         page.click("button.pause")
         page.click("text=End")
         page.click("text=Yes, end")
-        page.wait_for_url(f"**/sessions/{walk.session}/scores/")
+        page.wait_for_url(f"**/sessions/{walk.session}/ending/")
         page.goto(walk.path)  # what has ended shows its scores
         assert page.url.endswith("/scores/")
 
@@ -262,7 +262,7 @@ def test_a_page_that_is_signed_out_says_so_and_stops(server, browser):
         context.clear_cookies()
         wire.cut()
         looks(page, "closed", "This screen has stopped.")
-        expect(page.locator(".sub")).to_have_text("Sign in again, or pair the tablet again.")
+        expect(page.locator(".sub")).to_have_text("Please call your therapist.")
         assert page.locator("text=Load again").is_visible()
 
 
@@ -301,14 +301,14 @@ def test_a_stop_that_may_not_have_arrived_is_not_believed(server, browser):
         wire.freeze()  # nothing is closed: the tablet's Wi-Fi is just gone
         page.click("text=Stop robot")
         expect(button).to_have_text("Stop sent")
-        expect(page.locator(".note")).to_have_text("No answer. Use the robot's own button.")
+        expect(page.locator(".note")).to_have_text("No answer. Call your therapist.")
         expect(button).to_have_text("Stop robot")
         wire.go_down()
         wire.thaw()
         looks(page, "offline", "No connection.")
         page.click("text=Stop robot")
         expect(button).to_have_text("Not sent")
-        expect(page.locator(".note")).to_have_text("No connection. Use the robot's own button.")
+        expect(page.locator(".note")).to_have_text("No connection. Call your therapist.")
 
 
 @pytest.mark.parametrize("motion", ["no-preference", "reduce"])

@@ -10,6 +10,7 @@ import polib
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
+from tests.support.browsers import go_on_to_scores
 from tests.support.servers import Server
 from tests.support.walk_seed import Walk, feet_of, make_walks
 
@@ -136,7 +137,9 @@ def test_a_session_is_told_in_the_languages_of_who_reads_it(
         tablet.click("[data-ask=end]")
         is_spanish(tablet)
         tablet.click("[data-change=finish]")
-        tablet.wait_for_url("**/scores/")
+        tablet.wait_for_url("**/ending/")
+        is_spanish(tablet)
+        go_on_to_scores(tablet)
     is_spanish(tablet)
     monitor.wait_for_url("**/details/")
     pt(monitor)

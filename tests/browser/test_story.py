@@ -12,7 +12,7 @@ from itertools import product
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.support.browsers import SIZES
+from tests.support.browsers import SIZES, go_on_to_scores
 from tests.support.extent import EVERYTHING
 from tests.support.servers import ROOT, Server, clean_environment, serve
 
@@ -167,7 +167,7 @@ def end(story: Story, server: Server) -> None:
     page = story.page
     page.tap("[data-ask=end]")
     page.tap("[data-change=finish]")
-    page.wait_for_url("**/scores/")
+    go_on_to_scores(page)
     you = page.locator(f"section:not([hidden]) .you[data-session='{story.session}']")
     expect(you).to_be_in_viewport()
     expect(you).to_contain_text("You")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.support.browsers import SIZES
+from tests.support.browsers import SIZES, go_on_to_scores
 from tests.support.servers import serve
 
 pytestmark = pytest.mark.browser
@@ -13,6 +15,7 @@ pytestmark = pytest.mark.browser
 PATIENCE_MS = 40_000
 
 
+@pytest.mark.realtime
 def test_a_paired_tablet_follows_its_station(tmp_path, browser: Browser):
     with serve(tmp_path) as server:
 
@@ -53,7 +56,20 @@ def test_a_paired_tablet_follows_its_station(tmp_path, browser: Browser):
         expect(pt.locator("[data-main]")).to_contain_text("Go on")
         pt.click("[data-end]")
         pt.click("text=End session")
-        tablet.wait_for_url("**/scores/")
+        go_on_to_scores(tablet)
         expect(tablet.locator(".you >> visible=true")).to_be_in_viewport()
+
+        pt.goto("/start/")  # somebody else is next, while these scores are still shown
+        pt.click("text=Try a demo")
+        pt.click("text=Change something")
+        pt.click("text=To the therapist")
+        pt.wait_for_selector("[data-main]:not([disabled])")
+        asked_at = time.monotonic()
+        tablet.wait_for_selector("body[data-look=ready]")
+        assert time.monotonic() - asked_at <= 2
+        expect(pt.locator(".readiness")).to_contain_text("✓ Tablet shows Demo")
+        pt.click("[data-end]")
+        pt.click("text=End session")
+        go_on_to_scores(tablet)
         tablet.click("text=Continue")
         expect(tablet.locator("h1")).to_have_text("Ready.", timeout=PATIENCE_MS)

@@ -6,7 +6,9 @@ import json
 import numpy as np
 import pytest
 
+from rehab.gait import LegSamples
 from rehab.gait.__main__ import main
+from rehab.gait.recordings.plot import compute_curves
 from tests.gait.walks import make_walk, read_moore
 from tests.support.data import signals
 
@@ -82,10 +84,10 @@ def test_errors_say_the_cure(lab_file, capsys, arguments, message):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "no known layout"),
+        ("", "is empty. Export it again"),
         ("t,Fz,M,A\n", "no samples"),
         ("t,Fz,M,A\n0,x,1,1\n1,y,1,1\n", "holds no numbers"),
-        ("t,Fz,M,A\n1,1,1,1\n1,1,1,1\n", "the times do not go on"),
+        ("t,Fz,M,A\n1,1,1,1\n1,1,1,1\n", "times of the samples do not go on"),
     ],
 )
 @pytest.mark.filterwarnings("ignore:Empty input|genfromtxt")
@@ -112,3 +114,12 @@ def test_plot(lab_file, tmp_path, capsys):
     else:
         assert result == 0
         assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_is_plotted_is_what_was_measured():
+    """The drawn power peaks where A2 was measured, within what drawing takes off."""
+    walk, _ = make_walk(strides=12)
+    curves = compute_curves(LegSamples(*walk.left), 100, walk.mass_kg)
+    for stride in walk.one_leg(look_ahead_s=0.05):
+        at = int(np.searchsorted(walk.t_s, stride.a2_time_s))
+        assert curves[3][at - 3 : at + 4].max() == pytest.approx(stride.a2_w_kg, rel=0.03)

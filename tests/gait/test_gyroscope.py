@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from rehab.gait import ContactKind, GaitInputError, GyroscopeDetector, compute_ankle_velocity
+from rehab.gait.__main__ import main
+from rehab.gait.setup.gyroscope import measure_gyroscope
 from tests.support.data import signals
 
 RATE_HZ = 204.8
@@ -120,3 +122,29 @@ def test_settings_that_cannot_be():
 
 def test_ankle_velocity_of_two_gyroscopes():
     assert compute_ankle_velocity([1.0, 2.0], [0.5, -1.0]).tolist() == [0.5, 3.0]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_sign_is_found(feet, sign):
+    for time, rate, _ in feet.values():
+        strides, found = measure_gyroscope(time, sign * rate)
+        assert found == sign
+        assert len(strides) >= 20
+        assert 80 < np.median([stride.cadence_min for stride in strides]) < 130
+
+
+def test_the_command_measures_a_gyroscope(feet, tmp_path, capsys):
+    time, rate, _ = feet["left"]
+    path = tmp_path / "foot.csv"
+    np.savetxt(path, np.column_stack([time, -np.degrees(rate)]), "%.9g", ",", header="time,gyr_y",
+               comments="")  # fmt: skip
+    assert main(["gyroscope", str(path), "--rate-column", "gyr_y*0.0174533"]) == 0
+    assert "its sign is turned" in capsys.readouterr().out
+    assert main(["gyroscope", str(path), "--rate-column", "gyr_z"]) == 2
+    assert "has no column gyr_z. It has: time, gyr_y" in capsys.readouterr().err
+
+
+def test_nobody_walks():
+    time = np.arange(3000) / 100
+    with pytest.raises(GaitInputError, match="No strides are found with either sign"):
+        measure_gyroscope(time, 0.1 * np.sin(time))

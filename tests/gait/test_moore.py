@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rehab.gait import LegSamples, RejectionReason, StrideDetector, TwoLegDetector
+from rehab.gait import Flag, LegSamples, RejectionReason, StrideDetector, TwoLegDetector
 from tests.gait.walks import pair_up, read_moore
 
 LOOK_AHEADS = [0.0, 0.05]
@@ -29,12 +29,21 @@ def pairs_of(moore, strides):
         )
 
 
+def is_late(walk, time_s):
+    """Return whether samples came late there: the reference takes their stamps for true."""
+    stalls_s = walk.t_s[1:][np.diff(walk.t_s) > 0.015]
+    return bool(((stalls_s > time_s - 0.03) & (stalls_s < time_s + 0.2)).any())
+
+
 def test_contacts(moore, found):
     pairs = list(pairs_of(moore, found[0.0]))
     hit = [(stride, r) for stride, r in pairs if stride is not None]
     missed, false = len(pairs) - len(hit), len(found[0.0]) - len(hit)
-    begins = np.array([stride.initial_contact_s - r["hs"] for stride, r in hit]) * 1000
-    ends = np.array([stride.terminal_contact_s - r["to"] for stride, r in hit]) * 1000
+    begins, ends = (
+        np.array([getattr(s, ours) - r[theirs] for s, r in hit if not is_late(moore[0], r[theirs])])
+        * 1000
+        for ours, theirs in (("initial_contact_s", "hs"), ("terminal_contact_s", "to"))
+    )
 
     assert missed + false == 0
     assert abs(begins.mean()) <= 3
@@ -56,7 +65,7 @@ def test_a2(moore, found, look_ahead_s, mean_error, p95):
     )
     errors = np.abs(values[:, 0] / values[:, 1] - 1)
 
-    assert len(values) >= 78
+    assert len(values) >= 74
     assert errors.mean() <= mean_error
     assert np.percentile(errors, 95) <= p95
     assert np.corrcoef(values.T)[0, 1] >= 0.995
@@ -74,15 +83,15 @@ def test_the_stance_that_the_record_cuts_off(moore, found):
         assert stride.first_double_support_s == pytest.approx(0.244, abs=0.01)
 
 
-def test_only_strides_with_holes_in_them_are_invalid(moore, found):
+def test_only_strides_whose_push_off_came_late_are_invalid(moore, found):
     invalid = [s for s in found[0.05] if not s.valid and RejectionReason.CUT_OFF not in s.reasons]
 
-    assert len(invalid) <= 7
-    walk, _ = moore
+    assert len(invalid) == 12
     for stride in invalid:
-        begin, end = stride.initial_contact_s, stride.terminal_contact_s + 0.05
-        inside = walk.t_s[(walk.t_s >= begin - 0.01) & (walk.t_s <= end + 0.15)]
-        assert np.diff(inside).max() > 0.04
+        assert RejectionReason.LATE in stride.reasons
+        assert stride.late_s > 0.01
+    put_back = [s for s in found[0.05] if s.valid and Flag.LATE in s.flags]
+    assert max(s.late_s for s in put_back) > 0.12
 
 
 def test_two_legs_know_more(found):
@@ -129,5 +138,5 @@ def test_rates_agree(moore):
 
     pairs = zip(pair_up(fast, [s.initial_contact_s for s in slow]), slow, strict=True)
     ratios = [a.a2_w_kg / b.a2_w_kg for a, b in pairs if a is not None and b.valid]
-    assert len(ratios) > 38
+    assert len(ratios) > 35
     assert np.abs(np.array(ratios) - 1).max() < 0.01

@@ -120,6 +120,7 @@ def test_step_length_and_symmetry():
     assert left_step.step_s == pytest.approx(0.55, abs=0.05)
 
 
+@pytest.mark.long
 def test_memory_stays_as_it_is():
     walk, _ = make_walk(rate_hz=500)
     span = walk.t_s[-1] + 0.002

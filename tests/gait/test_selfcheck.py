@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rehab.gait import LegSamples, check_signals
+from rehab.gait.contacts.force_plate import STUCK_S
 from rehab.gait.selfcheck.cures import CURES
 from rehab.gait.stances.plausibility import STANCE_MAX_S
 from rehab.gait.strides import RejectionReason
@@ -141,4 +142,4 @@ def test_every_reason_of_the_set_up_has_a_cure():
     }
     of_its_own = {RejectionReason.RATE}  # told from the times themselves
     assert set(CURES) == set(RejectionReason) - of_the_walker - of_its_own
-    assert STANCE_MAX_S < 2.5
+    assert STANCE_MAX_S < STUCK_S

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from typing import Any
 
@@ -10,6 +11,7 @@ from django.test import Client
 
 from rehab.gestures.models import Gesture
 from robot.motion.dry_run import validate_gesture
+from robot.motion.gestures import GESTURES, ORIGINALS
 from tests.support.forms import gesture_form
 from tests.support.world import World, build_world, client_of
 
@@ -86,7 +88,7 @@ def test_what_no_robot_plays_is_refused_with_the_cure(pt, world, steps, cure):
     [
         ("celebrate", "Every robot knows celebrate already. Choose another name."),
         ("original_binary", "Every robot knows original_binary already."),
-        ("two words", "valid “slug”"),
+        ("!?", "Give a name with letters or digits."),
         ("", "This field is required."),
     ],
 )
@@ -103,17 +105,41 @@ def test_two_clinics_may_use_a_name_but_none_twice(pt):
     assert Gesture.everywhere.filter(name="wave").count() == 2
 
 
-def test_a_stored_gesture_is_drawn_without_styles_or_scripts(pt):
-    pt.post(ADD, gesture_form("wave", [{"forward_m": 0.12}, *WAVE, {"forward_m": -0.12}]))
-    wave = Gesture.everywhere.get(name="wave")
-    page = pt.get(f"/admin/rehab/gesture/{wave.pk}/change/").content.decode()
-    drawing = re.search(r"<svg xmlns.*?</svg>", page, re.DOTALL)[0]
-    assert 'aria-label="Takes' in drawing
-    assert "up to 0.12 m from home" in drawing
-    assert re.findall(r">([\d, ]+)</text>", drawing) == ["1, 4", "2", "3", "5"]
-    assert "style=" not in drawing
-    assert "<script" not in drawing
-    assert "up to 0.12 m from home" in pt.get("/admin/rehab/gesture/").content.decode()
+def test_a_name_is_written_as_people_write(pt):
+    assert pt.post(ADD, gesture_form("Slow wave", WAVE)).status_code == 302
+    assert Gesture.everywhere.get(name="slow-wave").to_data()["name"] == "slow-wave"
+
+
+def simulate(pt: Client, steps: Any, **tracks: str) -> dict[str, Any]:
+    """Return what the floor of the form is told of steps, lights and notes."""
+    answer = pt.get("/admin/rehab/gesture/preview/", {"steps": json.dumps(steps)} | tracks)
+    told: dict[str, Any] = answer.json()
+    return told
+
+
+def test_the_floor_is_told_what_steps_would_do(pt):
+    usual = {"turn_deg": 0, "forward_m": 0, "hold_s": 0, "pace": 1, "within_s": None}
+    out, back = usual | {"forward_m": 0.12}, usual | {"forward_m": -0.12}
+    told = simulate(pt, [out, *(usual | step for step in WAVE), back])
+    assert told["words"].startswith("Takes ")
+    assert "up to 0.12 m from home" in told["words"]
+    assert max(x_m for _at, x_m, _y, _heading in told["preview"]["poses"]) == pytest.approx(
+        0.12, 0.1
+    )
+    assert "button" in json.dumps(simulate(pt, [out, back], notes="1 button")["preview"])
+    assert "Line 1" in simulate(pt, [out, back], lights="green")["problem"]
+    assert simulate(pt, [out]) == {
+        "problem": "It ends 12 cm from home. Add steps that lead back home."
+    }
+    refused: list[Any] = [[], [{}], [1], {"a": 1}, [usual | {"turn_deg": "x"}]]
+    for broken in refused:
+        assert simulate(pt, broken)["problem"]
+
+
+def test_the_list_shows_those_that_every_robot_knows(pt):
+    page = pt.get("/admin/rehab/gesture/").content.decode()
+    assert page.count("data-preview=") == len(GESTURES) + len(ORIGINALS) == 7
+    assert "Celebrate: a step ahead and a wiggle" in page
 
 
 def test_a_change_is_simulated_as_a_whole(pt):
@@ -133,8 +159,40 @@ def test_a_change_is_simulated_as_a_whole(pt):
 
 
 def test_one_that_is_no_gesture_any_more_says_so(pt, world):
-    """Limits may change with a release; what is stored is then refused, not drawn."""
+    """Limits may change with a release; what is stored is then refused."""
     broken = Gesture.everywhere.create(clinic=world.clinic, name="broken")
     broken.steps.create(position=1, forward_m=0.2)
-    for url in (f"/admin/rehab/gesture/{broken.pk}/change/", "/admin/rehab/gesture/"):
-        assert "It ends 20 cm from home" in pt.get(url).content.decode()
+    assert "It ends 20 cm from home" in pt.get("/admin/rehab/gesture/").content.decode()
+
+
+def test_lights_and_notes_are_written_a_line_each_and_played(pt):
+    tracks = {"lights": "0 orange\n\n 0.5 green green ", "notes": "0 440 0.1\n1.0 button"}
+    assert pt.post(ADD, gesture_form("wave", WAVE) | tracks).status_code == 302
+    wave = Gesture.everywhere.get(name="wave")
+    score = validate_gesture(wave.to_data()).score
+    assert [(one.at_s, one.first, one.second) for one in score.lights] == [
+        *((0, "orange", "off"), (0.5, "green", "green"))
+    ]
+    assert [(one.at_s, one.frequency_hz, one.melody) for one in score.notes] == [
+        *((0, 440, None), (1, 0, "button"))
+    ]
+
+
+@pytest.mark.parametrize(
+    ("tracks", "cure"),
+    [
+        ({"lights": "green"}, "Line 1 is not written like “0.5 green off”."),
+        ({"lights": "0 green\n0.5 green off off"}, "Line 2 is not written like “0.5 green off”."),
+        ({"lights": "0.5 red"}, "Light 1 is off, green or orange; red says that the robot"),
+        ({"notes": "0.5"}, "Line 1 is not written like “0.5 440 0.2”."),
+        ({"notes": "0.5 440 loud"}, "Line 1 is not written like “0.5 440 0.2”."),
+        ({"notes": "nan 440 0.1"}, "Note 1: at_s is a number from"),
+        ({"notes": "0.5 440 9"}, "Note 1: duration_s is a number from"),
+        ({"notes": "0.5 tune"}, "Note 1 has no such melody."),
+        ({"notes": "0 440 0.1\n" * 200}, "notes is a list of up to"),
+    ],
+)
+def test_tracks_that_no_robot_plays_are_refused_with_the_cure(pt, tracks, cure):
+    answer = pt.post(ADD, gesture_form("wave", WAVE) | tracks)
+    assert any(cure in one for one in complaints(answer)), complaints(answer)
+    assert not Gesture.everywhere.filter(name="wave").exists()

@@ -8,7 +8,11 @@ from io import StringIO
 import pytest
 from django.core.management import call_command
 
+from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
+from rehab.training.checkpoints import fold_to_json
+from tests.support.walks import walk
 from tests.support.world import build_world
 
 pytestmark = pytest.mark.django_db
@@ -22,10 +26,10 @@ def well_set_up(settings, tmp_path):
     settings.BROWSER_LIBRARIES = {name: tmp_path / name for name in settings.BROWSER_LIBRARIES}
 
 
-def ask() -> tuple[int, str]:
+def ask(**options: bool) -> tuple[int, str]:
     out = StringIO()
     try:
-        call_command("doctor", stdout=out)
+        call_command("doctor", stdout=out, **options)
     except SystemExit as ended:
         return int(str(ended.code)), out.getvalue()
     return 0, out.getvalue()
@@ -41,11 +45,26 @@ def test_a_sound_installation_is_well():
 def test_sessions_that_a_dead_process_left_are_named():
     world = build_world("amber")
     TrainingSession.everywhere.filter(pk=world.session.pk).update(state="running", owner="x|1|0")
-    TrainingSession.everywhere.filter(pk=world.session.pk).update(owner="")
     status, said = ask()
     assert status == 1
     assert f"1 left running by a process that is gone: {world.session.pk}" in said
     assert "Start the server" in said
+
+
+def test_logs_are_looked_through_on_demand():
+    world = build_world("amber")
+    session = walk(world.patient, "binary", [4.0] * 4, end=None)
+    fold = SessionAggregate.load(session).fold
+    TrainingSession.everywhere.filter(pk=session.pk).update(checkpoint=fold_to_json(fold))
+    assert "the same by checkpoint" in ask(deep=True)[1]
+    fold.feedback.points = 99
+    TrainingSession.everywhere.filter(pk=session.pk).update(checkpoint=fold_to_json(fold))
+    status, said = ask(deep=True)
+    assert status == 1
+    assert f"session {session.pk} is another one by its checkpoint" in said
+    TrainingSession.everywhere.filter(pk=session.pk).update(checkpoint=None)
+    Step.everywhere.filter(session=session, number=2).delete()
+    assert f"session {session.pk} lacks steps" in ask(deep=True)[1]
 
 
 def test_a_failing_child_is_named_with_its_last_words(tmp_path):

@@ -4,6 +4,7 @@ import sys
 
 import pytest
 
+from tests.support.extent import EVERYTHING
 from tests.support.robot_room import robot_room
 from tests.support.robot_stops import LINK_S, STOPS, kill_server
 
@@ -12,7 +13,7 @@ pytestmark = [
     pytest.mark.skipif(sys.platform == "win32", reason="no pty, no such signals"),
 ]
 
-ROUNDS = 2
+ROUNDS = 2 if EVERYTHING else 1
 
 
 @pytest.fixture(scope="module")

@@ -59,6 +59,7 @@ def expect_gestures(above: str | None, below: str | None) -> list[tuple[str, flo
         ("binary", "celebrate", "droop"),
     ],
 )
+@pytest.mark.long
 def test_a_recordings_gestures_are_those_of_the_oracle(valence, above, below):
     result = run(valence, "kinematic")
     expected = expect_gestures(above, below)

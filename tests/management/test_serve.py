@@ -17,9 +17,9 @@ from tests.support.servers import ROOT, clean_environment, serve
 pytestmark = pytest.mark.server
 
 
-@pytest.fixture
-def server(tmp_path):
-    with serve(tmp_path, new_machine=True) as running:
+@pytest.fixture(params=["daphne", "uvicorn"])
+def server(request, tmp_path):
+    with serve(tmp_path, "--server", request.param, new_machine=True) as running:
         yield running
 
 

@@ -34,12 +34,14 @@ async def walk_until_closed(
 ) -> tuple[list[int], dict[int, int]]:
     """Five viewers for each of ten walking sources; give close codes and what was acknowledged."""
     codes: list[int] = []
+    begun = asyncio.Semaphore(0)
     acknowledged: dict[int, int] = {}
 
     async def watch(row: dict[str, Any]) -> None:
         path = f"{url}/ws/session/{row['session']}/patient/"
         token = {"Authorization": f"Bearer {row['tablet']}"}
-        async with connect(path, additional_headers=token) as socket:
+        async with connect(path, additional_headers=token, open_timeout=60) as socket:
+            begun.release()
             try:
                 async for text in socket:
                     frame = json.loads(text).get("frame")
@@ -51,7 +53,8 @@ async def walk_until_closed(
 
     async def walk(row: dict[str, Any]) -> None:
         token = {"Authorization": f"Bearer {row['source']}"}
-        async with connect(f"{url}/ws/source/", additional_headers=token) as socket:
+        address = f"{url}/ws/source/"
+        async with connect(address, additional_headers=token, open_timeout=60) as socket:
             await socket.send('{"type":"hello","version":1,"run":"x","last":0}')
             await socket.recv()
 
@@ -67,6 +70,8 @@ async def walk_until_closed(
                     step = {"type": "step", "number": number, "time_s": number, "side": "left"}
                     await socket.send(json.dumps(step | {"value": 3.5}))
                     await asyncio.sleep(0.02)
+                    if number == 10:
+                        begun.release()
             except Exception:  # noqa: S110
                 pass
             hearing.cancel()
@@ -74,15 +79,17 @@ async def walk_until_closed(
 
     tasks = [asyncio.create_task(watch(row)) for row in rows for _ in range(5)]
     tasks += [asyncio.create_task(walk(row)) for row in rows]
-    await asyncio.sleep(1.5)
+    for _ in tasks:  # however long it takes until all of them watch and walk
+        await begun.acquire()
     stop()
     await asyncio.wait_for(asyncio.gather(*tasks), 15)
     return codes, acknowledged
 
 
 @pytest.mark.realtime
-def test_sigterm_with_fifty_viewers(tmp_path):
-    with serve(tmp_path) as server:
+@pytest.mark.parametrize("by", ["daphne", "uvicorn"])
+def test_sigterm_with_fifty_viewers(tmp_path, by):
+    with serve(tmp_path, "--server", by) as server:
         rows = json.loads(python(server, "-m", "tests.support.live_seed", "10"))
         codes, acknowledged = asyncio.run(
             walk_until_closed(

@@ -16,9 +16,9 @@ HEAD = b"POST /sign-in/ HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
 TOO_MUCH = 3 * 1024 * 1024
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with serve(tmp_path_factory.mktemp("data")) as running:
+@pytest.fixture(scope="module", params=["daphne", "uvicorn"])
+def server(request, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with serve(tmp_path_factory.mktemp("data"), "--server", request.param) as running:
         yield running
 
 
@@ -48,7 +48,7 @@ def test_the_server_hangs_up_on_a_body_without_end(server):
         (b"Transfer-Encoding: chunked\r\n", chunked(body)),
     ):
         answer = post(server, head, sent)
-        assert answer in {b"", b"HTTP/1.1 413 Content Too Large\r\n\r\n"}
+        assert answer == b"" or answer.startswith(b"HTTP/1.1 413 ")
     assert b"403" in post(server, b"Content-Length: 3\r\n", b"a=b")  # it serves on: no CSRF token
 
 

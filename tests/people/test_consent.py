@@ -17,7 +17,7 @@ from rehab.people.consent.services import (
     record_consent,
     withdraw_consent,
 )
-from rehab.people.models import Boards, Clinic, Patient
+from rehab.people.models import BoardsConsent, Clinic, Patient
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
@@ -150,7 +150,7 @@ def test_the_new_patient_form_notes_what_is_agreed_to(world, pt):
     assert pt.post(reverse("new-patient"), given).status_code == 302
     rosa = Patient.everywhere.get(code="R1")
     assert set(active_consents(rosa)) == {"care", "boards"}
-    assert rosa.boards == Boards.CLINIC
+    assert rosa.boards == BoardsConsent.CLINIC
     given |= {"code": "R2"}
     del given["agrees"]
     pt.post(reverse("new-patient"), given)
@@ -162,7 +162,7 @@ def test_the_new_patient_form_notes_what_is_agreed_to(world, pt):
 
 def test_boards_with_others_need_consent(world):
     patient = Patient.everywhere.create(clinic=world.clinic, code="n", nickname="N")
-    patient.boards = Boards.TOTAL
+    patient.boards = BoardsConsent.TOTAL
     with pytest.raises(ValidationError, match="consent to boards"):
         patient.full_clean()
     record_consent(patient, Purpose.BOARDS, None, NOW)
@@ -193,15 +193,15 @@ def test_every_level_of_boards_is_noted_and_who_goes_further_agrees_again(world,
     assert [row.level for row in rows] == ["total", "across", "clinic"]
     assert [row.withdrawn_at is None for row in rows] == [False, False, True]
     page = pt.get(reverse("consent", kwargs={"patient_id": world.patient.pk})).content.decode()
-    assert str(Boards.ACROSS.label) in page
+    assert str(BoardsConsent.ACROSS.label) in page
 
 
 def test_withdrawing_takes_the_patient_off_all_boards_at_once(world, pt):
     assert BoardEntry.everywhere.filter(patient=world.patient).exists()
     patient = tap(pt, world.patient, "boards", "own")
-    assert patient.boards == Boards.OWN
+    assert patient.boards == BoardsConsent.OWN
     assert not BoardEntry.everywhere.filter(patient=patient).exists()
-    assert tap(pt, patient, "boards", "total").boards == Boards.TOTAL
+    assert tap(pt, patient, "boards", "total").boards == BoardsConsent.TOTAL
     assert "boards" in active_consents(patient)
 
 

@@ -47,6 +47,7 @@ def test_a_change_tells_the_field_before_and_after_and_who_did_it(world):
 
 def test_a_program_is_named_beside_its_person(world):
     row = ApiToken(clinic=world.clinic, user=world.people[Role.LEAD], name="nightly", role=Role.PT)
+    row.may_steer = True
     token = row.new_token()
     row.save()
     answer = Client(headers={"Authorization": f"Bearer {token}"}).patch(

@@ -77,7 +77,7 @@ def test_an_account_takes_no_language_that_there_is_not(world, pt):
 def test_what_a_patient_reads_is_in_the_patients_language(world, pt):
     Patient.everywhere.filter(pk=world.patient.pk).update(language="es")
     open_one = TrainingSession.everywhere.get(pk=world.session.pk)
-    open_one.pk, open_one.state = None, "ready"
+    open_one.pk, open_one.state, open_one.started_at = None, "ready", None
     open_one.save()
     tablet = paired(world)
     for path in (

@@ -10,6 +10,7 @@ import pytest
 from django.contrib import admin
 from django.test import Client
 from django.urls import reverse
+from django.utils.text import capfirst
 
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
@@ -30,6 +31,16 @@ def list_of(model: type) -> str:
 def is_refused(client: Client, url: str, **asked: str) -> bool:
     answer = client.get(url, asked)
     return answer.status_code == 400 or answer.headers.get("Location", "").endswith("?e=1")
+
+
+def test_a_list_is_called_what_it_lists(world):
+    client, titled = client_of(world, Role.LEAD), 0
+    for model in REGISTERED:
+        page = client.get(list_of(model))
+        if page.status_code == 200 and "cl" in page.context:
+            assert page.context["title"] == capfirst(model._meta.verbose_name_plural)
+            titled += 1
+    assert titled > 10
 
 
 def test_a_researcher_cannot_ask_letter_by_letter_what_is_hidden(world):
@@ -67,7 +78,13 @@ def test_the_check_above_finds_a_list_that_takes_any_field(world, monkeypatch):
     assert not is_refused(client_of(world, Role.LEAD), url, name__icontains="1")
 
 
-@pytest.mark.parametrize("role", [Role.LEAD, Role.PT, Role.RESEARCHER])
+@pytest.mark.parametrize(
+    "role",
+    [
+        Role.RESEARCHER,
+        *(pytest.param(role, marks=pytest.mark.long) for role in (Role.LEAD, Role.PT)),
+    ],
+)
 def test_every_link_on_a_list_and_on_a_rows_page_leads_somewhere(world, role):
     """Filters, days, columns, and what a session's page says of its log."""
     client = client_of(world, role)

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.django_db
 
 def test_the_front_page_says_what_can_be_done(client):
     page = client.get("/").content.decode()
-    for words in ("Positive", "Negative", "Binary", "Explicit", "runsession", "Sign in"):
+    for words in ("Positive", "Negative", "Binary", "Explicit", "Like last time", "Sign in"):
         assert words in page
 
 
@@ -93,7 +93,7 @@ def test_a_new_devices_token_is_shown_once_and_opens_until_revoked(world):
     client = client_of(world, Role.LEAD)
     form = {"station": world.rows[Station].pk, "kind": "source", "name": "Treadmill"}
     page = client.post("/admin/rehab/device/add/", form, follow=True).content.decode()
-    token = re.search(r"one time only: (\S+?)<", page).group(1)
+    token = re.search(r'class="token">(\S+?)<', page).group(1)
     device = Device.everywhere.get(name="Treadmill")
     assert find_device(token, NOW) == device
     assert token not in client.get("/admin/rehab/device/").content.decode()

@@ -22,7 +22,7 @@ from rehab.people.consent.services import (
     record_consent,
     withdraw_consent,
 )
-from rehab.people.models import Boards, ErasureReason, Patient
+from rehab.people.models import BoardsConsent, ErasureReason, Patient
 from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.services import SessionRequest, create_session
@@ -86,20 +86,20 @@ def test_who_leaves_the_boards_while_somebody_saves_has_left_them(save, world, m
     between(monkeypatch, lambda: client_of(world).post(leave))
     assert save(world).status_code in (200, 302)
     stored = Patient.everywhere.get(pk=world.patient.pk)
-    assert stored.boards == Boards.OWN
+    assert stored.boards == BoardsConsent.OWN
     assert "boards" not in active_consents(stored)
     assert not BoardEntry.everywhere.filter(patient=stored).exists()
 
 
 def test_whoever_read_the_patient_before_withdraws_and_erases_what_is_there_now(world):
     early, erasing = (Patient.everywhere.get(pk=world.patient.pk) for _ in range(2))
-    early.boards = erasing.boards = Boards.OWN  # read before the patient joined
+    early.boards = erasing.boards = BoardsConsent.OWN  # read before the patient joined
     withdraw_consent(early, Purpose.BOARDS, None, NOW)
-    assert Patient.everywhere.get(pk=early.pk).boards == Boards.OWN
-    record_boards_consent(world.patient, Boards.ACROSS, None, NOW)
+    assert Patient.everywhere.get(pk=early.pk).boards == BoardsConsent.OWN
+    record_boards_consent(world.patient, BoardsConsent.ACROSS, None, NOW)
     erase(erasing, ErasureReason.ASKED, None, NOW)
     stored = Patient.everywhere.get(pk=early.pk)
-    assert (stored.boards, stored.alias) == (Boards.OWN, None)
+    assert (stored.boards, stored.alias) == (BoardsConsent.OWN, None)
     assert not BoardEntry.everywhere.filter(patient=stored).exists()
 
 
@@ -108,9 +108,9 @@ def test_nobody_agrees_joins_or_walks_for_a_person_who_was_just_erased(world):
     erase(world.patient, ErasureReason.ASKED, None, NOW)
     agreed = Consent.everywhere.count()
     record_consent(stale[0], Purpose.CARE, None, NOW)
-    record_boards_consent(stale[1], Boards.CLINIC, None, NOW)
+    record_boards_consent(stale[1], BoardsConsent.CLINIC, None, NOW)
     assert Consent.everywhere.count() == agreed
-    assert Patient.everywhere.get(pk=world.patient.pk).boards == Boards.OWN
+    assert Patient.everywhere.get(pk=world.patient.pk).boards == BoardsConsent.OWN
     walked = world.session
     with pytest.raises(InvalidSetting, match="has ended"):
         create_session(

@@ -17,7 +17,7 @@ from django.utils.translation import override
 from rehab.people.models import Clinic, Patient
 from rehab.people.roles import Role
 from rehab.people.web.refusals import format_refusal
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind, NotAllowed, State
 from rehab.training.controls import CONTROLS
@@ -142,6 +142,7 @@ def test_a_preset_is_refused_in_spanish(world):
     data = {
         "name": "x",
         "valence": "positive",
+        "measure": world.rows[Measure].pk,
         "goal_by": "value",
         "robot": "normal",
         "robot_above": "(usual)",

@@ -100,7 +100,8 @@ def test_a_kobuki_plays_it_announced():
         assert main(["gesture", "nod", "--base", "kobuki", "--port", kobuki.url]) == 0
         moved_s = next(at_s for at_s, speed, _ in kobuki.orders if speed)
         assert moved_s - began_s > 0.5
-        assert kobuki.melodies == [3]
+        assert kobuki.notes == [(826, 120)]  # 440 Hz, 0.12 s
+        assert kobuki.melodies == []
         assert not kobuki.is_moving
 
 
@@ -110,22 +111,52 @@ def test_a_kobuki_that_is_not_there_plays_nothing(capsys):
     assert "base_silent" in capsys.readouterr().out
 
 
+def start(*words):
+    return subprocess.Popen(
+        [sys.executable, "-W", "error", "-m", "robot", "gesture", *words],
+        cwd=ROOT,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=hear_sigint,  # noqa: PLW1509 (it takes no lock)
+    )
+
+
 @pytest.mark.realtime
 @POSIX
-def test_ctrl_c_stops_a_kobuki():
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_stops_a_kobuki(name):
     with FakeKobuki() as kobuki:
-        words = ["gesture", "celebrate", "--base", "kobuki", "--port", kobuki.url]
-        process = subprocess.Popen(
-            [sys.executable, "-W", "error", "-m", "robot", *words],
-            cwd=ROOT,
-            stderr=subprocess.PIPE,
-            text=True,
-            preexec_fn=hear_sigint,  # noqa: PLW1509 (it takes no lock)
-        )
+        process = start("celebrate", "--base", "kobuki", "--port", kobuki.url)
         kobuki.until(lambda: kobuki.is_moving)
         since_s = time.monotonic()
-        process.send_signal(signal.SIGINT)
+        process.send_signal(getattr(signal, name))
+        process.send_signal(signal.SIGTERM)  # an impatient one disturbs nothing
         _, said = process.communicate(timeout=10)
-        assert process.returncode == 130, said
+        assert process.returncode == 128 + getattr(signal, name), said
         assert kobuki.moved_after(since_s) < 0.35
         assert "Traceback" not in said
+
+
+@pytest.mark.realtime
+@POSIX
+def test_a_port_that_is_lost_in_a_gesture_gets_its_stop_when_it_is_back(tmp_path):
+    port = tmp_path / "kobuki"
+    with FakeKobuki() as kobuki:
+        port.symlink_to(kobuki.url)
+        process = start("celebrate", "--base", "kobuki", "--port", str(port))
+        kobuki.until(lambda: kobuki.is_moving)
+        port.unlink()
+        kobuki.unplug()
+        time.sleep(1.5)
+        assert process.poll() is None
+        with FakeKobuki() as again:
+            back_s = time.monotonic()
+            port.symlink_to(again.url)
+            again.until(lambda: len(again.orders) >= 3)
+            assert time.monotonic() - back_s < 0.3
+            _, said = process.communicate(timeout=10)
+            assert not any(speed for _, speed, _ in again.orders)
+    assert process.returncode == 1
+    assert "switch it off" in said
+    assert "was stopped" in said
+    assert "Traceback" not in said

@@ -2,11 +2,14 @@
 
 import pytest
 
+from robot.bases.kinematic import KinematicBase
 from robot.simulation import Simulation
-from tests.support.robot_stage import CUE
+from tests.support.robot_stage import CUE, WELCOME, Stage
 
 
-def test_a_simulation_is_a_live_robot_on_another_clock(stage):
+def test_a_simulation_is_a_live_robot_on_another_clock():
+    stage = Stage(KinematicBase)
+    stage.hear(**WELCOME)
     performances = [0.5 + (number * 37 % 60) / 60 for number in range(60)]
     stage.walk(*performances)
     stage.wait(5)

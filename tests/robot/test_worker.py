@@ -8,18 +8,21 @@ from functools import partial
 import pytest
 
 from robot.bases import BASES, Abilities, BaseLost
-from robot.bases.kinematic import KinematicBase
+from robot.black_box import recorder
+from robot.black_box.recorder import BlackBox
 from robot.link import REFUSALS, Link, LinkRefused, Timing
 from robot.motion.twist import STILL
 from robot.wire.close_codes import CloseCode
+from robot.wire.incident import unpack
 from robot.worker import Worker
 from tests.support.fake_robot_server import TOKEN, FakeGarry, serve_garry
+from tests.support.robot_stage import IdealBase
 
 FAST = Timing(retry_first_s=0.02, retry_longest_s=0.1)
 ENDING = REFUSALS.keys() - {CloseCode.NOT_PROTOCOL}  # of the close codes, those that end the work
 
 
-class RealBase(KinematicBase):
+class RealBase(IdealBase):
     """A base that no program may arm."""
 
     abilities = Abilities(simulated=False, moves=True)
@@ -33,10 +36,11 @@ async def garry():
 
 
 @asynccontextmanager
-async def working(garry, base=None, token=TOKEN, said=None):
-    base = base or BASES["kinematic"](time.monotonic)
+async def working(garry, base=None, token=TOKEN, said=None, box=None):
+    base = base or IdealBase(time.monotonic)
     notice = (lambda _: None) if said is None else said.append
-    worker = Worker(partial(Link, garry.url, token, timing=FAST), base, notice=notice)
+    dial = partial(Link, garry.url, token, timing=FAST)
+    worker = Worker(dial, base, notice=notice, black_box=box)
     task = asyncio.create_task(worker.run())
     try:
         yield worker
@@ -72,7 +76,7 @@ async def test_it_says_hello_decides_performs_and_reports(garry):
 
 @pytest.mark.realtime
 async def test_a_stop_is_at_the_base_within_a_tenth_of_a_second(garry):
-    base = BASES["kinematic"](time.monotonic)
+    base = IdealBase(time.monotonic)
     async with working(garry, base):
         await garry.until_hello(1)
         await garry.walk(0, 1, 2, 3, 4, 5)
@@ -86,7 +90,7 @@ async def test_a_stop_is_at_the_base_within_a_tenth_of_a_second(garry):
 
 @pytest.mark.realtime
 async def test_silence_stops_it_and_what_was_on_its_way_counts_no_more(garry):
-    base = BASES["kinematic"](time.monotonic)
+    base = IdealBase(time.monotonic)
     said: list[str] = []
     async with working(garry, base, said=said):
         await garry.until_hello(1)
@@ -105,7 +109,7 @@ async def test_silence_stops_it_and_what_was_on_its_way_counts_no_more(garry):
 
 @pytest.mark.realtime
 async def test_a_server_that_goes_stops_it_and_is_found_again():
-    garry, base = FakeGarry(), BASES["kinematic"](time.monotonic)
+    garry, base = FakeGarry(), IdealBase(time.monotonic)
     async with serve_garry(garry) as server:
         port = server.sockets[0].getsockname()[1]
         async with working(garry, base):
@@ -163,7 +167,7 @@ async def test_a_server_that_refuses_every_report_is_not_hammered(garry):
         await asyncio.sleep(0)
 
     dial = partial(Link, garry.url, TOKEN, timing=FAST, jitter=lambda: 0.0, sleep=sleep)
-    worker = Worker(dial, BASES["kinematic"](time.monotonic))
+    worker = Worker(dial, IdealBase(time.monotonic))
     task = asyncio.create_task(worker.run())
     for count in range(1, 5):
         await garry.until_hello(count)
@@ -204,7 +208,7 @@ async def test_a_refusal_ends_it(garry):
 
 
 async def test_a_base_that_is_lost_ends_it(garry):
-    class Unplugged(KinematicBase):
+    class Unplugged(IdealBase):
         def read(self):
             raise BaseLost("The base is unplugged.")
 
@@ -215,3 +219,45 @@ async def test_a_base_that_is_lost_ends_it(garry):
     with pytest.raises(BaseLost, match="unplugged"):
         async with asyncio.timeout(5):
             await worker.run()
+
+
+@pytest.mark.realtime
+async def test_what_was_recorded_around_a_stop_is_sent_once_to_its_own_session(
+    garry, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(recorder, "AFTER_S", 0.3)
+    monkeypatch.setattr(recorder, "WRITE_EVERY_S", 0.05)
+    with BlackBox(tmp_path) as box:
+        async with working(garry, box=box):
+            await garry.until_hello(1)
+            await garry.walk(0, 1, 2, 3, 4, 5)
+            await garry.until(is_kind("status", state="performing"))
+            await asyncio.sleep(0.8)
+            await garry.tell(type="stop")
+            async with asyncio.timeout(10):
+                while not garry.incidents:  # noqa: ASYNC110
+                    await asyncio.sleep(0.01)
+            await asyncio.sleep(0.3)
+    (incident,) = garry.incidents
+    assert (incident["session"], incident["reason"]) == (7, "stopped")
+    assert 0.3 <= incident["ago_s"] < 5
+    records = unpack(incident["recording"])
+    assert {"type": "stop"} in [one.get("heard") for one in records]
+    assert any(any(one["tick"][:2]) for one in records if "tick" in one)
+
+
+@pytest.mark.realtime
+async def test_another_session_gets_nothing_of_the_one_before(garry, tmp_path, monkeypatch):
+    monkeypatch.setattr(recorder, "AFTER_S", 0.3)
+    monkeypatch.setattr(recorder, "WRITE_EVERY_S", 0.05)
+    with BlackBox(tmp_path) as box:
+        async with working(garry, box=box):
+            await garry.until_hello(1)
+            await garry.tell(type="stop")
+            await garry.tell(**garry.welcome | {"session": 8})
+            async with asyncio.timeout(10):
+                while not list(tmp_path.glob("incident-*")):  # noqa: ASYNC110
+                    await asyncio.sleep(0.01)
+            await asyncio.sleep(0.3)
+        assert not box.incidents
+    assert garry.incidents == []

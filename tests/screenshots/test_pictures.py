@@ -40,6 +40,8 @@ PAGES = {
     "feedback": "/admin/rehab/feedbacktype/add/?slug=binary",
     "feedback-types": "/admin/rehab/feedbacktype/",
     "gesture": "/admin/rehab/gesture/1/change/",
+    "ending": "/sessions/12/ending/",
+    "ending-explicit": "/sessions/4/ending/",
     "scores-points": "/sessions/12/scores/",
     "scores-kept": "/sessions/11/scores/",
     "past-sessions": "/patients/2/sessions/",
@@ -52,6 +54,7 @@ PAGES = {
     "screen": "/patients/2/screen/",
     "pairing": "/tablet/",
     "pair": "/tablets/pair/",
+    "check-recording": "/recordings/check/",
     "set-up": "/patients/2/new/",
     "set-up-preset": "/patients/2/new/?preset=1",
     "correct": "/sessions/12/correct/",
@@ -75,7 +78,7 @@ from rehab.people.models import Patient, User
 from rehab.sessions.corrections import CorrectedField, correct_session
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.sessions.setup.presets import Preset
 from rehab.patients.visits import plan_visit
 from rehab.stations.models import Device, Station
@@ -113,7 +116,8 @@ for name, valence, percent, minutes in (
 ):
     Preset.everywhere.create(
         clinic=first_clinic(), name=name, valence=valence, goal_by="percent", goal_percent=percent,
-        wanted_hits=60, minutes=minutes, protocol=blocks,
+        measure=Measure.everywhere.get(clinic=None, slug="a2"), protocol=blocks,
+        wanted_hits=60, minutes=minutes,
     )
 for station, kind, name, seen in (
     ("Treadmill 1", "tablet", "Tablet by the window", True),

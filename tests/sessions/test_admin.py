@@ -22,7 +22,7 @@ from rehab.people.roles import Role
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.presets import Preset
-from rehab.sessions.setup.protocols import Protocol, ProtocolPhase
+from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Station, find_device
 from tests.support.walks import strides, walk
 from tests.support.world import NOW, World, build_world, client_of
@@ -165,6 +165,7 @@ def multiply(world: World) -> None:
             clinic=world.clinic,
             name=f"More {number}",
             valence="binary",
+            measure=Measure.everywhere.get(clinic=None, slug="a2"),
             goal_value=2,
             protocol=protocol,
         )
@@ -285,6 +286,9 @@ def test_what_is_drawn_is_what_is_stored(world, protocol):
         "gain": 1.0,
         "strides": None,
         "seconds": 120.0,
+        "goal_percent": None,
+        "robot": True,
+        "rest_s": None,
     }
 
 
@@ -322,7 +326,8 @@ def test_nobody_copies_another_clinics_protocol_and_a_researcher_none(world):
 def test_a_token_is_renewed_and_revoked_from_the_devices_page(world):
     page = reverse("admin:rehab_device_change", args=[world.device.pk])
     answer = act(world, "device", "renew_tokens", world.device.pk, Role.LEAD)
-    assert answer.headers["Location"] == page
+    token = re.search(r'class="token">(\S+?)<', answer.content.decode()).group(1)
+    assert find_device(token, NOW) == world.device
     assert find_device(world.token, NOW) is None
     act(world, "device", "revoke_tokens", world.device.pk, Role.LEAD)
     told = client_of(world, Role.LEAD).get(page).content.decode()

@@ -111,7 +111,7 @@ def test_chips_count_each_type_and_filter_by_it(client, patient):
 
 
 def test_a_new_patient_has_no_sessions_yet(client, patient):
-    assert "What Rosa walks will stand here." in history(client, patient)
+    assert "The sessions of Rosa will be listed here." in history(client, patient)
 
 
 def test_many_sessions_come_in_pages_at_the_same_cost(client, patient, django_assert_num_queries):
@@ -119,9 +119,9 @@ def test_many_sessions_come_in_pages_at_the_same_cost(client, patient, django_as
         walk(patient, "positive", strides(3, 2), days_ago=index)
     url = reverse("history", kwargs={"patient_id": patient.pk})
     client.get(url)  # once a minute it is noted that somebody is there
-    with django_assert_num_queries(10):
+    with django_assert_num_queries(11):
         first = client.get(url).content.decode()
-    with django_assert_num_queries(10):
+    with django_assert_num_queries(11):
         second = client.get(f"{url}?page=2").content.decode()
     assert len(items(first)) == 20
     assert len(items(second)) == 3
@@ -180,6 +180,23 @@ def test_the_trend_has_the_newest_sessions_oldest_first(world, patient):
     assert dates == sorted(dates)
     newest = patient.sessions.filter(state="finished").order_by("-created_at").first()
     assert trend[-1].session == newest
+
+
+def test_an_imported_session_is_in_the_trend_with_its_points(client, world, patient):
+    imported, own = (walk(patient, "positive", strides(3, 1), days_ago=n) for n in (2, 1))
+    type(own).everywhere.filter(pk=imported.pk).update(legacy_id=9)
+    imported.metrics.exclude(slug="score").delete()
+    pt, mine = world.people[Role.PT], patient.sessions.all()
+    trend = load_trend(pt, mine, with_imported=True)
+    assert [(p.session.pk, p.hit_rate, p.score) for p in trend] == [
+        (imported.pk, None, 3),
+        (own.pk, 0.75, 3),
+    ]
+    assert [point.session.pk for point in load_trend(pt, mine)] == [own.pk]
+    page = client.get(f"/patients/{patient.pk}/sessions/")
+    assert page.context["chart"]["hits"]["hit"] == [None, 75.0]
+    assert page.context["chart"]["hits"]["days"][0].endswith("· imported")
+    assert page.context["totals"]["hit_rate"] == "75\N{NO-BREAK SPACE}%"
 
 
 def test_what_was_walked_and_what_was_simulated_share_no_figure(client, patient):
@@ -344,7 +361,7 @@ def test_thousands_of_strides_are_told_by_few_queries(client, patient, django_as
     session = walk(patient, "binary", strides(2000, 1000))
     url = reverse("session", kwargs={"session_id": session.pk})
     client.get(url)  # what is seen is noted once in some minutes
-    with django_assert_num_queries(8):
+    with django_assert_num_queries(9):
         page = client.get(url).content.decode()
     assert len(read_json(page, "session")["strides"]["number"]) == 3000
     assert len(page) < 150_000

@@ -7,23 +7,25 @@ from datetime import datetime, timedelta
 from typing import Any
 
 import pytest
-from django.db import IntegrityError
+from django.db import connection
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rehab.people.models import Clinic, Patient
 from rehab.people.scope import CrossClinicReference
 from rehab.sessions.live.aggregate import SessionAggregate, StepRow
-from rehab.sessions.live.writer import STEP_COLUMNS
+from rehab.sessions.live.commits import STEP_COLUMNS, LogDiffers
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind, NotAllowed
+from rehab.training.checkpoints import fold_to_json
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from rehab.training.metrics import compute_metrics
 from rehab.training.phases import make_phase
+from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import Measurement, Side
 from tests.support.world import NOW, store
 
@@ -88,7 +90,7 @@ def test_every_field_of_a_step_is_kept(patient):
         "valid": True,
         "reasons": [],
         "phase": 0,
-        "rules_version": 1,
+        "rules_version": RULES_VERSION,
         "extra": {"step_length_m": 0.5},
     }
 
@@ -148,7 +150,9 @@ def test_a_number_that_is_taken_writes_nothing_of_its_batch(patient):
     walk(aggregate, 4.0)
     again = aggregate.record_step(Measurement(2, 2.2, Side.LEFT, 4.0), NOW)
     taken = again._replace(step=dataclasses.replace(again.step, number=1))
-    with pytest.raises(IntegrityError):
+    with pytest.raises(LogDiffers):
+        store(aggregate, [taken])
+    with pytest.raises(LogDiffers):
         store(aggregate, [again, taken])
     assert Step.everywhere.count() == 1
 
@@ -211,6 +215,35 @@ def test_folding_the_log_rebuilds_the_actor_exactly(patient, actions):
     stored = Step.everywhere.filter(session=session)
     points = sum(step.points or 0 for step in stored)
     assert points == (aggregate.fold.score or 0)
+
+
+def test_old_sessions_fold_by_the_rules_that_they_were_stored_with(patient):
+    """Strides of two legs that overtake each other: version 1 doubted them, version 2 does not."""
+    aggregate = begin(patient)
+    strides = [(1.0, "left", 1), (1.6, "right", 1), (1.5, "left", 1), (2.1, "right", None)]
+    for number, (time_s, side, version) in enumerate([*strides, (2.05, "left", None)], 1):
+        stride = Measurement(number, time_s, Side(side), 4.0, rules_version=version)
+        store(aggregate, [aggregate.record_step(stride, NOW)])
+    stored = Step.everywhere.order_by("number").values_list("rules_version", "valid")
+    assert list(stored) == [(1, True), (1, True), (1, False), (2, True), (2, True)]
+    rebuilt = SessionAggregate.load(reread(aggregate))
+    assert fold_state(rebuilt) == fold_state(aggregate)
+
+
+def test_a_checkpoint_that_is_ahead_of_its_log_is_not_used(patient):
+    aggregate = begin(patient)
+    walk(aggregate, 4.0, 4.0)
+    session = reread(aggregate)
+    session.checkpoint = fold_to_json(aggregate.fold) | {"last_number": 9}
+    assert fold_state(SessionAggregate.load(session)) == fold_state(aggregate)
+
+
+def test_steps_are_indexed_once():
+    with connection.cursor() as cursor:
+        found = connection.introspection.get_constraints(cursor, Step._meta.db_table)
+    indexes = [tuple(one["columns"]) for one in found.values() if one["index"] or one["unique"]]
+    assert indexes.count(("session_id", "number")) == 1
+    assert ("session_id",) not in indexes
 
 
 def test_what_could_not_have_been_is_passed_over_and_nothing_else_is_lost(patient, caplog):

@@ -12,8 +12,9 @@ from rehab.gestures.models import Gesture
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.setup.answers import USUAL_ANSWERS
 from rehab.sessions.setup.presets import Preset
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.models import Station
 from tests.support.world import World, build_world, client_of, mark
 
@@ -42,6 +43,7 @@ def preset_of(world: World, **fields: object) -> Preset:
             "clinic": world.clinic,
             "name": "Challenge",
             "valence": "binary",
+            "measure": Measure.everywhere.get(clinic=None, slug="a2"),
             "goal_by": "percent",
             "goal_percent": 118,
             "wanted_hits": 70,
@@ -50,6 +52,13 @@ def preset_of(world: World, **fields: object) -> Preset:
             "robot": "gentle",
             "robot_above": "nod",
             "robot_below": "(nothing)",
+            "robot_threshold": 80,
+            "robot_answers": "streaks",
+            "robot_count": 4,
+            "robot_rest": 20,
+            "schedule": "faded",
+            "schedule_steps": 5,
+            "goal_follows": "automatic",
         }
         | fields
     )
@@ -66,6 +75,8 @@ def filled(page: str) -> dict[str, str]:
         if "checked" in tag:
             name = re.search(r'name="(\w+)"', tag)[1]
             found[name] = re.search(r'value="([^"]*)"', tag)[1]
+    for tag in re.findall(r"<input type=\"number\"[^>]*>", page):
+        found[re.search(r'name="(\w+)"', tag)[1]] = re.search(r'value="([^"]*)"', tag)[1]
     for name, options in re.findall(r'<select name="(\w+)"[^>]*>(.*?)</select>', page, re.DOTALL):
         found[name] = re.search(r'value="([^"]*)" selected', options)[1]
     return found
@@ -80,6 +91,7 @@ def test_one_tap_fills_the_set_up_and_leaves_person_and_place(pt, world, patient
     chosen = filled(pt.get(f"{url}?preset={preset.pk}").content.decode())
     assert chosen == {
         "valence": "binary",
+        "measure": str(preset.measure_id),
         "goal_by": "percent",
         "goal_value": "3.90",
         "goal_percent": "118",
@@ -89,6 +101,15 @@ def test_one_tap_fills_the_set_up_and_leaves_person_and_place(pt, world, patient
         "robot": "gentle",
         "robot_above": "nod",
         "robot_below": "(nothing)",
+        "robot_threshold": "80",
+        "robot_answers": "streaks",
+        "robot_window": "5.0",
+        "robot_count": "4",
+        "robot_rest": "20.0",
+        "schedule": "faded",
+        "schedule_steps": "5",
+        "schedule_band": "10",
+        "goal_follows": "automatic",
         "source": "live",
         "trained_side": "right",
         "station": chosen["station"],
@@ -183,7 +204,7 @@ def test_a_name_that_somebody_else_takes_this_moment_is_told(pt, world, patient,
     [
         ({"goal_by": "percent"}, "needs a baseline phase"),
         ({"goal_value": ""}, "either as a value or as percent"),
-        ({"goal_value": "16"}, "less than or equal to 15"),
+        ({"goal_value": "16"}, "above 0 and up to 15 W/kg"),
         ({"preset_name": "Challenge"}, "A preset of this name exists"),
         ({"valence": "kind"}, "Select a valid choice"),
     ],
@@ -203,12 +224,14 @@ def test_the_admin_refuses_what_could_not_be_walked(pt, world):
     form = {
         "name": "New one",
         "valence": "positive",
+        "measure": Measure.everywhere.get(clinic=None, slug="a2").pk,
         "protocol": protocol("Training only").pk,
         "goal_by": "percent",
         "goal_percent": "100",
         "robot": "normal",
         "robot_above": "(usual)",
         "robot_below": "(usual)",
+        **{name: value for name, value in USUAL_ANSWERS.items() if value is not False},
     }
     page = pt.post("/admin/rehab/preset/add/", form)
     assert "needs a baseline phase" in page.content.decode()

@@ -13,7 +13,7 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.models import Patient
 from rehab.people.roles import Role
-from rehab.sessions.log import SessionEvent
+from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.report import report_context
 from rehab.sessions.reports.report_chart import draw_chart
@@ -89,10 +89,19 @@ def test_what_was_noted_stands_with_its_times_adverse_first(world, patient):
     note(session, "robot_stop")
     words, at = read(world, session), f"{HERE:%H:%M}"
     assert f"! Fall 2 ×: {at}, {at} Rest 1 ×: {at} Exertion (Borg): 4 ({at}), 7 ({at})" in words
-    assert (
-        "1 gesture, 2 of 3 windows of five seconds at or above its threshold, stopped once."
-        in words
-    )
+    assert "1 gesture, 2 of 3 decisions at or above its threshold, stopped once." in words
+
+
+def test_a_fall_stands_with_how_badly_it_hurt_and_a_withdrawn_one_not_at_all(world, patient):
+    session = walk(patient, "binary", [HIT, MISS])
+    for kind, value in [("fall", None), ("fall_severity", 2), ("fall", None)]:
+        note(session, kind, value)
+    note(session, "fall_withdrawn")
+    assert f"! Fall 1 ×: {HERE:%H:%M} (moderately hurt)" in read(world, session)
+    other = walk(patient, "binary", [HIT, MISS])
+    note(other, "fall")
+    note(other, "fall_withdrawn")
+    assert "Fall" not in read(world, other)
 
 
 def test_of_many_events_the_count_is_right_and_the_list_short(world, patient):
@@ -104,6 +113,19 @@ def test_of_many_events_the_count_is_right_and_the_list_short(world, patient):
     assert f"! Pain 400 ×: {at}, {at}, {at}, {at}, {at}, … 394 more …, {at}" in words
     assert "… 24 changes more … → 2.30 W/kg" in words
     assert len(words) < 2_500
+
+
+def test_what_else_was_measured_stands_as_its_mean(world, patient):
+    session = walk(patient, "positive", [HIT, MISS, HIT, None, (RIGHT, HIT)])
+    extras = [
+        {"heart_rate": 100, "flag_late": 1, "sent_value": 4},
+        {"heart_rate": 103},
+        {"power": 2},
+    ]
+    extras += [{"heart_rate": 1}, {"heart_rate": 1}]  # an invalid stride, and the other leg
+    for number, extra in enumerate(extras, 1):
+        Step.everywhere.filter(session=session, number=number).update(extra=extra)
+    assert "Also measured, mean heart_rate 102 · power 2.00 Notes" in read(world, session)
 
 
 def test_a_researcher_reads_a_pseudonym(world, patient):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from django.test import Client
 
@@ -10,11 +12,13 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, change_session, create_session
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.models import Station
 from rehab.training.changes import ChangeKind
+from rehab.training.cueing import CueRule, CueTiming
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
+from rehab.training.schedules import Schedule, ScheduleKind
 from rehab.training.valences import CueGestures
 from robot.motion.gesture_spec import parse_gesture
 from robot.motion.pose import HOME
@@ -60,6 +64,13 @@ def choices(place: Station, protocol: str = "Training only", **others: object) -
     }
 
 
+def a_pulse(world) -> Measure:
+    return Measure.everywhere.create(
+        clinic=world.clinic, slug="pulse", name="heart rate", unit="1/min", channel="heart_rate",
+        value_min=30, value_max=220, goal_min=40, goal_max=200, first_goal=110,
+    )  # fmt: skip
+
+
 def newest() -> TrainingSession:
     return TrainingSession.everywhere.order_by("pk").last()
 
@@ -100,11 +111,36 @@ def test_a_goal_in_percent_waits_for_its_baseline(pt, patient, station):
     assert newest().goal is None
 
 
+def test_any_measure_of_the_clinic_can_be_trained(pt, patient, station, world):
+    pulse = a_pulse(world)
+    url = f"/patients/{patient.pk}/new/"
+    page = pt.get(url).content.decode()
+    assert "heart rate [1/min]" in page
+    assert "W/kg" in page
+    chosen = choices(station, measure=pulse.pk, goal_value="112.5")
+    refused = pt.post(url, chosen | {"goal_value": "3"}).content.decode()
+    assert "Give one above 40 and up to 200 1/min." in refused
+    assert 'data-step="0.5"' in refused
+    refused = pt.post(url, chosen | {"source": "synthetic good"}).content.decode()
+    assert "Simulated patients walk with A2 only" in refused
+    pt.post(url, chosen)
+    session = newest()
+    assert session.measure == pulse
+    assert session.to_plan().measure == pulse.to_rule()
+    TrainingSession.everywhere.filter(pk=session.pk).update(state="aborted")
+    again = pt.get(url).content.decode()  # like last time
+    assert 'value="112.5"' in again
+    assert re.search(r"goal\s+112.5\s+1/min", pt.get(f"/patients/{patient.pk}/").content.decode())
+    birch = build_world("birch")
+    other = Measure.everywhere.get(clinic=birch.clinic)
+    assert "Select a valid choice" in pt.post(url, chosen | {"measure": other.pk}).content.decode()
+
+
 @pytest.mark.parametrize(
     ("field", "value", "words"),
     [
-        ("goal_value", "0", "greater than or equal to 0.05"),
-        ("goal_value", "16", "less than or equal to 15"),
+        ("goal_value", "0", "above 0 and up to 15 W/kg"),
+        ("goal_value", "16", "above 0 and up to 15 W/kg"),
         ("goal_value", "nan", "Goal value: Enter a number"),
         ("goal_value", "", "either as a value or as percent"),
         ("wanted_hits", "101", "less than or equal to 100"),
@@ -150,13 +186,28 @@ def test_nobody_begins_where_somebody_else_may_be_walking(pt, patient, station, 
 
 @pytest.mark.django_db(transaction=True)  # the writer has its own connection
 def test_like_last_time_offers_what_the_last_session_was(pt, patient, station):
-    pt.post(f"/patients/{patient.pk}/new/", choices(station, source="synthetic poor"))
+    answers = {
+        "robot_threshold": "80",
+        "robot_answers": "streaks",
+        "robot_count": "4",
+        "robot_rest": "20",
+        "schedule": "faded",
+        "schedule_steps": "3",
+        "goal_follows": "automatic",
+    }
+    pt.post(f"/patients/{patient.pk}/new/", choices(station, source="synthetic poor", **answers))
     session = newest()
+    plan = session.to_plan()
+    assert (plan.activation_threshold, plan.adaptation.mode) == (0.8, "automatic")
+    assert plan.cue_timing == CueTiming(CueRule.STREAKS, count=4, rest_s=20)
+    assert plan.schedule == Schedule(ScheduleKind.FADED, 3)
     assert session.source_args[:3] == ["synthetic", "--profile", "poor"]
     assert session.simulated
     change_session(session, ChangeKind.START)
     change_session(session, ChangeKind.GOAL, 4.2)
     change_session(session, ChangeKind.ROBOT_INTENSITY, 0.0)
+    change_session(session, ChangeKind.ACTIVATION_THRESHOLD, 0.7)
+    change_session(session, ChangeKind.GOAL_ADAPTATION, "off")
     change_session(session, ChangeKind.FINISH)
     page = pt.get(f"/patients/{patient.pk}/")
     last = page.context["last"]
@@ -172,7 +223,10 @@ def test_like_last_time_offers_what_the_last_session_was(pt, patient, station):
     assert again.pk != session.pk
     assert again.to_plan().goal.value == 4.2
     assert again.to_plan().robot_intensity == 0
-    alike = {"goal": None, "robot_intensity": None}
+    assert again.to_plan().activation_threshold == 0.7
+    assert again.to_plan().adaptation.mode == "off"
+    varied = ("goal", "robot_intensity", "activation_threshold", "adaptation")
+    alike = dict.fromkeys(varied)
     assert again.plan | alike == session.plan | alike
 
 
@@ -298,9 +352,10 @@ def test_a_protocol_that_ends_by_itself_says_how_long_it_takes(pt, patient, stat
     page = pt.get(f"/patients/{patient.pk}/new/")
     assert page.context["form"]["minutes"].value() == 13  # 54 strides, 600 s and 120 s
     by_name = {row.name: row.pk for row in Protocol.everywhere.filter(clinic=None)}
-    lengths = page.context["lengths"]
-    assert lengths[by_name["Training only"]] is None
-    assert lengths[by_name["Baseline, training, washout"]] == 13
+    targets = page.context["targets"]
+    assert targets[by_name["Training only"]] == {"minutes": None, "wanted_hits": None}
+    assert targets[by_name["Baseline, training, washout"]]["minutes"] == 13
+    assert targets[by_name["Ten minutes at 60 %"]] == {"minutes": 10, "wanted_hits": 60}
 
 
 def test_the_demo_is_one_simulated_patient(pt, world):
@@ -314,3 +369,22 @@ def test_patients_are_found_by_name_or_code(pt, patient):
     for words in ("ros", "K7-2"):
         assert "Rosa" in pt.get("/start/", {"q": words}).content.decode()
     assert "Nobody is called" in pt.get("/start/", {"q": "xyz"}).content.decode()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"robot_threshold": "0"}, "greater than or equal to 1"),
+        ({"robot_window": "1"}, "greater than or equal to 2"),
+        ({"robot_rest": "900"}, "less than or equal to 600"),
+        ({"robot_answers": "dances"}, "not one of the available choices"),
+        ({"schedule": "summary"}, "A summary is about at least 2 steps."),
+        ({"schedule_band": "80"}, "less than or equal to 50"),
+        ({"goal_follows": "automatic", "wanted_hits": "95"}, "wanted hits of 30 to 90 %"),
+    ],
+)
+def test_answers_that_make_no_sense_are_refused_with_the_cure(pt, patient, station, wrong, words):
+    before = TrainingSession.everywhere.count()
+    page = pt.post(f"/patients/{patient.pk}/new/", choices(station, **wrong))
+    assert words in page.content.decode()
+    assert TrainingSession.everywhere.count() == before

@@ -21,3 +21,13 @@ def test_three_kills_lose_nothing(tmp_path, capsys):
     assert sum(walk.acknowledged for walk in torture.walks) > 100
     assert all(log["paused"] == log["resumed"] == 3 for log in ended["log"].values())
     assert all(log["valid"] for log in ended["log"].values())
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("restarts", [3, pytest.param(20, marks=pytest.mark.long)])
+def test_orderly_restarts_pause_nobody(tmp_path, restarts):
+    torture = Torture(tmp_path, seed=7)
+    ended = asyncio.run(torture.run(sessions=8, rounds=restarts, orderly=1.0))
+    assert torture.find_faults(ended) == []
+    assert all(log["paused"] == 0 for log in ended["log"].values())
+    assert sum(walk.acknowledged for walk in torture.walks) > 25 * restarts

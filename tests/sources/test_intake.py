@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rehab.gait import measure_both_legs
 from rehab.gait.recordings.columns import read_column_map
-from rehab.gait.recordings.csv_files import read_signals
+from rehab.gait.recordings.tables import read_signals
 from rehab.sources.synthetic.signals import Sensors, make_signals
 from rehab.sources.synthetic.walker import walk
 from rehab.training.steps import Side
@@ -283,7 +283,9 @@ def test_the_quality_line(table):
     harness.time.now_s += 10
     line = harness.intake.describe()
 
-    assert "200 samples/s, 1 gaps, lag" in line
+    assert (
+        "200 samples/s, 1 times lost for up to 305 ms (look at network and recorder), lag" in line
+    )
     assert "last stride" in line
     assert "10.0 s ago" in line
     harness.time.now_s += 5

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rehab.sources.serial_sensor import FrameReader, compute_checksum
+from rehab.sources.serial_sensor import SensorFrameReader, compute_checksum
 from tests.sources.labs import frame
 
 NAMES = b"$H,left_force_n,left_angle_rad*4D\n"
@@ -22,15 +22,15 @@ SKETCH = Path(__file__).parents[2] / "docs" / "garry_sensor" / "garry_sensor.ino
     ],
 )
 def test_golden_frames(data, rows):
-    assert FrameReader().read(NAMES + data) == rows
+    assert SensorFrameReader().read(NAMES + data) == rows
 
 
 def test_frames_of_any_cut_are_the_same():
     data = NAMES + b"".join(frame("D", n * 10_000, n, n / 10) for n in range(50))
-    whole = FrameReader().read(data)
+    whole = SensorFrameReader().read(data)
     assert len(whole) == 50
     for size in (1, 7, 64):
-        reader = FrameReader()
+        reader = SensorFrameReader()
         parts = [data[at : at + size] for at in range(0, len(data), size)]
         assert [row for part in parts for row in reader.read(part)] == whole
 
@@ -39,7 +39,7 @@ def test_frames_of_any_cut_are_the_same():
 def test_a_damaged_byte_costs_one_frame_and_no_value_is_wrong(place):
     good = b"$D,1500000,412.5,0.12*6D\n"
     bad = good[:place] + bytes([good[place] ^ 0x04]) + good[place + 1 :]
-    reader = FrameReader()
+    reader = SensorFrameReader()
     rows = reader.read(NAMES + bad + good)
 
     assert rows[-1] == {"time_s": 1.5, "left_force_n": 412.5, "left_angle_rad": 0.12}
@@ -47,7 +47,7 @@ def test_a_damaged_byte_costs_one_frame_and_no_value_is_wrong(place):
 
 
 def test_microseconds_go_on_where_they_wrap_around():
-    reader = FrameReader()
+    reader = SensorFrameReader()
     rows = reader.read(NAMES + frame("D", 2**32 - 10_000, 1, 1) + frame("D", 0, 1, 1))
 
     first, second = (float(row["time_s"]) for row in rows)
@@ -55,7 +55,7 @@ def test_microseconds_go_on_where_they_wrap_around():
 
 
 def test_endless_noise_takes_no_memory():
-    reader = FrameReader()
+    reader = SensorFrameReader()
     for _ in range(1000):
         assert reader.read(b"\xff" * 1000) == []
     assert len(reader._partial) <= 1024

@@ -9,6 +9,7 @@ from django.core.cache import cache
 from django.test import Client
 from django.utils import timezone
 
+from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.random_codes import ALPHABET
 from rehab.stations import pairing, tablets
 from rehab.stations.models import Device, Pairing, Station
@@ -104,7 +105,27 @@ def test_a_flood_of_strangers_ends_somewhere(monkeypatch):
     monkeypatch.setattr(pairing, "MAX_PENDING", 3)
     pages = [Client().get("/tablet/") for _ in range(4)]
     assert [page.status_code for page in pages] == [200, 200, 200, 503]
-    assert "Try again in five minutes" in pages[-1].content.decode()
+    assert "try again in five minutes" in pages[-1].content.decode()
+
+
+def test_strangers_of_many_addresses_leave_room_for_a_clinics_network(world, monkeypatch):
+    monkeypatch.setattr(pairing, "MAX_PENDING", 3)
+    monkeypatch.setattr(pairing, "MAX_PENDING_KNOWN", 5)
+    signed_in = {"act": Act.SIGN_IN, "clinic": world.clinic, "address": "198.51.100.0/24"}
+    AuditEntry.everywhere.create(**signed_in)
+    flood = [Client(REMOTE_ADDR=f"203.0.{net}.7").get("/tablet/") for net in range(6)]
+    assert [page.status_code for page in flood] == [200] * 3 + [503] * 3
+    clinic = [Client(REMOTE_ADDR=f"198.51.100.{host}").get("/tablet/") for host in range(3)]
+    assert [page.status_code for page in clinic] == [200, 200, 503]
+
+
+def test_codes_cannot_be_filled_by_forged_addresses(settings, monkeypatch):
+    settings.PROXIES = 1
+    monkeypatch.setattr(pairing, "MAX_PENDING_PER_ADDRESS", 3)
+    for last in range(20):  # past the proxy, straight from the internet
+        stranger = Client(REMOTE_ADDR="8.8.8.8")
+        stranger.get("/tablet/", headers={"X-Forwarded-For": f"198.51.{last}.7"})
+    assert Pairing.everywhere.count() == 3
 
 
 def test_a_flood_from_one_address_shuts_no_other_clinic_out(monkeypatch):
@@ -156,7 +177,8 @@ def test_a_session_of_its_station_appears_and_no_other(world, pt, station):
     page = tablet.get(there).content.decode()
     assert world.patient.nickname in page
     assert 'class="walk alone"' in page
-    type(session).everywhere.filter(pk=session.pk).update(state="finished")
+    ended = {"state": "finished", "ended_at": timezone.now()}
+    type(session).everywhere.filter(pk=session.pk).update(**ended)
     assert tablet.get(there).headers["Location"] == f"{there}scores/"
     scores = tablet.get(f"{there}scores/").content.decode()
     assert 'href="/tablet/"' in scores

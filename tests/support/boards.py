@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from django.test import Client
+from django.urls import reverse
+
 from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
 from rehab.boards.panels.viewer import make_session_panels
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.models import TrainingSession
+from rehab.stations.models import Device, Station
 from tests.support.walks import strides, walk
 from tests.support.world import NOW, agreeing
 
@@ -55,3 +59,22 @@ def everything() -> tuple[list[str], list[tuple[int, str, int, int]]]:
     rows = sorted(map(str, BoardEntry.everywhere.values_list(*fields)))
     counts = sorted(BoardCount.everywhere.values_list("board", "valence", "figure", "rows"))
     return rows, counts
+
+
+def page_of(session: TrainingSession, client: Client | None = None) -> str:
+    """Return the page of a session's scores, as a tablet shows it."""
+    if client is None:
+        station, _ = Station.everywhere.get_or_create(clinic=session.clinic, name="One")
+        TrainingSession.everywhere.filter(pk=session.pk).update(station=station)
+        client = tablet_at(station)
+    answer = client.get(reverse("scores", kwargs={"session_id": session.pk}))
+    assert answer.status_code == 200
+    return answer.content.decode()
+
+
+def tablet_at(station: Station) -> Client:
+    """Return a browser that is a station's tablet."""
+    tablet = Device(clinic=station.clinic, station=station, kind="tablet", name="T")
+    token = tablet.new_token()
+    tablet.save()
+    return Client(headers={"Authorization": f"Bearer {token}"})

@@ -28,6 +28,13 @@ def chromium() -> Iterator[Browser]:
         browser.close()
 
 
+def go_on_to_scores(page: Page) -> None:
+    """Go on from the page that ends a walk."""
+    page.wait_for_url("**/ending/")
+    page.click(".go")
+    page.wait_for_url("**/scores/")
+
+
 class SharedChromium:
     """Chromium that stays until it is closed, and is started again when asked for."""
 

@@ -16,6 +16,7 @@ from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
+from rehab.sessions.setup.protocols import Measure
 from rehab.stations.models import Device, Station
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
@@ -55,7 +56,9 @@ class Caller:
     ) -> None:
         from garry_site.asgi import application
 
-        lines = [(b"host", b"localhost:8000"), *headers]
+        lines = list(headers)
+        if b"host" not in dict(lines):
+            lines.append((b"host", b"localhost:8000"))
         if token is not None:
             lines.append((b"authorization", f"Bearer {token}".encode()))
         if user is not None:
@@ -322,8 +325,12 @@ def open_session(
     at_station: bool = True,
     beside: bool = False,
     cue: CueGestures | None = None,
+    measure: Measure | None = None,
+    **rules: Any,
 ) -> TrainingSession:
     """Make a session that is ready at the place's station.
+
+    ``rules``: what else a `SessionRequest` says.
 
     ``beside`` puts it there though another one is open, as databases of before may have it.
     """
@@ -334,8 +341,10 @@ def open_session(
             goal=goal or GoalRule(value=3.0),
             phases=phases or (make_phase("training"),),
             cue=cue,
+            measure=measure,
             station=place.station if at_station and not beside else None,
             created_by=place.pt,
+            **rules,
         )
     )
     if beside:

@@ -21,6 +21,20 @@ FORWARD_200 = bytes.fromhex("AA55060104C8000000CB")
 TICK_M = 8.5292090497737556558e-5
 
 
+STANDS_M_S = 0.002
+
+
+def _speeds(speed, radius):
+    """Return the speeds of an order: ahead [m/s] and turning [rad/s]."""
+    speed_m_s, radius_m = speed / 1000, radius / 1000
+    if radius == 0:
+        return speed_m_s, 0.0
+    if radius == 1:
+        return 0.0, speed_m_s / 0.115
+    w = speed_m_s / (radius_m + math.copysign(0.115, radius_m))
+    return w * radius_m, w
+
+
 def frame(payload):
     checksum = 0
     for byte in bytes([len(payload)]) + payload:
@@ -32,16 +46,22 @@ class FakeKobuki:
     """Runs on a thread until closed. ``orders`` has (monotonic time, speed, radius).
 
     What it feels (``bumper`` to ``battery``) goes into its frames as it is; ``is_mute`` keeps it
-    from saying anything, ``is_flooded`` from reading, ``is_held`` its wheels from rolling. Where it
-    really is from where it began: ``x_m``, ``y_m`` and ``heading_rad``.
+    from saying anything, ``is_flooded`` from reading, ``is_held`` its wheels from rolling, and
+    ``is_driven`` rolls them by somebody else's order. Where it really is from where it began:
+    ``x_m``, ``y_m`` and ``heading_rad``. Its wheels follow after ``dead_s``, with a lag of
+    ``lag_s``; ``rolled`` has the times at which they turned. ``frames`` were sent.
     """
 
-    def __init__(self, over="pty", version=(1, 2, 0)):
+    def __init__(self, over="pty", version=(1, 2, 0), dead_s=0.0, lag_s=0.0):
         self.over, self.version = over, version
+        self.dead_s, self.lag_s = dead_s, lag_s
+        self.rolled: list[float] = []
+        self.frames = 0
+        self._followed, self._v, self._w = 0, 0.0, 0.0
         self.bumper = self.cliff = self.wheel_drop = self.over_current = 0
         self.buttons, self.charger, self.battery = 0, 0, 160
-        self.is_mute = self.is_held = self.is_flooded = False
-        self.orders, self.outputs, self.melodies, self.bad = [], [], [], 0
+        self.is_mute = self.is_held = self.is_flooded = self.is_driven = False
+        self.orders, self.outputs, self.melodies, self.notes, self.bad = [], [], [], [], 0
         self.noise = b""  # to be sent before the next frame
         self._asked = 0
         self._left = self._right = 65000.0  # ticks; they wrap soon
@@ -92,6 +112,7 @@ class FakeKobuki:
         """Switch it off and on: its counters and angle begin at 0, its wheels stand."""
         self._left = self._right = 0.0
         self._angle_deg, self._speed = 0.0, 0
+        self._followed, self._v, self._w = len(self.orders), 0.0, 0.0
         self._booted_s = time.monotonic()
 
     @property
@@ -127,6 +148,7 @@ class FakeKobuki:
                 self._roll(0.02)
                 if not self.is_mute:
                     self._send(self.noise + self._feedback(now_s, count))
+                    self.frames += 1
                     self.noise = b""
             time.sleep(0.001)
 
@@ -140,7 +162,10 @@ class FakeKobuki:
     def _hear(self, now_s):
         if self._listener is not None:
             with suppress(OSError):
-                self._io, _ = self._listener.accept()
+                following, _ = self._listener.accept()
+                if self._io is not None:
+                    self._io.close()
+                self._io = following
                 self._io.setblocking(False)
         if self.is_flooded:
             return
@@ -171,6 +196,8 @@ class FakeKobuki:
             if kind == 1:
                 self._speed, self._radius = struct.unpack("<hh", data)
                 self.orders.append((now_s, self._speed, self._radius))
+            elif kind == 3:
+                self.notes.append(struct.unpack("<HB", data))
             elif kind == 4:
                 self.melodies.append(data[0])
             elif kind == 9:
@@ -180,16 +207,19 @@ class FakeKobuki:
 
     def _roll(self, elapsed_s):
         self._rate_deg_s = 0.0
-        if self.is_held or not self._speed:
+        now_s = time.monotonic()
+        follow_s = now_s - self.dead_s
+        while self._followed < len(self.orders) and self.orders[self._followed][0] <= follow_s:
+            self._followed += 1
+        _, speed, radius = self.orders[self._followed - 1] if self._followed else (0.0, 0, 0)
+        v, w = (0.1, 0.0) if self.is_driven else _speeds(speed, radius)
+        share = 1 - math.exp(-elapsed_s / self.lag_s) if self.lag_s else 1.0
+        self._v += share * (v - self._v)
+        self._w += share * (w - self._w)
+        v, w = self._v, self._w
+        if self.is_held or abs(v) + 0.115 * abs(w) < STANDS_M_S:
             return
-        speed, radius = self._speed / 1000, self._radius / 1000
-        if self._radius == 0:
-            v, w = speed, 0.0
-        elif self._radius == 1:
-            v, w = 0.0, speed / 0.115
-        else:
-            w = speed / (radius + math.copysign(0.115, radius))
-            v = w * radius
+        self.rolled.append(now_s)
         self._left += (v - w * 0.115) * elapsed_s / TICK_M
         self._right += (v + w * 0.115) * elapsed_s / TICK_M
         along_rad = self.heading_rad + w * elapsed_s / 2
@@ -198,6 +228,10 @@ class FakeKobuki:
         self.heading_rad += w * elapsed_s
         self._rate_deg_s = math.degrees(w)
         self._angle_deg += self._rate_deg_s * elapsed_s
+
+    def rolled_after(self, since_s: float) -> float:
+        """Return how long after a time its wheels still turned [s]."""
+        return max((at_s - since_s for at_s in list(self.rolled) if at_s > since_s), default=0.0)
 
     def _feedback(self, now_s, count):
         core = struct.pack(

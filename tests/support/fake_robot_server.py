@@ -22,7 +22,7 @@ Message = dict[str, Any]
 
 
 class FakeGarry:
-    """One station with one session. ``reports`` holds what the robot said."""
+    """One station with one session. ``reports`` and ``incidents`` hold what the robot said."""
 
     def __init__(self) -> None:
         self.url = ""
@@ -30,6 +30,7 @@ class FakeGarry:
         self.welcome |= {"cue": CUE, "stopped": False}
         self.hellos: list[Message] = []
         self.reports: list[Message] = []
+        self.incidents: list[Message] = []
         self.sockets: list[ServerConnection] = []
         self.beats = True
         self._reported = asyncio.Event()
@@ -48,7 +49,11 @@ class FakeGarry:
             await socket.send(json.dumps(self.welcome))
             self._dialed_in.set()
             async for text in socket:
-                self.reports.append(json.loads(text)["report"])
+                message = json.loads(text)
+                if message["type"] == "report":
+                    self.reports.append(message["report"])
+                else:
+                    self.incidents.append(message)
                 self._reported.set()
         except ConnectionClosed:
             pass

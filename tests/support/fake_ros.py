@@ -7,12 +7,15 @@ its own, or real ROS (``ros_side.RosGraph``).
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
 import threading
 import time
 from collections import defaultdict
 from contextlib import suppress
+from functools import cache
+from pathlib import Path
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import serve
@@ -20,6 +23,7 @@ from websockets.sync.server import serve
 from robot.motion.limits import TICK_S
 from robot.motion.twist import STILL
 
+WATCHDOG = Path(__file__).parents[2] / "deploy" / "ros" / "garry_watchdog.py"
 TWIST, ODOMETRY = "geometry_msgs/Twist", "nav_msgs/Odometry"
 
 
@@ -132,7 +136,7 @@ class FakeBase:
     it follows.
     """
 
-    def __init__(self, graph, clock, order="/cmd_vel", odometry="/odom", timeout_s=0.6):
+    def __init__(self, graph, clock, order="/cmd_vel", odometry="/odom", timeout_s=0.6, kind=TWIST):
         self.graph, self.clock = graph, clock
         self.odometry, self.timeout_s = odometry, timeout_s
         self.x_m, self.y_m, self.heading_rad = 3.0, -2.0, 3.0
@@ -140,12 +144,13 @@ class FakeBase:
         self.goes, self.is_mute = 1.0, False
         self.orders: list[tuple[float, float, float]] = []
         self._ordered_s = self._moved_s = clock()
-        graph.subscribe(order, TWIST, self.follow)
+        graph.subscribe(order, kind, self.follow)
         if odometry:
             graph.advertise(odometry, ODOMETRY, "/base")
 
     def follow(self, message):
         self.move()
+        message = message.get("twist", message)  # a TwistStamped
         self.v_m_s, self.w_rad_s = message["linear"]["x"], message["angular"]["z"]
         self._ordered_s = self.clock()
         self.orders.append((self._ordered_s, self.v_m_s, self.w_rad_s))
@@ -270,3 +275,50 @@ def wait_until(holds, within_s=10.0):
     while not holds():
         assert time.monotonic() < until_s, "it did not happen"
         time.sleep(0.002)
+
+
+class FakeRelay:
+    """The watchdog relay on a graph: its own code, on a clock that a test gives."""
+
+    def __init__(self, graph, clock, output="/cmd_vel"):
+        self.graph, self.clock, self.output = graph, clock, output
+        self.is_dead = self.is_mute = False
+        self.watchdog = load_watchdog().Watchdog(
+            self.publish, lambda: twist_message(0.0, 0.0), is_still_message, clock()
+        )
+        graph.advertise("/garry/watchdog", "std_msgs/String", "/garry_watchdog")
+        graph.subscribe("/garry/cmd_vel", TWIST, self.receive)
+
+    def publish(self, message):
+        self.graph.publish(self.output, message)
+
+    def receive(self, message):
+        if not self.is_dead:
+            self.watchdog.receive(message, self.clock())
+
+    def tell(self):
+        """Check, and say that it is there."""
+        if not self.is_dead:
+            self.watchdog.check(self.clock())
+            if not self.is_mute and self.watchdog.hears(self.clock()):
+                self.graph.publish("/garry/watchdog", {"data": self.output})
+
+
+def twist_message(v_m_s, w_rad_s):
+    return {
+        "linear": {"x": v_m_s, "y": 0.0, "z": 0.0},
+        "angular": {"x": 0.0, "y": 0.0, "z": w_rad_s},
+    }
+
+
+def is_still_message(message):
+    return not (message["linear"]["x"] or message["angular"]["z"])
+
+
+@cache
+def load_watchdog():
+    """Return the module of the relay, which stands on its own."""
+    spec = importlib.util.spec_from_file_location("garry_watchdog", WATCHDOG)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

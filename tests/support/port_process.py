@@ -4,8 +4,10 @@ import json
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+import psutil
 
 from tests.support.fake_kobuki import FORWARD_200, STOP_FRAME
 
@@ -58,5 +60,9 @@ def owning(kobuki):
             pass
         yield owner
     finally:
+        # Its guard first: the next test may have a port of the same name.
+        with suppress(psutil.NoSuchProcess):
+            for guard in psutil.Process(owner.process.pid).children():
+                guard.kill()
         owner.process.kill()
         owner.process.communicate()

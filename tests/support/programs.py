@@ -18,6 +18,7 @@ ROOT = "/api/v1"
 def bearer_token(user: User, role: str) -> str:
     """Make an account a new API token."""
     row = ApiToken(clinic=user.clinic, user=user, name="program", role=role)
+    row.may_steer = row.may_export = True
     token = row.new_token()
     row.save()
     return token

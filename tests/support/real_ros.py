@@ -1,8 +1,9 @@
-"""Real ROS 1, as Debian packages it: a master and nodes of rospy, on loopback.
+"""Real ROS: 1 as Debian packages it (a master and nodes of rospy), 2 from PyPI, on loopback.
 
-rospy belongs to the system's Python, so each node is this file run by that, and takes its orders as
-JSON lines. A ``RosNode`` can stand in for a ``FakeGraph``: behind a ``FakeRosbridge`` it is the
-bridge's node, and of rosbridge, which Debian does not have, only the frames are played.
+rospy belongs to the system's Python, and rclpy to one of its own (``GARRY_ROS2_PYTHON``), so each
+node is this file run by that, and takes its orders as JSON lines. A ``RosNode`` can stand in for a
+``FakeGraph``: behind a ``FakeRosbridge`` it is the bridge's node, and of rosbridge, which neither
+has, only the frames are played.
 """
 
 from __future__ import annotations
@@ -16,11 +17,14 @@ import tempfile
 import threading
 import time
 from collections import defaultdict
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 PYTHON = "/usr/bin/python3"
-PACKAGES = "python3-rospy python3-rosmaster python3-nav-msgs"
+PACKAGES = "python3-rospy python3-rosmaster python3-geometry-msgs python3-nav-msgs python3-std-msgs"
+PACKAGES_2 = "ros-rclpy ros-geometry-msgs ros-nav-msgs ros-std-msgs ros-rmw-fastrtps-cpp"
 USER_DATA = "float32 a2\nfloat32 goal\n"  # garry_ros/UserData, which ROS users have to build
 START_S = 20.0
 
@@ -46,6 +50,7 @@ class RosMaster:
         self._env = {name: value for name, value in os.environ.items() if "PYTHON" not in name}
         self._env |= {"ROS_MASTER_URI": f"http://127.0.0.1:{port}", "ROS_IP": "127.0.0.1"}
         self._env |= {"ROS_HOME": self._home.name, "ROS_LOG_DIR": self._home.name}
+        self.env, self.python = self._env, PYTHON
         begin = f"import rosmaster; rosmaster.rosmaster_main(['', '--core', '-p', '{port}'])"
         self._master = subprocess.Popen([PYTHON, "-c", begin], env=self._env, cwd=self._home.name)
         self._nodes = []
@@ -72,12 +77,44 @@ class RosMaster:
         return self._nodes[-1]
 
 
-class RosNode:
-    """A node of rospy, with the methods of a ``FakeGraph``."""
+class Ros2:
+    """ROS 2 on a domain of its own, as long as it is open."""
 
-    def __init__(self, env, name):
+    python = os.environ.get("GARRY_ROS2_PYTHON", sys.executable)
+
+    def __enter__(self):
+        self._home = tempfile.TemporaryDirectory(prefix="garry-ros2-")
+        self.env = {name: value for name, value in os.environ.items() if "PYTHON" not in name}
+        self.env |= {"ROS_DOMAIN_ID": str(1 + os.getpid() % 100), "ROS_LOG_DIR": self._home.name}
+        self.env |= {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        self._nodes = []
+        return self
+
+    def __exit__(self, *_):
+        for node in self._nodes:
+            node.close()
+        self._home.cleanup()
+
+    def node(self, name):
+        """Start a node of that name, and give it when it is there."""
+        self._nodes.append(RosNode(self.env, name, self.python, "2"))
+        return self._nodes[-1]
+
+
+@cache
+def why_ros2_missing() -> str:
+    """Return why there is no ROS 2 here; empty where there is."""
+    look = "import rclpy, geometry_msgs.msg, nav_msgs.msg, std_msgs.msg"
+    done = subprocess.run([Ros2.python, "-c", look], capture_output=True)
+    return "" if done.returncode == 0 else f"no ROS 2: pip install {PACKAGES_2}"
+
+
+class RosNode:
+    """A node of rospy or rclpy, with the methods of a ``FakeGraph``."""
+
+    def __init__(self, env, name, python=PYTHON, version="1"):
         self._process = subprocess.Popen(
-            [PYTHON, __file__, name],
+            [python, __file__, name, version],
             env=env,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -174,5 +211,67 @@ def run_node(name: str) -> None:
     rospy.signal_shutdown("told to end")
 
 
+def fill(message, value):
+    """Store JSON in a message of ROS 2; fields that only ROS 1 has are left out."""
+    for name, part in value.items():
+        if not hasattr(message, name):
+            continue
+        if isinstance(part, dict):
+            fill(getattr(message, name), part)
+        else:
+            setattr(message, name, part)
+    return message
+
+
+def read(value):
+    """Return a message of ROS 2, or a part of one, as JSON has it."""
+    if hasattr(value, "get_fields_and_field_types"):
+        return {name: read(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def run_node_2(name: str) -> None:
+    """Be a node of ROS 2 until standard input ends."""
+    from importlib import import_module
+
+    import rclpy
+    from rclpy.executors import ExternalShutdownException
+
+    def class_of(kind):
+        package, *_, name = kind.split("/")
+        return getattr(import_module(f"{package}.msg"), name)
+
+    def say(**said):
+        with lock:
+            sys.stdout.write(json.dumps(said) + "\n")
+            sys.stdout.flush()
+
+    def spin():
+        with suppress(ExternalShutdownException):
+            rclpy.spin(node)
+
+    lock, publishers = threading.Lock(), dict[str, tuple[Any, Any]]()
+    rclpy.init()
+    node = rclpy.create_node(name)
+    threading.Thread(target=spin, daemon=True).start()
+    say(ready=True)
+    for line in sys.stdin:
+        order = json.loads(line)
+        topic = order["topic"]
+        if order["do"] == "publish":
+            publisher, kind = publishers[topic]
+            publisher.publish(fill(kind(), order["message"]))
+        elif order["do"] == "subscribe":
+
+            def hear(message, topic=topic):
+                say(topic=topic, message=read(message))
+
+            node.create_subscription(class_of(order["kind"]), topic, hear, 10)
+        elif topic not in publishers:
+            kind = class_of(order["kind"])
+            publishers[topic] = node.create_publisher(kind, topic, 1), kind
+    rclpy.shutdown()
+
+
 if __name__ == "__main__":
-    run_node(sys.argv[1])
+    {"1": run_node, "2": run_node_2}[sys.argv[2]](sys.argv[1])

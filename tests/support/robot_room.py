@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
@@ -24,6 +24,16 @@ from websockets.typing import Origin
 from tests.support.fake_kobuki import FakeKobuki
 from tests.support.servers import ROOT, Server, clean_environment, serve
 from tests.support.wire import Wire
+
+
+class Late(NamedTuple):
+    """How late its Kobuki answers: dead time and lag [s]."""
+
+    dead_s: float = 0.0
+    lag_s: float = 0.0
+
+
+PROMPT = Late()
 
 
 class Page:
@@ -57,9 +67,12 @@ class Page:
 class Room:
     """All of it. ``wire`` lies between worker and server."""
 
-    def __init__(self, server: Server, row: dict[str, Any], wire: Wire, close: ExitStack) -> None:
+    def __init__(
+        self, server: Server, row: dict[str, Any], wire: Wire, close: ExitStack, late: Late
+    ) -> None:
         self.server, self.row, self.wire = server, row, wire
-        self.kobuki = close.enter_context(FakeKobuki())
+        self.kobuki = close.enter_context(FakeKobuki(dead_s=late.dead_s, lag_s=late.lag_s))
+        self.rolled_s = 0.0  # after the last deed, by its wheels
         self.worker = self.start_worker()
         address = f"ws://127.0.0.1:{server.port}/ws"
         url, header = f"{address}/session/{row['session']}/monitor/", f"sessionid={row['cookie']}"
@@ -127,7 +140,8 @@ class Room:
         """Do something; give how long the setpoint was still other than zero [s]."""
         began_s = time.monotonic()
         deed()
-        time.sleep(wait_s)
+        time.sleep(wait_s + self.kobuki.dead_s + 6 * self.kobuki.lag_s)
+        self.rolled_s = self.kobuki.rolled_after(began_s)
         return self.kobuki.moved_after(began_s)
 
     def signal_server(self, what: signal.Signals) -> None:
@@ -150,7 +164,7 @@ class Room:
 
 
 @contextmanager
-def robot_room(folder: Path) -> Iterator[Room]:
+def robot_room(folder: Path, late: Late = PROMPT) -> Iterator[Room]:
     """Set it all up, and clear it away."""
     with serve(folder) as server, Wire(server.port) as wire, ExitStack() as close:
         environment = clean_environment(folder, server.port)
@@ -162,7 +176,7 @@ def robot_room(folder: Path) -> Iterator[Room]:
             text=True,
             check=True,
         )
-        room = Room(server, json.loads(made.stdout)[0], wire, close)
+        room = Room(server, json.loads(made.stdout)[0], wire, close, late)
         try:
             yield room
         finally:

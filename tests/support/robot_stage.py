@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 from robot.bases import Abilities, SensorState
-from robot.bases.kinematic import KinematicBase
+from robot.bases.kinematic import IDEAL, KinematicBase
 from robot.behavior.performer import Performer
 from robot.motion.limits import TICK_S
 from robot.motion.pose import HOME
@@ -22,7 +22,14 @@ WELCOME = {"type": "welcome", "session": 7, "state": "running", "cue": CUE, "sto
 WELCOME |= {"watched": True}
 
 
-class RealBase(KinematicBase):
+class IdealBase(KinematicBase):
+    """A base that follows at once and exactly, where a test is about something else."""
+
+    def __init__(self, monotonic):
+        super().__init__(monotonic, IDEAL)
+
+
+class RealBase(IdealBase):
     """A base that no program may arm."""
 
     name: ClassVar[str] = "real"
@@ -32,7 +39,7 @@ class RealBase(KinematicBase):
 class Stage:
     """A performer with a clock, and everything that came of it."""
 
-    def __init__(self, make=KinematicBase):
+    def __init__(self, make=IdealBase):
         self.now_s = 1000.0
         self.base = make(lambda: self.now_s)
         self.robot = Performer(self.base)
@@ -87,11 +94,12 @@ class Stage:
 class FeelingBase(RealBase):
     """A real base that feels what a test tells it to, and has lights and sounds."""
 
-    abilities = Abilities(simulated=False, moves=True, announces=True)
+    abilities = Abilities(simulated=False, moves=True, announces=True, notes=True)
 
     def __init__(self, monotonic):
         super().__init__(monotonic)
         self.sensors, self.shown, self.is_held = SensorState(), [], False
+        self.lit, self.played = [], []
 
     def read(self):
         there = super().read()
@@ -101,3 +109,9 @@ class FeelingBase(RealBase):
 
     def show(self, indication, *, aloud):
         self.shown.append((indication, aloud))
+
+    def light(self, first, second):
+        self.lit.append((first, second))
+
+    def play(self, note):
+        self.played.append(note)

@@ -1,6 +1,7 @@
 """A rosbridge base with its bridge and robot, on a clock that a test moves."""
 
 import json
+import math
 from contextlib import suppress
 
 from robot.bases.rosbridge import RosbridgeBase
@@ -9,13 +10,14 @@ from robot.behavior.performer import Performer
 from robot.motion.limits import TICK_S
 from robot.motion.twist import STILL
 from robot.ros.frames import BadRosFrame, Topic, read_frame, to_text
-from tests.support.fake_ros import FakeBase, FakeRosbridge
+from tests.support.fake_ros import FakeBase, FakeRelay, FakeRosbridge
 from tests.support.robot_stage import CUE, WELCOME
 
 CMD, ODOM = PROFILES["plain"].order, PROFILES["plain"].odometry
 BUMPER = Topic("/bumper", "std_msgs/Bool")
-CLOSED = Topics(CMD, ODOM, {"bump": BUMPER})
-OPEN = Topics(CMD)
+CLOSED = Topics(CMD, ODOM, {"bump": BUMPER}, own_timeout_s=0.6)
+OPEN = Topics(CMD, own_timeout_s=0.6)
+WATCHED = Topics(CMD, ODOM, {"bump": BUMPER})
 
 
 class Stage:
@@ -24,7 +26,13 @@ class Stage:
     def __init__(self, topics=CLOSED, has_rosapi=True):
         self.now_s = 100.0
         self.bridge = FakeRosbridge(has_rosapi=has_rosapi)
-        self.robot = FakeBase(self.bridge.graph, lambda: self.now_s)
+        # A base that is watched has no timeout of its own.
+        timeout_s = topics.own_timeout_s or math.inf
+        order = topics.order
+        self.robot = FakeBase(
+            self.bridge.graph, lambda: self.now_s, order.name, timeout_s=timeout_s, kind=order.kind
+        )
+        self.relay = FakeRelay(self.bridge.graph, lambda: self.now_s) if topics.relay else None
         self.bridge.graph.advertise(BUMPER.name, BUMPER.kind, "/base")
         self.base = RosbridgeBase(lambda: self.now_s, topics)
         self.base_client = self.base._client
@@ -61,6 +69,8 @@ class Stage:
         while self.outbox and not self.is_frozen:
             self.client.take(self.outbox.pop(0))
         self.robot.tell()
+        if self.relay is not None:
+            self.relay.tell()
         while self.inbox and not self.is_frozen:
             with suppress(BadRosFrame):
                 self.base_client.handle(read_frame(self.inbox.pop(0)), self.now_s)

@@ -26,7 +26,7 @@ async def walk_with_restarts(
     torture = Torture(folder, seed=1)
     server = await torture.start_server()
     (row,) = json.loads(torture.run_python("-m", "tests.support.live_seed", "1"))
-    session = Walk(row, torture.port, 1.0)
+    session = Walk(row, torture.entrance, 1.0)
     strides = list(walk(seed=3, strides=int(seconds / 1.05)))
     made = make_signals(strides, 75, Sensors(rate_hz=100), seed=3)
     arguments = ("rows", "--listen", "tcp://127.0.0.1:0", "--mass", "75")

@@ -7,7 +7,7 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -65,7 +65,13 @@ def _tables() -> bytes:
 
 
 @contextmanager
-def serve(folder: Path, *arguments: str, new_machine: bool = False) -> Iterator[Server]:
+def serve(
+    folder: Path,
+    *arguments: str,
+    new_machine: bool = False,
+    settings: Mapping[str, str] | None = None,
+    program: Sequence[str] = ("manage.py",),
+) -> Iterator[Server]:
     """Run `manage.py serve` on a folder of its own until the block ends.
 
     Unless it is a new machine, its tables are there: a server makes them in seconds.
@@ -76,9 +82,9 @@ def serve(folder: Path, *arguments: str, new_machine: bool = False) -> Iterator[
         database.write_bytes(_tables())
     port = free_port()
     process = subprocess.Popen(
-        [sys.executable, "manage.py", "serve", *arguments],
+        [sys.executable, *program, "serve", *arguments],
         cwd=ROOT,
-        env=clean_environment(folder, port),
+        env=clean_environment(folder, port) | dict(settings or {}),
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

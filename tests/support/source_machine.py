@@ -6,6 +6,8 @@ import asyncio
 import os
 import socket
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from asgiref.sync import sync_to_async
@@ -281,10 +283,12 @@ class Sources(RuleBasedStateMachine):
         await self.source.overhear()
         self._note_acks()
         runtimes._current = None
-        await self._lose_all_but(kept)
-        await runtimes.current().session(self.session.pk)  # a paused one is taken over when wanted
-        thaw.set()
-        await self._end(frozen)
+        try:
+            await self._lose_all_but(kept)
+            await runtimes.current().session(self.session.pk)  # a paused one is taken over so
+        finally:  # whatever fault was found: its writer waits, and Python would wait for it
+            thaw.set()
+            await self._end(frozen)
 
     async def _catch_up(self) -> None:
         """Let the server finish, so that what a crash takes along is no matter of timing."""
@@ -417,8 +421,19 @@ class FirstFault(Sources):
         self.found: Found | None = None
 
     def go(self, work: Any) -> Any:
-        try:
+        with self._ending():
             return super().go(work)
+
+    @invariant()
+    def the_source_is_still_welcome(self) -> None:
+        with self._ending():
+            super().the_source_is_still_welcome()
+
+    @contextmanager
+    def _ending(self) -> Iterator[None]:
+        """End the test with what fails inside."""
+        try:
+            yield
         except (AssertionError, TimeoutError, NotStored) as fault:  # HungUp is an assertion, too
             self.found = self.found or Found(fault)
             raise self.found from fault

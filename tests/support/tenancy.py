@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,20 +18,29 @@ from django.urls import URLPattern, URLResolver, get_resolver, reverse
 from rehab.boards.models import Leaderboard
 from rehab.people.models import Patient
 from rehab.people.roles import Role
+from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.models import TrainingSession
+from rehab.studies.models import Study
+from rehab.studies.participants import Enrollment
 from tests.support.archives import words_of
-from tests.support.world import Actor, World, mark, scoped_models
+from tests.support.identities import find_identities, identifying_texts
+from tests.support.world import Actor, World, all_actors, mark, scoped_models
 
 # What a role reads in the pages of its own clinic, by the marks of tests/support/world.py.
 # Researchers see no patient; a host sees clinics and accounts and nothing else.
 HOST_SEES = {"Clinic", "User"}
 
+MARK = re.compile("zq[a-z]+?qz")  # of tests/support/world.py
+
 # Parameters of addresses, the model that they name a row of, and by what.
 KEYS: dict[str, tuple[type[Model], str]] = {
     "board_id": (Leaderboard, "pk"),
     "code": (Patient, "code"),
+    "enrollment_id": (Enrollment, "pk"),
+    "incident_id": (RobotIncident, "pk"),
     "patient_id": (Patient, "pk"),
     "session_id": (TrainingSession, "pk"),
+    "study_id": (Study, "pk"),
 }
 
 
@@ -79,6 +89,16 @@ def walk_patterns(
             yield ":".join((*names, entry.name or "")), here, entry
 
 
+def undeclared_views() -> list[str]:
+    """Return the names of addresses whose view does not say who may open it."""
+    return [
+        name
+        for name, _, pattern in walk_patterns(get_resolver())
+        if not name.startswith("admin:")
+        and not isinstance(getattr(pattern.callback, "access", None), frozenset)
+    ]
+
+
 def all_routes(worlds: tuple[World, ...]) -> Iterator[Route]:
     """Return every address that the site knows, for the rows of every clinic."""
     for name, _, pattern in walk_patterns(get_resolver()):
@@ -114,14 +134,21 @@ def fill(
                     key = world.rows[field.related_model].pk
                     yield Route(name, f"{reverse(name)}?{field.name}__id__exact={key}")
         return
+    if name == "api:list_sessions":
+        yield Route(name, reverse(name))
+        for world in worlds:
+            found_by = f"{reverse(name)}?patient={world.patient.pk}"
+            yield Route(name, found_by, world.name, Patient)
+        return
     if not wanted:
         assert name, f"the route {pattern} has no name, so it cannot be checked"
         yield Route(name, reverse(name))
         return
     for world in worlds:
         if wanted == {"object_id"} and model is not None:
-            key = world.rows[model].pk
-            yield Route(name, reverse(name, kwargs={"object_id": key}), world.name, model)
+            for row in world.rows_of(model):
+                url = reverse(name, kwargs={"object_id": row.pk})
+                yield Route(name, url, world.name, model)
         elif wanted == {"id"} and name == "admin:auth_user_password_change":
             user = world.people[Role.PT]
             yield Route(name, reverse(name, kwargs={"id": user.pk}), world.name, type(user))
@@ -132,8 +159,9 @@ def fill(
                 yield Route(name, reverse(name, kwargs=kwargs), world.name, kind)
         elif len(wanted) == 1 and (parameter := min(wanted)) in KEYS:
             target, by = KEYS[parameter]
-            key = getattr(world.rows[target], by)
-            yield Route(name, reverse(name, kwargs={parameter: key}), world.name, target)
+            for row in world.rows_of(target):
+                url = reverse(name, kwargs={parameter: getattr(row, by)})
+                yield Route(name, url, world.name, target)
         elif wanted == {"app_label"}:
             yield Route(name, reverse(name, kwargs={"app_label": "rehab"}))
             return
@@ -174,25 +202,33 @@ def find_leaks(
     routes = [r for r in dict.fromkeys(all_routes(worlds)) if r.url.startswith(under)]
     for actor in actors:
         client = enter(actor, worlds)
+        hidden = identifying_texts(actor)
         for route in routes:
             if route.name == "admin:logout":
                 continue
             response = client.get(route.url)
             counts[actor.label] += 1
-            leaks += what_leaks(actor, route, response, worlds)
+            leaks += what_leaks(actor, route, response, worlds, hidden)
     return leaks, counts
 
 
 def what_leaks(
-    actor: Actor, route: Route, response: Any, worlds: tuple[World, ...]
+    actor: Actor,
+    route: Route,
+    response: Any,
+    worlds: tuple[World, ...],
+    hidden: dict[str, str],
 ) -> Iterator[str]:
-    """Return what is wrong with an answer: a foreign mark, an open door, a failure."""
+    """Return what is wrong with an answer: a foreign mark, a person named, a door, a failure."""
     body = words_of(response)
-    if response.status_code >= 500:
+    for whose in find_identities(hidden, body):
+        yield f"{actor.label}: {route.url} names {whose}"
+    if response.status_code >= 500 and route.name != "readyz":  # no server runs here
         yield f"{actor.label}: {route.url} fails with {response.status_code}"
+    marks = set(MARK.findall(body))
     for world in worlds:
         for model in scoped_models():
-            if mark(world.name, model) in body and not may_read_mark(actor, model, world):
+            if mark(world.name, model) in marks and not may_read_mark(actor, model, world):
                 yield f"{actor.label}: {route.url} shows {model.__name__} of {world.name}"
     is_open = response.status_code == 200 and route.owner and route.model
     if is_open and not may_read(actor, route.model, route.owner):
@@ -200,7 +236,10 @@ def what_leaks(
 
 
 def may_read_mark(actor: Actor, model: type[Model], world: World) -> bool:
-    """Names of accounts and stations may stand beside a session that an actor may read."""
+    """The own clinic and its stations may stand beside a session that an actor may read.
+
+    The mark of accounts is in the reader's own name as well: `identities` tells them apart.
+    """
     beside = {"User", "Station", "Clinic"}
     if actor.role == "researcher" and actor.clinic == world.name and model.__name__ in beside:
         return True
@@ -237,3 +276,11 @@ def find_offers(worlds: tuple[World, ...], actors: list[Actor]) -> tuple[list[st
                     and rows.filter(pk=world.rows[kind].pk).exists()
                 ]
     return leaks, checked
+
+
+def some_actors(worlds: tuple[World, World], *labels: str) -> list[Actor]:
+    return [actor for actor in all_actors(*worlds) if actor.label in labels]
+
+
+def researchers(worlds: tuple[World, World]) -> list[Actor]:
+    return [actor for actor in all_actors(*worlds) if actor.role == "researcher"]

@@ -11,8 +11,10 @@ import asyncio
 import json
 import random
 import signal
+import ssl
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,12 +27,31 @@ from tests.support.servers import ROOT, clean_environment, free_port
 GONE = (ConnectionClosed, InvalidHandshake, OSError, EOFError, TimeoutError)
 
 
+@dataclass(frozen=True)
+class Entrance:
+    """Where clients find the server: its own port, or a proxy with TLS before it."""
+
+    url: str  # http:// or https://
+    tls: ssl.SSLContext | None = None
+
+    def dial(self, path: str, **headers: str) -> connect:
+        """Return a connection to a socket, to be awaited or entered."""
+        return connect(
+            f"ws{self.url.removeprefix('http')}{path}",
+            ssl=self.tls,
+            additional_headers=headers,
+            open_timeout=5,
+            max_queue=None,
+            proxy=None,
+        )
+
+
 @dataclass
 class Walk:
     """One session's source and viewer, and what each of them knows."""
 
     row: dict[str, Any]
-    port: int
+    entrance: Entrance
     rate: float
     made: int = 0
     unacknowledged: dict[int, str] = field(default_factory=dict)
@@ -38,19 +59,14 @@ class Walk:
     seen: list[int] = field(default_factory=list)
     stopping: bool = False
 
-    async def dial(self, path: str, token: str) -> ClientConnection:
-        return await connect(
-            f"ws://127.0.0.1:{self.port}{path}",
-            additional_headers={"Authorization": f"Bearer {token}"},
-            open_timeout=5,
-            max_queue=None,
-        )
+    def dial(self, path: str, token: str) -> connect:
+        return self.entrance.dial(path, Authorization=f"Bearer {token}")
 
     async def send(self) -> None:
         """Walk, and never lose a step that was not acknowledged."""
         while not (self.stopping and not self.unacknowledged):
             try:
-                async with await self.dial("/ws/source/", self.row["source"]) as socket:
+                async with self.dial("/ws/source/", self.row["source"]) as socket:
                     await self._send_over(socket)
             except GONE:
                 await asyncio.sleep(0.05)
@@ -105,7 +121,7 @@ class Walk:
         while True:
             after = self.seen[-1] if self.seen else 0
             try:
-                async with await self.dial(f"{path}?after={after}", self.row["tablet"]) as socket:
+                async with self.dial(f"{path}?after={after}", self.row["tablet"]) as socket:
                     async for text in socket:
                         message = json.loads(text)
                         for step in message.get("steps", []) if "frame" in message else []:
@@ -124,15 +140,26 @@ class Walk:
 class Torture:
     """A server that dies, and those who must not notice."""
 
-    def __init__(self, folder: Path, seed: int, rate: float = 40.0) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        seed: int,
+        rate: float = 40.0,
+        database: str = "",
+        serve: Sequence[str] = (),
+    ) -> None:
         self.folder = folder
         self.random = random.Random(seed)
         self.port = free_port()
+        self.entrance = Entrance(f"http://127.0.0.1:{self.port}")
+        self.serve = serve
         self.rate = rate
         self.walks: list[Walk] = []
         self.environment = clean_environment(folder, self.port) | {
             "DJANGO_SETTINGS_MODULE": "garry_site.settings"
         }
+        if database:
+            self.environment["GARRY_DATABASE_URL"] = database
 
     def run_python(self, *arguments: str) -> str:
         """Run Python beside the server, on its database."""
@@ -152,6 +179,7 @@ class Torture:
             sys.executable,
             "manage.py",
             "serve",
+            *self.serve,
             cwd=ROOT,
             env=self.environment,
             stdout=asyncio.subprocess.PIPE,
@@ -165,13 +193,9 @@ class Torture:
 
     async def resume(self, walk: Walk) -> None:
         """Do what the PT does: a session comes back paused, and a person lets it go on."""
-        origin = f"http://127.0.0.1:{self.port}"
         cookie = f"sessionid={walk.row['cookie']}"
-        async with await connect(
-            f"ws://127.0.0.1:{self.port}/ws/session/{walk.row['session']}/monitor/",
-            additional_headers={"Cookie": cookie, "Origin": origin},
-            max_queue=None,
-        ) as socket:
+        path = f"/ws/session/{walk.row['session']}/monitor/"
+        async with self.entrance.dial(path, Cookie=cookie, Origin=self.entrance.url) as socket:
             await socket.send('{"type":"change","kind":"resume","id":"r"}')
             async for text in socket:
                 answer = json.loads(text)
@@ -179,19 +203,32 @@ class Torture:
                     assert answer["type"] == "done", answer
                     return
 
-    async def run(self, sessions: int, rounds: int) -> dict[str, Any]:
-        """Kill the server so many times; return what the log and the viewers ended with."""
+    async def run(self, sessions: int, rounds: int, orderly: float = 0.0) -> dict[str, Any]:
+        """End the server so many times; return what the log and the viewers ended with.
+
+        ``orderly``: the share of ends by SIGTERM, after which sessions go on as they were; after a
+        kill they come back paused.
+        """
         server = await self.start_server()
         rows = json.loads(self.run_python("-m", "tests.support.live_seed", str(sessions)))
-        self.walks = [Walk(row, self.port, self.rate) for row in rows]
+        self.walks = [Walk(row, self.entrance, self.rate) for row in rows]
         senders = [asyncio.create_task(walk.send()) for walk in self.walks]
         watchers = [asyncio.create_task(walk.watch()) for walk in self.walks]
+        async with asyncio.timeout(60):  # until the server has all of them
+            while not all(walk.acknowledged for walk in self.walks):  # noqa: ASYNC110
+                await asyncio.sleep(0.05)
+        kills, statuses = 0, []
         for _ in range(rounds):
             await asyncio.sleep(self.random.uniform(0.2, 1.5))
-            server.send_signal(signal.SIGKILL)
-            await server.wait()
+            is_orderly = self.random.random() < orderly
+            server.send_signal(signal.SIGTERM if is_orderly else signal.SIGKILL)
+            status = await asyncio.wait_for(server.wait(), 30)
             server = await self.start_server()
-            await asyncio.gather(*(self.resume(walk) for walk in self.walks))
+            if is_orderly:
+                statuses.append(status)
+            else:
+                kills += 1
+                await asyncio.gather(*(self.resume(walk) for walk in self.walks))
         await asyncio.sleep(1.0)
         for walk in self.walks:
             walk.stopping = True
@@ -200,10 +237,10 @@ class Torture:
         for watcher in watchers:
             watcher.cancel()
         server.send_signal(signal.SIGTERM)
-        status = await asyncio.wait_for(server.wait(), 20)
+        statuses.append(await asyncio.wait_for(server.wait(), 20))
         ids = ",".join(str(row["session"]) for row in rows)
         log = json.loads(self.run_python("-m", "tests.support.live_log", ids))
-        return {"status": status, "log": log}
+        return {"statuses": statuses, "kills": kills, "log": log}
 
     async def _until_seen(self) -> None:
         for _ in range(200):
@@ -213,7 +250,7 @@ class Torture:
 
     def find_faults(self, ended: dict[str, Any]) -> list[str]:
         """Return everything that must not have happened."""
-        faults = [] if ended["status"] == 0 else [f"the server ended with {ended['status']}"]
+        faults = [f"a server ended with {status}" for status in ended["statuses"] if status]
         for walk in self.walks:
             name = f"session {walk.row['session']}"
             log = ended["log"][str(walk.row["session"])]
@@ -225,6 +262,8 @@ class Torture:
                 faults.append(f"{name}: a viewer saw a step twice or out of order")
             if set(walk.seen) != set(range(1, walk.made + 1)):
                 faults.append(f"{name}: a viewer missed {walk.made - len(set(walk.seen))} steps")
+            if log["paused"] != ended["kills"]:
+                faults.append(f"{name}: paused {log['paused']} times in {ended['kills']} kills")
             if not log["refolds"]:
                 faults.append(f"{name}: a fresh fold differs from the log")
         return faults

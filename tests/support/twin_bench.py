@@ -103,12 +103,20 @@ class Wire:
         pass
 
 
+def ideal() -> Faults:
+    """Return what no base has: nothing wrong at all, for tests that are about something else."""
+    faults = Faults()
+    for name in ("drift_deg_min", "gyro_noise_deg_s", "dead_time_s", "lag_s", "stiction_m_s"):
+        setattr(faults, name, 0.0)
+    return faults
+
+
 class Bench:
     """A twin whose time is told."""
 
     def __init__(self, body, **more):
         self.wire, self.now_s = Wire(), 1000.0
-        firmware = Firmware(body, Faults(), chance=random.Random(5), **more)
+        firmware = Firmware(body, ideal(), chance=random.Random(5), **more)
         self.twin = Twin(firmware, self.wire)
 
     def live(self, for_s, send=b""):

@@ -1,8 +1,8 @@
 """Put sessions to walk into a server's database: `python -m tests.support.walk_seed JSON`.
 
-JSON is a list of sessions: {"valence", "name", "phases": [{"kind", …}], "goal", "minutes",
-"screen": {"screen_side", …}, "pin"}, where anything may be left out. Each gets a station of its own
-with tokens for its devices.
+JSON is a list of sessions: {"valence", "name", "phases": [{"kind", …}], "goal" (or
+"goal_percent", of the baseline), "minutes", "screen": {"screen_side", …}, "pin"}, where anything
+may be left out. Each gets a station of its own with tokens for its devices.
 """
 
 from __future__ import annotations
@@ -141,7 +141,9 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
             SessionRequest(
                 patient=patient,
                 valence=wish.get("valence", "positive"),
-                goal=GoalRule(value=wish.get("goal", GOAL)),
+                goal=GoalRule(percent_of_baseline=wish["goal_percent"])
+                if "goal_percent" in wish
+                else GoalRule(value=wish.get("goal", GOAL)),
                 phases=[make_phase(**phase) for phase in phases],
                 target=Target(duration_s=60 * wish.get("minutes", 10)),
                 station=station,

@@ -16,28 +16,42 @@ from rehab.gestures.models import Gesture, GestureStep
 from rehab.patients.visits import Visit
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
+from rehab.people.audit.seals import LogSeal
 from rehab.people.consent.models import Consent, ConsentText, Purpose
 from rehab.people.consent.services import record_consent
 from rehab.people.consent.tombstones import ImportTombstone
-from rehab.people.models import Boards, Clinic, Patient, User
+from rehab.people.models import BoardsConsent, Clinic, Patient, User
 from rehab.people.roles import Role
+from rehab.people.sign_in.attempts import SignInAttempts
 from rehab.people.sign_in.factors import Authenticator, RecoveryCode
+from rehab.people.sign_in.resets import ResetRequest
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.corrections import SessionCorrection
+from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.live.aggregate import Row, SessionAggregate
-from rehab.sessions.live.writer import Job, commit
+from rehab.sessions.live.commits import Job, commit
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Pairing, PinAttempts, Station
+from rehab.studies.models import Arm, Study, StudyMark, StudyVersion
+from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.steps import Measurement, Side
+from robot.wire.incident import pack
 from tests.support.clock import START
 
 NOW = START  # the moment at which a test begins
+# What a robot recorded around a bump.
+RECORDED = [
+    {"at_s": 10.0, "tick": [0.2, 0.0, 0.0, 0.0, 0.0, 0.2, 0.0]},
+    {"at_s": 10.5, "tick": [0.2, 0.0, 0.1, 0.0, 0.0, 0.2, 0.0], "hazards": ["bump"]},
+    {"at_s": 10.5, "kept": "bump", "is_first": True},
+    {"at_s": 10.7, "tick": [0.0, 0.0, 0.12, 0.0, 0.0, 0.0, 0.0]},
+]
 
 
 def mark(clinic: str, model: type[Model]) -> str:
@@ -55,6 +69,11 @@ class World:
     device: Device
     token: str
     rows: dict[type[Model], Any] = field(default_factory=dict)
+    more: list[Any] = field(default_factory=list)  # further rows, which have pages as well
+
+    def rows_of(self, model: type[Model]) -> list[Any]:
+        """Return the clinic's rows of a model that pages are opened for."""
+        return [self.rows[model], *(row for row in self.more if type(row) is model)]
 
     @property
     def patient(self) -> Patient:
@@ -76,7 +95,7 @@ def scoped_models() -> list[type[Any]]:
 
 def agreeing(patient: Patient) -> Patient:
     """Return a patient who agrees to stand on the boards that are set."""
-    if patient.boards != Boards.OWN:
+    if patient.boards != BoardsConsent.OWN:
         record_consent(patient, Purpose.BOARDS, None, NOW, patient.boards)
     return patient
 
@@ -95,6 +114,74 @@ def store(aggregate: SessionAggregate, rows: list[Row]) -> None:
             )
         ]
     )
+
+
+def seal_nothing(clinic: Clinic) -> LogSeal:
+    """Store the seal with which a clinic's audit log begins here: of no rows."""
+    seal = LogSeal(log="AuditEntry", clinic=clinic, number=1, first_id=0, last_id=0, last_at=NOW)
+    seal.digest = seal.compute_digest([])
+    seal.save()
+    return seal
+
+
+# What a version of a study tells (`describe` in rehab/studies/registration.py), as short as can be.
+PLAN: dict[str, Any] = {
+    **dict.fromkeys(("code", "title", "clinic", "question"), ""),
+    "participants": 2,
+    "months_since_stroke_at_least": None,
+    "design": "parallel",
+    "arms": [],
+    "allocation": {"method": "blocks", "groups": [], "factors": [], "commitment_sha256": ""},
+    "visits": dict.fromkeys(("in_each_period", "days_between", "days_between_periods"), 1),
+    "goal_percent_of_baseline": 100,
+    "primary_outcome": "hit_rate",
+    "secondary_outcomes": [],
+    "scoring_rules_version": 1,
+}
+
+
+def close_study(name: str, patient: Patient, session: TrainingSession, by: User) -> Study:
+    """Store a study that is closed, so that it hides nothing: with a row of each of its models."""
+    study = Study.everywhere.create(
+        clinic=patient.clinic,
+        code=f"7{patient.clinic_id}",
+        title=mark(name, Study),
+        question=mark(name, Study),
+        state="closed",
+        participants=2,
+        primary_outcome="hit_rate",
+        closed_at=NOW,
+    )
+    version = StudyVersion.everywhere.create(
+        study=study, number=1, document=PLAN, reason=mark(name, StudyVersion)
+    )
+    for position, valence in enumerate(("positive", "binary")):
+        Arm.everywhere.create(
+            study=study,
+            position=position,
+            code="AB"[position],
+            name=mark(name, Arm),
+            valence=valence,
+            measure=session.measure,
+            protocol=session.protocol,
+        )
+    StudyMark.everywhere.create(study=study, user=by, task="assessor")
+    enrollment = Enrollment.everywhere.create(
+        clinic=patient.clinic,
+        study=study,
+        patient=patient,
+        version=version,
+        code=mark(name, Enrollment),
+        keep_data=True,
+    )
+    Allocation.everywhere.create(enrollment=enrollment, group="A")
+    StudyVisit.everywhere.create(
+        enrollment=enrollment, number=1, period=0, day=NOW.date(), session=session, version=version
+    )
+    StudyEvent.everywhere.create(
+        study=study, enrollment=enrollment, kind="enrolled", reason=mark(name, StudyEvent)
+    )
+    return study
 
 
 def build_world(name: str) -> World:
@@ -185,7 +272,16 @@ def build_world(name: str) -> World:
         period="all",
         min_valid_strides=1,
     )
-    world = World(name, clinic, people, device, token)
+    of_group = Leaderboard.everywhere.create(
+        clinic=clinic,
+        name=f"{mark(name, Leaderboard)} 2",
+        among="group",
+        aggregation="best",
+        active=False,
+    )
+    of_group.group.add(patient)
+    study = close_study(name, patient, session, people[Role.PT])
+    world = World(name, clinic, people, device, token, more=[of_group])
     for row in (
         clinic,
         people[Role.PT],
@@ -208,10 +304,14 @@ def build_world(name: str) -> World:
             by=people[Role.PT],
             at=NOW,
         ),
+        RobotIncident.everywhere.create(
+            session=session, at=NOW, reason=mark(name, RobotIncident), recording=pack(RECORDED)
+        ),
         Preset.everywhere.create(
             clinic=clinic,
             name=mark(name, Preset),
             valence="binary",
+            measure=measure,
             goal_value=1.5,
             protocol=protocol,
         ),
@@ -223,19 +323,35 @@ def build_world(name: str) -> World:
         BoardCount.everywhere.get(board=board),
         text,
         Consent.everywhere.filter(patient=patient).last(),
+        study,
+        StudyVersion.everywhere.get(study=study),
+        study.arms.first(),
+        StudyMark.everywhere.get(study=study),
+        Enrollment.everywhere.get(study=study),
+        Allocation.everywhere.get(enrollment__study=study),
+        StudyVisit.everywhere.get(enrollment__study=study),
+        StudyEvent.everywhere.get(study=study),
         AuditEntry.everywhere.create(clinic=clinic, act="view", about=mark(name, AuditEntry)),
         HistoryEntry.everywhere.get(model_name="Patient", object_id=patient.pk),
+        seal_nothing(clinic),
         ApiToken.everywhere.create(
             clinic=clinic,
             user=people[Role.PT],
             name=mark(name, ApiToken),
             role=Role.PT,
+            may_steer=True,
             token_hash=f"program-{name}",
         ),
         Authenticator.everywhere.create(
             user=people[Role.PT], kind="app", name=mark(name, Authenticator), credential="-"
         ),
         RecoveryCode.everywhere.create(user=people[Role.PT], code_hash=mark(name, RecoveryCode)),
+        ResetRequest.everywhere.create(
+            account=people[Role.PT], asked_by=people[Role.LEAD], asked_at=NOW
+        ),
+        SignInAttempts.everywhere.create(
+            user=people[Role.PT], key=mark(name, SignInAttempts), counted_at=NOW
+        ),
         PinAttempts.everywhere.create(
             station=station, screen=f"tablet {device.pk}", locked_until=NOW
         ),

@@ -13,6 +13,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rehab.training.changes import Change, ChangeKind, PauseReason
+from rehab.training.checkpoints import fold_from_json, fold_to_json
 from rehab.training.fold import SessionFold
 from rehab.training.measures import InvalidSetting
 from rehab.training.metrics import compute_metrics
@@ -139,6 +140,23 @@ def test_the_log_gives_the_session_back_wherever_it_is_cut(
     again = SessionFold.replay(stored_plan, log[:cut])
     assert walk_log(again, log[cut:]) == steps[count_steps(log[:cut]) :]
     assert vars(again) == vars(whole)
+
+
+@given(sessions(), st.integers(0, 120))
+def test_a_checkpoint_gives_the_fold_back_wherever_it_is_taken(
+    session: tuple[SessionPlan, Log], cut: int
+) -> None:
+    plan, log = session
+    whole, first = SessionFold(plan), SessionFold(plan)
+    steps = walk_log(whole, log)
+    walk_log(first, log[:cut])
+    stored_plan = SessionPlan.from_json(json.loads(json.dumps(plan.to_json())))
+    again = fold_from_json(stored_plan, json.loads(json.dumps(fold_to_json(first))))
+    assert again is not None
+    assert vars(again) == vars(first)
+    assert walk_log(again, log[cut:]) == steps[count_steps(log[:cut]) :]
+    assert vars(again) == vars(whole)
+    assert fold_from_json(plan, fold_to_json(first) | {"version": 0}) is None
 
 
 def count_steps(log: Log) -> int:

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from rehab.training.cueing import check_activation_threshold
 from rehab.training.measures import A2, GAIN_MAX, GAIN_MIN, MEASURES, InvalidSetting, check_gain
-from rehab.training.plans import check_activation_threshold
 from rehab.training.scoring import judge
 from robot.wire.limits import PERFORMANCE_MAX
 from tests.training.sessions import SWAY
@@ -32,6 +32,23 @@ def test_every_measure_can_be_trained(slug: str) -> None:
     assert measure.check_goal(measure.goal_max) == measure.goal_max
     shown = judge(measure, measure.goal_max, 1.0, measure.goal_max).shown
     assert shown == measure.goal_max <= measure.value_max, "its highest goal can be reached"
+
+
+@pytest.mark.parametrize(
+    ("most", "step", "places"),
+    [(15, 0.05, 2), (200, 0.5, 1), (1.5, 0.005, 3), (3, 0.01, 2), (300, 1, 0), (1e5, 200, 0)],
+)
+def test_goals_are_raised_by_steps_of_some_three_hundred(most, step, places) -> None:
+    measure = dataclasses.replace(A2, goal_max=most, first_goal=None)
+    assert measure.goal_step == pytest.approx(step)
+    assert measure.goal_places == places
+    assert measure.check_goal(measure.offered_goal) == pytest.approx(most / 2, rel=0.02)
+
+
+def test_the_first_goal_is_one_that_can_be_used() -> None:
+    assert A2.offered_goal == 3.9
+    with pytest.raises(InvalidSetting, match="A goal of 16 W/kg"):
+        dataclasses.replace(A2, first_goal=16)
 
 
 @pytest.mark.parametrize("goal", [5e-324, 0.1, 3.9, 15, 15.0])

@@ -58,6 +58,7 @@ VALUES: dict[ChangeKind, ChangeValue] = {
     **NUMBERS,
     K.VALENCE: "negative",
     K.CHART_STYLE: "line",
+    K.GOAL_ADAPTATION: "automatic",
     K.FEEDBACK_TEXT: {"valence": "binary", "bands": bands_to_json(BINARY.bands)},
 }
 

@@ -6,13 +6,15 @@ import math
 
 import pytest
 
-from rehab.training.measures import A2
+from rehab.training.measures import A2, Measure
+from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import (
     InvalidMeasurement,
     InvalidReason,
     Measurement,
     Side,
     find_invalid_reasons,
+    select_value,
 )
 from tests.training.sessions import make_plan, start, step_at
 
@@ -57,6 +59,39 @@ def test_reasons_are_not_given_twice(value: float | None, stored: tuple[str, ...
     assert find_invalid_reasons(Measurement(1, 0.0, Side.LEFT, value, stored), A2) == stored
 
 
+PULSE = Measure("pulse", "heart rate", "1/min", 30, 220, 40, 200, channel="heart_rate")
+
+
+@pytest.mark.parametrize(
+    ("sent", "value", "extra"),
+    [
+        (
+            Measurement(1, 0.0, Side.LEFT, 4.0, extra={"heart_rate": 90.0}),
+            90.0,
+            {"sent_value": 4.0},
+        ),
+        (Measurement(1, 0.0, Side.LEFT, None, extra={"heart_rate": 90.0}), 90.0, {}),
+        (Measurement(1, 0.0, Side.LEFT, math.nan, extra={"heart_rate": 90.0}), 90.0, {}),
+        (Measurement(1, 0.0, Side.LEFT, 4.0), None, {"sent_value": 4.0}),
+    ],
+)
+def test_a_measure_with_a_channel_takes_its_value_from_there(sent, value, extra) -> None:
+    selected = select_value(sent, PULSE)
+    assert (selected.value, selected.extra) == (value, {**sent.extra, **extra})
+    assert select_value(selected, PULSE) == selected
+    assert select_value(sent, A2) is sent
+
+
+def test_a_session_of_another_channel_is_scored_by_it() -> None:
+    fold = start(make_plan(goal=100, measure=PULSE))
+    steps = [Measurement(n, n, Side.LEFT, 4.0, extra={"heart_rate": 80.0 + 20 * n}) for n in (1, 2)]
+    scored = [fold.step(step) for step in steps]
+    assert [(step.shown, step.hit) for step in scored] == [(100.0, True), (120.0, True)]
+    stored = [Measurement(s.number, s.time_s, s.side, s.value, s.reasons, s.extra) for s in scored]
+    again = start(make_plan(goal=100, measure=PULSE))
+    assert [again.step(step) for step in stored] == scored, "a replay gives the same"
+
+
 @pytest.mark.parametrize("number", [1, 2, 4, 40])
 def test_a_number_that_does_not_follow_is_refused_and_changes_nothing(number: int) -> None:
     fold = start(make_plan())
@@ -89,3 +124,34 @@ def test_two_steps_at_one_time_are_in_order(times_s: tuple[float, ...]) -> None:
     """A sum of differences would round past the time that it should be."""
     fold = start(make_plan())
     assert all(step_at(fold, time_s).valid for time_s in times_s)
+
+
+# Two legs whose strides overtake each other, and what each version says of them.
+OVERTAKEN = [(1.0, "left"), (1.6, "right"), (2.1, "left"), (2.05, "right"), (3.2, "left")]
+
+
+@pytest.mark.parametrize(
+    ("version", "doubted", "active_s"), [(1, [2.05], 1.1), (2, [], 2.2), (None, [], 2.2)]
+)
+def test_a_leg_may_be_overtaken_by_the_other_one(
+    version: int | None, doubted: list[float], active_s: float
+) -> None:
+    fold = start(make_plan())
+    steps = [
+        fold.step(Measurement(number, time_s, Side(side), 4.0, rules_version=version))
+        for number, (time_s, side) in enumerate(OVERTAKEN, 1)
+    ]
+    assert [step.time_s for step in steps if not step.valid] == doubted
+    assert {step.rules_version for step in steps} == {version or RULES_VERSION}
+    assert fold.active_s == pytest.approx(active_s)
+
+
+def test_each_leg_notices_a_clock_that_was_set_back() -> None:
+    fold = start(make_plan())
+    for number, (time_s, side) in enumerate(
+        [(1000.0, "left"), (1000.5, "right"), (0.5, "left"), (1.0, "right"), (1.6, "left")], 1
+    ):
+        step = fold.step(Measurement(number, time_s, Side(side), 4.0))
+        backwards = (InvalidReason.TIME_BACKWARDS,) if number in (3, 4) else ()
+        assert step.reasons == backwards
+    assert fold.active_s == 0.5

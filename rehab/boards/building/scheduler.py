@@ -1,5 +1,7 @@
 """Rebuilding boards: of a few patients at once, of many in a thread in batches of patients.
 
+The thread also lets boards follow the sessions that have ended (``boards_due``).
+
 SQLite allows one writer at a time, and steps must be stored meanwhile: a step's commit waits for
 one batch at most. The progress is stored with each batch (`entries.py`), so that a server that was
 stopped goes on where it was; several may build at once. A board is not shown before it is built,
@@ -21,6 +23,7 @@ from django.utils import timezone
 
 from rehab.boards.building import entries
 from rehab.boards.models import Leaderboard
+from rehab.sessions.models import TrainingSession
 
 log = logging.getLogger(__name__)
 
@@ -101,6 +104,8 @@ class BoardBuilder:
 
 def find_work(now: datetime) -> Work | None:
     """Return the work that builds or updates a board; None where there is none."""
+    if find_ended(1):
+        return follow_sessions
     board_id = entries.find_unbuilt()
     if board_id is not None:
         return partial(entries.build_next, board_id)
@@ -108,6 +113,33 @@ def find_work(now: datetime) -> Work | None:
     if outdated is not None:
         return partial(entries.refresh_stale, outdated)
     return None
+
+
+def find_ended(limit: int) -> dict[int, int]:
+    """Return sessions that have ended and that boards do not have yet, with their patients."""
+    due = TrainingSession.everywhere.filter(boards_due=True).order_by("pk")
+    return dict(due.values_list("pk", "patient_id")[:limit])
+
+
+def follow_sessions(limit: int, now: datetime) -> bool:
+    """Bring boards up to date with sessions that have ended; return whether there are more.
+
+    Each board is a transaction of its own. What is done twice, after a crash or beside another
+    process, comes out the same. Boards that cannot follow are rebuilt.
+    """
+    ended = find_ended(limit)
+    patients = set(ended.values())
+    try:
+        entries.refresh_patients(patients, now=now)
+    except Exception:
+        log.exception(
+            "Boards could not be updated after sessions %s. They are rebuilt in the background; if "
+            "that fails too, run manage.py rebuildboards",
+            sorted(ended),
+        )
+        rebuild_after_failure(patients, now)
+    TrainingSession.everywhere.filter(pk__in=ended).update(boards_due=False)
+    return len(ended) == limit
 
 
 board_builder = BoardBuilder()
@@ -144,6 +176,8 @@ def catch_up(board: Leaderboard, now: datetime) -> bool:
 
     Many rows are left to the thread: the board is not shown meanwhile.
     """
+    if find_ended(1):  # the page was quicker than the thread
+        follow_sessions(MAX_INLINE, now)
     stale = entries.find_stale(board, now, MAX_INLINE + 1)
     if len(stale) > MAX_INLINE:
         board_builder.wake()

@@ -1,8 +1,8 @@
 """The panels of own sessions on every scores page: of one feedback type, and of all.
 
 Points rank sessions of one type, hit rates those of all. Sessions that were simulated and those
-that a person walked never share a board. Only finished sessions with judged steps are on one:
-others have no hit rate.
+that a person walked never share a board. Only finished sessions are on one: with judged steps,
+which have a hit rate, or imported from the original GARRY, which kept their points alone.
 """
 
 from __future__ import annotations
@@ -87,13 +87,21 @@ def make_own_panels(session: TrainingSession, now: datetime) -> list[BoardPanel]
         session__simulated=session.simulated,
         slug__in=("hit_rate", "score", "steps"),
     )
-    sessions = list(read_sessions(by_rate, rows, period, frozenset({"score"})))
+    # An imported session has points and no steps: it is on the first panel alone.
+    by_points = [board for _slug, _label, _scale, board in boards if board is not by_rate]
+    sessions = list(read_sessions(by_rate, rows, period, frozenset({"score"}), by_points))
+    if any("hit_rate" not in one.values for one in sessions):
+        known = TrainingSession.everywhere.filter(patient=session.patient_id)
+        imported = set(known.filter(legacy_id__isnull=False).values_list("pk", flat=True))
+        sessions = [
+            one for one in sessions if "hit_rate" in one.values or one.session_id in imported
+        ]
     visible = []
     for _slug, _label, _scale, board in boards:
         standings = ComputedStandings(board, own_results(board, sessions, session.valence, period))
         visible.append(find_visible_own_rows(standings, standings.find_session(session.pk)))
     walked = (
-        TrainingSession.everywhere.only("created_at", "started_at", "active_s")
+        TrainingSession.everywhere.only("created_at", "started_at", "active_s", "legacy_id")
         .order_by()  # by key; the model's own order would lead through the clinic's other rows
         .in_bulk({each.row.session_id for rows in visible for each in rows})
     )

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, datetime
 
+from django.utils.translation import gettext
+
 from rehab.boards.choices import NameStyle
 from rehab.boards.models import Leaderboard
 from rehab.boards.ranking.eligibility import eligible_patients
@@ -120,7 +122,10 @@ def date_rows(
     dated: list[PanelRow] = []
     for row in rows:
         start = began[row.session_id or 0]
-        walked = format_duration(sessions[row.session_id or 0].active_s)
+        session = sessions[row.session_id or 0]
+        walked = format_duration(session.active_s)
+        if session.legacy_id is not None:
+            walked = f"{walked} · {gettext('imported')}"
         dated.append(
             replace(
                 row,

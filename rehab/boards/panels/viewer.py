@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import cached_property
 
+from django.db.models import Count
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_noop, ngettext
 
 from rehab.boards.building.scheduler import board_builder, catch_up
 from rehab.boards.choices import Aggregation, DisplayMode, Occasion, Participants
-from rehab.boards.models import Leaderboard
+from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.boards.panels.panel import BoardPanel, Total
 from rehab.boards.panels.rows import (
     PanelRow,
@@ -78,6 +80,7 @@ class BoardViewer:
     """The viewer of a board: a patient, with or without a session at hand, or anybody.
 
     ``results`` are those of a board that is not stored as it is here, computed from the sessions.
+    ``staff``: a PT looks at it, and not for a patient.
     """
 
     board: Leaderboard
@@ -85,11 +88,20 @@ class BoardViewer:
     patient: Patient | None = None
     session: TrainingSession | None = None
     results: Sequence[Result] | None = None
+    staff: bool = False
 
     @property
     def valence(self) -> str:
-        """The valence of the session at hand, or ""."""
-        return self.session.valence if self.session else ""
+        """The valence of the session at hand, or ""; for a PT that of the board's longest list."""
+        if self.session is not None:
+            return self.session.valence
+        return self._longest_list if self.staff else ""
+
+    @cached_property
+    def _longest_list(self) -> str:
+        lists = BoardEntry.everywhere.filter(board=self.board).values_list("valence")
+        longest = lists.annotate(rows=Count("pk")).order_by("-rows", "valence").first()
+        return "" if longest is None else longest[0]
 
     def make_panel(self) -> BoardPanel:
         """Return the board, or the own sessions and why."""
@@ -115,9 +127,8 @@ class BoardViewer:
         me = standings.find(patient.pk) if patient else None
         if board.display == DisplayMode.TOTAL:
             return self._panel(total=self._total(standings, me), shared=True, summary=people)
-        rows = name_rows(
-            board, find_visible_rows(board, standings, me), patient.pk if patient else None
-        )
+        visible = find_visible_rows(board, standings, me, staff=self.staff)
+        rows = name_rows(board, visible, patient.pk if patient else None)
         if rows:
             return self._panel(rows=rows, shared=True, summary=people)
         why = _("Outside its first half, own sessions are shown.")
@@ -169,7 +180,9 @@ class BoardViewer:
         me = standings.find_session(self.session.pk) if self.session else None
         shown_as = board if board.is_own else self._own_board()
         rows = format_rows(board, find_visible_rows(shown_as, standings, me))
-        walked = TrainingSession.everywhere.only("created_at", "started_at", "active_s")
+        walked = TrainingSession.everywhere.only(
+            "created_at", "started_at", "active_s", "legacy_id"
+        )
         found = walked.in_bulk([row.session_id for row in rows])
         now = clinic_time(self.now, patient.clinic)
         dated = date_rows(rows, found, self.session, now)

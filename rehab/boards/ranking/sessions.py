@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from itertools import groupby
@@ -80,6 +80,7 @@ def read_sessions(
     rows: QuerySet[SessionMetric],
     period: Period,
     more_metrics: frozenset[str] = frozenset(),
+    others: Sequence[Leaderboard] = (),
 ) -> Iterator[CountedSession]:
     """Yield the sessions that count on a board, grouped by patient and ordered by time.
 
@@ -89,6 +90,8 @@ def read_sessions(
         The metrics of the patients in question.
     more_metrics
         What to read besides the board's own metrics.
+    others
+        Boards on which a session may count instead, which admit no more sessions than this one.
     """
     wanted = {board.metric, board.tie_breaker, "steps", "active_minutes", *more_metrics} - {""}
     columns = [
@@ -120,7 +123,7 @@ def read_sessions(
             values={row[5]: row[6] for row in metrics},
             miss_cost=-(metrics[0][7] or 0) if len(columns) > 7 else 0,
         )
-        if session.counts_for(board):
+        if any(session.counts_for(each) for each in (board, *others)):
             yield session
 
 

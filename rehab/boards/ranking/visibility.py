@@ -34,16 +34,18 @@ class VisibleRow:
 
 
 def find_visible_rows(
-    board: Leaderboard, standings: Standings, me: RankedRow | None
+    board: Leaderboard, standings: Standings, me: RankedRow | None, *, staff: bool = False
 ) -> list[VisibleRow]:
     """Return the rows that are shown to a patient or, without ``me``, to anybody.
+
+    A PT (``staff``) is no row's neighbor, and sees the first rows of a board of neighbors.
 
     Of several patients only the first half is shown, and no rank in the last half. Where
     neighbors are shown, a patient in the last half gets an empty list, and pages show own sessions.
     """
     last = standings.count if board.is_own else (standings.count + 1) // 2
     if board.display == DisplayMode.NEIGHBORS:
-        return _find_neighbors(board, standings, me, last)
+        return _find_neighbors(board, standings, me, last, staff=staff)
     most = min(last, board.top_n)
     best = [row for row in standings.top(board.top_n + MAX_TIED) if cutoff_rank(board, row) <= most]
     visible = [VisibleRow(row, False, True) for row in best]
@@ -54,10 +56,10 @@ def find_visible_rows(
 
 
 def _find_neighbors(
-    board: Leaderboard, standings: Standings, me: RankedRow | None, last: int
+    board: Leaderboard, standings: Standings, me: RankedRow | None, last: int, *, staff: bool
 ) -> list[VisibleRow]:
     if me is None:
-        rows = standings.top(1 + 2 * NEIGHBORS) if board.is_own else []
+        rows = standings.top(1 + 2 * NEIGHBORS) if board.is_own or staff else []
     else:
         rows = standings.around(me, NEIGHBORS) if cutoff_rank(board, me) <= last else []
     seen = [row for row in rows if cutoff_rank(board, row) <= last]

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rehab.gait.contacts.drag import DRAG_S, ELBOW_S, find_drag, find_elbow
+from rehab.gait.contacts.zero import PlateZero, find_finite_median
 from rehab.gait.signals.buffer import LegBuffer
-from rehab.gait.signals.filters import Floats, find_maximum, find_upper_median
+from rehab.gait.signals.filters import Floats, find_maximum
 from rehab.gait.signals.samples import FORCE, TIME
 
 # Force is not filtered here: 20 Hz of causal filter would move both events by 10 ms
@@ -18,10 +20,12 @@ CONTACT_N = 30.0  # 6 times the noise of an unloaded treadmill plate (4.5 N sd)
 RELEASE_N = 20.0
 STEP_PEAK = 0.25  # of body weight; a contact that never bears more is no step
 BOUNCE_S = 0.15  # no foot swings faster; a contact sooner than that goes on with the last stance
-LOOK_BACK_S = 0.05  # loading takes less from release to contact threshold
-OFFSET_MAX = 0.15  # of body weight; a plate that reads more in swing needs its own zero button
-OFFSET_SWINGS = 10
-STUCK_S = 2.5  # in contact for longer: standing, or the plate's zero has moved above the threshold
+# A foot that is dragged over the belt loads its plate by 60 N and more in swing. A contact is
+# certain above that; its ends are timed at the release threshold where the force gets there, else
+# where it leaves the level of the drag.
+CERTAIN = 0.15  # of body weight
+LOOK_BACK_S = 0.25  # from there to the release threshold, for a foot that is loaded slowly
+STUCK_S = 4.5  # in contact for longer: standing, or the plate's zero has moved above the threshold
 BLOCK_S = 0.1
 
 
@@ -41,6 +45,8 @@ class Contact:
         Whether it only continues the stance before it.
     peak_n
         Largest force above the offset [N], once the contact has ended.
+    known_index
+        The sample at which it was known that the contact has ended.
     """
 
     begin_index: int
@@ -51,13 +57,15 @@ class Contact:
     end_index: int | None = None
     end_s: float | None = None
     peak_n: float = 0.0
+    known_index: int | None = None
 
 
 class ContactFinder:
     """Finds contacts by hysteresis and tracks the plate's zero in swing.
 
-    A contact is certain at ``contact_n``; its beginning and end are timed where the force crosses
-    ``release_n``, by linear interpolation between samples.
+    A contact is certain at 0.15 of the body weight, ``contact_n`` at least; its beginning and
+    end are timed where the force crosses ``release_n``, by linear interpolation between samples.
+    Where a dragged foot keeps the force above that, they are timed at ``release_n`` above the drag.
 
     Parameters
     ----------
@@ -79,22 +87,43 @@ class ContactFinder:
     ) -> None:
         # The contacts of the buffered samples, and the last one before them.
         self.recent: deque[Contact] = deque()
-        self.offset_n = 0.0
         self._buffer = buffer
         self._rate_hz = rate_hz
         self._weight_n = weight_n
-        self._contact_n = contact_n
+        self._contact_n = max(contact_n, CERTAIN * weight_n)
         self._release_n = release_n
-        self._offsets: deque[float] = deque(maxlen=OFFSET_SWINGS)
+        self._zero = PlateZero(weight_n, max(3, int(BLOCK_S * rate_hz / 2)))
         self._current: Contact | None = None
         self._last: Contact | None = None  # the last step
         self._zero_index = 0  # swing samples before this belong to another zero
         self._stuck_index = 0
+        self._low_index: int | None = None  # since when the force of a contact is not certain
+        self._dragged = max(3, round(DRAG_S * rate_hz))
+        self._elbow = max(2, round(ELBOW_S * rate_hz))
+
+    @property
+    def offset_n(self) -> float:
+        """The plate's zero [N]."""
+        return self._zero.offset_n
 
     def advance(self, start: int, stop: int) -> list[Contact]:
         """Process new samples ``start:stop`` and return the steps that ended in them."""
-        ended: list[Contact] = []
+        if start == stop:
+            return []
         force = self._buffer.channel(FORCE, start, stop)
+        limit = self._zero.offset_n + self._contact_n
+        # Most chunks are of swing or of stance whole.
+        if self._current is None:
+            if force[force.argmax()] <= limit:  # false for NaN, too
+                return []
+        elif stop < self._stuck_index and force[force.argmin()] >= limit:
+            self._low_index = None
+            return []
+        return self._search(force, start)
+
+    def _search(self, force: Floats, start: int) -> list[Contact]:
+        """Return the steps that ended in samples from ``start`` on."""
+        ended: list[Contact] = []
         done = 0
         while done < len(force):
             rest = force[done:] if done else force
@@ -109,21 +138,69 @@ class ContactFinder:
                 done += step
                 self._begin(start + done)
             else:
-                limit = self.offset_n + self._release_n
                 until = self._stuck_index - start - done  # exclusive, whatever the chunks
                 if until <= len(rest):
                     rest = rest[:until]
-                if len(rest) and not rest[rest.argmin()] >= limit:
-                    free = rest < limit
-                    step = int(free.argmax())
-                    if free[step]:
-                        done += step
-                        self._end(start + done, ended)
-                        continue
+                left = self._find_end(rest, start + done, ended)
+                if left is not None:
+                    done = left - start
+                    continue
                 done += len(rest)
                 if start + done >= self._stuck_index:
                     self._recover_from_drift(start + done)
         return ended
+
+    def _find_end(self, rest: Floats, start: int, ended: list[Contact]) -> int | None:
+        """End the contact if it ends in these samples; return the sample from which to go on."""
+        if not len(rest) or rest[rest.argmin()] >= self.offset_n + self._contact_n:
+            self._low_index = None
+            return None
+        low = ~(rest >= self.offset_n + self._contact_n)
+        done = 0
+        while done < len(rest):
+            if self._low_index is None:
+                step = int(low[done:].argmax())
+                if not low[done + step]:
+                    return None
+                done += step
+                self._low_index = start + done
+            again = int((~low[done:]).argmax())
+            stop = len(rest) if low[done + again] else done + again
+            due = self._low_index + self._dragged - start
+            part = rest[done : min(stop, due + 1)]
+            free = part < self.offset_n + self._release_n
+            step = int(free.argmax()) if len(free) else 0
+            if len(free) and free[step]:
+                at = start + done + step
+                elbow = None
+                if at - self._low_index >= self._dragged // 2:
+                    elbow = self._find_drag_end(self._low_index, at)
+                index, level = elbow or (at, self.offset_n + self._release_n)
+                self._end(index, at, level, ended)
+                return at
+            if due < stop:
+                elbow = self._find_drag_end(self._low_index, start + due)
+                if elbow is not None:
+                    self._end(elbow[0], start + due, elbow[1], ended)
+                    return start + due
+                self._low_index += self._elbow  # looked at anew a little later
+                done = max(done, due)
+                continue
+            done = stop
+            if stop < len(rest):
+                self._low_index = None
+        return None
+
+    def _find_drag_end(self, low: int, last: int) -> tuple[int, float] | None:
+        """Return where, and at which force [N], a stance ended whose foot drags on, if it did."""
+        contact = self._current
+        assert contact is not None  # noqa: S101 (for mypy)
+        if not self._is_step(contact, low):
+            return None
+        first = max(contact.begin_index, low - self._elbow)
+        force = self._buffer.channel(FORCE, first, last + 1)
+        elbow = find_elbow(force, self._rate_hz, self._release_n)
+        return None if elbow is None else (first + elbow[0], elbow[1])
 
     def truncate(self) -> Contact | None:
         """Return the step under way, as if it ended with the last sample, if there is one."""
@@ -136,9 +213,11 @@ class ContactFinder:
         return contact if self._is_step(contact, stop) else None
 
     def _begin(self, index: int) -> None:
-        buffer, level = self._buffer, self.offset_n + self._release_n
-        first = max(0, index - max(2, int(LOOK_BACK_S * self._rate_hz)))
+        buffer = self._buffer
+        first = max(0, buffer.samples.first, index - max(2, int(LOOK_BACK_S * self._rate_hz)))
         before = buffer.channel(FORCE, first, index)
+        drag_n = find_drag(before, self._rate_hz, self.offset_n)
+        level = (self.offset_n if drag_n is None else drag_n) + self._release_n
         below = np.flatnonzero(before <= level)
         seen = len(below) > 0
         at = first + int(below[-1]) + 1 if seen else index
@@ -150,23 +229,25 @@ class ContactFinder:
         last = self._last
         bounce = last is not None and last.end_s is not None and 0 <= time_s - last.end_s < BOUNCE_S
         if seen and not bounce:
-            self._update_offset(at)
+            self._learn_zero(at)
         self._current = Contact(at, time_s, self.offset_n, seen, bounce)
         self._drop_before(index - self._buffer.samples.keep)
         self.recent.append(self._current)
         self._stuck_index = index + int(STUCK_S * self._rate_hz)
+        self._low_index = None
 
     def _drop_before(self, index: int) -> None:
         recent = self.recent
         while len(recent) > 1 and (end := recent[1].end_index) is not None and end < index:
             recent.popleft()
 
-    def _end(self, index: int, ended: list[Contact]) -> None:
+    def _end(self, index: int, known: int, level: float, ended: list[Contact]) -> None:
+        """End the contact at a sample, known at another one, where the force crosses a level."""
         contact = self._current
         assert contact is not None  # noqa: S101 (for mypy)
-        contact.end_index = index
-        contact.end_s = self._interpolate_crossing(index, self.offset_n + self._release_n)
-        self._current = None
+        contact.end_index, contact.known_index = index, known
+        contact.end_s = self._interpolate_crossing(index, level)
+        self._current = self._low_index = None
         if not self._is_step(contact, index):
             self.recent.pop()  # it is the newest
         elif math.isfinite(contact.begin_s) and math.isfinite(contact.end_s):
@@ -188,19 +269,13 @@ class ContactFinder:
         crossed: float = t0 + share * (t1 - t0) if 0 <= share <= 1 else t1  # t1 beside NaN
         return crossed
 
-    def _update_offset(self, index: int) -> None:
-        """Learn the plate's zero from the median of the swing that ends at ``index``."""
+    def _learn_zero(self, index: int) -> None:
+        """Learn the plate's zero from the swing that ends at ``index``."""
         last = self._last
         begin = self._zero_index if last is None or last.end_index is None else last.end_index
         begin = max(begin, self._zero_index, index - self._buffer.samples.keep // 2)
         margin = (index - begin) // 5
-        swing = self._buffer.channel(FORCE, begin + margin, index - margin)
-        if len(swing) < max(3, int(BLOCK_S * self._rate_hz / 2)):
-            return
-        zero = _find_finite_median(swing)
-        if abs(zero) <= OFFSET_MAX * self._weight_n:
-            self._offsets.append(zero)
-            self.offset_n = sorted(self._offsets)[len(self._offsets) // 2]
+        self._zero.learn(self._buffer.channel(FORCE, begin + margin, index - margin))
 
     def _recover_from_drift(self, index: int) -> None:
         """Reset the plate's zero where it has drifted so far that a contact does not end.
@@ -212,17 +287,15 @@ class ContactFinder:
         first = max(0, index - int(STUCK_S * self._rate_hz))
         force = self._buffer.channel(FORCE, first, index)
         blocks = force[len(force) % block :].reshape(-1, block)
-        lowest = min((_find_finite_median(b) for b in blocks), default=np.inf)
-        if abs(lowest) > OFFSET_MAX * self._weight_n or abs(lowest - self.offset_n) < 5.0:
+        lowest = min((find_finite_median(b) for b in blocks), default=np.inf)
+        if not self._zero.reset(lowest):
             return
-        self.offset_n = lowest
-        self._offsets.clear()
         self._zero_index = index
         if force[-1] > lowest + self._contact_n:
             return  # in stance now; its end will be seen with the new zero
         if self._current is not None:
-            self._current.end_index = index
-        self._current = None
+            self._current.end_index = self._current.known_index = index
+        self._current = self._low_index = None
         self._last = None
 
 
@@ -233,11 +306,3 @@ def _find_peak(force: Floats) -> float:
         return peak
     finite = force[np.isfinite(force)]
     return float(finite.max()) if len(finite) else 0.0
-
-
-def _find_finite_median(values: Floats) -> float:
-    """Return the median of the finite values, infinity without one."""
-    if np.isfinite(values).all():
-        return find_upper_median(values)
-    finite = values[np.isfinite(values)]
-    return float(np.median(finite)) if len(finite) else np.inf

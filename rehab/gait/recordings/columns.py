@@ -15,10 +15,21 @@ SIDES = ("left", "right")
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column by name, and the factor that its numbers take to SI units and our signs."""
+    """A column by name, and what takes its numbers to SI units, our signs and the force's time.
+
+    Attributes
+    ----------
+    name
+        Of the column.
+    factor
+        What its numbers are multiplied with.
+    delay_s
+        By how much it comes later than the force [s].
+    """
 
     name: str
     factor: float = 1.0
+    delay_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +90,8 @@ def read_column_map(pairs: Sequence[str]) -> ColumnMap:
     Parameters
     ----------
     pairs
-        ``time=COLUMN`` and ``SIDE.CHANNEL=COLUMN``; ``COLUMN*FACTOR`` changes unit or sign.
+        ``time=COLUMN`` and ``SIDE.CHANNEL=COLUMN``; ``COLUMN*FACTOR`` changes unit or sign,
+        ``COLUMN@DELAY`` takes out a delay [s]; both: ``COLUMN*FACTOR@DELAY``.
 
     Raises
     ------
@@ -92,9 +104,9 @@ def read_column_map(pairs: Sequence[str]) -> ColumnMap:
         channel, _, text = pair.partition("=")
         side, _, what = channel.partition(".")
         if channel == "time" and text:
-            time = _read_column(text)
+            time = read_column(text)
         elif side in SIDES and what in CHANNELS and text:
-            legs.setdefault(side, {})[what] = _read_column(text)
+            legs.setdefault(side, {})[what] = read_column(text)
         else:
             raise GaitInputError(
                 f"'{pair}' maps no column. Write time=COLUMN and SIDE.CHANNEL=COLUMN with SIDE "
@@ -131,11 +143,16 @@ def find_layout(header: Sequence[str]) -> ColumnMap:
     )
 
 
-def _read_column(text: str) -> Column:
-    name, star, factor = text.rpartition("*")
-    if not star:
-        return Column(text)
+def read_column(text: str) -> Column:
+    """Return the column that a text such as ``ANK_L*0.01745@0.01`` describes."""
+    text, delay_s = _split_number(text, "@", 0.0)
+    return Column(*_split_number(text, "*", 1.0), delay_s)
+
+
+def _split_number(text: str, mark: str, usual: float) -> tuple[str, float]:
+    """Return a text without the number behind a mark, and the number; a name may have marks."""
+    name, found, number = text.rpartition(mark)
     try:
-        return Column(name, float(factor))
+        return (name, float(number)) if found and name else (text, usual)
     except ValueError:
-        return Column(text)
+        return text, usual

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+import gzip
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 
-from rehab.gait.recordings.columns import ColumnMap, find_layout, read_column_map
+from rehab.gait.recordings.columns import CHANNELS, SIGNAL_LAYOUTS, Column, ColumnMap
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.strides import GaitInputError
 
 MAX_HEADER = 64 * 1024
+
+
+def open_text(path: Path) -> TextIO:
+    """Open a text file, gzipped or not."""
+    if path.suffix == ".gz":
+        return gzip.open(path, "rt", newline="", encoding="utf-8-sig")
+    return path.open(newline="", encoding="utf-8-sig")
 
 
 def read_header(path: Path) -> tuple[list[str], str]:
@@ -28,7 +36,7 @@ def read_header(path: Path) -> tuple[list[str], str]:
         For a file that cannot be read.
     """
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
+        with open_text(path) as file:
             first = file.readline(MAX_HEADER)
     except UnicodeDecodeError:
         raise GaitInputError(f"{path.name} is no text. Save it as CSV UTF-8.") from None
@@ -36,88 +44,105 @@ def read_header(path: Path) -> tuple[list[str], str]:
     return [name.strip() for name in next(csv.reader([first], delimiter=delimiter), [])], delimiter
 
 
-def read_signals(
-    path: Path, pairs: Sequence[str] | None = None
-) -> tuple[Floats, dict[str, LegSamples]]:
-    """Return times [s] and each leg's channels of a CSV file.
+def read_table(path: Path, names: Sequence[str] | None = None) -> dict[str, Floats]:
+    """Return the columns of a CSV file by name, shape (n,) each; blank cells and text are NaN.
 
     Parameters
     ----------
     path
-        The file. A cell that is not a number is a missing sample: NaN.
-    pairs
-        Which column is which channel, as for ``read_column_map``; None to decide by the header.
-
-    Returns
-    -------
-    Times, shape (n,), and ``LegSamples`` of shape (n,) by side, in SI units with our signs.
+        The file.
+    names
+        Which columns; None for all.
 
     Raises
     ------
     GaitInputError
-        With the cure, for columns that are missing or empty and for a file without samples.
+        With the cure, for columns that are missing and for a file without samples.
     OSError
         For a file that cannot be read.
     """
     header, delimiter = read_header(path)
-    columns: ColumnMap = read_column_map(pairs) if pairs else find_layout(header)
-    missing = [column.name for column in columns.columns if column.name not in header]
+    if not any(header):
+        raise GaitInputError(f"{path.name} is empty. Export it again.")
+    wanted = header if names is None else list(names)
+    missing = [name for name in wanted if name not in header]
     if missing:
         raise GaitInputError(
             f"{path.name} has no column {', '.join(missing)}. It has: {', '.join(header)}."
         )
-    names = [column.name for column in columns.columns]
     table = np.genfromtxt(
         path,
         delimiter=delimiter,
         skip_header=1,
-        usecols=[header.index(name) for name in names],
+        usecols=[header.index(name) for name in wanted],
         encoding="utf-8-sig",
         invalid_raise=False,
         ndmin=2,
     )
     if not table.shape[0]:
         raise GaitInputError(f"{path.name} has a header but no samples. Export it again.")
-    empty = [name for name, values in zip(names, table.T, strict=True) if np.isnan(values).all()]
-    if empty:
-        raise GaitInputError(f"{path.name}: column {', '.join(empty)} holds no numbers.")
-    scaled = iter(
-        values * column.factor for column, values in zip(columns.columns, table.T, strict=True)
-    )
-    time = next(scaled)
-    legs = {}
-    for side, leg in columns.legs.items():
-        channels = {channel: next(scaled) for channel in leg}
-        legs[side] = LegSamples(
-            channels["force"],
-            channels["moment"],
-            channels["angle"],
-            channels.get("forward"),
-            channels.get("position"),
-        )
-    return time, legs
+    return dict(zip(wanted, table.T, strict=True))
 
 
-def estimate_rate(time: Floats, path: Path) -> float:
-    """Return the rate of samples [Hz], from the median of the steps between their times.
+def apply_columns(
+    table: Mapping[str, Floats], columns: ColumnMap
+) -> tuple[Floats, dict[str, LegSamples]]:
+    """Return times [s] and each leg's channels, in SI units, with our signs and in time.
 
     Parameters
     ----------
-    time
-        Times [s], shape (n,).
-    path
-        The file that messages name.
+    table
+        Columns by name, shape (n,) each.
+    columns
+        Which is which; all are there.
+    """
+    time: Floats = table[columns.time.name] * columns.time.factor
+
+    def read(column: Column | None) -> Floats | None:
+        if column is None:
+            return None
+        values: Floats = table[column.name] * column.factor
+        if not column.delay_s:
+            return values
+        shifted: Floats = np.interp(time + column.delay_s, time, values)
+        return shifted
+
+    return time, {
+        side: LegSamples(
+            np.asarray(read(leg["force"])),
+            np.asarray(read(leg["moment"])),
+            np.asarray(read(leg["angle"])),
+            read(leg.get("forward")),
+            read(leg.get("position")),
+        )
+        for side, leg in columns.legs.items()
+    }
+
+
+def save_signals(path: Path, time_s: Floats, legs: Mapping[str, LegSamples]) -> None:
+    """Write signals in SI units to a new CSV file, in the layout ``garry``.
 
     Raises
     ------
     GaitInputError
-        Where the times do not increase.
+        Where there is such a file already.
+    OSError
+        Where it cannot be written.
     """
-    steps = np.diff(time[np.isfinite(time)])
-    step = float(np.median(steps)) if len(steps) else 0.0
-    if not step > 0:
-        raise GaitInputError(f"{path.name}: the times do not go on. Map another time column.")
-    return round(1 / step, 1)
+    layout = SIGNAL_LAYOUTS["garry"]
+    columns = {layout.time.name: time_s}
+    for side, leg in legs.items():
+        for channel, values in zip(CHANNELS, leg, strict=True):
+            if values is not None:
+                columns[layout.legs[side][channel].name] = np.asarray(values)
+    rows = np.column_stack(list(columns.values()))
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            np.savetxt(file, rows, "%.9g", ",", header=",".join(columns), comments="")
+    except FileExistsError:
+        raise GaitInputError(
+            f"There is a recording {path.name} already. Choose another name."
+        ) from None
 
 
 def read_mass(path: Path) -> float:

@@ -1,4 +1,4 @@
-"""A plot of each leg's force, contacts and A2. Needs matplotlib, which GARRY does not install."""
+"""A picture of strides: signals, A2, reasons and the mean gait cycle. Needs matplotlib."""
 
 from __future__ import annotations
 
@@ -9,8 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from rehab.gait.signals.filters import Floats
+from rehab.gait.signals.filters import Floats, ZeroPhaseFilter
+from rehab.gait.signals.samples import LegSamples
+from rehab.gait.stances.kinetics import CUTOFF_HZ
 from rehab.gait.strides import GaitInputError, Stride
+
+# Okabe and Ito's colors, which people tell apart however they see colors; marks differ as well.
+BLUE, ORANGE, GRAY = "#0072B2", "#D55E00", "#666666"
+CYCLE = np.linspace(0, 1, 101)
+ROWS = ("force [N/kg]", "moment [Nm/kg]", "angular velocity [rad/s]", "power [W/kg]")
+A2_SHOWN = (-2.0, 15.0)  # W/kg
 
 
 def load_pyplot() -> Any:
@@ -31,20 +39,28 @@ def load_pyplot() -> Any:
 
 
 def plot_strides(
-    path: Path, t_s: Floats, forces_n: Mapping[str, Floats], strides: Sequence[Stride]
+    path: Path,
+    t_s: Floats,
+    legs: Mapping[str, LegSamples],
+    strides: Sequence[Stride],
+    *,
+    rate_hz: float,
+    mass_kg: float,
 ) -> None:
-    """Draw force with contacts, and A2 of each stride, to an image file, two rows a leg.
+    """Draw each leg's signals by time with A2 marked, and their mean and sd over the gait cycle.
+
+    Invalid strides are hatched, and their reasons written on them.
 
     Parameters
     ----------
     path
         The file to write; its suffix determines the format.
-    t_s
-        Times [s], shape (n,).
-    forces_n
-        Vertical force by side [N], shape (n,) each.
+    t_s, legs
+        Times [s], shape (n,), and the channels by side.
     strides
         Of all sides.
+    rate_hz, mass_kg
+        Of the samples, and the body mass.
 
     Raises
     ------
@@ -52,29 +68,107 @@ def plot_strides(
         Where matplotlib is not installed.
     """
     pyplot = load_pyplot()
-    figure, rows = pyplot.subplots(
-        2 * len(forces_n), 1, figsize=(12, 5 * len(forces_n)), sharex=True, squeeze=False
-    )
-    for number, (side, force) in enumerate(forces_n.items()):
+    count = len(ROWS) + 1
+    figure, panels = pyplot.subplots(
+        count * len(legs), 2, figsize=(16, 2.2 * count * len(legs)), squeeze=False,
+        width_ratios=(4, 1),
+    )  # fmt: skip
+    for number, (side, leg) in enumerate(legs.items()):
         own = [stride for stride in strides if stride.side == side]
-        top, bottom = rows[2 * number][0], rows[2 * number + 1][0]
-        top.plot(t_s, force, color="0.5", linewidth=0.8)
-        for stride in own:
-            color = "tab:green" if stride.valid else "tab:red"
-            top.axvspan(stride.initial_contact_s, stride.terminal_contact_s, color=color, alpha=0.2)
-        top.set_ylabel(f"{side}: force [N]")
-        for valid, color in ((True, "tab:green"), (False, "tab:red")):
-            shown = [s for s in own if s.valid is valid and s.a2_w_kg is not None]
-            bottom.plot(
-                [s.terminal_contact_s for s in shown],
-                np.clip([s.a2_w_kg or 0.0 for s in shown], -2, 15),
-                "o",
-                color=color,
-                label="valid" if valid else "invalid",
-            )
-        bottom.set_ylabel(f"{side}: A2 [W/kg]")
-        bottom.legend(loc="upper right")
-    rows[-1][0].set_xlabel("time [s]")
+        block = panels[number * count : (number + 1) * count]
+        curves = compute_curves(leg, rate_hz, mass_kg)
+        for panel, label, values in zip(block, ROWS, curves, strict=False):
+            panel[0].plot(t_s, values, color=GRAY, linewidth=0.8)
+            panel[0].set_ylabel(f"{side}\n{label}")
+            _mark_stances(panel[0], own)
+            _plot_cycle(panel[1], t_s, values, own)
+        _mark_a2(block[len(ROWS) - 1][0], own)
+        _write_reasons(block[0][0], own)
+        _plot_a2(block[-1][0], own, side)
+        block[-1][1].axis("off")
+        for panel in block[1:]:
+            panel[0].sharex(block[0][0])
+    panels[-1][0].set_xlabel("time [s]")
+    panels[-2][1].set_xlabel("gait cycle, mean ± SD of valid strides [%]")
     figure.tight_layout()
-    figure.savefig(path)
+    figure.savefig(path, dpi=80)
     pyplot.close(figure)
+
+
+def compute_curves(leg: LegSamples, rate_hz: float, mass_kg: float) -> list[Floats]:
+    """Return force, moment, angular velocity and power of a leg, shape (n,) each, as drawn.
+
+    Moment and angle are filtered over the whole recording, so that the curves differ from what a
+    stride was measured with by a percent.
+    """
+    force, moment, angle = (np.asarray(channel, dtype=np.float64) for channel in leg[:3])
+    known = np.arange(len(force))
+    rows = np.array(
+        [
+            np.interp(known, known[np.isfinite(row)], row[np.isfinite(row)])
+            if np.isfinite(row).any()
+            else np.zeros(len(row))
+            for row in (moment, angle)
+        ]
+    )
+    smooth = ZeroPhaseFilter(CUTOFF_HZ, rate_hz).smooth(rows)
+    velocity = np.gradient(smooth[1], 1 / rate_hz)
+    return [force / mass_kg, smooth[0] / mass_kg, velocity, smooth[0] / mass_kg * velocity]
+
+
+def _mark_stances(panel: Any, strides: Sequence[Stride]) -> None:
+    for stride in strides:
+        color, hatch = (BLUE, "") if stride.valid else (ORANGE, "///")
+        panel.axvspan(
+            stride.initial_contact_s, stride.terminal_contact_s, facecolor=color, alpha=0.15,
+            hatch=hatch, edgecolor=color, linewidth=0,
+        )  # fmt: skip
+
+
+def _write_reasons(panel: Any, strides: Sequence[Stride]) -> None:
+    top = panel.get_ylim()[1]
+    for stride in strides:
+        if stride.reasons:
+            text = "\n".join(str(reason).replace("_", " ") for reason in stride.reasons)
+            panel.text(
+                stride.initial_contact_s, top, text, fontsize=6, color=ORANGE, rotation=90,
+                va="top",
+            )  # fmt: skip
+
+
+def _mark_a2(panel: Any, strides: Sequence[Stride]) -> None:
+    for valid, color, mark in ((True, BLUE, "o"), (False, ORANGE, "x")):
+        shown = [s for s in strides if s.valid is valid and s.a2_w_kg is not None]
+        panel.plot([s.a2_time_s for s in shown], _clip(shown), mark, color=color, markersize=4)
+
+
+def _plot_a2(panel: Any, strides: Sequence[Stride], side: str) -> None:
+    for valid, color, mark in ((True, BLUE, "o"), (False, ORANGE, "x")):
+        shown = [s for s in strides if s.valid is valid and s.a2_w_kg is not None]
+        panel.plot(
+            [s.terminal_contact_s for s in shown], _clip(shown), mark, color=color,
+            label="valid" if valid else "invalid",
+        )  # fmt: skip
+    panel.set_ylabel(f"{side}\nA2 [W/kg]")
+    panel.legend(loc="upper right", fontsize=7)
+
+
+def _plot_cycle(panel: Any, t_s: Floats, values: Floats, strides: Sequence[Stride]) -> None:
+    """Draw mean and sd over the cycles that end with the contact of a valid stride."""
+    cycles = [
+        np.interp(
+            s.initial_contact_s - s.stride_s * (1 - CYCLE), t_s[np.isfinite(values)],
+            values[np.isfinite(values)],
+        )
+        for s in strides
+        if s.valid and s.stride_s is not None
+    ]  # fmt: skip
+    if cycles:
+        mean, sd = np.mean(cycles, axis=0), np.std(cycles, axis=0)
+        panel.fill_between(100 * CYCLE, mean - sd, mean + sd, color=BLUE, alpha=0.25, linewidth=0)
+        panel.plot(100 * CYCLE, mean, color=BLUE)
+
+
+def _clip(strides: Sequence[Stride]) -> Floats:
+    clipped: Floats = np.clip([s.a2_w_kg or 0.0 for s in strides], *A2_SHOWN)
+    return clipped

@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 from rehab.gait.one_leg import GRAVITY_M_S2, OFFSET_N
 from rehab.gait.online import StrideDetector
 from rehab.gait.selfcheck.cures import CURES
-from rehab.gait.selfcheck.lag import DECELERATION_S, PERSON_TOLERANCE_S, find_deceleration_peak
+from rehab.gait.selfcheck.lag import PERSON_TOLERANCE_S, find_deceleration_peak
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
 from rehab.gait.stances.continuity import RATE_TOLERANCE
+from rehab.gait.stances.lag_watch import DECELERATION_S
 from rehab.gait.strides import Stride
 from rehab.gait.two_legs import SUPPORTED_BELOW, TwoLegDetector
 

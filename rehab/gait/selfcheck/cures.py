@@ -10,7 +10,11 @@ CURES = {
         "The clock stands still or jumps back. Send the sensors' own times."
     ),
     RejectionReason.GAP: (
-        "Samples are missing for more than 50 ms. Look at the network and the recorder."
+        "Samples are lost for more than 50 ms. Look at the network and the recorder."
+    ),
+    RejectionReason.LATE: (
+        "Samples come late while the foot pushes off, and the lab's inverse dynamics takes that "
+        "for a slower motion. Close other programs on the lab's computer."
     ),
     RejectionReason.FORCE_LOST: (
         "The vertical force breaks off while the foot stands. Look at the plate."

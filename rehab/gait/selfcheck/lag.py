@@ -7,19 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rehab.gait.signals.filters import Floats, ZeroPhaseFilter, differentiate, interpolate_peak
+from rehab.gait.stances.lag_watch import AROUND_S, GRID_HZ, BrakingFinder
 from rehab.gait.strides import Stride
 
-# A foot that has left the floor stops plantarflexing: the ankle brakes hardest 51 ms after terminal
-# contact (moore2013, shown to be in time by its authors: 52.7 ms left, 49.2 ms right). The peak
-# moves with an injected lag to 0.3 ms; between people it is taken to differ by 8 ms.
-DECELERATION_S = 0.051
 PERSON_TOLERANCE_S = 0.008
-DECELERATION_MIN_RAD_S2 = 20.0  # below, there is no push-off to stop
 SEARCH_S = (-0.05, 0.15)
-AROUND_S = 0.4
-GRID_HZ = 200.0
-CUTOFF_HZ = 8.0
 STRIDES_MIN = 10
 
 
@@ -53,11 +45,4 @@ def find_deceleration_peak(
     grid = np.arange(-round(AROUND_S * GRID_HZ), round(AROUND_S * GRID_HZ) + 1) / GRID_HZ
     waves = np.interp(ends[:, np.newaxis] + grid, time, angle)
     wave = np.median(waves - waves.mean(axis=1, keepdims=True), axis=0)
-    smooth: Floats = ZeroPhaseFilter(CUTOFF_HZ, GRID_HZ).smooth(wave[np.newaxis])[0]
-    braking = -differentiate(differentiate(smooth, GRID_HZ), GRID_HZ)
-    first, last = np.searchsorted(grid, SEARCH_S).tolist()
-    peak = first + int(braking[first:last].argmax())
-    if peak in (first, last - 1) or braking[peak] < DECELERATION_MIN_RAD_S2:
-        return None
-    place, _ = interpolate_peak(braking, peak)
-    return float(grid[0] + place / GRID_HZ)
+    return BrakingFinder(SEARCH_S).find_in_wave(wave)

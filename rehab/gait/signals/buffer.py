@@ -34,22 +34,41 @@ class SampleBuffer:
         self._table = table
         self._rows = [tables[0][TIME], *(row for leg in tables for row in leg[FORCE:])]
         self._sent = [False] * len(self._rows)  # rows that were never sent stay NaN
+        self._late = np.zeros(3 * keep)
+        self._late_end = 0  # behind the newest sample that was late
 
-    def append(self, chunk: Sequence[Floats | None], count: int) -> None:
-        """Append ``count`` samples of each channel: times, then those of each leg; None for NaN."""
+    def append(
+        self, chunk: Sequence[Floats | None], count: int, late_s: Floats | None = None
+    ) -> None:
+        """Append ``count`` samples of each channel: times, then those of each leg; None for NaN.
+
+        ``late_s`` is by how much each came late, None where none did.
+        """
         begin = self.end - self.first
         end = begin + count
         if end > self._table.shape[1]:
             self._table[:, : self.keep] = self._table[:, begin - self.keep : begin]
+            self._late[: self.keep] = self._late[begin - self.keep : begin]
+            self._late[self.keep :] = 0
             self.first = self.end - self.keep
             begin, end = self.keep, self.keep + count
-        for place, values in enumerate(chunk):
+        for place, (row, values) in enumerate(zip(self._rows, chunk, strict=True)):
             if values is not None:
-                self._rows[place][begin:end] = values
+                row[begin:end] = values
                 self._sent[place] = True
             elif self._sent[place]:
-                self._rows[place][begin:end] = np.nan
+                row[begin:end] = np.nan
         self.end += count
+        if late_s is not None:
+            self._late[begin:end] = late_s
+            self._late_end = self.end
+
+    def find_lateness(self, start: int, stop: int) -> Floats | None:
+        """Return by how much samples ``start:stop`` came late [s], None where none did."""
+        if start >= self._late_end:
+            return None
+        late_s: Floats = self._late[start - self.first : stop - self.first]
+        return late_s if late_s.any() else None
 
 
 class LegBuffer:

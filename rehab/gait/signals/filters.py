@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, lfilter, lfilter_zi
+from scipy.signal import butter, lfilter
 
 Floats = NDArray[np.float64]
 
 
 class ZeroPhaseFilter:
-    """A Butterworth low-pass of second order, run forward and backward.
+    """A Butterworth low-pass of second order, run forward and backward: no delay, -6 dB at cut-off.
 
-    Both runs together have no delay, and attenuate by 6 dB at the cut-off (as scipy's ``filtfilt``,
-    with which the published references of A2 are made).
+    As scipy's ``filtfilt``, with which the published references of A2 are made, but as the one
+    symmetric impulse response that both runs have together, computed once.
 
     Parameters
     ----------
@@ -25,10 +25,15 @@ class ZeroPhaseFilter:
     """
 
     def __init__(self, cutoff_hz: float, rate_hz: float) -> None:
-        self._b, self._a = butter(2, cutoff_hz / (rate_hz / 2))
-        self._settled = np.asarray(lfilter_zi(self._b, self._a), dtype=np.float64)[np.newaxis]
         # Four time constants of the slowest decay: samples further away have no influence.
-        self.padding = max(3, round(4 * rate_hz / (2 * np.pi * cutoff_hz * np.sqrt(0.5))))
+        decay = rate_hz / (2 * np.pi * cutoff_hz * np.sqrt(0.5))
+        self.padding = max(3, round(4 * decay))
+        self.reach = max(3, round(8 * decay))
+        b, a = butter(2, cutoff_hz / (rate_hz / 2))
+        impulse = np.zeros(4 * self.reach + 1)
+        impulse[2 * self.reach] = 1.0
+        response = lfilter(b, a, lfilter(b, a, impulse)[::-1])[self.reach : -self.reach]
+        self._response: Floats = np.asarray((response + response[::-1]) / (2 * response.sum()))
 
     def smooth(self, signals: Floats) -> Floats:
         """Return each row filtered, extended point-symmetrically beyond its ends for the purpose.
@@ -45,12 +50,22 @@ class ZeroPhaseFilter:
         return self.smooth_extended(np.concatenate((before, signals, after), axis=1), n)
 
     def smooth_extended(self, signals: Floats, padding: int) -> Floats:
-        """Return rows filtered and without the ``padding`` samples that they have at each end."""
-        forward, _ = lfilter(self._b, self._a, signals, zi=signals[:, :1] * self._settled)
-        turned = forward[:, ::-1]
-        backward, _ = lfilter(self._b, self._a, turned, zi=turned[:, :1] * self._settled)
-        smooth: Floats = backward[:, ::-1]
-        return smooth[:, padding : smooth.shape[1] - padding]
+        """Return rows filtered and without the ``padding`` samples that they have at each end.
+
+        Beyond these, the first and the last one stand for all others.
+        """
+        more = max(0, self.reach - padding)
+        rows, count = signals.shape
+        wide = np.empty((rows, count + 2 * more))
+        wide[:, :more] = signals[:, :1]
+        wide[:, more : more + count] = signals
+        wide[:, more + count :] = signals[:, -1:]
+        cut = max(0, padding - self.reach)
+        # One run over all rows; what spans two of them is left out. (The response is symmetric.)
+        whole = np.empty(wide.size)
+        smooth = wide.shape[1] - 2 * self.reach
+        whole[: wide.size - 2 * self.reach] = np.correlate(wide.ravel(), self._response, "valid")
+        return whole.reshape(wide.shape)[:, cut : smooth - cut]
 
 
 def differentiate(values: Floats, rate_hz: float) -> Floats:
@@ -110,4 +125,6 @@ def find_minimum(values: Floats) -> float:
 def find_upper_median(values: Floats) -> float:
     """Return the median, of an even number of values the upper one of the middle two."""
     place = len(values) // 2
-    return float(np.partition(values, place)[place])
+    ordered = values.copy()
+    ordered.partition(place)
+    return float(ordered[place])

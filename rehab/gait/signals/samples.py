@@ -42,6 +42,14 @@ def read_chunk(names: Sequence[str], channels: Sequence[ArrayLike | None]) -> li
         For channels of different lengths or with more than one dimension.
     """
     chunk = [None if values is None else np.asarray(values, np.float64) for values in channels]
+    first = chunk[0]
+    if first is not None and first.ndim == 1:
+        shape = first.shape
+        for array in chunk:
+            if array is not None and array.shape != shape:
+                break
+        else:
+            return chunk
     shapes = {array.shape for array in chunk if array is not None}
     if len(shapes) == 1 and len(*shapes) == 1:
         return chunk

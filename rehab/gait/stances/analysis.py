@@ -9,25 +9,38 @@ import numpy as np
 
 from rehab.gait.contacts.force_plate import Contact
 from rehab.gait.signals.buffer import LegBuffer
-from rehab.gait.signals.filters import Floats, ZeroPhaseFilter, find_maximum
+from rehab.gait.signals.filters import Floats, ZeroPhaseFilter, find_maximum, find_minimum
 from rehab.gait.signals.samples import ANGLE, FORCE, FORWARD, MOMENT, POSITION, TIME
 from rehab.gait.stances.continuity import check_samples, check_steps
 from rehab.gait.stances.kinetics import PushOff, PushOffAnalyzer
+from rehab.gait.stances.lag_watch import (
+    ANGLE_LAG_MAX_S,
+    AROUND_S,
+    DECELERATION_S,
+    MOMENT_LAG_MAX_S,
+    BrakingFinder,
+    LagWatch,
+    find_moment_lag,
+)
 from rehab.gait.stances.plausibility import (
     STANCE_MAX_S,
     STANCE_MIN_S,
     check_force,
     check_lever,
     check_push_off,
+    has_clonus,
 )
-from rehab.gait.stances.resampling import resample_stance
-from rehab.gait.strides import RejectionReason
+from rehab.gait.stances.resampling import ResampledStance, resample_stance
+from rehab.gait.stances.timing import HARMFUL_FROM, ClockJudge, StanceClock
+from rehab.gait.stances.uncertainty import Uncertainty
+from rehab.gait.strides import Flag, RejectionReason
 
 BEFORE_S = 0.25  # of swing: for the filter to settle, and for the check of the moment in swing
 LONGEST_S = BEFORE_S + STANCE_MAX_S + 1.0
 # Neighbors are averaged down to 200-400 Hz before the filter: signals up to 6 Hz lose nothing.
 DECIMATED_HZ = 200.0
 FORWARD_HZ = 20.0
+LATE_FROM = 0.72  # of stance; there moment and force have their late peaks
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +57,20 @@ class Stance:
         Largest forward force of the second half of stance.
     position_m
         Of the foot at initial contact [m, forward].
+    flags
+        What the therapist should know of it.
+    late_s, lost_s, a2_sd_w_kg
+        As in ``Stride``.
     """
 
     reasons: list[RejectionReason]
-    push_off: PushOff | None
-    propulsion_n_kg: float | None
-    position_m: float | None
+    push_off: PushOff | None = None
+    propulsion_n_kg: float | None = None
+    position_m: float | None = None
+    flags: tuple[Flag, ...] = ()
+    late_s: float = 0.0
+    lost_s: float = 0.0
+    a2_sd_w_kg: float | None = None
 
 
 class StanceAnalyzer:
@@ -82,32 +103,53 @@ class StanceAnalyzer:
         self._decimation = max(1, int(rate_hz // DECIMATED_HZ))
         self._even_hz = rate_hz / self._decimation
         self._analyzer = PushOffAnalyzer(self._even_hz, mass_kg, cutoff_hz, is_velocity)
+        self._uncertainty = Uncertainty(self._even_hz, cutoff_hz, is_velocity)
         self._forward_filter = ZeroPhaseFilter(FORWARD_HZ, self._even_hz)
         self._before = int(BEFORE_S * rate_hz)
+        self._clock = ClockJudge(rate_hz)
+        self._braking = BrakingFinder()
+        self._angle_lag = LagWatch(DECELERATION_S, ANGLE_LAG_MAX_S)
+        self._moment_lag = LagWatch(0.0, MOMENT_LAG_MAX_S)
+        self._last_end: tuple[int, float] | None = None
 
     def measure(self, contact: Contact, stop: int) -> Stance:
         """Return the stance of a contact that has ended, from the samples before ``stop``."""
         begin, end = contact.begin_index, contact.end_index or 0
         begin_s, end_s = contact.begin_s, contact.end_s or 0.0
         if end - begin > 1.2 * STANCE_MAX_S * self._rate_hz:
-            return Stance([RejectionReason.LONG_STANCE], None, None, None)
+            return Stance([RejectionReason.LONG_STANCE])
         reasons = [] if contact.is_onset_seen else [RejectionReason.FORCE_LOST]
         before = self._find_before(begin)
         window = self._buffer.view(begin - before, stop)
-        reasons += check_samples(window, before, self._rate_hz, self._mass_kg, self._is_velocity)
-        if RejectionReason.TIME_BACKWARDS in reasons:
-            return Stance(reasons, None, None, None)
+        time = window[TIME, before:]
+        if not find_minimum(time[1:] - time[:-1]) > 0:
+            return Stance([*reasons, RejectionReason.TIME_BACKWARDS])
+        late_s = self._buffer.samples.find_lateness(begin - before, stop)
+        critical_s = begin_s + HARMFUL_FROM * (end_s - begin_s)
+        critical = before + max(1, int(np.searchsorted(time, critical_s)))
+        clock = self._clock.judge(window, late_s, before, critical)
+        reasons += clock.reasons
+        reasons += check_samples(
+            window, before, clock, self._rate_hz, self._mass_kg, self._is_velocity
+        )
         if end_s - begin_s < STANCE_MIN_S:
             reasons.append(RejectionReason.SHORT_STANCE)
         elif end_s - begin_s > STANCE_MAX_S:
             reasons.append(RejectionReason.LONG_STANCE)
         force = window[FORCE, before : before + end - begin + 1] - contact.offset_n
         reasons += check_force(force, contact.peak_n, self._weight_n, self._rate_hz)
-        bridged, gap_s = _bridge_gaps(window, before)
-        clean = None if bridged is None else _decimate(bridged[: ANGLE + 1], self._decimation)
-        push_off = None
+        is_sure = late_s is None and contact.known_index == end
+        self._watch_angle((end, end_s) if is_sure else None, end)
+        bridged, gap_s = _bridge_gaps(window, clock, critical)
+        clean = None if bridged is None else _decimate(bridged, self._decimation)
+        push_off, a2_sd, flags = None, None, list(clock.flags)
         if clean is not None and clean[TIME, -1] - clean[TIME, 0] < LONGEST_S:
-            push_off = self._measure_push_off(contact, clean, gap_s, reasons)
+            stance = self._resample(contact, clean)
+            push_off = None if stance is None else self._analyzer.measure(stance)
+            if stance is not None and push_off is not None:
+                self._check_push_off(contact, stance, push_off, gap_s, reasons, flags)
+                drift_s = self._angle_lag.moved_s
+                a2_sd = self._uncertainty.find(stance, push_off, clock.late_s, drift_s)
         if push_off is None and not reasons:
             reasons.append(RejectionReason.NO_PUSH_OFF)
         return Stance(
@@ -115,23 +157,70 @@ class StanceAnalyzer:
             push_off,
             self._find_propulsion(window),
             self._find_position(contact),
+            tuple(flags),
+            clock.late_s,
+            clock.lost_s,
+            a2_sd,
         )
 
     def locate(self, contact: Contact) -> Stance:
         """Return what is known of the stance of a contact that has not ended: its position."""
-        return Stance([], None, None, self._find_position(contact))
+        return Stance([], position_m=self._find_position(contact))
 
-    def _measure_push_off(
-        self, contact: Contact, clean: Floats, gap_s: float, reasons: list[RejectionReason]
-    ) -> PushOff | None:
-        """Return the push-off of samples whose gaps are bridged; append what is wrong with it."""
-        stance = resample_stance(clean, self._even_hz, contact.begin_s, contact.end_s or 0.0)
-        push_off = None if stance is None else self._analyzer.measure(stance)
-        if stance is not None and push_off is not None:
-            reasons += check_steps(stance, push_off, gap_s, self._is_velocity)
-            reasons += check_lever(stance, contact.offset_n, self._weight_n)
-            reasons += check_push_off(push_off, stance, self._is_velocity)
-        return push_off
+    def _resample(self, contact: Contact, clean: Floats) -> ResampledStance | None:
+        """Return samples whose gaps are bridged at evenly spaced times."""
+        kinetics_s = clean[ANGLE + 1] if len(clean) > ANGLE + 1 else None
+        return resample_stance(
+            clean, self._even_hz, contact.begin_s, contact.end_s or 0.0, kinetics_s
+        )
+
+    def _check_push_off(
+        self,
+        contact: Contact,
+        stance: ResampledStance,
+        push_off: PushOff,
+        gap_s: float,
+        reasons: list[RejectionReason],
+        flags: list[Flag],
+    ) -> None:
+        """Append what a push-off is like."""
+        reasons += check_steps(stance, push_off, gap_s, self._is_velocity)
+        reasons += check_lever(stance, contact.offset_n, self._weight_n)
+        reasons += self._check_lags(stance, contact.offset_n)
+        reasons += check_push_off(push_off, stance, self._is_velocity)
+        if not self._is_velocity and has_clonus(push_off, stance):
+            flags.append(Flag.CLONUS)
+
+    def _watch_angle(self, sure: tuple[int, float] | None, end: int) -> None:
+        """Add when the ankle braked after the stance before, if it is sure when that ended.
+
+        At its own end that was not known yet.
+        """
+        last, self._last_end = self._last_end, sure
+        if last is None or self._is_velocity:
+            return
+        around = int((AROUND_S + 0.1) * self._rate_hz)
+        first, stop = last[0] - around, min(last[0] + around, end)
+        if first < self._buffer.samples.first:
+            return
+        time, angle = (self._buffer.channel(row, first, stop) for row in (TIME, ANGLE))
+        if find_minimum(time[1:] - time[:-1]) > 0:
+            self._angle_lag.add(self._braking.find(time, angle, last[1]))
+
+    def _check_lags(self, stance: ResampledStance, offset_n: float) -> list[RejectionReason]:
+        """Return which channels are out of time by this stride and those before."""
+        late = slice(stance.index(LATE_FROM), stance.end + 1)
+        self._moment_lag.add(
+            find_moment_lag(
+                stance.signals[0, late] - offset_n, stance.signals[1, late], stance.rate_hz
+            )
+        )
+        reasons = []
+        if self._moment_lag.is_off:
+            reasons.append(RejectionReason.MOMENT_OUT_OF_STEP)
+        if self._angle_lag.is_off:
+            reasons.append(RejectionReason.ANGLE_OUT_OF_STEP)
+        return reasons
 
     def _find_before(self, begin: int) -> int:
         """Return how many samples before a stance follow each other closely enough to be used."""
@@ -159,19 +248,22 @@ class StanceAnalyzer:
         return position if math.isfinite(position) else None
 
 
-def _bridge_gaps(window: Floats, stance: int) -> tuple[Floats | None, float]:
+def _bridge_gaps(window: Floats, clock: StanceClock, critical: int) -> tuple[Floats | None, float]:
     """Return a stance's samples with gaps in moment and angle bridged, and the longest bridge [s].
 
-    The samples are None where nothing is known to bridge between. The time is the longest from
-    sample ``stance`` on that a straight line bridges. Longer gaps have made the stride invalid
-    already, so that values measured across them are not shown.
+    The samples are None where nothing is known to bridge between; a fifth row is when moment and
+    angle were measured, where that is not when the force was. The time is the longest from sample
+    ``critical`` on that a straight line bridges. Longer gaps have made the stride invalid already,
+    so that values measured across them are not shown.
     """
-    time = window[TIME]
-    steps = time[stance + 1 :] - time[stance:-1]
-    longest_s = find_maximum(steps)
-    if math.isfinite(window[MOMENT : ANGLE + 1].sum()):
-        return window, longest_s
-    bridged = window.copy()
+    time = clock.kinetics_s
+    rows = window[: ANGLE + 1]
+    if time is not window[TIME] and clock.late_s > 0:
+        rows = np.vstack((rows, time))
+    longest_s = find_maximum(time[critical:] - time[critical - 1 : -1])
+    if math.isfinite(rows[MOMENT : ANGLE + 1].sum()):
+        return rows, longest_s
+    bridged = rows.copy()
     for row in bridged[MOMENT : ANGLE + 1]:
         known = np.isfinite(row)
         if known.sum() < 2:

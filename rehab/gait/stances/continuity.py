@@ -15,9 +15,9 @@ from rehab.gait.signals.filters import Floats, find_maximum, find_minimum, find_
 from rehab.gait.signals.samples import ANGLE, FORCE, MOMENT, TIME
 from rehab.gait.stances.kinetics import PushOff
 from rehab.gait.stances.resampling import ResampledStance
+from rehab.gait.stances.timing import GAP_S, StanceClock
 from rehab.gait.strides import RejectionReason
 
-GAP_S = 0.05  # bridged by a straight line up to here (docs/reference/gait.md#time-base)
 RATE_TOLERANCE = 0.2
 # One value repeated for this long is no measurement. The moment changes all through stance; the
 # angle rests where the ankle turns, but not to the last digit.
@@ -40,7 +40,12 @@ MOMENT_TO_S = 0.02  # before its end; a moment that is computed from the force e
 
 
 def check_samples(
-    window: Floats, stance: int, rate_hz: float, mass_kg: float, is_velocity: bool
+    window: Floats,
+    stance: int,
+    clock: StanceClock,
+    rate_hz: float,
+    mass_kg: float,
+    is_velocity: bool,
 ) -> list[RejectionReason]:
     """Return what is wrong with the samples of a stance, before anything is measured from them.
 
@@ -50,6 +55,8 @@ def check_samples(
         Shape (channels, n): time, force, moment, angle, …
     stance
         The sample at which the stance begins.
+    clock
+        The stance's clock.
     rate_hz, mass_kg
         Nominal rate, and body mass.
     is_velocity
@@ -58,34 +65,33 @@ def check_samples(
     rows = slice(TIME, ANGLE + 1)
     steps = window[rows, stance + 1 :] - window[rows, stance:-1]
     low, high = steps.min(axis=1).tolist(), steps.max(axis=1).tolist()
-    if not low[TIME] > 0:
-        return [RejectionReason.TIME_BACKWARDS]
     reasons = []
-    gap_s = high[TIME]
-    if gap_s > max(GAP_S, 2.5 / rate_hz):
-        reasons.append(RejectionReason.GAP)
-    else:
+    if clock.lost_s <= GAP_S:
         taken_s = float(window[TIME, -1] - window[TIME, stance])
         if abs(steps.shape[1] / (taken_s * rate_hz) - 1) > RATE_TOLERANCE:
             reasons.append(RejectionReason.RATE)
+    time = clock.kinetics_s[stance:]
     for row, scale, (at_once, by_time), reason in (
         (MOMENT, mass_kg, MOMENT_JUMP, RejectionReason.MOMENT_LOST),
         (ANGLE, 1.0, VELOCITY_JUMP if is_velocity else ANGLE_JUMP, RejectionReason.ANGLE_LOST),
     ):
         jump = max(high[row], -low[row])
         if not math.isfinite(jump):  # some are missing
-            time, values = window[TIME, stance:], window[row, stance:]
+            values = window[row, stance:]
             known = np.flatnonzero(np.isfinite(values))
             if _has_gap(time, known):
                 reasons.append(reason)
                 continue
+            steps_s = np.diff(time[known])
             values = values[known]
             moved = np.diff(values)
             jump = find_maximum(np.abs(moved))
         else:
-            values, moved = window[row, stance:], steps[row]
-        limit = scale * (at_once + by_time * max(gap_s, 1 / rate_hz))
-        if jump > limit or _is_frozen(values, moved, FROZEN_S[row] * rate_hz):
+            values, moved, steps_s = window[row, stance:], steps[row], np.diff(time)
+        is_jumping = jump > scale * (at_once + by_time / rate_hz) and bool(
+            (np.abs(moved) > scale * (at_once + by_time * np.maximum(steps_s, 1 / rate_hz))).any()
+        )
+        if is_jumping or _is_frozen(values, moved, FROZEN_S[row] * rate_hz):
             reasons.append(reason)
     return reasons
 

@@ -13,7 +13,7 @@ from rehab.gait.stances.resampling import ResampledStance
 from rehab.gait.strides import RejectionReason
 
 STANCE_MIN_S = 0.2
-STANCE_MAX_S = 2.2  # 0.3 m/s after a stroke: strides of up to 2.5 s with 75-80 % stance
+STANCE_MAX_S = 4.0  # 0.15 m/s after a stroke: strides of 3.4 to 5 s with 75-80 % stance
 # A force that falls from half the body weight to nothing in 20 ms was cut off: unloading takes
 # 110 ms and more (Moore 2013: half the weight is left 50 ms before terminal contact).
 CUT_S = 0.02
@@ -48,6 +48,9 @@ REVERSED_SHARE = 0.5  # of the peak; an ankle that pushed does not brake so much
 BACKWARD_RAD_S = (0.05, 0.5)
 BACKWARD_SHARE = 0.1  # of the velocity at A2, between these limits
 BACKWARD_S = 0.04
+FULL_LOAD = 0.8  # of body weight; even slow walking reaches 95 %
+CLONUS_TO = 0.8  # of stance; then the ankle pushes off
+CLONUS_RAD_S, CLONUS_TURNS = 0.25, 4
 SWING_S = 0.03  # before initial contact; later, the filter has some of the stance
 
 
@@ -77,6 +80,25 @@ def check_force(
 def check_load(load: float) -> list[RejectionReason]:
     """Return what is wrong with the mean force of one plate over a cycle, by body weight."""
     return [RejectionReason.WEIGHT] if load < LOAD_MIN or load > LOAD_MAX else []  # neither, if NaN
+
+
+def check_whole_foot(peak_n: float, weight_n: float) -> list[RejectionReason]:
+    """Return what is wrong with a step over a plate, given its peak force and body weight [N].
+
+    A foot that is half beside its plate bears less than even slow walking does.
+    """
+    return [RejectionReason.WEIGHT] if peak_n < FULL_LOAD * weight_n else []
+
+
+def has_clonus(push_off: PushOff, stance: ResampledStance) -> bool:
+    """Return whether the ankle beats in stance, as it does in clonus (5 to 8 a second).
+
+    A walker's ankle turns back twice until push-off: after contact, and where it begins.
+    """
+    part = slice(stance.begin, stance.index(CLONUS_TO) + 1)
+    velocity = push_off.velocity_rad_s[part]
+    turning = np.sign(velocity[np.abs(velocity) > CLONUS_RAD_S])
+    return int((turning[1:] != turning[:-1]).sum()) >= CLONUS_TURNS
 
 
 def check_lever(stance: ResampledStance, offset_n: float, weight_n: float) -> list[RejectionReason]:

@@ -46,7 +46,7 @@ class ResampledStance:
 
 
 def resample_stance(
-    window: Floats, rate_hz: float, begin_s: float, end_s: float
+    window: Floats, rate_hz: float, begin_s: float, end_s: float, kinetics_s: Floats | None = None
 ) -> ResampledStance | None:
     """Return a stance at evenly spaced times that end with the last sample's time.
 
@@ -58,6 +58,8 @@ def resample_stance(
         Of the result.
     begin_s, end_s
         Initial and terminal contact [s].
+    kinetics_s
+        When moment and angle were measured, if not when the force was [s], shape (n,).
 
     Returns
     -------
@@ -68,8 +70,9 @@ def resample_stance(
     count = int((last - first) * rate_hz + 1e-6) + 1
     grid = last - np.arange(count - 1, -1, -1) / rate_hz
     signals = np.empty((3, count))
-    for row, values in zip(signals, window[FORCE : ANGLE + 1], strict=True):
-        row[:] = np.interp(grid, time_s, values)
+    times = (time_s, *(2 * (time_s if kinetics_s is None else kinetics_s,)))
+    for row, values, taken_s in zip(signals, window[FORCE : ANGLE + 1], times, strict=True):
+        row[:] = np.interp(grid, taken_s, values)
     first = float(grid[0])
     begin = max(0, math.ceil((begin_s - first) * rate_hz))
     end = min(count - 1, int((end_s - first) * rate_hz + 1e-6))

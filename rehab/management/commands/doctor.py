@@ -7,6 +7,7 @@ import json
 import os
 import tempfile
 import time
+from argparse import ArgumentParser
 from collections.abc import Callable, Iterator
 from datetime import timedelta
 from statistics import median
@@ -21,10 +22,14 @@ from django.db import DatabaseError, connection
 from django.db.migrations.executor import MigrationExecutor
 from django.utils import timezone
 
+from rehab.people.audit import guards, seals
+from rehab.people.audit.seals import LogSeal
 from rehab.sessions.live import owners
+from rehab.sessions.live.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.replay import DamagedLog, check_log
 from rehab.stations.models import Device
-from rehab.training.changes import State
+from rehab.training.changes import OPEN_STATES, State
 
 SLOW_DISK_S = 0.05
 
@@ -43,9 +48,16 @@ class Command(BaseCommand):
     help = "Explain the state of this installation, with cures."
     requires_system_checks: list[str] = []
 
-    def handle(self, *args: Any, **options: Any) -> None:
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Add the options."""
+        parser.add_argument(
+            "--deep", action="store_true", help="also fold the logs of all open sessions again"
+        )
+
+    def handle(self, *args: Any, deep: bool = False, **options: Any) -> None:
         """Print the diagnoses. Exits with status 1 where something needs a cure."""
-        diagnoses = [diagnosis for run in EXAMINATIONS for diagnosis in examine(run)]
+        examinations = (*EXAMINATIONS, examine_session_logs) if deep else EXAMINATIONS
+        diagnoses = [diagnosis for run in examinations for diagnosis in examine(run)]
         for diagnosis in diagnoses:
             mark = "needs care" if diagnosis.cure else "well"
             self.stdout.write(f"{diagnosis.subject:<12} {mark:<11} {diagnosis.state}")
@@ -70,7 +82,8 @@ def examine(run: Callable[[], Iterator[Diagnosis]]) -> list[Diagnosis]:
 
 def examine_settings() -> Iterator[Diagnosis]:
     """Diagnose the settings by the system checks."""
-    messages = run_checks(include_deployment_checks=settings.HOSTED)
+    found = run_checks(include_deployment_checks=settings.HOSTED)
+    messages = [message for message in found if not message.is_silenced()]
     for message in messages:
         yield Diagnosis("settings", f"{message.id}: {message.msg}", message.hint or "See above.")
     if not messages:
@@ -142,8 +155,8 @@ def examine_files() -> Iterator[Diagnosis]:
 
 def examine_sessions() -> Iterator[Diagnosis]:
     """Diagnose running sessions, among them those of a process that no longer exists."""
-    running = list(TrainingSession.everywhere.filter(state=State.RUNNING.value))
-    left = [s.pk for s in running if not s.owner or not owners.is_alive(s.owner)]
+    running = TrainingSession.everywhere.filter(state=State.RUNNING.value).count()
+    left, _ = owners.find_ownerless()
     if left:
         yield Diagnosis(
             "sessions",
@@ -153,8 +166,33 @@ def examine_sessions() -> Iterator[Diagnosis]:
         )
     yield Diagnosis(
         "sessions",
-        f"{len(running) - len(left)} running, {TrainingSession.everywhere.count()} in all",
+        f"{running - len(left)} running, {TrainingSession.everywhere.count()} in all",
     )
+
+
+def examine_session_logs() -> Iterator[Diagnosis]:
+    """Diagnose the logs of open sessions: whole, and the same by checkpoint as from their start."""
+    states = [state.value for state in OPEN_STATES]
+    faults = 0
+    for session in TrainingSession.everywhere.filter(state__in=states).order_by("pk").iterator():
+        try:
+            check_log(session)
+        except DamagedLog as problem:
+            faults += 1
+            yield Diagnosis("session logs", f"session {session.pk} lacks steps", str(problem))
+            continue
+        quick = SessionAggregate.load(session).fold
+        session.checkpoint = None
+        if vars(SessionAggregate.load(session).fold) != vars(quick):
+            faults += 1
+            yield Diagnosis(
+                "session logs",
+                f"session {session.pk} is another one by its checkpoint than by its log",
+                "Stop the server, clear the session's checkpoint (it is not needed), start again, "
+                "and report this.",
+            )
+    if not faults:
+        yield Diagnosis("session logs", "whole, and the same by checkpoint as from their start")
 
 
 def examine_children() -> Iterator[Diagnosis]:
@@ -186,6 +224,20 @@ def examine_tokens() -> Iterator[Diagnosis]:
         yield Diagnosis("tokens", f"{stale} not used for 90 days", "Revoke what is not needed.")
 
 
+def examine_seals() -> Iterator[Diagnosis]:
+    """Diagnose the chains of the audit log and the history, and what keeps them append-only."""
+    for name in guards.find_missing(connection.alias):
+        yield Diagnosis("logs", f"the trigger {name} is missing", "Run manage.py migrate.")
+    broken = list(seals.find_broken())
+    for problem in broken[:10]:
+        cure = "Compare with the copy that manage.py shiplogs made, and find out who was there."
+        yield Diagnosis("logs", problem, cure)
+    if not broken:
+        late = seals.count_unsealed(timezone.now() - timedelta(days=1))
+        state = f"{LogSeal.everywhere.count()} seals hold, {late} rows older than a day lack one"
+        yield Diagnosis("logs", state, "Start the server: it seals them." if late else "")
+
+
 EXAMINATIONS: tuple[Callable[[], Iterator[Diagnosis]], ...] = (
     examine_settings,
     examine_database,
@@ -194,4 +246,5 @@ EXAMINATIONS: tuple[Callable[[], Iterator[Diagnosis]], ...] = (
     examine_sessions,
     examine_children,
     examine_tokens,
+    examine_seals,
 )

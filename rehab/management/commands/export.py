@@ -53,6 +53,7 @@ class Command(BaseCommand):
         try:
             descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
             with os.fdopen(descriptor, "wb") as out:
+                os.fchmod(descriptor, 0o600)  # also a file that was there with other rights
                 for part in write_zip(files):
                     out.write(part)
         except OSError as problem:

@@ -139,7 +139,9 @@ class Command(BaseCommand):
         def strides(fold: SessionFold) -> Iterator[Measurement]:
             if recording is not None:
                 return iter(recording)
-            walker = SyntheticWalker(PROFILES[options["profile"]], options["synthetic"], side)
+            walker = SyntheticWalker(
+                PROFILES[options["profile"]], options["synthetic"], side, options["valence"]
+            )
             return simulate_strides(walker, fold, options["strides"])
 
         fold = asyncio.run(run_session(session.pk, strides, Pace(options["speed"])))

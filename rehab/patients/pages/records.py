@@ -18,6 +18,7 @@ from rehab.people.access import for_roles, user_of
 from rehab.people.consent.services import active_consents
 from rehab.people.models import EndReason, ErasureReason, Patient, User
 from rehab.people.roles import Role
+from rehab.people.sign_in import step_up
 from rehab.sessions.models import TrainingSession
 
 
@@ -79,6 +80,7 @@ def reopen_patient_program(request: HttpRequest, patient_id: int) -> HttpRespons
 
 
 @for_roles(Role.LEAD, patients=False)  # the audit entry must not name the erased patient
+@step_up.required
 @require_POST
 def erase_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     """Erase everything that identifies a person, after the code was typed as confirmation."""
@@ -92,5 +94,5 @@ def erase_patient(request: HttpRequest, patient_id: int) -> HttpResponse:
     except SessionStillOpen as problem:
         form.add_error(None, str(problem))
         return render_records(request, patient, erasing=form)
-    messages.success(request, _("All that led to this person is erased, for good."))
+    messages.success(request, _("All data that identified this person are erased, for good."))
     return redirect("start")

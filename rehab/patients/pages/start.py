@@ -20,7 +20,8 @@ from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
-from rehab.sessions.forms.session import SessionForm, initial_choices
+from rehab.sessions.forms.initial import initial_choices
+from rehab.sessions.forms.session import SessionForm
 from rehab.sessions.models import TrainingSession
 from rehab.stations.builtin import first_station
 from rehab.training.changes import OPEN_STATES

@@ -26,6 +26,7 @@ from rehab.people.networks import client_address
 SUBJECTS = {
     "patient_id": ("Patient", "pk", "pk"),
     "code": ("Patient", "code", "pk"),
+    "enrollment_id": ("Enrollment", "pk", "patient_id"),
     "session_id": ("TrainingSession", "pk", "patient_id"),
 }
 ADMIN_PAGES_WITHOUT_PATIENTS = {
@@ -43,10 +44,14 @@ def record_request(request: HttpRequest, response: HttpResponseBase, now: dateti
     if (
         actor is None
         or match is None
-        or response.status_code >= 400
-        or not _may_show_patients(request, match)
+        or (response.status_code >= 400 and response.status_code != 403)
     ):
         return
+    if response.status_code == 403:
+        _record_refusal(request, actor, now)
+        return
+    if actor.clinic_id is None or not _may_show_patients(request, match):
+        return  # hosts see no patients
     is_read = request.method in ("GET", "HEAD", "OPTIONS")
     if is_read and response.status_code != 200:
         return  # not modified or redirected: nothing was shown
@@ -63,6 +68,17 @@ def record_request(request: HttpRequest, response: HttpResponseBase, now: dateti
         now=now,
     )
     audit_log.record_after_the_fact([entry])
+
+
+def _record_refusal(request: HttpRequest, actor: Any, now: datetime) -> None:
+    """Record that somebody asked for what is not theirs; the same again is counted.
+
+    The route says which page it was: the address itself may name a person.
+    """
+    match, address = request.resolver_match, client_address(request)
+    about = f"/{match.route}" if match is not None else ""
+    entry = audit_log.build_entry(Act.REFUSED, actor, about=about, address=address, now=now)
+    audit_log.record_counted(entry)
 
 
 def _actor_of(request: HttpRequest) -> Any:

@@ -1,8 +1,8 @@
-"""The audit log: who looked at or exported patients' data, or commanded a robot. Append-only.
+"""The audit log: who looked at or exported patients' data, commanded a robot, or signed in.
 
 `AccessMiddleware` records views of every page and API call that is not declared to show no
-patients; sockets, exports and commands record their own. An export is recorded before its first
-byte is sent. A page that reloads is recorded once in some minutes.
+patients; sockets, exports, commands and `sign_in_log` record their own. An export is recorded
+before its first byte is sent. A page that reloads is recorded once in some minutes.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from threading import Lock
 from typing import Any, ClassVar, NoReturn
 
 from django.db import DatabaseError, models, transaction
-from django.db.models import QuerySet
+from django.db.models import F, Q, QuerySet
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.audit.history import clinic_id_of
+from rehab.people.audit.sealing import SealableModel
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.scope import Scope, ScopedManager, ScopedModel
+from rehab.people.scope import Scope, ScopedManager
 
 log = logging.getLogger(__name__)
 
@@ -55,6 +56,13 @@ class AppendOnlyQuerySet(QuerySet["AuditEntry"]):
         """Raise AppendOnlyViolation."""
         raise AppendOnlyViolation
 
+    def bulk_create(self, objs: Any, *args: Any, **options: Any) -> Any:
+        """Add rows with their digests."""
+        entries = list(objs)
+        for entry in entries:
+            entry.set_digest()
+        return super().bulk_create(entries, *args, **options)
+
 
 class ScopedEntryManager(ScopedManager["AuditEntry"]):
     """Entries by scope, append-only."""
@@ -72,19 +80,40 @@ class Act(models.TextChoices):
     ERASE = "erase", _("Erased")
     UNLOCK = "unlock", _("Unlocked an account")
     FACTORS = "factors", _("Removed second factors")
+    RESET = "reset", _("Confirmed a host's reset")
+    SIGN_IN = "sign_in", _("Signed in")
+    SIGN_IN_FAILED = "sign_in_failed", _("Failed to sign in")
+    LOCK_OUT = "lock_out", _("Was locked out")
+    SIGN_INS_ENDED = "sign_ins_ended", _("Ended all sign-ins")
+    FACTOR_ADDED = "factor_added", _("Added a second factor")
+    FACTOR_REMOVED = "factor_removed", _("Removed a second factor")
+    RECOVERY_CODES = "recovery_codes", _("Made new recovery codes")
+    PASSWORD = "password", _("Changed a password")
+    TOKEN_USE = "token_use", _("Used a token from a new network")
+    REFUSED = "refused", _("Was refused")
     TOKEN = "token", _("Gave a new token")
+    UNBLIND = "unblind", _("Revealed a study's arm")
     ROBOT_STOP = "robot_stop", _("Stopped the robot")
     ROBOT_ARM = "robot_arm", _("Armed the robot")
     ROBOT_TRIAL = "robot_trial", _("Tried a gesture on the robot")
 
 
-class AuditEntry(ScopedModel):
-    """Who did what, with whose data, when and from where."""
+# What an account's own page of sign-ins tells.
+SIGN_IN_ACTS = (
+    *(Act.SIGN_IN, Act.SIGN_IN_FAILED, Act.LOCK_OUT, Act.SIGN_INS_ENDED, Act.PASSWORD),
+    *(Act.FACTOR_ADDED, Act.FACTOR_REMOVED, Act.RECOVERY_CODES, Act.TOKEN_USE, Act.REFUSED),
+)
 
-    scope = Scope(clinic="clinic")
 
+class AuditEntry(SealableModel):
+    """Who did what, with whose data, when and from where. ``count``: how often in some minutes."""
+
+    scope = Scope(clinic="clinic", host=Q(clinic__isnull=True))
+    sealed_fields = ("clinic", "at", "by", "through", "act", "patient", "about", "address")
+
+    # None: what hosts do, who have no clinic.
     clinic = models.ForeignKey(
-        Clinic, on_delete=models.PROTECT, related_name="+", verbose_name=_("clinic")
+        Clinic, on_delete=models.PROTECT, related_name="+", null=True, verbose_name=_("clinic")
     )
     at = models.DateTimeField(_("when"), default=timezone.now)
     by = models.ForeignKey(
@@ -103,11 +132,12 @@ class AuditEntry(ScopedModel):
     )
     about = models.CharField(_("where in GARRY"), max_length=200, blank=True)
     address = models.CharField(_("from"), max_length=45, blank=True)
+    count = models.PositiveIntegerField(_("times"), default=1)
 
     everywhere: ClassVar[Any] = models.Manager.from_queryset(AppendOnlyQuerySet)()
     objects: ClassVar[ScopedEntryManager] = ScopedEntryManager()
 
-    class Meta(ScopedModel.Meta):
+    class Meta(SealableModel.Meta):
         verbose_name = _("audit entry")
         verbose_name_plural = _("audit log")
         ordering: ClassVar = ["-at", "-pk"]
@@ -151,6 +181,30 @@ class RecentViews:
 recent_views = RecentViews()
 
 
+class RecentEntries:
+    """The counted entries of the last minutes. Shared by the threads of a process."""
+
+    def __init__(self) -> None:
+        self._keys: OrderedDict[Hashable, tuple[datetime, int]] = OrderedDict()
+        self._lock = Lock()
+
+    def find(self, key: Hashable, now: datetime) -> int | None:
+        """Return the entry that was added for the same in the last minutes; None without one."""
+        with self._lock:
+            at, entry_id = self._keys.get(key, (None, None))
+        return entry_id if at is not None and now - at < REPEAT_AFTER else None
+
+    def add(self, key: Hashable, now: datetime, entry_id: int) -> None:
+        """Remember an entry, whose repeats are counted for some minutes."""
+        with self._lock:
+            self._keys[key] = now, entry_id
+            while len(self._keys) > MAX_RECENT:
+                self._keys.popitem(last=False)
+
+
+recent_entries = RecentEntries()
+
+
 def build_entry(
     act: Act,
     actor: Any,
@@ -167,7 +221,7 @@ def build_entry(
     """
     person = actor if isinstance(actor, User) else None
     through = SERVER if actor is None else person.program if person else str(actor)
-    entry_clinic_id: Any = getattr(actor, "clinic_id", None) or clinic_id
+    entry_clinic_id: Any = clinic_id or getattr(actor, "clinic_id", None)
     return AuditEntry(
         clinic_id=entry_clinic_id,
         at=now,
@@ -187,24 +241,35 @@ def record(act: Act, actor: Any, **details: Any) -> None:
 
 def record_security_change(act: Act, actor: User, row: Any, address: str, now: datetime) -> None:
     """Add an entry about a change to who has access: of an account, a device or an API token."""
-    clinic_id = clinic_id_of(row) or actor.clinic_id
     about = f"{row._meta.verbose_name}: {row}"
-    if clinic_id is None:  # a host's own account belongs to no clinic's log
-        log.warning("%s, %s, by %s from %s", act.label, about, actor, truncate_address(address))
-        return
-    record(act, actor, clinic_id=clinic_id, about=about, address=address, now=now)
+    record(act, actor, clinic_id=clinic_id_of(row), about=about, address=address, now=now)
 
 
 def record_after_the_fact(entries: list[AuditEntry]) -> None:
-    """Add entries about what has happened already. A failure is logged: care must go on.
-
-    Entries without a clinic are skipped: they are a host's, who sees no patients.
-    """
+    """Add entries about what has happened already. A failure is logged: care must go on."""
     try:
         with transaction.atomic():
-            AuditEntry.everywhere.bulk_create([entry for entry in entries if entry.clinic_id])
+            AuditEntry.everywhere.bulk_create(entries)
     except DatabaseError:
         log.exception("The audit log missed: %s", ", ".join(str(entry) for entry in entries))
+
+
+def record_counted(entry: AuditEntry) -> None:
+    """Add an entry about what has happened; the same again in some minutes is only counted.
+
+    A failure is logged: care must go on.
+    """
+    who = (entry.clinic_id, entry.by_id, entry.through, entry.address)
+    key = (*who, entry.act, entry.patient_id, entry.about)
+    try:
+        with transaction.atomic():
+            known = recent_entries.find(key, entry.at)
+            repeated = _mutable_rows().filter(pk=known or 0).update(count=F("count") + entry.count)
+            if not repeated:
+                entry.save()
+                recent_entries.add(key, entry.at, entry.pk)
+    except DatabaseError:
+        log.exception("The audit log missed: %s", entry)
 
 
 def truncate_address(address: str) -> str:
@@ -217,16 +282,12 @@ def truncate_address(address: str) -> str:
     return str(ip_network((parsed, bits), strict=False))
 
 
-def delete_before(clinic_id: int, moment: datetime) -> int:
-    """Delete a clinic's entries from before a moment. Return how many."""
-    return _mutable_rows().filter(clinic=clinic_id, at__lt=moment).delete()[0]
-
-
 def anonymize_patient(patient_id: int) -> None:
-    """Remove an erased patient from the entries."""
-    _mutable_rows().filter(patient=patient_id).update(patient=None, about="")
+    """Remove an erased patient from the entries; their digests stay."""
+    emptied = {"patient": None, "about": "", "salt": "", "erased": True}
+    _mutable_rows().filter(patient=patient_id).update(**emptied)
 
 
 def _mutable_rows() -> QuerySet[AuditEntry]:
-    """Return rows that can be changed: for retention and erasure, and only in this module."""
+    """Return rows that can be changed: for repeats and erasure, and only in this module."""
     return QuerySet(AuditEntry)

@@ -22,6 +22,7 @@ from django.http import HttpRequest
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.audit.sealing import SealableModel
 from rehab.people.models import Clinic, User
 from rehab.people.roles import RIGHTS, Right, Role, rights_of
 from rehab.people.scope import Scope, ScopedModel
@@ -32,6 +33,7 @@ UNTRACKED_FIELDS = {
     "created_at",
     "last_login",
     "last_seen_at",
+    "sign_in_generation",
     "token_hash",
     "epoch",
     "owner",
@@ -60,7 +62,7 @@ def model_choices() -> list[tuple[str, Any]]:
     return [(model.__name__, model._meta.verbose_name) for model in _tracked]
 
 
-class HistoryEntry(ScopedModel):
+class HistoryEntry(SealableModel):
     """One change of one row. ``changes``: for each field its old and its new value."""
 
     class Kind(models.TextChoices):
@@ -73,6 +75,8 @@ class HistoryEntry(ScopedModel):
     scope = HistoryScope(
         clinic="clinic", host=Q(clinic__isnull=True) | Q(model_name__in=["Clinic", "User"])
     )
+
+    sealed_fields = ("clinic", "model_name", "object_id", "kind", "changes", "by", "through", "at")
 
     clinic = models.ForeignKey(
         Clinic, on_delete=models.CASCADE, related_name="+", null=True, verbose_name=_("clinic")
@@ -92,7 +96,7 @@ class HistoryEntry(ScopedModel):
     )
     at = models.DateTimeField(_("at"), default=timezone.now, db_index=True)
 
-    class Meta(ScopedModel.Meta):
+    class Meta(SealableModel.Meta):
         verbose_name = _("change")
         verbose_name_plural = _("changes")
         ordering: ClassVar = ["-at", "-pk"]
@@ -112,6 +116,11 @@ def attribute_changes_to(request: HttpRequest) -> Iterator[None]:
         yield
     finally:
         _request.reset(token)
+
+
+def current_request() -> HttpRequest | None:
+    """Return the request that is answered now; None for the server's own work."""
+    return _request.get()
 
 
 def current_actor() -> tuple[User | None, str]:
@@ -139,10 +148,13 @@ def track_models(*tracked: type[Any]) -> None:
 
 
 def erase_values(model_name: str, object_id: int) -> None:
-    """Remove the values from a row's history; who changed which field, and when, stays."""
+    """Remove the values from a row's history; who changed which field, and when, stays.
+
+    So does the digest, without the salt that would help to guess what it was made of.
+    """
     for entry in HistoryEntry.everywhere.filter(model_name=model_name, object_id=object_id):
-        entry.changes = dict.fromkeys(entry.changes)
-        entry.save(update_fields=["changes"])
+        entry.changes, entry.salt, entry.erased = dict.fromkeys(entry.changes), "", True
+        entry.save(update_fields=["changes", "salt", "erased"])
 
 
 def _values_of(row: Model) -> dict[str, Any]:

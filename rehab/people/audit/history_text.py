@@ -10,6 +10,7 @@ from django.db.models import Field, ForeignKey, Model, Q
 from django.utils.translation import gettext as _
 
 from rehab.people.audit.history import HistoryEntry
+from rehab.people.roles import Right, may_see_names, rights_of
 from rehab.people.scope import ScopedModel
 
 MAX_ENTRIES = 200  # the newest
@@ -26,9 +27,13 @@ class FieldChange:
 
 @dataclass(frozen=True, slots=True)
 class RowChange:
-    """A change as text. ``part``: the kind of a row that is a part of the page's own row."""
+    """A change as text. ``part``: the kind of a row that is a part of the page's own row.
+
+    ``who``: the person, and the program or tablet; "" where the reader may not know staff.
+    """
 
     entry: HistoryEntry
+    who: str
     part: str
     fields: list[FieldChange]
 
@@ -53,6 +58,7 @@ def changes_of(user: Any, row: ScopedModel, parts: Sequence[type[Model]] = ()) -
     return [
         RowChange(
             entry,
+            describe_actor(entry) if may_see_names(user.role) else "",
             ""
             if entry.model_name == type(row).__name__
             else str(models[entry.model_name]._meta.verbose_name),
@@ -62,12 +68,22 @@ def changes_of(user: Any, row: ScopedModel, parts: Sequence[type[Model]] = ()) -
     ]
 
 
+def describe_actor(entry: Any) -> str:
+    """Return who did what an entry of a log tells: the person, and the program or device used."""
+    names = [str(entry.by)] if entry.by else []
+    names += [entry.through] if entry.through else []
+    return " · ".join(names) or _("the server")
+
+
 def _field_changes(user: Any, model: type[Model], entry: HistoryEntry) -> Iterator[FieldChange]:
     fields = {
         field.name: field for field in (*model._meta.concrete_fields, *model._meta.many_to_many)
     }
     for name, pair in entry.changes.items():
         field: Any = fields.get(name)
+        related: Any = getattr(field, "related_model", None)
+        if related is not None and Right.VIEW not in rights_of(user.role, related.__name__):
+            continue  # its number alone could be looked up elsewhere
         label = getattr(field, "verbose_name", name)
         if pair is None:
             yield FieldChange(str(label), _("erased"), "")

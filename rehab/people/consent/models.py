@@ -10,7 +10,8 @@ from django.db.models import Exists, OuterRef, Q
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.models import Boards, Clinic, Patient, User
+from rehab.people.models import BoardsConsent, Clinic, Patient, User
+from rehab.people.models.blinding import hidden_patients
 from rehab.people.roles import Role
 from rehab.people.scope import Scope, ScopedModel
 
@@ -71,7 +72,7 @@ class Consent(ScopedModel):
     )
     purpose = models.CharField(_("to what"), max_length=8, choices=Purpose.choices)
     # For boards only.
-    level = models.CharField(_("how far"), max_length=8, choices=Boards.choices, blank=True)
+    level = models.CharField(_("how far"), max_length=8, choices=BoardsConsent.choices, blank=True)
     # None: given before GARRY stored the text.
     text = models.ForeignKey(
         ConsentText, on_delete=models.PROTECT, related_name="+", null=True, verbose_name=_("text")
@@ -110,10 +111,18 @@ class PatientScope(Scope):
     """Rows of patients' sessions: researchers see those of patients who consent to research.
 
     ``patient`` is the lookup of the patient. Simulated patients need no consent, and a clinic may
-    require none (`Clinic.research_needs_consent`).
+    require none (`Clinic.research_needs_consent`). ``tells_condition``: the rows betray what a
+    study hides from its assessors, who see none of them.
     """
 
     patient: str = "patient"
+    tells_condition: bool = True
+
+    def member_filter(self, user: User) -> Q:
+        """Return the condition that no study hides a row from an account."""
+        if not self.tells_condition:
+            return Q()
+        return ~Q(**{f"{self.patient}__in": hidden_patients(user)})
 
     def role_filter(self, role: Role) -> Q:
         """Return the condition for a role, besides that of the clinic."""

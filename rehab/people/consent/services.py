@@ -6,12 +6,16 @@ from datetime import datetime
 from typing import Any
 
 from django.db import transaction
+from django.dispatch import Signal
 from django.utils.translation import gettext_lazy as _
 from django.utils.translation import override
 
 from rehab.people.consent.models import Consent, ConsentText, Purpose
-from rehab.people.models import Boards, Clinic, Patient, User
+from rehab.people.models import BoardsConsent, Clinic, Patient, User
 from rehab.people.networks import is_in_networks
+
+# Sent in the transaction of a withdrawal, with patient, purpose, by and now.
+consent_withdrawn = Signal()
 
 REMOTE_VIEW_TEXT = _("Remote view: your therapist may watch a session from another place.")
 # The first text of a clinic, in its language. The clinic may change it.
@@ -125,14 +129,17 @@ def withdraw_consent(patient: Patient, purpose: Purpose, by: User | None, now: d
         Consent.everywhere.filter(patient=patient, purpose=purpose, withdrawn_at=None).update(
             withdrawn_at=now, withdrawn_by=by
         )
-        if purpose == Purpose.BOARDS and patient.boards != Boards.OWN:
-            patient.boards = Boards.OWN
+        if purpose == Purpose.BOARDS and patient.boards != BoardsConsent.OWN:
+            patient.boards = BoardsConsent.OWN
             patient.save(update_fields=["boards"])
+        consent_withdrawn.send(Consent, patient=patient, purpose=purpose, by=by, now=now)
 
 
-def record_boards_consent(patient: Patient, boards: Boards, by: User | None, now: datetime) -> None:
+def record_boards_consent(
+    patient: Patient, boards: BoardsConsent, by: User | None, now: datetime
+) -> None:
     """Record on which boards a patient consents to stand; OWN withdraws the consent."""
-    if boards == Boards.OWN:
+    if boards == BoardsConsent.OWN:
         withdraw_consent(patient, Purpose.BOARDS, by, now)
         return
     with transaction.atomic():

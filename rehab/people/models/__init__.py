@@ -4,7 +4,7 @@ from rehab.people.models.accounts import ScopedUserManager, ServerUserManager, U
 from rehab.people.models.clinics import LANGUAGES, Clinic, validate_time_zone
 from rehab.people.models.patients import (
     SIDES,
-    Boards,
+    BoardsConsent,
     EndReason,
     ErasureReason,
     Patient,
@@ -17,7 +17,7 @@ from rehab.people.models.patients import (
 __all__ = [
     "LANGUAGES",
     "SIDES",
-    "Boards",
+    "BoardsConsent",
     "Clinic",
     "EndReason",
     "ErasureReason",

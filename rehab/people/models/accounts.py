@@ -7,7 +7,8 @@ from typing import Any, ClassVar
 from django.contrib.auth.base_user import BaseUserManager
 from django.contrib.auth.models import AbstractUser, UserManager
 from django.db import models
-from django.db.models import Q
+from django.db.models import F, Q
+from django.utils.crypto import salted_hmac
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models.clinics import LANGUAGES, Clinic
@@ -55,7 +56,11 @@ class User(AbstractUser):
         blank=True,
         help_text=_("Of the pages that this account opens; empty: the clinic's."),
     )
-    program = ""  # the name of the API token through which this person acts
+    # Raised to end all sign-ins from before.
+    sign_in_generation = models.PositiveIntegerField(default=0, editable=False)
+    # The name of the API token through which this person acts, and what it may do.
+    program = ""
+    program_scopes: frozenset[str] = frozenset()
 
     everywhere = ServerUserManager()
     objects: ClassVar[ScopedUserManager] = ScopedUserManager()  # type: ignore[assignment]
@@ -82,6 +87,20 @@ class User(AbstractUser):
 
     def __str__(self) -> str:
         return self.get_full_name() or self.username
+
+    def get_session_auth_hash(self) -> str:
+        """Return what a browser session keeps of this account; when it changes, that ends."""
+        what = f"{self.sign_in_generation} {self.password}"
+        return salted_hmac("garry.sign_in", what, algorithm="sha256").hexdigest()
+
+    def end_sign_ins(self) -> None:
+        """End all sign-ins of this account, also pending ones; open sockets close within seconds.
+
+        Their browser sessions no longer sign anybody in, and go when they expire.
+        """
+        row = User.everywhere.filter(pk=self.pk)
+        row.update(sign_in_generation=F("sign_in_generation") + 1)
+        self.refresh_from_db(fields=["sign_in_generation"])
 
     @classmethod
     def is_taken(cls, username: str) -> bool:

@@ -39,7 +39,7 @@ class ScreenText(models.TextChoices):
     LARGEST = "largest", _("largest")
 
 
-class Boards(models.TextChoices):
+class BoardsConsent(models.TextChoices):
     """Which leaderboards a patient has agreed to stand on; each includes those before it."""
 
     OWN = "own", _("None: sees own sessions only")
@@ -123,8 +123,8 @@ class Patient(ClinicModel):
     boards = models.CharField(
         _("leaderboards"),
         max_length=8,
-        choices=Boards.choices,
-        default=Boards.OWN,
+        choices=BoardsConsent.choices,
+        default=BoardsConsent.OWN,
         help_text=_("What the patient has agreed to. Taken back, it takes effect at once."),
     )
     alias = models.CharField(
@@ -169,7 +169,7 @@ class Patient(ClinicModel):
 
     def save(self, *args: Any, **kwargs: Any) -> None:
         """Save the patient; one who has agreed to boards first gets an animal name."""
-        if self.boards != Boards.OWN and self.alias is None:
+        if self.boards != BoardsConsent.OWN and self.alias is None:
             self.draw_alias()
             if kwargs.get("update_fields") is not None:
                 kwargs["update_fields"] = {*kwargs["update_fields"], "alias"}
@@ -198,7 +198,7 @@ class Patient(ClinicModel):
         """Refuse boards with others without consent, and any change to an erased patient."""
         if self.erased_at is not None:
             raise PatientErased
-        if self.boards == Boards.OWN or self.simulated:
+        if self.boards == BoardsConsent.OWN or self.simulated:
             return
         has_consent = self.pk and self.consents.filter(purpose="boards", withdrawn_at=None).exists()
         if not has_consent:

@@ -25,7 +25,7 @@ from rehab.people.consent.services import (
     withdraw_consent,
 )
 from rehab.people.forms import ConsentTextForm
-from rehab.people.models import Boards, Patient
+from rehab.people.models import BoardsConsent, Patient
 from rehab.people.roles import Role
 
 MEANINGS = {
@@ -37,10 +37,10 @@ MEANINGS = {
     Purpose.REMOTE: gettext_lazy("A therapist may watch a session from another place."),
 }
 LEVELS = {
-    Boards.OWN: gettext_lazy("No"),
-    Boards.TOTAL: gettext_lazy("Totals only"),
-    Boards.CLINIC: gettext_lazy("This clinic"),
-    Boards.ACROSS: gettext_lazy("All clinics"),
+    BoardsConsent.OWN: gettext_lazy("No"),
+    BoardsConsent.TOTAL: gettext_lazy("Totals only"),
+    BoardsConsent.CLINIC: gettext_lazy("This clinic"),
+    BoardsConsent.ACROSS: gettext_lazy("All clinics"),
 }
 
 
@@ -65,8 +65,8 @@ def show_consent(request: HttpRequest, patient_id: int) -> HttpResponse:
     patient = get_object_or_404(patients, pk=patient_id)
     if request.method == "POST" and patient.erased_at is None:
         purpose, answer = request.POST.get("purpose"), request.POST.get("answer", "")
-        if purpose == Purpose.BOARDS and answer in Boards.values:
-            record_boards_consent(patient, Boards(answer), user, timezone.now())
+        if purpose == Purpose.BOARDS and answer in BoardsConsent.values:
+            record_boards_consent(patient, BoardsConsent(answer), user, timezone.now())
         elif purpose in (
             *offered_purposes(patient.clinic),
             *active_consents(patient),
@@ -97,9 +97,9 @@ def list_choices(patient: Patient) -> list[PurposeChoice]:
     for purpose in (purpose for purpose in Purpose if purpose in listed):
         consent = active.get(purpose)
         if purpose == Purpose.BOARDS:
-            now = patient.boards if consent else Boards.OWN
-            across = patient.clinic.boards_across or now == Boards.ACROSS
-            levels = [level for level in Boards if across or level != Boards.ACROSS]
+            now = patient.boards if consent else BoardsConsent.OWN
+            across = patient.clinic.boards_across or now == BoardsConsent.ACROSS
+            levels = [level for level in BoardsConsent if across or level != BoardsConsent.ACROSS]
             options = [(level.value, str(LEVELS[level]), level == now) for level in levels]
         else:
             options = [("yes", _("Yes"), consent is not None), ("no", _("No"), consent is None)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import segno
 from django.contrib import messages
+from django.contrib.auth import update_session_auth_hash
 from django.core.exceptions import PermissionDenied
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
@@ -15,10 +16,14 @@ from django.views.decorators.debug import sensitive_post_parameters
 from django.views.decorators.http import require_http_methods, require_safe
 
 from rehab.people.access import for_roles, user_of
+from rehab.people.audit import audit_log
+from rehab.people.audit.audit_log import Act
 from rehab.people.models import User
+from rehab.people.networks import client_address
+from rehab.people.pages.confirm import ask_again
 from rehab.people.roles import Role
-from rehab.people.sign_in import factors, flow, passkeys, totp
-from rehab.people.sign_in.forms import WRONG_FIRST_CODE, AppForm, OwnPasswordForm
+from rehab.people.sign_in import factors, flow, passkeys, step_up, totp
+from rehab.people.sign_in.forms import WRONG_FIRST_CODE, AppForm
 
 SECRET = "app_secret"  # noqa: S105 (key of the browser session, until the app has shown a code)
 
@@ -34,6 +39,7 @@ def enrolling_user(request: HttpRequest) -> User:
 
 
 @for_roles(*Role, enrolling=True, patients=False)
+@step_up.required
 @never_cache
 @require_safe
 def choose_factor(request: HttpRequest) -> HttpResponse:
@@ -48,6 +54,7 @@ def choose_factor(request: HttpRequest) -> HttpResponse:
 
 
 @for_roles(*Role, enrolling=True, patients=False)
+@step_up.required
 @never_cache
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
@@ -69,6 +76,7 @@ def add_app(request: HttpRequest) -> HttpResponse:
 
 
 @for_roles(*Role, enrolling=True, patients=False)
+@step_up.required
 @never_cache
 @require_http_methods(["GET", "HEAD", "POST"])
 def add_passkey(request: HttpRequest) -> HttpResponse:
@@ -93,6 +101,7 @@ def _finish_enrollment(request: HttpRequest, user: User, new: list[str]) -> Http
     """Finish a pending sign-in, if there is one, and show new recovery codes."""
     next_url = reverse("account")
     if request.user.is_authenticated:
+        update_session_auth_hash(request, user)  # this sign-in goes on, no other one
         request.session[flow.SECOND_FACTOR_VERIFIED] = True
     else:
         next_url = flow.finish(request, user, timezone.now(), second_factor_verified=True)
@@ -107,20 +116,20 @@ def _finish_enrollment(request: HttpRequest, user: User, new: list[str]) -> Http
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
 def renew_codes(request: HttpRequest) -> HttpResponse:
-    """Make new recovery codes, after the password, for an account with a second factor."""
+    """Make new recovery codes for an account with a second factor, which is asked who it is."""
     user = user_of(request)
     if not factors.authenticators_of(user).exists():
         return redirect("account")
-    form = OwnPasswordForm(request, user, request.POST if request.method == "POST" else None)
-    if form.is_valid():
-        return _show_recovery_codes(request, factors.renew_recovery_codes(user), reverse("account"))
-    context = {
-        "form": form,
-        "title": _("New recovery codes"),
-        "words": _("They replace the old ones, which then open nothing."),
-        "act": _("Make new codes"),
-    }
-    return render(request, "people/sign_in/confirm_password.html", context)
+    asked = ask_again(
+        request,
+        _("New recovery codes"),
+        _("They replace the old ones, which then open nothing."),
+        _("Make new codes"),
+    )
+    if asked is not None:
+        return asked
+    audit_log.record(Act.RECOVERY_CODES, user, address=client_address(request), now=timezone.now())
+    return _show_recovery_codes(request, factors.renew_recovery_codes(user), reverse("account"))
 
 
 def _show_recovery_codes(request: HttpRequest, new: list[str], next_url: str) -> HttpResponse:
@@ -134,25 +143,22 @@ def _show_recovery_codes(request: HttpRequest, new: list[str], next_url: str) ->
 @sensitive_post_parameters()
 @require_http_methods(["GET", "HEAD", "POST"])
 def remove_authenticator(request: HttpRequest) -> HttpResponse:
-    """Remove one of the own authenticators, after the password."""
+    """Remove one of the own authenticators, after asking who it is."""
     user = user_of(request)
     which = request.GET.get("which", "")
     own = factors.authenticators_of(user).filter(pk=int(which) if which.isdecimal() else 0).first()
     if own is None:
         return redirect("account")
-    form = OwnPasswordForm(request, user, request.POST if request.method == "POST" else None)
-    if form.is_valid():
-        if factors.remove_authenticator(user, own.pk):
-            messages.success(request, _("%(name)s is removed.") % {"name": own})
-        else:
-            messages.error(
-                request, _("Your clinic asks for a second factor. Add another one first.")
-            )
-        return redirect("account")
-    context = {
-        "form": form,
-        "title": _("Remove %(name)s") % {"name": own},
-        "words": _("It then no longer signs you in."),
-        "act": _("Remove"),
-    }
-    return render(request, "people/sign_in/confirm_password.html", context)
+    asked = ask_again(
+        request,
+        _("Remove %(name)s") % {"name": own},
+        _("It then no longer signs you in."),
+        _("Remove"),
+    )
+    if asked is not None:
+        return asked
+    if factors.remove_authenticator(user, own.pk):
+        messages.success(request, _("%(name)s is removed.") % {"name": own})
+    else:
+        messages.error(request, _("Your clinic asks for a second factor. Add another one first."))
+    return redirect("account")

@@ -20,7 +20,7 @@ from rehab.people.access import public
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.sign_in import factors, flow, passkeys
-from rehab.people.sign_in.forms import CodeForm, SignInForm
+from rehab.people.sign_in.forms import FactorForm, SignInForm
 
 
 def landing_page(user: User) -> str:
@@ -57,24 +57,12 @@ def verify_second_factor(request: HttpRequest) -> HttpResponse:
     user = flow.pending_second_factor(request, now)
     if user is None:
         return redirect("sign-in")
-    answer = request.POST.get("passkey", "")
-    form = CodeForm(request, user, None if answer or request.method != "POST" else request.POST)
-    problem = ""
-    if answer:
-        try:
-            passkeys.verify(request, user, answer, now)
-        except passkeys.PasskeyRejected:
-            problem = _("This passkey was not accepted. Try again, or type a code.")
-        else:
-            return HttpResponseRedirect(
-                flow.finish(request, user, now, second_factor_verified=True)
-            )
-    elif form.is_valid():
+    form = FactorForm(request, user, request.POST if request.method == "POST" else None)
+    if form.is_valid():
         return HttpResponseRedirect(flow.finish(request, user, now, second_factor_verified=True))
     own = factors.authenticators_of(user)
     context = {
         "form": form,
-        "problem": problem,
         "has_app": own.filter(kind=factors.Authenticator.Kind.APP).exists(),
         "passkey": passkeys.authentication_options(request, user),
     }

@@ -2,10 +2,14 @@
 
 The cookie lasts for the day; the database decides when the session expires. Opening a page, and a
 training session that runs on one, extend it.
+
+Cookies hold a session's key and the database its digest, so that nobody who reads the database can
+make a cookie of it.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Collection, Mapping
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -14,12 +18,19 @@ from django.conf import settings
 from django.contrib.sessions.backends import db
 from django.contrib.sessions.base_session import AbstractBaseSession
 from django.contrib.sessions.models import Session
+from django.db.models import QuerySet
 from django.http import HttpRequest
 from django.utils import timezone
 
 SIGNED_IN_AT = "signed_in_at"
 LAST_ACTIVITY_AT = "last_activity_at"
 ACTIVITY_RESOLUTION = timedelta(minutes=1)  # activity is stored no more often than this
+DIGEST_LENGTH = 40  # hexadecimal digits (160 bits): as many as Django's column has room for
+
+
+def digest_of(key: str) -> str:
+    """Return the digest under which the session of a cookie's key is stored."""
+    return hashlib.sha256(key.encode()).hexdigest()[:DIGEST_LENGTH]
 
 
 def idle_timeout() -> timedelta:
@@ -47,9 +58,55 @@ class SessionStore(db.SessionStore):
 
     def create_model_instance(self, data: dict[str, Any]) -> AbstractBaseSession:
         """Return the row to save."""
-        row = super().create_model_instance(data)
+        return self._as_stored(super().create_model_instance(data), data)
+
+    async def acreate_model_instance(self, data: dict[str, Any]) -> AbstractBaseSession:
+        """Return the row to save."""
+        return self._as_stored(await super().acreate_model_instance(data), data)
+
+    def load(self) -> dict[str, Any]:
+        """Return the session's data; without a stored session none, and forget its key."""
+        return self._data_of(self._stored().first())
+
+    async def aload(self) -> dict[str, Any]:
+        """Return the session's data; without a stored session none, and forget its key."""
+        return self._data_of(await self._stored().afirst())
+
+    def exists(self, session_key: str) -> bool:
+        """Return whether there is a session with this key."""
+        return super().exists(digest_of(session_key))
+
+    async def aexists(self, session_key: str) -> bool:
+        """Return whether there is a session with this key."""
+        return await super().aexists(digest_of(session_key))
+
+    def delete(self, session_key: str | None = None) -> None:
+        """Delete the session of a key; without one, this session."""
+        key = session_key or self.session_key
+        if key is not None:
+            super().delete(digest_of(key))
+
+    async def adelete(self, session_key: str | None = None) -> None:
+        """Delete the session of a key; without one, this session."""
+        key = session_key or self.session_key
+        if key is not None:
+            await super().adelete(digest_of(key))
+
+    def _as_stored(self, row: AbstractBaseSession, data: dict[str, Any]) -> AbstractBaseSession:
+        row.session_key = digest_of(row.session_key)
         row.expire_date = expires_at(data, timezone.now())
         return row
+
+    def _stored(self) -> QuerySet[Session]:
+        digest = digest_of(self.session_key or "")
+        return Session.objects.filter(session_key=digest, expire_date__gt=timezone.now())
+
+    def _data_of(self, row: Session | None) -> dict[str, Any]:
+        if row is None:
+            self._session_key = None  # Django draws a new one when data are stored
+            return {}
+        data: dict[str, Any] = self.decode(row.session_data)
+        return data
 
 
 def record_activity(request: HttpRequest, now: datetime) -> None:
@@ -62,7 +119,7 @@ def record_activity(request: HttpRequest, now: datetime) -> None:
 def extend_sessions(keys: Collection[str], now: datetime) -> None:
     """Extend the sessions whose pages watch a running training session."""
     due = Session.objects.filter(
-        session_key__in=keys,
+        session_key__in=[digest_of(key) for key in keys],
         expire_date__gt=now,
         expire_date__lt=now + idle_timeout() - ACTIVITY_RESOLUTION,
     )

@@ -91,12 +91,16 @@ def authenticators_of(user: User) -> models.QuerySet[Authenticator]:
 def add_authenticator(
     user: User, kind: Authenticator.Kind, name: str, credential: str, counter: int
 ) -> list[str]:
-    """Store an authenticator. Return the recovery codes that come with the first one."""
+    """Store an authenticator, and end the account's sign-ins: somebody else may have one.
+
+    Return the recovery codes that come with the first one.
+    """
     with transaction.atomic():
         is_first = not authenticators_of(user).exists()
         Authenticator.everywhere.create(
             user=user, kind=kind, name=name, credential=credential, counter=counter
         )
+        user.end_sign_ins()
         return renew_recovery_codes(user) if is_first else []
 
 
@@ -138,7 +142,8 @@ def renew_recovery_codes(user: User) -> list[str]:
     with transaction.atomic():
         RecoveryCode.everywhere.filter(user=user).delete()
         RecoveryCode.everywhere.bulk_create(
-            RecoveryCode(user=user, code_hash=hash_code(code)) for code in codes
+            RecoveryCode(user=user, code_hash=hash_code(code, user.pk, user.date_joined))
+            for code in codes
         )
     return codes
 
@@ -158,7 +163,8 @@ def verify_code(user: User, code: str, now: datetime) -> bool:
         time_step = matching_time_step(secret, code, now.timestamp())
         if time_step is not None and app.record_use(time_step, now):
             return True
-    used, _ = RecoveryCode.everywhere.filter(user=user, code_hash=hash_code(code)).delete()
+    typed = hash_code(code, user.pk, user.date_joined)
+    used, _ = RecoveryCode.everywhere.filter(user=user, code_hash=typed).delete()
     return bool(used)
 
 

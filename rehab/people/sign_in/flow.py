@@ -72,7 +72,7 @@ def finish(request: HttpRequest, user: User, now: datetime, *, second_factor_ver
     request.session[SECOND_FACTOR_VERIFIED] = second_factor_verified
     request.session[browser_sessions.SIGNED_IN_AT] = int(now.timestamp())
     request.session[browser_sessions.LAST_ACTIVITY_AT] = int(now.timestamp())
-    lockout.reset_attempts(user)
+    lockout.forget_failures(request, user, now)
     return str(pending.get("next_url", ""))
 
 

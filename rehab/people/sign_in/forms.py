@@ -9,16 +9,19 @@ from django.contrib.auth import authenticate
 from django.contrib.auth.forms import AuthenticationForm, PasswordChangeForm
 from django.core.exceptions import ValidationError
 from django.http import HttpRequest
-from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
-from rehab.people.sign_in import lockout
+from rehab.people.sign_in import factors, lockout
 
 WRONG_LOGIN = _("Name and password do not fit. Look at capitals, and try again.")
 WRONG_PASSWORD = _("That is not your password.")
 WRONG_FIRST_CODE = _("This code does not fit. Look at the app again.")
-WRONG_CODE = _("This code does not fit, or was used. Wait for the next one, and try again.")
+WRONG = {
+    "password": WRONG_PASSWORD,
+    "code": _("This code does not fit, or was used. Wait for the next one, and try again."),
+    "passkey": _("This passkey was not accepted. Try again, or type a code."),
+}
 
 
 class SignInForm(AuthenticationForm):
@@ -27,9 +30,7 @@ class SignInForm(AuthenticationForm):
     def get_invalid_login_error(self) -> ValidationError:
         """Return the error, which does not reveal whether there is such an account."""
         assert self.request is not None  # noqa: S101  (the view gives it)
-        name = str(self.cleaned_data["username"])
-        locked_out = lockout.lockout_message(self.request, timezone.now(), username=name)
-        return ValidationError(locked_out or WRONG_LOGIN)
+        return ValidationError(lockout.lockout_message(self.request) or WRONG_LOGIN)
 
 
 class CodeField(forms.CharField):
@@ -47,50 +48,54 @@ class CodeField(forms.CharField):
         super().__init__(max_length=32, **kwargs)
 
 
-class CodeForm(forms.Form):
-    """The code of a pending sign-in."""
+class FactorForm(forms.Form):
+    """A second factor of an account: a code, or a passkey's signature."""
 
-    code = CodeField(label=_("Code"))
+    code = CodeField(label=_("Code"), required=False)
+    passkey = forms.CharField(required=False, widget=forms.HiddenInput)
 
     def __init__(self, request: HttpRequest, user: User, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.request, self.user = request, user
-        self.fields["code"].widget.attrs["autofocus"] = True
+        next(iter(self.fields.values())).widget.attrs["autofocus"] = True
 
-    def clean_code(self) -> str:
-        """Refuse a wrong or used code, and every code during a lockout."""
-        code: str = self.cleaned_data["code"]
-        if authenticate(self.request, username=self.user.username, code=code) is None:
-            username = self.user.username
-            locked_out = lockout.lockout_message(
-                self.request, timezone.now(), username=username, code=""
-            )
-            raise ValidationError(locked_out or WRONG_CODE)
-        return code
+    def clean(self) -> dict[str, Any]:
+        """Refuse what is wrong or was used before, and everything during a lockout."""
+        shown = {name: value for name, value in self.cleaned_data.items() if value}
+        first = next(iter(self.fields), None)
+        if not shown and not self.errors:
+            self.add_error(first, forms.Field.default_error_messages["required"])
+        for name, value in list(shown.items())[:1]:
+            if authenticate(self.request, username=self.user.username, **{name: value}) is None:
+                self.add_error(name, lockout.lockout_message(self.request) or WRONG[name])
+        return self.cleaned_data
+
+
+class ProofForm(FactorForm):
+    """The own password or a factor, asked for again: whichever of them the account has."""
+
+    field_order = ("password", "code", "passkey")
+    password = forms.CharField(
+        label=_("Your password"),
+        strip=False,
+        required=False,
+        widget=forms.PasswordInput(attrs={"autocomplete": "current-password"}),
+    )
+
+    def __init__(self, request: HttpRequest, user: User, *args: Any, **kwargs: Any) -> None:
+        super().__init__(request, user, *args, **kwargs)
+        if not factors.authenticators_of(user).exists():
+            del self.fields["code"], self.fields["passkey"]
+        elif user.has_usable_password():
+            self.fields["code"].label = _("Or a code")
+        if not user.has_usable_password():
+            del self.fields["password"]
 
 
 class AppForm(forms.Form):
     """The first code of an app that has just read its secret."""
 
     code = CodeField(label=_("Code that the app shows"))
-
-
-class OwnPasswordForm(forms.Form):
-    """The own password, asked for again before security settings change."""
-
-    password = forms.CharField(
-        label=_("Your password"),
-        strip=False,
-        widget=forms.PasswordInput(attrs={"autocomplete": "current-password"}),
-    )
-
-    def __init__(self, request: HttpRequest, user: User, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        self.request, self.user = request, user
-
-    def clean_password(self) -> str:
-        """Refuse a wrong password."""
-        return check_own_password(self.request, self.user, self.cleaned_data["password"])
 
 
 class NewPasswordForm(PasswordChangeForm):
@@ -109,6 +114,5 @@ class NewPasswordForm(PasswordChangeForm):
 def check_own_password(request: HttpRequest, user: User, password: str) -> str:
     """Return the password. Raises ValidationError where it is wrong, and counts the attempt."""
     if authenticate(request, username=user.username, password=password) is None:
-        locked_out = lockout.lockout_message(request, timezone.now(), username=user.username)
-        raise ValidationError(locked_out or WRONG_PASSWORD)
+        raise ValidationError(lockout.lockout_message(request) or WRONG_PASSWORD)
     return password

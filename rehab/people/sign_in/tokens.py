@@ -9,6 +9,7 @@ from typing import Any, ClassVar, TypeVar
 
 from django.core.exceptions import ValidationError
 from django.db import models
+from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, User
@@ -17,6 +18,8 @@ from rehab.people.scope import ClinicModel, Scope
 
 # 256 random bits: nothing to guess, so a fast hash keeps the token as safe as a slow one would.
 TOKEN_BYTES = 32
+LIFETIME = timedelta(days=90)  # of a program's token, unless its maker says otherwise
+LONGEST_LIFETIME = timedelta(days=366)
 LAST_SEEN_RESOLUTION = timedelta(minutes=1)  # precision of `last_seen_at`
 
 
@@ -65,8 +68,24 @@ def find_by_token(model: type[T], token: str, now: datetime) -> T | None:
     return holder
 
 
+class TokenScope(models.TextChoices):
+    """What a program may do with its token."""
+
+    READ = "read", _("Read patients, sessions and boards")
+    STEER = "steer", _("Add patients and sessions, change and steer them")
+    EXPORT = "export", _("Take out the steps of sessions")
+
+
+def default_expiry() -> datetime:
+    """Return when a token of now expires."""
+    return timezone.now() + LIFETIME
+
+
 class ApiToken(TokenModel):
-    """Lets a program use the API as a person, with that person's role or one that sees less."""
+    """Lets a program use the API as a person, with that person's role or one that sees less.
+
+    It ends when it expires or is revoked, and with its account's password, role or clinic.
+    """
 
     scope = Scope(clinic="clinic")
 
@@ -90,6 +109,14 @@ class ApiToken(TokenModel):
             "reads a nickname or code."
         ),
     )
+    may_read = models.BooleanField(TokenScope.READ.label, default=True)
+    may_steer = models.BooleanField(TokenScope.STEER.label, default=False)
+    may_export = models.BooleanField(TokenScope.EXPORT.label, default=False)
+    expires_at = models.DateTimeField(
+        _("valid until"),
+        default=default_expiry,
+        help_text=_("A year from now at the latest. Renewed, it is valid as long again."),
+    )
 
     class Meta(TokenModel.Meta):
         verbose_name = _("API token")
@@ -99,8 +126,25 @@ class ApiToken(TokenModel):
     def __str__(self) -> str:
         return self.name
 
+    @property
+    def scopes(self) -> frozenset[str]:
+        """What the program may do."""
+        return frozenset(scope.value for scope in TokenScope if getattr(self, f"may_{scope.value}"))
+
+    def new_token(self) -> str:
+        """Set and return a new token, which is valid as long as the old one was."""
+        if not self._state.adding:
+            self.expires_at = timezone.now() + min(
+                self.expires_at - self.created_at, LONGEST_LIFETIME
+            )
+        return super().new_token()
+
     def clean(self) -> None:
-        """Refuse a role that the account cannot delegate."""
+        """Refuse a role that the account cannot delegate, and a date that is too far away."""
+        now = timezone.now()
+        expires_at: datetime | None = self.expires_at  # None where the form had no date
+        if expires_at is not None and not now < expires_at <= now + LONGEST_LIFETIME:
+            raise ValidationError({"expires_at": _("Give a day within a year from now.")})
         user: Any = getattr(self, "user", None)
         if user is not None and not may_delegate(user.role, self.role):
             raise ValidationError(
@@ -114,15 +158,35 @@ class ApiToken(TokenModel):
 def find_user_by_token(token: str, now: datetime) -> User | None:
     """Return the person that a program calls as, with the token's role; None if it is invalid.
 
-    A token is valid while its account is active and may delegate the role. The returned object is
-    for this call alone and must not be saved.
+    A token is valid until it expires, while its account is active and may delegate the role. The
+    returned object is for this call alone and must not be saved.
     """
     holder = find_by_token(ApiToken, token, now)
-    if holder is None:
+    if holder is None or holder.expires_at <= now:
         return None
     user = holder.user
     is_valid = user.is_active and user.clinic_id == holder.clinic_id
     if not is_valid or not may_delegate(user.role, holder.role):
         return None
-    user.role, user.program = holder.role, holder.name
+    user.role, user.program, user.program_scopes = holder.role, holder.name, holder.scopes
     return user
+
+
+def revoke_with_account(
+    instance: User, raw: bool = False, update_fields: Any = None, **_: Any
+) -> None:
+    """Revoke an account's tokens when its password, role or clinic changes.
+
+    A receiver of `pre_save`: whoever knew the old password may have made a token.
+    """
+    if raw or instance.pk is None:
+        return
+    # Django has a new password there until it is stored; a hash that it renews is no new password.
+    is_changed = vars(instance).get("_password") is not None
+    if not is_changed and (update_fields is None or {"role", "clinic"} & set(update_fields)):
+        before = User.everywhere.filter(pk=instance.pk).values_list("role", "clinic_id").first()
+        is_changed = before is not None and before != (instance.role, instance.clinic_id)
+    if is_changed:
+        for holder in ApiToken.everywhere.filter(user=instance.pk, revoked_at__isnull=True):
+            holder.revoked_at = timezone.now()
+            holder.save(update_fields=["revoked_at"])

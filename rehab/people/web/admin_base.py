@@ -24,8 +24,9 @@ from rehab.people.audit.audit_log import Act, record_security_change
 from rehab.people.audit.history import clinic_id_of
 from rehab.people.audit.history_text import changes_of
 from rehab.people.networks import client_address
-from rehab.people.roles import Right, Role, rights_of
+from rehab.people.roles import Right, Role, is_hidden_beside, rights_of
 from rehab.people.scope import ScopedModel, visible_rows
+from rehab.people.sign_in import step_up
 from rehab.people.sign_in.tokens import TokenModel
 
 
@@ -65,6 +66,27 @@ class RestrictedChangeList(ChangeList):
         return found
 
 
+def hidden_fields(request: HttpRequest, model: type[models.Model]) -> set[str]:
+    """Return the fields that refer to persons whom the person of this request may not know."""
+    role = getattr(request.user, "role", "")
+    relations = (*model._meta.concrete_fields, *model._meta.many_to_many)
+    return {
+        field.name
+        for field in relations
+        if isinstance(field.related_model, type)
+        and is_hidden_beside(role, field.related_model.__name__)
+    }
+
+
+def omit_fields(fields: Any, omitted: set[str]) -> list[Any]:
+    """Return the fields of an admin form, some of them in one line, without the omitted ones."""
+    return [
+        field if isinstance(field, str) else omit_fields(field, omitted)
+        for field in fields
+        if field not in omitted
+    ]
+
+
 class ScopedOptions(admin.options.BaseModelAdmin):
     """Options that a model's own pages and its inlines have in common."""
 
@@ -79,6 +101,14 @@ class ScopedOptions(admin.options.BaseModelAdmin):
         rows: QuerySet[Any] = self.model.objects.visible_to(request.user)
         ordering = self.get_ordering(request)
         return rows.order_by(*ordering) if ordering else rows
+
+    def get_fieldsets(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Return the fields without those of persons whom this person may not know."""
+        hidden = hidden_fields(request, self.model)
+        return [
+            (title, {**options, "fields": omit_fields(options["fields"], hidden)})
+            for title, options in super().get_fieldsets(request, obj)
+        ]
 
     def get_field_queryset(self, db: str | None, db_field: Any, request: HttpRequest) -> Any:
         """Return the related rows that this person may see."""
@@ -137,11 +167,16 @@ class ClinicForm(forms.ModelForm):
 
 
 class TrackedAdmin(admin.ModelAdmin):
-    """Pages of a row with our own change history."""
+    """A list with its model's name as title, and pages of a row with our own change history."""
 
     def get_object(self, request: HttpRequest, object_id: str, from_field: Any = None) -> Any:
         """Return a row; by its key where ``from_field`` is empty, on which Django fails."""
         return super().get_object(request, object_id, from_field or None)
+
+    def changelist_view(self, request: HttpRequest, extra_context: Any = None) -> HttpResponse:
+        """Show the list with the model's name as title."""
+        title = capfirst(self.opts.verbose_name_plural)
+        return super().changelist_view(request, {"title": title} | (extra_context or {}))
 
     def history_view(
         self, request: HttpRequest, object_id: str, extra_context: Any = None
@@ -175,6 +210,10 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
         """Return whether the model is on the front page."""
         return bool(rights_for(request, self.model))
 
+    def get_list_display(self, request: HttpRequest) -> Any:
+        """Return the columns without those of persons whom this person may not know."""
+        return omit_fields(super().get_list_display(request), hidden_fields(request, self.model))
+
     def get_exclude(self, request: HttpRequest, obj: Any = None) -> Any:
         """Return the excluded fields with the clinic, which follows from the person."""
         exclude = tuple(super().get_exclude(request, obj) or ())
@@ -186,11 +225,6 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
         """Return the form; a new row's clinic is the person's own, or none for a host."""
         form: Any = super().get_form(request, obj, change=change, **kwargs)
         return type(form)(form.__name__, (form,), {"new_clinic_id": user_of(request).clinic_id})
-
-    def changelist_view(self, request: HttpRequest, extra_context: Any = None) -> HttpResponse:
-        """Show the list with the model's name as title."""
-        title = capfirst(self.opts.verbose_name_plural)
-        return super().changelist_view(request, {"title": title} | (extra_context or {}))
 
     def get_row_links(self, request: HttpRequest, row: Any) -> list[tuple[str, Any]]:
         """Return URLs and labels of further pages about a row."""
@@ -250,16 +284,37 @@ class TokenAdmin(ScopedAdmin):
     readonly_fields: ClassVar[tuple[str, ...]] = ("created_at", "last_seen_at", "revoked_at")
     actions = row_actions = ("renew_tokens", "revoke_tokens")
 
+    def add_view(
+        self, request: HttpRequest, form_url: str = "", extra_context: Any = None
+    ) -> HttpResponse:
+        """Show the form of a new row, whose token speaks for somebody; ask for the password."""
+        if not step_up.is_confirmed(request, timezone.now()):
+            return step_up.ask(request)
+        return super().add_view(request, form_url, extra_context)
+
+    def may_issue(self, request: HttpRequest, holder: Any) -> bool:
+        """Return whether this person may be shown a new token of a row."""
+        return True
+
     def save_model(self, request: HttpRequest, obj: Any, form: Any, change: bool) -> None:
-        """Save the row; issue and show the token of a new one."""
-        token = None if change else obj.new_token()
+        """Save the row, a new one with a token."""
+        if not change:
+            obj.token = obj.new_token()
         super().save_model(request, obj, form, change)
-        if token:
-            self._show_token(request, obj, token)
+
+    def response_add(self, request: HttpRequest, obj: Any, *args: Any, **kwargs: Any) -> Any:
+        """Show the token of a new row."""
+        return self._show_tokens(request, [(obj, obj.token)])
 
     @admin.action(description=_("Give new tokens (old ones stop at once)"), permissions=["change"])
-    def renew_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:
-        """Replace the tokens of the chosen rows."""
+    def renew_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> HttpResponse | None:
+        """Replace the tokens of the chosen rows, and show the new ones; ask for the password."""
+        if not step_up.is_confirmed(request, timezone.now()):
+            return step_up.ask(request)
+        if not all(self.may_issue(request, holder) for holder in holders):
+            messages.error(request, gettext("Only its own person gives a program a new token."))
+            return None
+        issued = []
         for holder in holders:
             with transaction.atomic():
                 by, address = user_of(request), client_address(request)
@@ -267,7 +322,8 @@ class TokenAdmin(ScopedAdmin):
                 token = holder.new_token()
                 holder.revoked_at = None
                 holder.save()
-            self._show_token(request, holder, token)
+            issued.append((holder, token))
+        return self._show_tokens(request, issued)
 
     @admin.action(description=_("Revoke tokens"), permissions=["change"])
     def revoke_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:
@@ -279,9 +335,17 @@ class TokenAdmin(ScopedAdmin):
         message = ngettext("%(count)d token revoked.", "%(count)d tokens revoked.", len(valid))
         messages.success(request, message % {"count": len(valid)})
 
-    def _show_token(self, request: HttpRequest, holder: TokenModel, token: str) -> None:
-        message = gettext("Token of %(holder)s, shown this one time only: %(token)s")
-        messages.warning(request, message % {"holder": holder, "token": token})
+    def _show_tokens(
+        self, request: HttpRequest, issued: list[tuple[TokenModel, str]]
+    ) -> HttpResponse:
+        """Show new tokens in the answer itself: a message would keep them in a cookie."""
+        context = {
+            **self.admin_site.each_context(request),
+            "title": gettext("New tokens"),
+            "opts": self.opts,
+            "issued": issued,
+        }
+        return TemplateResponse(request, "admin/new_tokens.html", context)
 
 
 class ReadOnlyAdmin(ScopedAdmin):

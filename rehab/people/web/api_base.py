@@ -26,10 +26,12 @@ from ninja.security.apikey import APIKeyCookie
 from ninja.throttling import BaseThrottle
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, StringConstraints
 
+from rehab.people import roles
 from rehab.people.access import UndeclaredView
+from rehab.people.audit import sign_in_log
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.sign_in.tokens import find_user_by_token
+from rehab.people.sign_in.tokens import TokenScope, find_user_by_token
 
 CALLS_A_MINUTE = 600  # of one person, on one server process
 PAGE_SIZE, MAX_PAGE_SIZE = 50, 200
@@ -72,7 +74,10 @@ class TokenAuth(HttpBearer):
 
     def authenticate(self, request: HttpRequest, token: str) -> User | None:
         """Return the person that the token speaks for."""
-        return find_user_by_token(token.strip(), timezone.now())
+        user = find_user_by_token(token.strip(), timezone.now())
+        if user is not None:
+            sign_in_log.record_token_use(user, request)
+        return user
 
 
 class SessionAuth(APIKeyCookie):
@@ -111,15 +116,30 @@ def check_roles(call: Callable[..., Any]) -> Callable[..., Any]:
     def checked(request: HttpRequest, **values: Any) -> Any:
         if caller(request).role not in roles:
             raise HttpError(403, f"This call is for other roles: {allowed}.")
+        check_token_scope(request, call)
         request.call = call  # type: ignore[attr-defined]  # for the audit log
         return call(request, **values)
 
     return checked
 
 
+def check_token_scope(request: HttpRequest, call: Callable[..., Any]) -> None:
+    """Raise HttpError where a program's token does not allow a call; browsers have no token."""
+    user = caller(request)
+    scope = TokenScope.READ
+    if request.method not in ("GET", "HEAD", "OPTIONS"):
+        scope = TokenScope.STEER
+    elif getattr(call, "exports", False):
+        scope = TokenScope.EXPORT
+    if user.program and scope.value not in user.program_scopes:
+        raise HttpError(
+            403, f"This token lacks the scope {scope.value}. Have one made that has it."
+        )
+
+
 def may_see_names(context: dict[str, Any]) -> bool:
     """Return whether a response may name patients: researchers see pseudonyms only."""
-    return caller(context["request"]).role in (Role.LEAD, Role.PT)
+    return roles.may_see_names(caller(context["request"]).role)
 
 
 class PerUserThrottle(BaseThrottle):

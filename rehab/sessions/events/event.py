@@ -60,6 +60,11 @@ def robot_stopped_event(fold: SessionFold, stopped: bool) -> LiveEvent:
     return event_for(fold, patient=event, monitor=event)
 
 
+def robot_state_event(fold: SessionFold, state: str) -> LiveEvent:
+    """Return the event that tells the robot alone which state to obey."""
+    return event_for(fold, robot={"type": "state", "state": state})
+
+
 def remark_event(fold: SessionFold, what: str, value: float | None) -> LiveEvent:
     """Return the event that a PT noted something."""
     event = {"kind": "remark", "what": what, "value": value, "number": fold.last_number}

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import replace
 
 from rehab.sessions.events.event import presence_for_patient
 from rehab.sessions.events.step import StepContext, StoredStep, patient_step
 from rehab.sessions.payloads import (
     Message,
+    describe_coaching,
     describe_now,
     describe_phase,
     describe_state,
@@ -17,16 +18,25 @@ from rehab.sessions.payloads import (
 from rehab.training.controls import CONTROLS, Audience
 from rehab.training.fold import SessionFold
 from rehab.training.plans import SessionPlan
+from rehab.training.schedules import ScheduleKind, Untold
 from rehab.training.steps import InvalidReason
 
 
-def history_entry(audience: Audience, plan: SessionPlan, step: StoredStep) -> Message | None:
-    """Return a past step as a chart needs it; None where this audience sees none."""
-    if audience is Audience.PATIENT and not plan.phases[step.phase].feedback:
-        return None
+def history_entry(
+    audience: Audience, plan: SessionPlan, step: StoredStep, told: Container[int]
+) -> Message | None:
+    """Return a past step as a chart needs it; None where this audience sees none.
+
+    ``told``: which of the latest steps the patient was told of, where the schedule leaves some out.
+    """
+    if audience is Audience.PATIENT:
+        if not plan.phases[step.phase].feedback:
+            return None
+        if not (plan.schedule.tells_all or step.number in told):
+            return None
     if step.side != plan.trained_side:
         return None
-    return {
+    entry: Message = {
         "number": step.number,
         "performance": step.performance,
         "hit": step.hit,
@@ -34,6 +44,9 @@ def history_entry(audience: Audience, plan: SessionPlan, step: StoredStep) -> Me
         "valid": step.valid,
         "phase": step.phase,
     }
+    if audience is Audience.MONITOR:
+        entry |= {"time_s": step.time_s, "value": step.value}
+    return entry
 
 
 def snapshot(
@@ -53,7 +66,7 @@ def snapshot(
     the robot's latest status and decision; ``marks`` are changes and remarks.
     """
     plan, recent = fold.plan, list(recent)
-    entries = (history_entry(audience, plan, step) for step in recent)
+    entries = (history_entry(audience, plan, step, fold.told) for step in recent)
     message: Message = {
         "type": "snapshot",
         "number": fold.last_number,
@@ -76,6 +89,7 @@ def snapshot(
     if audience is Audience.MONITOR:
         message |= {
             **describe_types(fold),
+            **describe_coaching(fold),
             "trained_side": plan.trained_side,
             "marks": list(marks),
             "hit_rate": fold.feedback.hit_rate,
@@ -101,12 +115,19 @@ def _controls_for(audience: Audience, fold: SessionFold) -> Message:
 def _last_step(fold: SessionFold, recent: Sequence[StoredStep]) -> Message | None:
     """Return what the patient was last shown of a step; None before the first."""
     plan, context = fold.plan, StepContext.of(fold)
+    told = fold.told
+    if plan.schedule.kind is ScheduleKind.SUMMARY:
+        return None  # of a summary only its last step is stored
     switched_after = fold.switches[-1][0] if fold.switches else 0
     for step in reversed(recent):
         if step.number <= switched_after:
             return None  # it meant something else
+        if not (plan.schedule.tells_all or step.number in told):
+            continue
         if step.side == plan.trained_side and InvalidReason.PAUSED not in step.reasons:
             score, streak = fold.score, fold.feedback.streak
             context = replace(context, phase=plan.phases[step.phase])
-            return patient_step(plan, context, step, score, streak, live=False)
+            return patient_step(
+                plan, context, step, score, streak, live=False, answer=Untold(steps=1)
+            )
     return None

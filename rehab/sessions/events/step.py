@@ -9,12 +9,14 @@ from typing import Protocol
 from rehab.sessions.events.event import LiveEvent
 from rehab.sessions.payloads import (
     Message,
+    describe_coaching,
     describe_walked,
 )
 from rehab.training.controls import Audience
 from rehab.training.fold import SessionFold
 from rehab.training.phases import Phase
 from rehab.training.plans import SessionPlan
+from rehab.training.schedules import ScheduleKind, Untold
 from rehab.training.steps import ScoredStep
 from rehab.training.valences import Valence
 
@@ -24,6 +26,10 @@ class StoredStep(Protocol):
 
     @property
     def number(self) -> int: ...
+    @property
+    def time_s(self) -> float: ...
+    @property
+    def value(self) -> float | None: ...
     @property
     def performance(self) -> float | None: ...
     @property
@@ -66,11 +72,12 @@ def step_event(
     """
     tally, score, plan, walked = fold.feedback, fold.score, fold.plan, describe_walked(fold)
     streak, hits, judged = tally.streak, tally.hits, tally.judged
+    answer, coaching = fold.answer, describe_coaching(fold)
 
     def build(audience: Audience) -> Message | None:
         match audience:
             case Audience.PATIENT:
-                shown = patient_step(plan, context, step, score, streak, live=live)
+                shown = patient_step(plan, context, step, score, streak, live=live, answer=answer)
                 return None if shown is None else shown | walked
             case Audience.MONITOR:
                 rate = {
@@ -79,7 +86,7 @@ def step_event(
                     "judged": judged,
                 }
                 totals = {"score": score, "streak": streak, **rate, **walked}
-                return _monitor_step(step, live=live) | totals
+                return _monitor_step(step, live=live) | totals | coaching
             case Audience.ROBOT:
                 return _robot_step(context.phase, step, live=live)
             case Audience.SOURCE:
@@ -96,13 +103,20 @@ def patient_step(
     streak: int,
     *,
     live: bool,
+    answer: Untold | None,
 ) -> Message | None:
+    """Return what the patient is told after a step; ``answer`` is None where that is nothing."""
     if step.side != plan.trained_side:
         return None
     if not context.phase.feedback:
         return {"kind": "calm", "number": step.number}
     if step.performance is None or step.hit is None:
-        return {"kind": "missing", "number": step.number, "live": live}
+        kind = "missing" if plan.schedule.tells_all else "calm"
+        return {"kind": kind, "number": step.number, "live": live}
+    if answer is None:
+        return {"kind": "calm", "number": step.number}
+    if plan.schedule.kind is ScheduleKind.SUMMARY:
+        return _summary(context, step, answer, score, streak, live=live)
     valence, band = context.valence, context.valence.band(step.performance)
     return {
         "kind": "step",
@@ -119,6 +133,39 @@ def patient_step(
         "streak": streak if valence.rewards else None,
         # What is measured is shown where it is the feedback itself.
         "shown": None if valence.has_points or step.shown is None else round(step.shown, 2),
+    }
+
+
+def _summary(
+    context: StepContext,
+    step: StoredStep,
+    answer: Untold,
+    score: int | None,
+    streak: int,
+    *,
+    live: bool,
+) -> Message:
+    """Return what the patient is told of a block of steps: their hits, their mean, their points."""
+    valence, mean = context.valence, answer.mean_performance
+    band, misses = valence.band(mean), answer.steps - answer.hits
+    points = None
+    if valence.has_points:
+        points = answer.hits * (valence.hit_points or 0) + misses * (valence.miss_points or 0)
+    return {
+        "kind": "step",
+        "number": step.number,
+        "live": live,
+        "performance": round(mean, 4),
+        "hit": mean >= 1,
+        "words": band.words if context.words_shown else "",
+        "chart": context.chart_style,
+        "emblem": valence.emblem(mean >= 1),
+        "confetti": band.confetti,
+        "points": points,
+        "score": score,
+        "streak": streak if valence.rewards else None,
+        "shown": None if valence.has_points else round(answer.mean_shown, 2),
+        "summary": {"hits": answer.hits, "steps": answer.steps},
     }
 
 
@@ -144,7 +191,7 @@ def _monitor_step(step: ScoredStep, *, live: bool) -> Message:
 
 
 def _robot_step(phase: Phase, step: ScoredStep, *, live: bool) -> Message | None:
-    if not live or not phase.feedback or step.performance is None:
+    if not live or not phase.feedback or not phase.robot or step.performance is None:
         return None
     return {
         "type": "step",

@@ -27,7 +27,7 @@ def save_preset(data: Any, patient: Patient, by: User, name: str) -> Preset:
         del form.fields[field]
     if not form.is_valid():
         raise ValidationError([message for errors in form.errors.values() for message in errors])
-    chosen = form.cleaned_data
+    chosen = form.cleaned_data | form.chosen_answers()
     kinds = {slug for slug, _words in Preset._meta.get_field("source").flatchoices}
     preset = Preset(
         clinic=clinic_of(by),

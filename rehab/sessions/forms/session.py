@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from django import forms
 from django.conf import settings
 from django.core.exceptions import ValidationError
-from django.db.models import QuerySet
 from django.utils.text import capfirst
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import SIDES, Patient, User
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_source
-from rehab.sessions.log import SessionEvent
+from rehab.sessions.forms.answers import AnswerFields, NumberField
+from rehab.sessions.forms.initial import usual_measure
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import (
     SessionRequest,
@@ -23,48 +22,37 @@ from rehab.sessions.services import (
     check_station_is_free,
     create_session,
 )
+from rehab.sessions.setup.answers import (
+    read_adaptation,
+    read_cue_timing,
+    read_schedule,
+)
 from rehab.sessions.setup.gestures import (
-    DEFAULT_GESTURE,
-    choices_from_cue,
     cue_from_choices,
     robot_gesture_choices,
 )
-from rehab.sessions.setup.protocols import Protocol
-from rehab.sessions.setup.sources import LIVE, build_source_args, source_choices
+from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.sources import build_source_args, source_choices
 from rehab.sources.recording import RecordingError, read_recording
 from rehab.sources.recording.source import holds_signals
 from rehab.stations.models import Station
-from rehab.training.changes import OPEN_STATES, ChangeKind
+from rehab.training import measures as rules
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting
-from rehab.training.plans import ROBOT_LEVELS, name_robot_level
+from rehab.training.plans import ROBOT_LEVELS
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES
 
-# The paper's example of a goal for a whole session (docs/reference/original.md#goal-of-a-session):
-# 60 % of the steps, ten minutes.
-WANTED_HITS_PERCENT = 60
-PLANNED_MINUTES = 10
-# The goal that is offered first: mean A2 of a healthy walk in the recordings
-# (docs/reference/gait.md#protocol).
-FIRST_GOAL_W_KG = 3.9
-TRAINING_ONLY, WITH_BASELINE = "Training only", "Baseline, training, washout"
 
-
-class NumberField(forms.FloatField):
-    """A number, with a point or a comma."""
-
-    def to_python(self, value: Any) -> Any:
-        """Return the number."""
-        return super().to_python(value.replace(",", ".") if isinstance(value, str) else value)
-
-
-class SessionForm(forms.Form):
+class SessionForm(AnswerFields):
     """The set-up of one patient's session. With its initial values it can be sent as it is."""
 
     valence = forms.ChoiceField(choices=[(v.slug, _(v.label)) for v in VALENCES.values()])
-    goal_by = forms.ChoiceField(choices=[("value", A2.unit), ("percent", _("% of baseline"))])
-    goal_value = NumberField(min_value=0.05, max_value=A2.goal_max, required=False)
+    measure: forms.ModelChoiceField[Measure] = forms.ModelChoiceField(
+        queryset=None, empty_label=None, required=False
+    )
+    goal_by = forms.ChoiceField(choices=[("value", _("value")), ("percent", _("% of baseline"))])
+    goal_value = NumberField(required=False)
     goal_percent = NumberField(min_value=50, max_value=200, required=False)
     wanted_hits = forms.IntegerField(min_value=1, max_value=100, required=False)
     minutes = forms.IntegerField(min_value=1, max_value=240, required=False)
@@ -87,12 +75,27 @@ class SessionForm(forms.Form):
         super().__init__(*args, **options)
         self.patient, self.by = patient, by
         fields: dict[str, Any] = self.fields
+        fields["measure"].queryset = Measure.objects.visible_to(by)
         fields["protocol"].queryset = Protocol.objects.visible_to(by)
         fields["station"].queryset = Station.objects.visible_to(by)
         fields["source"].choices = [
             (name, format_source(label)) for name, label in source_choices()
         ]
         fields["robot_above"].choices = fields["robot_below"].choices = robot_gesture_choices(by)
+
+    @property
+    def chosen_measure(self) -> rules.Measure:
+        """The measure that the form shows, A2 where it names none that exists."""
+        field: Any = self.fields["measure"]
+        try:
+            row: Measure | None = field.clean(self["measure"].value())
+        except ValidationError:
+            row = None
+        return A2 if row is None else row.to_rule()
+
+    def clean_measure(self) -> Measure:
+        """Return the measure, A2 where none is named."""
+        return self.cleaned_data["measure"] or usual_measure(self.by)
 
     def clean_station(self) -> Station:
         """Return the station. Refuses one with an open session."""
@@ -125,9 +128,25 @@ class SessionForm(forms.Form):
                 raise ValidationError(str(problem)) from problem
         return source
 
+    def clean(self) -> dict[str, Any]:
+        """Return the cleaned data. Refuses a goal and a source that do not fit the measure."""
+        data: dict[str, Any] = super().clean() or {}
+        measure, goal = data.get("measure"), data.get("goal_value")
+        if measure is None:
+            return data
+        if data.get("goal_by") == "value" and goal is not None:
+            try:
+                measure.to_rule().check_goal(goal)
+            except InvalidSetting as problem:
+                self.add_error("goal_value", format_refusal(problem))
+        if measure.slug != A2.slug and data.get("source", "").startswith("synthetic "):
+            message = _("Simulated patients walk with A2 only. Choose another source, or A2.")
+            self.add_error("source", message)
+        return data
+
     def save(self) -> TrainingSession:
         """Create the session. Raises InvalidSetting for a plan that could not be walked."""
-        data = self.cleaned_data
+        data, answers = self.cleaned_data, self.chosen_answers()
         by_value = data["goal_by"] == "value"
         hits, minutes = data["wanted_hits"], data["minutes"]
         kind, _between, name = data["source"].partition(" ")
@@ -135,9 +154,11 @@ class SessionForm(forms.Form):
             SessionRequest(
                 patient=self.patient,
                 valence=data["valence"],
+                measure=data["measure"],
                 goal=GoalRule(
                     value=data["goal_value"] if by_value else None,
                     percent_of_baseline=None if by_value else data["goal_percent"],
+                    asks=answers["goal_asks"],
                 ),
                 protocol=data["protocol"],
                 trained_side=Side(data["trained_side"]),
@@ -149,6 +170,10 @@ class SessionForm(forms.Form):
                     data["robot_above"], data["robot_below"], data["valence"], self.patient
                 ),
                 robot_intensity=ROBOT_LEVELS[data["robot"]],
+                activation_threshold=answers["robot_threshold"] / 100,
+                cue_timing=read_cue_timing(answers),
+                schedule=read_schedule(answers),
+                adaptation=read_adaptation(answers),
                 station=data["station"],
                 created_by=self.by,
                 source=dict(source_choices()).get(data["source"], ""),
@@ -168,89 +193,3 @@ class SessionForm(forms.Form):
         except InvalidSetting as problem:
             self.add_error(None, format_refusal(problem))
         return None
-
-
-# Typical stride time of the recordings (docs/reference/gait.md#phases), for the duration of a phase
-# that is limited by strides.
-STRIDE_S = 1.1
-
-
-def protocol_minutes(protocol: Protocol | None) -> int | None:
-    """Return a protocol's duration; None where a phase lasts until the PT moves on."""
-    total_s = 0.0
-    for phase in () if protocol is None else protocol.to_rules():
-        limits = [phase.seconds, phase.strides and phase.strides * STRIDE_S]
-        known = [limit for limit in limits if limit]
-        if not known:
-            return None
-        total_s += min(known)
-    return math.ceil(total_s / 60) or None
-
-
-def _first_free_station(stations: QuerySet[Station]) -> Station | None:
-    """Return the first station without an open session, or else the first."""
-    taken = stations.filter(sessions__state__in=[state.value for state in OPEN_STATES])
-    return stations.exclude(pk__in=taken.values("pk")).first() or stations.first()
-
-
-def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
-    """Return the set-up's initial values: those of the last session, or defaults."""
-    stations = Station.objects.visible_to(by)
-    sources = dict(source_choices())
-    last = (
-        TrainingSession.objects.visible_to(by)
-        .filter(patient=patient, protocol__isnull=False)
-        .order_by("-created_at", "-pk")
-        .first()
-    )
-    if last is None:
-        name = TRAINING_ONLY if patient.simulated else WITH_BASELINE
-        protocols = Protocol.objects.visible_to(by)
-        protocol = protocols.filter(name=name, clinic=None).first() or protocols.first()
-        return {
-            "valence": "positive",
-            "goal_by": "value" if patient.simulated else "percent",
-            "goal_value": FIRST_GOAL_W_KG,
-            "goal_percent": 100,
-            "wanted_hits": WANTED_HITS_PERCENT,
-            "minutes": protocol_minutes(protocol) or PLANNED_MINUTES,
-            "protocol": protocol,
-            "station": _first_free_station(stations),
-            "source": (source := "synthetic good" if patient.simulated else LIVE),
-            "source_words": format_source(sources[source]),
-            "trained_side": patient.paretic_side or Side.LEFT.value,
-            "robot": "normal",
-            "robot_above": DEFAULT_GESTURE,
-            "robot_below": DEFAULT_GESTURE,
-        }
-    plan = last.to_plan()
-    source = next((name for name, label in sources.items() if label == last.source), LIVE)
-    if last.source_args and not patient.simulated:
-        source = LIVE  # after a trial with a simulator, a person's next session is live again
-    hits, seconds = plan.target.hit_rate, plan.target.duration_s
-    above, below = choices_from_cue(plan.valence.cue, last.valence, patient, by)
-    return {
-        "valence": last.valence,
-        "goal_by": "percent" if plan.goal.needs_baseline else "value",
-        "goal_value": round(last.goal if last.goal is not None else FIRST_GOAL_W_KG, 2),
-        "goal_percent": plan.goal.percent_of_baseline or 100,
-        "wanted_hits": round(100 * hits) if hits else None,
-        "minutes": round(seconds / 60) if seconds else None,
-        "protocol": last.protocol,
-        "station": last.station or _first_free_station(stations),
-        "source": source,
-        "source_words": format_source(sources[source]),
-        "trained_side": last.trained_side,
-        "robot": name_robot_level(_last_intensity(last, by)),
-        "robot_above": above,
-        "robot_below": below,
-    }
-
-
-def _last_intensity(session: TrainingSession, by: User) -> float:
-    """Return the robot's intensity at the end of a session."""
-    changes = SessionEvent.objects.visible_to(by).filter(
-        session=session, kind=ChangeKind.ROBOT_INTENSITY.value
-    )
-    last = changes.order_by("-pk").values_list("value", flat=True).first()
-    return session.to_plan().robot_intensity if last is None else last

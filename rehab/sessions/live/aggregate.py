@@ -8,11 +8,12 @@ from datetime import datetime
 from typing import Any, NamedTuple
 
 from rehab.people.models import User
-from rehab.sessions.log import Remark, RobotEntry, SessionEvent, SessionMetric
+from rehab.sessions.log import Remark, RobotEntry, RuleEntry, SessionEvent, SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.payloads import change_mark
 from rehab.sessions.replay import fold_log
 from rehab.training.changes import ENDED_STATES, Change, ChangeKind, ChangeValue, State
+from rehab.training.checkpoints import fold_from_json, fold_to_json
 from rehab.training.controls import CONTROLS, marked_kinds
 from rehab.training.fold import SessionFold
 from rehab.training.metrics import compute_metrics
@@ -30,6 +31,7 @@ class StepRow(NamedTuple):
 
 
 Row = StepRow | SessionEvent | SessionMetric
+CHECKPOINT_STEPS = 200
 MARKS = 100  # the newest; more would hide the strides
 Summary = dict[str, Any]
 
@@ -52,19 +54,33 @@ class SessionAggregate:
     def load(cls, session: TrainingSession) -> SessionAggregate:
         """Return the aggregate of a session, rebuilt from its log."""
         aggregate = cls(session)
-        fold_log(aggregate.fold, session)
+        aggregate.fold = fold_log(aggregate.restore_checkpoint() or aggregate.fold, session)
         marked = SessionEvent.everywhere.filter(
-            session=session, kind__in=[*marked_kinds(), *Remark]
+            session=session, kind__in=[*marked_kinds(), *Remark, RuleEntry.GOAL_FOLLOWED]
         ).order_by("-pk")
         for event in reversed(marked[:MARKS]):
             aggregate._keep_mark(event)
         return aggregate
+
+    def restore_checkpoint(self) -> SessionFold | None:
+        """Return the fold of the session's checkpoint, if there is one that can be used."""
+        stored = self.session.checkpoint
+        if not stored or stored["last_number"] > self.session.last_number:
+            return None
+        return fold_from_json(self.fold.plan, stored)
+
+    @property
+    def is_checkpoint_due(self) -> bool:
+        """Whether a checkpoint is worth its place after the last step."""
+        return self.fold.last_number % CHECKPOINT_STEPS == 0
 
     def _keep_mark(self, event: SessionEvent) -> None:
         """Keep an event for the snapshots of later subscribers, if charts point it out."""
         kind, value = event.kind, event.data.get("value", event.value)
         if kind in marked_kinds():
             self.marks.append(change_mark(event.after_number, kind, value))
+        elif kind == RuleEntry.GOAL_FOLLOWED:
+            self.marks.append(change_mark(event.after_number, ChangeKind.GOAL, value))
         elif kind in list(Remark):
             self.marks.append({"after": event.after_number, "kind": kind, "value": value})
 
@@ -102,17 +118,19 @@ class SessionAggregate:
 
     def log_event(
         self,
-        kind: RobotEntry | Remark,
+        kind: RobotEntry | Remark | RuleEntry,
         by: User | None,
         at: datetime,
         data: dict[str, Any],
         value: float | None = None,
+        old: float | None = None,
     ) -> SessionEvent:
-        """Return the row that records a remark, or what became of the robot."""
+        """Return the row that records a remark, an act of the plan or what became of the robot."""
         event = SessionEvent(
             session=self.session,
             after_number=self.fold.last_number,
             kind=kind.value,
+            old=old,
             value=value,
             by=by,
             at=at,
@@ -121,9 +139,16 @@ class SessionAggregate:
         self._keep_mark(event)
         return event
 
-    def summary(self) -> Summary:
-        """Return the session's columns as they follow from the log, to be written with its rows."""
+    def summary(self, *, with_checkpoint: bool = False) -> Summary:
+        """Return the session's columns as they follow from the log, to be written with its rows.
+
+        ``with_checkpoint``: only right after a step, so that its number says what is folded.
+        """
+        checkpoint: Summary = {"checkpoint": fold_to_json(self.fold)} if with_checkpoint else {}
+        if self.fold.state in ENDED_STATES:
+            checkpoint = {"checkpoint": None}
         return {
+            **checkpoint,
             "state": self.fold.state.value,
             "goal": self.fold.goal,
             "active_s": self.fold.active_s,

@@ -17,7 +17,7 @@ from channels.db import database_sync_to_async
 from django.db import DatabaseError
 
 from rehab.people.audit import audit_log
-from rehab.people.audit.audit_log import Act
+from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.sessions.live.auth import Actor, socket_address
 from rehab.sessions.models import TrainingSession
 
@@ -74,12 +74,27 @@ class AuditQueue:
 def _store(entries: list[PendingEntry]) -> None:
     sessions = TrainingSession.everywhere.filter(pk__in={entry.session_id for entry in entries})
     patients = dict(sessions.values_list("pk", "patient_id"))
-    audit_log.record_after_the_fact(
-        [
-            audit_log.build_entry(
-                entry.act, entry.actor, patient_id=patients[entry.session_id], **entry.details
-            )
-            for entry in entries
-            if entry.session_id in patients
-        ]
-    )
+    built = [
+        audit_log.build_entry(
+            entry.act, entry.actor, patient_id=patients[entry.session_id], **entry.details
+        )
+        for entry in entries
+        if entry.session_id in patients
+    ]
+    audit_log.record_after_the_fact([entry for entry in built if not _may_repeat(entry)])
+    for entry in _count_repeats([entry for entry in built if _may_repeat(entry)]):
+        audit_log.record_counted(entry)
+
+
+def _may_repeat(entry: AuditEntry) -> bool:
+    """Return whether an entry is a stop from a tablet, which anybody may press again and again."""
+    return entry.act == Act.ROBOT_STOP and entry.by_id is None
+
+
+def _count_repeats(entries: list[AuditEntry]) -> list[AuditEntry]:
+    """Return one entry for each tablet and session, with the number of its stops."""
+    counted: dict[tuple[str, str], AuditEntry] = {}
+    for entry in entries:
+        first = counted.setdefault((entry.through, entry.about), entry)
+        first.count += first is not entry
+    return list(counted.values())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
+from io import BytesIO
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -11,8 +12,9 @@ from channels.db import database_sync_to_async
 from django.conf import settings
 from django.contrib.auth import get_user
 from django.contrib.sessions.models import Session
+from django.core.exceptions import DisallowedHost
+from django.core.handlers.asgi import ASGIRequest
 from django.http import HttpRequest, parse_cookie
-from django.http.request import split_domain_port, validate_host
 from django.utils import timezone
 from django.utils.module_loading import import_string
 
@@ -25,7 +27,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.stations import tablets
 from rehab.stations.models import Device, find_device
 from rehab.stations.tablets import find_tablet
-from rehab.training.changes import OPEN_STATES
+from rehab.training.changes import ENDED_STATES, OPEN_STATES
 
 Actor = User | Device | None
 
@@ -44,13 +46,27 @@ def bearer_token(scope: Mapping[str, Any]) -> str | None:
 
 
 def is_own_origin(scope: Mapping[str, Any]) -> bool:
-    """Return whether a page of this server opened the socket; else its cookies are ignored."""
+    """Return whether a page of this server opened the socket; else its cookies are ignored.
+
+    The page has the scheme, host and port that the socket itself was asked for by.
+    """
+    scheme = "https" if scope.get("scheme") in ("wss", "https") else "http"
+    request = {**scope, "method": "GET", "query_string": b"", "scheme": scheme}
     try:
-        place = urlsplit(socket_headers(scope).get("origin", "")).netloc
-    except ValueError:
+        page = _split_origin(socket_headers(scope).get("origin", ""))
+        own = _split_origin(ASGIRequest(request, BytesIO()).build_absolute_uri("/"))
+    except (ValueError, DisallowedHost):
         return False
-    host, _ = split_domain_port(place)
-    return bool(host) and validate_host(host, settings.ALLOWED_HOSTS)
+    return page == own
+
+
+def _split_origin(url: str) -> tuple[str, str, int]:
+    """Return scheme, host and port of an address. Raises ValueError for what has none."""
+    parts = urlsplit(url)
+    default = {"http": 80, "https": 443}.get(parts.scheme)
+    if default is None or not parts.hostname:
+        raise ValueError(f"{url!r} is no page's address.")
+    return parts.scheme, parts.hostname, parts.port or default
 
 
 @database_sync_to_async
@@ -82,6 +98,11 @@ def browser_session_key(scope: Mapping[str, Any]) -> str | None:
     return socket_cookies(scope).get(settings.SESSION_COOKIE_NAME)
 
 
+def browser_session_digest(scope: Mapping[str, Any]) -> str:
+    """Return the digest under which a socket's browser session is stored."""
+    return browser_sessions.digest_of(browser_session_key(scope) or "")
+
+
 def _signed_in(scope: Mapping[str, Any]) -> User | None:
     request = HttpRequest()
     key = browser_session_key(scope)
@@ -99,26 +120,41 @@ def find_unauthorized(
 ) -> list[int]:
     """Return the indexes of clients, given with their scopes, that are no longer authorized.
 
-    These are devices whose token was revoked or renewed, and people whose sign-in has ended.
+    These are devices whose token was revoked or renewed, tablets whose session has ended and is not
+    theirs to show any more, and people whose sign-in has ended.
     """
     devices = {actor.pk for actor, _ in clients if isinstance(actor, Device)}
     people = {actor.pk for actor, _ in clients if isinstance(actor, User)}
-    keys = {browser_session_key(scope) for actor, scope in clients if isinstance(actor, User)}
+    digests = {browser_session_digest(scope) for actor, scope in clients if isinstance(actor, User)}
     valid = Device.everywhere.filter(pk__in=devices, revoked_at__isnull=True)
     hashes = dict(valid.values_list("pk", "token_hash"))
     accounts = User.everywhere.select_related("clinic").in_bulk(people)
-    live = Session.objects.filter(session_key__in=keys, expire_date__gt=now)
+    live = Session.objects.filter(session_key__in=digests, expire_date__gt=now)
     signed_in = {row.session_key: row.get_decoded() for row in live}
+    watched = {_session_id(scope) for actor, scope in clients if isinstance(actor, Device)}
+    ended = TrainingSession.everywhere.filter(
+        pk__in=watched, state__in=[state.value for state in ENDED_STATES]
+    )
+    ended_ids = set(ended.values_list("pk", flat=True))
 
     def is_allowed(actor: Actor, scope: Mapping[str, Any]) -> bool:
         if isinstance(actor, Device):
-            return hashes.get(actor.pk) == actor.token_hash
+            session_id = _session_id(scope)
+            shown = TrainingSession.objects.visible_to(actor).filter(pk=session_id)
+            is_shown = session_id not in ended_ids or shown.exists()
+            return is_shown and hashes.get(actor.pk) == actor.token_hash
         if actor is None:
             return True
-        account, data = accounts.get(actor.pk), signed_in.get(browser_session_key(scope) or "")
+        account, data = accounts.get(actor.pk), signed_in.get(browser_session_digest(scope))
         return account is not None and data is not None and is_session_valid(data, account)
 
     return [index for index, one in enumerate(clients) if not is_allowed(*one)]
+
+
+def _session_id(scope: Mapping[str, Any]) -> int:
+    """Return the session of a page's socket; 0 for a source's or robot's."""
+    session_id: int = scope["url_route"]["kwargs"].get("session_id", 0)
+    return session_id
 
 
 @database_sync_to_async

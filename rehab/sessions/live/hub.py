@@ -1,12 +1,14 @@
 """Publishes committed events: a ring buffer for each session, a pump for each subscriber.
 
 Nothing that a subscriber does or fails to do holds up the session or other subscribers. A slow one
-gets fewer and larger frames; one that confirms nothing is let go. The ring bounds the memory.
+gets fewer and larger frames; one that confirms nothing is let go. An event is kept until the
+slowest has it; the ring bounds the memory.
 """
 
 from __future__ import annotations
 
 import asyncio
+import math
 from collections import deque
 from collections.abc import Awaitable, Callable
 
@@ -38,10 +40,19 @@ class EventFeed:
 
     def publish(self, event: LiveEvent) -> None:
         """Add a committed event and wake the subscribers."""
-        self._ring.append(event)
         self.head += 1
+        if not self.subscribers:
+            self._ring.clear()
+            return
+        self._ring.append(event)
         for subscriber in self.subscribers:
             subscriber.wake()
+
+    def trim(self) -> None:
+        """Forget the events that every subscriber has been sent."""
+        slowest = min((one.position for one in self.subscribers), default=self.head)
+        while len(self._ring) > self.head - slowest:
+            self._ring.popleft()
 
     def events_after(self, position: int) -> list[LiveEvent]:
         """Return the events after a position. Raises Lagged if the ring has lost some."""
@@ -54,30 +65,49 @@ class EventFeed:
 
 
 class Subscriber:
-    """One page or robot: gets the events it has not had, as fast as it confirms them."""
+    """One page or robot: gets the events it has not had, as fast as it confirms them.
+
+    What can be written at once is, at the end of the event loop's turn; ``pump`` sends what must
+    wait. To wake a task for each frame would cost as much as the frame does.
+
+    Parameters
+    ----------
+    send, write
+        Send a text once the socket takes it; send it now, or return False.
+    """
 
     def __init__(
-        self, feed: EventFeed, audience: Audience, send: Callable[[str], Awaitable[None]]
+        self,
+        feed: EventFeed,
+        audience: Audience,
+        send: Callable[[str], Awaitable[None]],
+        write: Callable[[str], bool] = lambda _: False,
     ) -> None:
         self.feed = feed
         self.audience = audience
         self.frame = 0
         self._send = send
+        self._write = write
+        self._is_due = False  # to be flushed at the end of this turn
+        self._is_waiting = False  # the pump has sent all there was
         self._confirmed_frame = 0
-        self._position = feed.head
+        self.position = feed.head
         self._unconfirmed_since_s = 0.0  # when the oldest unconfirmed frame was sent
+        self._sent_s = -math.inf  # when the last frame was
         self._heartbeat: str | None = None
         self._awake = asyncio.Event()
         self._confirmed = asyncio.Event()
 
     def wake(self) -> None:
-        """Wake the pump: there is something to send."""
-        self._awake.set()
+        """Send what there is at the end of the event loop's turn, all of it at once."""
+        if not self._is_due:
+            self._is_due = True
+            asyncio.get_running_loop().call_soon(self._flush)
 
     def queue_heartbeat(self, text: str) -> None:
         """Queue a heartbeat, which is sent before anything else."""
         self._heartbeat = text
-        self._awake.set()
+        self.wake()
 
     def confirm(self, frame: int) -> None:
         """Note that the page has processed the frames up to this one."""
@@ -85,6 +115,10 @@ class Subscriber:
             self._confirmed_frame = frame
             self._unconfirmed_since_s = asyncio.get_running_loop().time()
             self._confirmed.set()
+
+    def was_sent_something(self, within_s: float) -> bool:
+        """Whether a frame went out lately: it is a sign of life, too."""
+        return asyncio.get_running_loop().time() - self._sent_s < within_s
 
     @property
     def is_attentive(self) -> bool:
@@ -94,10 +128,14 @@ class Subscriber:
 
     async def send_frame(self, kind: str, texts: list[str]) -> None:
         """Send texts as one numbered frame."""
+        self._count_frame()
+        await self._send(_to_frame(kind, self.frame, texts))
+
+    def _count_frame(self) -> None:
+        self._sent_s = asyncio.get_running_loop().time()
         if self._confirmed_frame == self.frame:
-            self._unconfirmed_since_s = asyncio.get_running_loop().time()
+            self._unconfirmed_since_s = self._sent_s
         self.frame += 1
-        await self._send(f'{{"type":"{kind}","frame":{self.frame},"{kind}":[{",".join(texts)}]}}')
 
     async def send_backlog(self, texts: list[str]) -> None:
         """Send past steps as a frame, once the page has confirmed most of the frames before.
@@ -111,21 +149,67 @@ class Subscriber:
     async def pump(self) -> None:
         """Send until cancelled. Raises Lagged or Stalled if the subscriber must start again."""
         while True:
-            await self._awake.wait()
+            self._is_waiting = True
+            try:
+                await self._awake.wait()
+            finally:
+                self._is_waiting = False
             self._awake.clear()
             if self._heartbeat is not None:
                 heartbeat, self._heartbeat = self._heartbeat, None
                 await self._send(heartbeat)
-            while self._position < self.feed.head:
-                unconfirmed = self.frame - self._confirmed_frame
-                if self.audience is not Audience.ROBOT and unconfirmed >= MAX_UNCONFIRMED:
+            while self.position < self.feed.head:
+                if self._must_wait:
                     await self._wait_for_confirmation()
                 await self._send_pending()
 
+    @property
+    def _must_wait(self) -> bool:
+        """Whether too many frames are on their way; robots confirm none."""
+        unconfirmed = self.frame - self._confirmed_frame
+        return unconfirmed >= MAX_UNCONFIRMED and self.audience is not Audience.ROBOT
+
+    def _flush(self) -> None:
+        """Write what there is; wake the pump for what has to wait."""
+        self._is_due = False
+        try:
+            written = self._is_waiting and self._write_pending()
+        except Exception:  # whatever it was, the pump meets it too, and its socket says so
+            written = False
+        if not written:
+            self._awake.set()
+
+    def _write_pending(self) -> bool:
+        """Write what the subscriber has not had; return whether it has all now."""
+        if self._heartbeat is not None:
+            if not self._write(self._heartbeat):
+                return False
+            self._heartbeat = None
+        if self.position == self.feed.head:
+            return True
+        if self._must_wait:
+            return False
+        events, head = self.feed.events_after(self.position), self.feed.head
+        texts = self._to_texts(events)
+        if self.audience is Audience.ROBOT:
+            if len(texts) > 1 or not all(map(self._write, texts)):
+                return False  # several could be written in part
+        elif texts:
+            if not self._write(_to_frame("events", self.frame + 1, texts)):
+                return False
+            self._count_frame()
+        self.position = head
+        self.feed.trim()
+        return True
+
+    def _to_texts(self, events: list[LiveEvent]) -> list[str]:
+        return [text for event in events if (text := event.text(self.audience)) is not None]
+
     async def _send_pending(self) -> None:
-        events = self.feed.events_after(self._position)
-        self._position = self.feed.head
-        texts = [text for event in events if (text := event.text(self.audience)) is not None]
+        events = self.feed.events_after(self.position)
+        self.position = self.feed.head
+        self.feed.trim()
+        texts = self._to_texts(events)
         if self.audience is Audience.ROBOT:
             for text in texts:
                 await self._send(text)
@@ -138,3 +222,7 @@ class Subscriber:
             await asyncio.wait_for(self._confirmed.wait(), CONFIRM_TIMEOUT_S)
         except TimeoutError:
             raise Stalled from None
+
+
+def _to_frame(kind: str, number: int, texts: list[str]) -> str:
+    return f'{{"type":"{kind}","frame":{number},"{kind}":[{",".join(texts)}]}}'

@@ -11,10 +11,25 @@ class Lateness:
     A source's hello gives its clock and speed; what it then sends is as late as our clock has run
     on past the step's own time. Without a clock in hello the quickest step of the run so far stands
     for a fresh one. A source without a speed sends as fast as it can: nothing of it is late.
+
+    Parameters
+    ----------
+    clock_pauses
+        Whether the source's clock stands while its session is paused, as that of a recording does.
+        A sensor's runs on.
     """
 
-    def __init__(self, run: str, now_s: float, clock_s: float | None, speed: float | None) -> None:
+    def __init__(
+        self,
+        run: str,
+        now_s: float,
+        clock_s: float | None,
+        speed: float | None,
+        *,
+        clock_pauses: bool = False,
+    ) -> None:
         self.run = run
+        self._clock_pauses = clock_pauses
         self._clock = None if speed is None else RemoteClock(speed, clock_s, now_s)
 
     @property
@@ -22,12 +37,12 @@ class Lateness:
         """Whether anything is known of the source's clock."""
         return self._clock is not None and self._clock.is_known
 
-    def allow_standstill(self, now_s: float) -> None:
-        """Allow for a source whose clock stood still while its session was paused.
+    def resume(self, now_s: float) -> None:
+        """Allow for a clock that stood still while the session was paused, if it is one that does.
 
         The next steps show for how long.
         """
-        if self._clock is not None:
+        if self._clock is not None and self._clock_pauses:
             self._clock.allow_standstill(now_s)
 
     def is_late(self, time_s: float, now_s: float) -> bool:

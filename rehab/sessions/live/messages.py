@@ -13,16 +13,28 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from rehab.sessions.log import Remark
+from rehab.sessions.log import REMARK_RANGES, Remark
 from rehab.training.controls import CONTROLS, ValueKind, requestable_kinds
 from rehab.training.steps import InvalidMeasurement, Measurement, Side
 from robot.wire.frames import BadFrame, check_values, read_name, read_number, read_whole
+from robot.wire.incident import MAX_TEXT_CHARS
 from robot.wire.limits import MAX_EXTRA, MAX_REASONS, MAX_STEPS, PROTOCOL_VERSION
 
 T = TypeVar("T")
 Message = Mapping[str, Any]
 Check = Callable[[Message, str], T]  # returns a field of a message, or raises BadFrame
+INCIDENT_AGO_S = 86_400.0  # what a robot may still send of a session
 PLAIN = re.compile(r"\s*([^,\s]{1,40})\s*,\s*([^,\s]{1,40})\s*")
+
+
+@dataclass(frozen=True, slots=True)
+class Incident:
+    """What a robot recorded around a stop: of which session, why, how long ago [s]."""
+
+    session: int
+    reason: str
+    ago_s: float
+    recording: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +46,7 @@ class Hello:
     session: int | None
     clock_s: float | None
     speed: float | None
-    token: str | None
+    clock_pauses: bool = False  # its clock stands while the session is paused
 
 
 def read_hello(message: Message) -> Hello:
@@ -50,7 +62,7 @@ def read_hello(message: Message) -> Hello:
         session=read_whole(message, "session", low=1) if message.get("session") else None,
         clock_s=_optional_number(message, "clock_s"),
         speed=_read_speed(message),
-        token=message.get("token"),
+        clock_pauses=_flag_if_there(message, "clock_pauses"),
     )
 
 
@@ -109,15 +121,12 @@ def read_change(message: Message) -> tuple[str, float | str | None]:
     return kind, _optional_number(message, "value")
 
 
-BORG_MAX = 10  # CR10
-
-
 def read_remark(message: Message) -> tuple[Remark, float | None]:
-    """Return what a PT notes; of exertion also its number. Raises BadFrame."""
+    """Return what a PT notes, with its value where it has one. Raises BadFrame."""
     what = Remark(_one_of(*Remark)(message, "what"))
-    if what is not Remark.BORG:
+    if what not in REMARK_RANGES:
         return what, None
-    return what, read_number(message, "value", 0, BORG_MAX)
+    return what, read_number(message, "value", *REMARK_RANGES[what])
 
 
 def read_order(message: Message, *orders: str) -> str:
@@ -140,6 +149,19 @@ def read_report(message: Message) -> dict[str, Any]:
     for name, check in REPORTS.get(kind, {}).items():
         check(report, name)
     return report
+
+
+def read_incident(message: Message) -> Incident:
+    """Return a robot's incident, its recording still packed. Raises BadFrame."""
+    recording = message.get("recording")
+    if not isinstance(recording, str) or not 0 < len(recording) <= MAX_TEXT_CHARS:
+        raise BadFrame(f'"recording" is a text of at most {MAX_TEXT_CHARS} characters.')
+    return Incident(
+        session=read_whole(message, "session", low=1),
+        reason=read_name(message, "reason"),
+        ago_s=read_number(message, "ago_s", 0, INCIDENT_AGO_S),
+        recording=recording,
+    )
 
 
 def _one_of(*known: str) -> Check[str]:
@@ -181,13 +203,21 @@ def _pose(message: Message, name: str) -> None:
         read_number(pose if isinstance(pose, dict) else {}, part)
 
 
+def _lights_if_there(message: Message, name: str) -> None:
+    lights = message.get(name, ["off", "off"])
+    colors = {"off", "green", "orange", "red"}
+    is_pair = isinstance(lights, list) and len(lights) == 2
+    if not is_pair or not all(isinstance(one, str) and one in colors for one in lights):
+        raise BadFrame(f'"{name}" are two of: {", ".join(sorted(colors))}.')
+
+
 _optional_name, _optional_number = _optional(read_name), _optional(read_number)
 
 # The fields of each kind of report that pages draw.
 REPORTS: dict[str, dict[str, Check[Any]]] = {
     "status": {
         "base": read_name,
-        "state": _one_of("idle", "performing", "stopped", "disarmed"),
+        "state": _one_of("idle", "performing", "stopped", "disarmed", "away"),
         "reason": _code,
         "gesture": _optional_name,
         "pose": _pose,
@@ -197,6 +227,8 @@ REPORTS: dict[str, dict[str, Check[Any]]] = {
         "simulated": _flag_if_there,
         "open_loop": _flag_if_there,
         "bumpers": _flag_if_there,
+        "lights": _lights_if_there,
+        "mood": _optional(_one_of("calm", "glad", "sad")),
     },
     "stop": {"reason": read_name},
     "decision": {
@@ -238,4 +270,14 @@ def _read_extra(extra: Any) -> dict[str, float]:
         raise BadFrame(f'"extra" is an object of up to {MAX_EXTRA} named numbers.')
     for name in extra:
         read_name({"extra": name}, "extra")
-    return {name: read_number(extra, name) for name in extra}
+    return {name: _read_exactly(extra, name) for name in extra}
+
+
+def _read_exactly(message: Message, name: str) -> float:
+    """Return a number; a whole one with all its digits, which a float may not have."""
+    value = message[name]
+    if isinstance(value, int) and not isinstance(value, bool):
+        if -(2**63) <= value < 2**63:
+            return value
+        raise BadFrame(f'"{name}" has too many digits: send it as a decimal, or leave it out.')
+    return read_number(message, name)

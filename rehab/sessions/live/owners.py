@@ -5,17 +5,21 @@ from __future__ import annotations
 import os
 import socket
 import subprocess
+from collections.abc import Collection
 from functools import cache
 from pathlib import Path
 
 from django.conf import settings
 
+from rehab.sessions.live import server_lock
+from rehab.sessions.log import noted_end
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
 
 PROC_DIR = Path("/proc")
+HANDED_ON = "handed on"  # the owner of a session that runs, whose process was stopped in order
 # The previous owner may have written these since the session was read.
-WRITTEN_BY_OWNER = ("state", "started_at", "ended_at")
+WRITTEN_BY_OWNER = ("checkpoint", "last_number", "state", "started_at", "ended_at")
 
 
 class OwnedElsewhere(RuntimeError):
@@ -47,14 +51,17 @@ def own_name() -> str:
 
 
 def is_alive(owner: str) -> bool:
-    """Return whether an owner's process runs. Hosted, those of other machines are assumed to."""
+    """Return whether an owner's process runs.
+
+    Of other machines this is known where this process is the database's only server.
+    """
     try:
         host, pid, started = owner.split("|")
     except ValueError:
         return False
     if host != socket.gethostname():
         # Only hosted servers share a database; else the machine was renamed.
-        return bool(settings.HOSTED)
+        return settings.HOSTED and not server_lock.is_held()
     try:
         os.kill(int(pid), 0)
     except ProcessLookupError:
@@ -86,16 +93,20 @@ def claim(session: TrainingSession) -> str:
 
 def release(session_id: int, epoch: int) -> None:
     """Release the session, so that any process can claim it."""
-    TrainingSession.everywhere.filter(pk=session_id, epoch=epoch).update(owner="")
+    held = TrainingSession.everywhere.filter(pk=session_id, epoch=epoch)
+    held.update(owner="", last_number=noted_end())
 
 
-def release_all(held: list[tuple[int, int]]) -> None:
-    """Release sessions, given with their epochs."""
-    for session_id, epoch in held:
-        release(session_id, epoch)
+def release_all(held: Collection[int]) -> None:
+    """Release the sessions that this process has; hand those on that run."""
+    own = TrainingSession.everywhere.filter(pk__in=held, owner=own_name())
+    own.filter(state=State.RUNNING.value).update(owner=HANDED_ON, last_number=noted_end())
+    own.update(owner="", last_number=noted_end())
 
 
-def find_orphaned() -> list[int]:
-    """Return the running sessions whose process is gone."""
-    running = TrainingSession.everywhere.filter(state=State.RUNNING.value)
-    return [one.pk for one in running if not one.owner or not is_alive(one.owner)]
+def find_ownerless() -> tuple[list[int], list[int]]:
+    """Return the running sessions whose process died, and those that one handed on."""
+    running = TrainingSession.everywhere.filter(owner__gt="", state=State.RUNNING.value)
+    owners = sorted(running.order_by().values_list("pk", "owner"))  # by the owners' index
+    orphaned = [key for key, owner in owners if owner != HANDED_ON and not is_alive(owner)]
+    return orphaned, [key for key, owner in owners if owner == HANDED_ON]

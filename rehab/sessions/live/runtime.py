@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextvars
-import gc
 import logging
-import sys
 import threading
 import time
 from collections import defaultdict
@@ -14,18 +12,23 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from asgiref.sync import sync_to_async
+from channels.db import database_sync_to_async
 from django.conf import settings
-from django.db import DatabaseError, connection
+from django.db import DatabaseError
 from django.utils import timezone
 
+from rehab.people.audit.seals import SEALED_AFTER, seal_logs
 from rehab.people.models import User
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live import owners, sources
 from rehab.sessions.live.audit_queue import AuditQueue
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
+from rehab.sessions.live.instruments import LATE_S
 from rehab.sessions.live.loading import find_newest_open, load
-from rehab.sessions.live.session import LiveSession, RobotStop
+from rehab.sessions.live.process import move_database_log
+from rehab.sessions.live.session import LiveSession, NotStored, RobotStop
 from rehab.sessions.live.supervisor import Supervisor
+from rehab.sessions.live.trouble import WORDS, Trouble, describe_failure
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Remark
 from rehab.training.changes import (
@@ -47,12 +50,13 @@ log = logging.getLogger(__name__)
 # Robot heartbeats between those of pages, sweeps of idle sessions and checks of sign-ins.
 SWEEP = round(PAGE_HEARTBEAT_S / ROBOT_HEARTBEAT_S)
 CHECKPOINT = 8  # heartbeats
+SEAL = round(600 / ROBOT_HEARTBEAT_S)
 HEARTBEAT = to_text({"type": "heartbeat"})
-# Python's full collections take 200 ms with 2,000 sockets (docs/reference/stack.md#live-path): make
-# them rare.
-GC_THRESHOLDS = (50_000, 50, 100)
-# How long the event loop may keep the interpreter's lock while the writer wants it (default 5 ms).
-SWITCH_S = 0.002
+RECOVERED_TOGETHER = 50  # sessions whose commits are awaited while others are read
+
+
+class Draining(NotStored):
+    """The server is stopping and opens no session any more."""
 
 
 class Runtime:
@@ -62,6 +66,9 @@ class Runtime:
         self.loop = asyncio.get_running_loop()
         self.sessions: dict[int, LiveSession] = {}
         self.draining = False
+        self._beat = 0
+        self.is_ready = False  # the sessions of the last run are back
+        self._trouble = Trouble.NONE  # as it was told last
         self.writer = Writer(self._call)
         # By station: devices that wait for a session to open there.
         self.waiting_devices: dict[int, set[Callable[[int], None]]] = defaultdict(set)
@@ -73,6 +80,7 @@ class Runtime:
             settings.HOST, settings.PORT
         )  # where child processes connect
         self._opening: dict[int, asyncio.Task[None]] = {}
+        self._held: set[int] = set()  # sessions that this process may be the owner of
         self._orphaned: set[int] = set()  # sessions of dead processes: paused if they run
         self._unlogged_stops: dict[
             str, RobotStop
@@ -82,10 +90,12 @@ class Runtime:
             self.loop.create_task(self._repeat(beats, work), context=contextvars.Context())
             for beats, work in (
                 (1, self._send_robot_heartbeats),
-                (SWEEP, self._send_page_heartbeats),
+                (1, self._watch_storage),
+                (1, self._send_page_heartbeats),
                 (SWEEP, self._close_idle),
                 (SWEEP, self._check_sign_ins),
                 (CHECKPOINT, self._checkpoint_log),
+                (SEAL, self._seal_logs),
             )
         ]
 
@@ -95,10 +105,12 @@ class Runtime:
     async def session(self, session_id: int) -> LiveSession:
         """Return a live session, rebuilt from its log where it is not in memory.
 
-        Raises TrainingSession.DoesNotExist, OwnedElsewhere, and NotStored where a change that it
-        needs could not be committed.
+        Raises TrainingSession.DoesNotExist, OwnedElsewhere, DamagedLog, Draining, and NotStored
+        where a change that it needs could not be committed.
         """
         while (live := self.sessions.get(session_id)) is None:
+            if self.draining:
+                raise Draining("The server restarts. Try again in a moment.")
             if session_id not in self._opening:
                 # Its own context: a request's ends with the request, and others wait for this too.
                 self._opening[session_id] = self.loop.create_task(
@@ -125,6 +137,7 @@ class Runtime:
                 return live
 
     async def _open(self, session_id: int) -> None:
+        self._held.add(session_id)
         loaded = await sync_to_async(load)(session_id)
         aggregate, stopped = loaded.aggregate, loaded.robot_stopped
         live = LiveSession(aggregate, self.writer, loaded.recent, self._drop, robot_stopped=stopped)
@@ -177,9 +190,7 @@ class Runtime:
             del self.sessions[live.id]
         for peer in (live.source, live.robot):
             if peer is not None:
-                peer.evict(
-                    CloseCode.NOT_STORED, "not_stored", "A step could not be stored. Connect again."
-                )
+                peer.evict(CloseCode.NOT_STORED, "not_stored", describe_failure(problem))
         for socket in list(self.sockets):
             if getattr(socket, "live", None) is live:
                 socket.close_soon(CloseCode.RESTARTING)
@@ -191,7 +202,7 @@ class Runtime:
         """
         live = await self.settled_session(session_id)
         if live.source_clock is not None and CONTROLS[kind].leads_to is State.RUNNING:
-            live.source_clock.allow_standstill(time.monotonic())
+            live.source_clock.resume(time.monotonic())
         await live.change(Change(kind, value), by, timezone.now())
         if live.aggregate.fold.state not in ENDED_STATES:
             return
@@ -223,20 +234,31 @@ class Runtime:
                 tell(session_id)
 
     async def recover(self) -> int:
-        """Pause the sessions whose process died while they ran; return how many."""
-        left = await sync_to_async(owners.find_orphaned)()
-        self._orphaned.update(left)
-        for session_id in left:
-            try:
-                await self._pause_orphaned(await self.session(session_id))
-            except Exception:  # one broken session must not keep the server from starting
-                log.exception("Session %s could not be recovered", session_id)
-        return len(left)
+        """Pause the sessions whose process died while they ran; return how many.
+
+        Sessions that a process handed on when it was stopped go on as they are.
+        """
+        orphaned, handed_on = await sync_to_async(owners.find_ownerless)()
+        self._orphaned.update(orphaned)
+        left = (*orphaned, *handed_on)
+        for first in range(0, len(left), RECOVERED_TOGETHER):
+            some = left[first : first + RECOVERED_TOGETHER]
+            await asyncio.gather(*(self._recover(session_id) for session_id in some))
+        self.is_ready = True
+        return len(orphaned)
+
+    async def _recover(self, session_id: int) -> None:
+        try:
+            await self._pause_orphaned(await self.session(session_id))
+        except Exception:  # one broken session must not keep the server from starting
+            log.exception("Session %s could not be recovered", session_id)
 
     async def _repeat(self, beats: int, work: Callable[[], Awaitable[None]]) -> None:
         """Call a function periodically; log its failures and go on."""
         while True:
+            due_s = self.loop.time() + beats * ROBOT_HEARTBEAT_S
             await asyncio.sleep(beats * ROBOT_HEARTBEAT_S)
+            LATE_S.observe(self.loop.time() - due_s)
             try:
                 await work()
             except Exception:
@@ -247,14 +269,31 @@ class Runtime:
             if live.robot is not None:
                 live.robot.tell({"type": "heartbeat", "watched": live.is_watched})
 
-    async def _send_page_heartbeats(self) -> None:
+    async def _watch_storage(self) -> None:
+        """Tell monitors, robots and the log when steps cannot be stored, and when they can."""
+        trouble = self.writer.trouble
+        if trouble == self._trouble:
+            return
+        self._trouble = trouble
+        log.error("%s", WORDS.get(trouble, "Steps are stored again."))
         for live in self.sessions.values():
+            live.announce_storage(timezone.now())
+
+    async def _send_page_heartbeats(self) -> None:
+        """Send heartbeats to the pages of some sessions: of all of them within an interval."""
+        self._beat = (self._beat + 1) % SWEEP
+        for live in self.sessions.values():
+            if live.id % SWEEP != self._beat or not live.feed.subscribers:
+                continue
             presence = live.presence(timezone.now())
             quality = to_text({"type": "heartbeat", "presence": presence})
             for subscriber in live.feed.subscribers:
-                subscriber.queue_heartbeat(
-                    quality if subscriber.audience is Audience.MONITOR else HEARTBEAT
-                )
+                if subscriber.audience is Audience.MONITOR:
+                    subscriber.queue_heartbeat(quality)
+                elif subscriber.audience is Audience.PATIENT and not subscriber.was_sent_something(
+                    within_s=1.0
+                ):  # robots have their own
+                    subscriber.queue_heartbeat(HEARTBEAT)
 
     async def _close_idle(self) -> None:
         for live in list(self.sessions.values()):
@@ -263,7 +302,10 @@ class Runtime:
             live.recently_used = False  # who gets it now has until the next sweep to subscribe
 
     async def _checkpoint_log(self) -> None:
-        await self.loop.run_in_executor(None, _checkpoint)
+        await self.loop.run_in_executor(None, move_database_log)
+
+    async def _seal_logs(self) -> None:
+        await database_sync_to_async(seal_logs)(timezone.now() - SEALED_AFTER)
 
     async def _check_sign_ins(self) -> None:
         """Extend sign-ins at a running session; close sockets that are no longer authorized."""
@@ -281,6 +323,7 @@ class Runtime:
         self.sessions.pop(live.id, None)
         try:
             await sync_to_async(owners.release)(live.id, live.aggregate.session.epoch)
+            self._held.discard(live.id)
         except DatabaseError:
             log.exception("Session %s could not be released", live.id)  # go on with the others
 
@@ -293,25 +336,15 @@ class Runtime:
         await asyncio.gather(*self.background_tasks, return_exceptions=True)
         closing = [socket.close_now(CloseCode.RESTARTING) for socket in list(self.sockets)]
         await asyncio.gather(*closing, self.audit_queue.join(), return_exceptions=True)
+        await asyncio.gather(*self._opening.values(), return_exceptions=True)
         await asyncio.gather(*self.requests, return_exceptions=True)
         await self.loop.run_in_executor(None, self.writer.close)
         await asyncio.sleep(0)  # the writer's last reports
-        held = [(live.id, live.aggregate.session.epoch) for live in self.sessions.values()]
         self.sessions.clear()
-        await sync_to_async(owners.release_all)(held)
-
-
-def _checkpoint() -> None:
-    """Checkpoint SQLite's write-ahead log on its own connection, so that commits go on."""
-    if connection.vendor != "sqlite":
-        return
-    try:
-        with connection.cursor() as cursor:
-            cursor.execute("PRAGMA wal_checkpoint(PASSIVE)")
-    except DatabaseError as problem:
-        log.warning("The database's log could not be moved: %s", problem)
-    finally:
-        connection.close()
+        try:
+            await sync_to_async(owners.release_all)(self._held)
+        except DatabaseError:
+            log.exception("Sessions could not be released; they come back paused")
 
 
 _current: Runtime | None = None
@@ -331,11 +364,3 @@ def current() -> Runtime:
 def peek() -> Runtime | None:
     """Return the process's runtime, or None; callable from any thread."""
     return _current if _current is not None and not _current.draining else None
-
-
-def tune_interpreter() -> None:
-    """Make pauses by the garbage collector and by the writer's wait for the lock rare."""
-    sys.setswitchinterval(SWITCH_S)
-    gc.collect()
-    gc.freeze()
-    gc.set_threshold(*GC_THRESHOLDS)

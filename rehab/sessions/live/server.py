@@ -10,52 +10,20 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from autobahn.twisted import websocket as twisted_websocket
-from autobahn.websocket import protocol as websocket_protocol
 from daphne import http_protocol
 from daphne.server import Server
-from daphne.ws_protocol import WebSocketFactory, WebSocketProtocol
 from django.conf import settings
 from twisted.internet import defer, reactor
 
+from rehab.sessions.live import process
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.frames import WRITE_NOW
+from rehab.sessions.live.websockets import DirectProtocol, InboundQueue, sender
 from robot.wire.limits import MAX_FRAME_BYTES
 
 log = logging.getLogger(__name__)
 
 CLOSE_S = 2.0  # how long clients have to answer our close frame
-
-
-def _plain(*_: object, **__: object) -> str:
-    return ""
-
-
-# Autobahn formats a colored debug line for each frame even if none is logged: a tenth of the event
-# loop's time in a profile of 700 sessions.
-for module in (websocket_protocol, twisted_websocket):
-    vars(module).update(hltype=_plain, hlval=_plain)
-
-
-class EagerProtocol(WebSocketProtocol):  # type: ignore[misc]
-    """Writes frames to the kernel at once.
-
-    Twisted would ask its event loop to do so on the next turn. At 1,000 sessions on a full core
-    that halved the median delay (383 → 164 ms, one run each), at the same processor time.
-    """
-
-    def sendData(self, data: bytes, sync: bool = False, chopsize: int | None = None) -> None:  # noqa: N802
-        """Send bytes; what the kernel does not accept now takes the usual way."""
-        out = self.transport
-        idle = not (sync or chopsize or self.send_queue or out.dataBuffer or out._tempDataLen)  # noqa: SLF001
-        if idle and out.connected and not out.disconnecting:
-            sent = out.writeSomeData(data)
-            if isinstance(sent, int) and sent > 0:
-                data = data[sent:]
-        if data:
-            super().sendData(data, sync, chopsize)
-
-
-WebSocketFactory.protocol = EagerProtocol
 
 
 class BoundedRequest(http_protocol.WebRequest):  # type: ignore[misc]
@@ -105,6 +73,22 @@ class LiveServer(Server):  # type: ignore[misc]
         reactor.callWhenRunning(self._begin)
         super().run()
 
+    def create_application(self, protocol: Any, scope: dict[str, Any]) -> Any:
+        """Start the application of a connection; return the queue of what it receives."""
+        if not isinstance(protocol, DirectProtocol):
+            return super().create_application(protocol, scope)
+        queue = InboundQueue(protocol.transport)
+        scope.setdefault("asgi", {"version": "3.0"})
+        scope["extensions"] = {WRITE_NOW: protocol.send_text}
+        application = self.application(
+            scope=scope, receive=queue.get, send=sender(protocol, self.handle_reply)
+        )
+        if protocol not in self.connections:
+            application.close()
+            return None
+        self.connections[protocol]["application_instance"] = asyncio.ensure_future(application)
+        return queue
+
     def _begin(self) -> None:
         # The reactor runs before its event loop does.
         loop = asyncio.get_event_loop()
@@ -117,12 +101,13 @@ class LiveServer(Server):  # type: ignore[misc]
         paused = await runtimes.current().recover()
         if paused:
             log.warning("%s session(s) were left running; they are paused now.", paused)
-        runtimes.tune_interpreter()
+        process.tune_interpreter()
         if self._on_ready is not None:
             self._on_ready()
 
     def kill_all_applications(self) -> defer.Deferred[Any]:
         """Drain before the reactor stops: close sockets, commit, end the writer."""
+        process.end_in_time()
         return defer.Deferred.fromFuture(asyncio.ensure_future(self._drain()))
 
     async def _drain(self) -> None:

@@ -15,15 +15,18 @@ from rehab.sessions.events.event import (
     presence_event,
     remark_event,
     robot_report_event,
+    robot_state_event,
     robot_stopped_event,
 )
 from rehab.sessions.events.snapshot import snapshot
 from rehab.sessions.events.step import StepContext, step_event
-from rehab.sessions.live.aggregate import Row, SessionAggregate
+from rehab.sessions.live.aggregate import Row, SessionAggregate, StepRow, Summary
+from rehab.sessions.live.commits import Job
 from rehab.sessions.live.hub import EventFeed, Subscriber
 from rehab.sessions.live.lateness import Lateness
-from rehab.sessions.live.writer import Job, Writer
-from rehab.sessions.log import Remark, RobotEntry, Step
+from rehab.sessions.live.trouble import WORDS, classify_failure
+from rehab.sessions.live.writer import Writer
+from rehab.sessions.log import Remark, RobotEntry, RuleEntry, Step
 from rehab.sessions.payloads import Message, type_mark
 from rehab.training.changes import Change, ChangeKind, State
 from rehab.training.controls import Audience
@@ -112,6 +115,7 @@ class LiveSession:
         self._subscribing = 0
         self._nobody_subscribes = asyncio.Event()
         self._turn = asyncio.Lock()  # first come, first served
+        self._in_turn = 0  # how many wait for it
 
     @property
     def next_number(self) -> int:
@@ -141,11 +145,12 @@ class LiveSession:
         fold = self.aggregate.fold
         index, goal, had_obstacle = fold.phase_index, fold.goal, fold.obstacle
         context, switches = StepContext.of(fold), len(fold.switches)
+        was_running = self.is_running
         row = self.aggregate.record_step(measurement, received_at)
-        self.stride_at = received_at
+        rows: list[Row] = [row]
         events = [step_event(fold, context, row.step, live=not late)]
         moved = (fold.phase_index, fold.goal, fold.obstacle) != (index, goal, had_obstacle)
-        if moved:
+        if moved and not (fold.adapted and fold.phase_index == index):
             events.append(phase_event(fold, switched=len(fold.switches) > switches))
         changed: list[str] = []
         if fold.phase_index != index:
@@ -153,7 +158,18 @@ class LiveSession:
         if fold.goal != goal:
             events.append(change_event(fold, ChangeKind.GOAL))
             changed.append(ChangeKind.GOAL)
-        self._submit([row], events, changed, summarize=moved, step=row.step)
+        if fold.adapted:
+            followed = RuleEntry.GOAL_FOLLOWED
+            rows.append(self.aggregate.log_event(followed, None, received_at, {}, fold.goal, goal))
+        if was_running and not self.is_running:
+            rest = RuleEntry.PLANNED_REST
+            rows.append(self.aggregate.log_event(rest, None, received_at, {}, fold.rest_s))
+            events.append(change_event(fold, ChangeKind.PAUSE))
+            changed.append(ChangeKind.PAUSE)
+        summary = None
+        if moved or self.aggregate.is_checkpoint_due:
+            summary = self.aggregate.summary(with_checkpoint=True)
+        self._submit(rows, events, changed, summary, row=row)
 
     def change(self, change: Change, by: User | None, at: datetime) -> asyncio.Future[None]:
         """Apply a change from the next step on; the future is done when it is committed.
@@ -171,7 +187,7 @@ class LiveSession:
         changed = [change.kind]
         if change.kind == ChangeKind.PHASE and fold.goal != goal:
             changed.append(ChangeKind.GOAL)
-        self._submit(rows, events, changed, summarize=True, stored=stored)
+        self._submit(rows, events, changed, self.aggregate.summary(), stored=stored)
         return stored
 
     def remark(
@@ -181,7 +197,7 @@ class LiveSession:
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         row = self.aggregate.log_event(what, by, at, {}, value)
         event = remark_event(self.aggregate.fold, what.value, value)
-        self._submit([row], [event], [], summarize=False, stored=stored)
+        self._submit([row], [event], [], stored=stored)
         return stored
 
     def stop_robot(self, by: User | None, at: datetime, data: Message) -> None:
@@ -196,7 +212,7 @@ class LiveSession:
             self.unlogged_stop = stop = RobotStop(by, at, data)
             row = self.aggregate.log_event(RobotEntry.STOP, by, at, data)
             event = robot_stopped_event(self.aggregate.fold, True)
-            self._submit([row], [event], [], summarize=False, stop=stop)
+            self._submit([row], [event], [], stop=stop)
 
     def arm_robot(self, by: User, at: datetime) -> asyncio.Future[None]:
         """Let the robot move again once that is committed; then the future is done."""
@@ -211,7 +227,7 @@ class LiveSession:
         stored.add_done_callback(tell)
         row = self.aggregate.log_event(RobotEntry.ARM, by, at, {})
         event = robot_stopped_event(self.aggregate.fold, False)
-        self._submit([row], [event], [], summarize=False, stored=stored)
+        self._submit([row], [event], [], stored=stored)
         return stored
 
     def record_robot_report(self, report: Message, at: datetime) -> None:
@@ -223,7 +239,7 @@ class LiveSession:
         if kind in LOGGED_REPORTS:
             data = {name: value for name, value in report.items() if name != "kind"}
             row = self.aggregate.log_event(LOGGED_REPORTS[kind], None, at, data)
-            self._submit([row], [event], [], summarize=False)
+            self._submit([row], [event], [])
         else:
             self.feed.publish(event)
 
@@ -232,9 +248,9 @@ class LiveSession:
         rows: list[Row],
         events: list[LiveEvent],
         changed: Sequence[str],
+        summary: Summary | None = None,
         *,
-        summarize: bool,
-        step: ScoredStep | None = None,
+        row: StepRow | None = None,
         stored: asyncio.Future[None] | None = None,
         stop: RobotStop | None = None,
     ) -> None:
@@ -249,7 +265,8 @@ class LiveSession:
             self.uncommitted -= 1
             if problem is not None:
                 if stored is not None and not stored.done():
-                    stored.set_exception(NotStored("It could not be stored. Try again."))
+                    words = WORDS.get(classify_failure(problem))
+                    stored.set_exception(NotStored(words or "It could not be stored. Try again."))
                 self._on_failure(self, problem)
                 return
             if stop is not None and self.unlogged_stop is stop:
@@ -257,11 +274,12 @@ class LiveSession:
             if self.source is not None:
                 for message in for_source:  # before the ack, which a simulated patient waits for
                     self.source.tell(message)
-                if step is not None:
-                    self.source.acknowledge(step.number)
-            if step is not None:
-                self.recent.append(step)
-                self.committed = step.number
+                if row is not None:
+                    self.source.acknowledge(row.step.number)
+            if row is not None:
+                self.recent.append(row.step)
+                self.committed = row.step.number
+                self.stride_at = row.received_at
             for event in events:
                 self.feed.publish(event)
             if stored is not None and not stored.done():
@@ -274,7 +292,7 @@ class LiveSession:
                 session_id=self.id,
                 epoch=self.aggregate.session.epoch,
                 rows=rows,
-                summary=self.aggregate.summary() if summarize else None,
+                summary=summary,
                 done=done,
             )
         )
@@ -287,14 +305,30 @@ class LiveSession:
             "tablets": self.tablets,
             "stride_ago_s": _ago_s(self.stride_at, now),
             "tablet_ago_s": _ago_s(self.tablet_heard_at, now) if self.tablets else None,
+            "storage": self._writer.trouble.value,
         }
+
+    @property
+    def state_for_robot(self) -> str:
+        """The state that its robot obeys: it stands still while nothing can be stored."""
+        state = State.PAUSED if self.is_running and self._writer.trouble else None
+        return (state or self.aggregate.fold.state).value
+
+    def announce_storage(self, now: datetime) -> None:
+        """Publish whether steps are stored; the robot stands still while they are not."""
+        self.announce_presence(now)
+        self.feed.publish(robot_state_event(self.aggregate.fold, self.state_for_robot))
 
     def announce_presence(self, now: datetime) -> None:
         """Publish who is connected."""
         self.feed.publish(presence_event(self.aggregate.fold, self.presence(now)))
 
     async def subscribe(
-        self, audience: Audience, send: Callable[[str], Awaitable[None]], now: datetime
+        self,
+        audience: Audience,
+        send: Callable[[str], Awaitable[None]],
+        now: datetime,
+        write: Callable[[str], bool] = lambda _: False,
     ) -> tuple[Message, Subscriber]:
         """Add a subscriber; return it with the snapshot that its events continue.
 
@@ -317,7 +351,7 @@ class LiveSession:
                 robot_stopped=self.robot_stopped,
                 marks=self._marks(),
             )
-            subscriber = Subscriber(self.feed, audience, send)
+            subscriber = Subscriber(self.feed, audience, send, write)
             self.feed.subscribers.add(subscriber)
             return shown, subscriber
         finally:
@@ -335,14 +369,20 @@ class LiveSession:
 
         Waiting callers continue in the order in which they came.
         """
-        async with self._turn:
-            while self._subscribing:
-                await self._nobody_subscribes.wait()
+        if not (self._subscribing or self._in_turn):
+            return
+        self._in_turn += 1
+        try:
+            async with self._turn:
+                while self._subscribing:
+                    await self._nobody_subscribes.wait()
+        finally:
+            self._in_turn -= 1
 
     async def wait_until_committed(self) -> None:
         """Wait until everything queued so far is committed. Raises NotStored."""
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._submit([], [], [], summarize=False, stored=stored)
+        self._submit([], [], [], stored=stored)
         await stored
 
 

@@ -2,171 +2,40 @@
 
 One thread writes for all sessions of the process. As soon as a commit is done it commits all that
 is queued by then: no timer, so that a fast disk answers at once and a slow one gets larger batches
-(measured against a timer: docs/reference/stack.md#durability).
+(measured against a timer: docs/reference/stack.md#durability). Only while several steps come at a
+time, commits begin at least ``SPACING_S`` apart: each costs as much as ten rows do, and a turn of
+the event loop (docs/performance.md).
 """
 
 from __future__ import annotations
 
+import copy
 import logging
 import threading
-from collections.abc import Callable, Sequence
-from contextlib import closing
-from dataclasses import dataclass
-from functools import lru_cache
+import time
+from collections import deque
+from collections.abc import Callable
 from queue import Empty, SimpleQueue
-from typing import Any
+from weakref import WeakSet
 
-from django.db import close_old_connections, connection, transaction
+from django.db import DEFAULT_DB_ALIAS, close_old_connections, connection, connections
+from django.db.backends.base.base import BaseDatabaseWrapper
 
-from rehab.sessions.live.aggregate import Row, StepRow, Summary
-from rehab.sessions.log import SessionEvent, SessionMetric, figures_stored
-from rehab.sessions.models import TrainingSession
+from rehab.sessions.live.commits import EarlierWriteFailed, Job, commit
+from rehab.sessions.live.instruments import COMMIT_S, STEPS, WRITE_FAILURES
+from rehab.sessions.live.trouble import Trouble, classify_failure, concerns_all
 
 log = logging.getLogger(__name__)
 
 MAX_ROWS = 5000  # rows a transaction
-
-# Steps are the one table that is written many times a second. Plain rows spare the ORM's objects,
-# compiler and wrappers: a headless run went from 7,400 to 18,800 steps/s with that alone.
-STEP_COLUMNS = (
-    "session_id",
-    "number",
-    "time_s",
-    "received_at",
-    "side",
-    "value",
-    "gain",
-    "shown",
-    "goal",
-    "performance",
-    "hit",
-    "points",
-    "valid",
-    "reasons",
-    "phase",
-    "rules_version",
-    "extra",
-)
-# SQLite takes 32,766 parameters a statement, PostgreSQL 65,535.
-STEPS_A_STATEMENT = 500
-
-
-def _step_values(rows: Sequence[StepRow]) -> list[Any]:
-    """Return the values of rows as one flat list, each row in the order of ``STEP_COLUMNS``."""
-    to_time = connection.ops.adapt_datetimefield_value
-    to_json = connection.ops.adapt_json_value
-    values: list[Any] = []
-    for session_id, step, received_at in rows:
-        values += (
-            session_id,
-            step.number,
-            step.time_s,
-            to_time(received_at),
-            step.side.value,
-            step.value,
-            step.gain,
-            step.shown,
-            step.goal,
-            step.performance,
-            step.hit,
-            step.points,
-            step.valid,
-            to_json(list(step.reasons), None),
-            step.phase,
-            step.rules_version,
-            to_json(dict(step.extra), None),
-        )
-    return values
-
-
-@lru_cache(maxsize=STEPS_A_STATEMENT)
-def _insert_statement(count: int, mark: str) -> str:
-    row = f"({', '.join([mark] * len(STEP_COLUMNS))})"
-    columns = ", ".join(STEP_COLUMNS)
-    return f"INSERT INTO rehab_step ({columns}) VALUES {', '.join([row] * count)}"  # noqa: S608
-
-
-class Fenced(RuntimeError):
-    """Another process has claimed the session; this one must not write to it."""
-
-
-class EarlierWriteFailed(RuntimeError):
-    """An earlier write of the session failed, so this one would leave a gap."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Job:
-    """Rows of one session, committed together.
-
-    ``owner``: the object whose rows these are; after a failed job none of its later ones is
-    written. ``done`` is called on the event loop with the error, or None.
-    """
-
-    owner: object
-    session_id: int
-    epoch: int
-    rows: Sequence[Row]
-    summary: Summary | None
-    done: Callable[[Exception | None], None]
-
-
-def commit(jobs: Sequence[Job]) -> None:
-    """Write jobs, in their order, in one transaction.
-
-    Raises Fenced if a session has another owner, and the database's errors, for example
-    IntegrityError for a duplicate step number; nothing is written then.
-    """
-    with transaction.atomic():
-        _check_epochs({job.session_id: job.epoch for job in jobs})
-        _insert_steps([row for job in jobs for row in job.rows if isinstance(row, StepRow)])
-        events = [row for job in jobs for row in job.rows if isinstance(row, SessionEvent)]
-        if events:
-            SessionEvent.everywhere.bulk_create(events)
-        metrics = [row for job in jobs for row in job.rows if isinstance(row, SessionMetric)]
-        if metrics:
-            SessionMetric.everywhere.bulk_create(metrics)
-        for job in jobs:
-            if job.summary is not None:
-                TrainingSession.everywhere.filter(pk=job.session_id).update(**job.summary)
-        if metrics:
-            _announce_figures({row.session_id for row in metrics})
-
-
-def _announce_figures(sessions: set[int]) -> None:
-    """Send ``figures_stored``; errors of its receivers are logged, the steps are kept."""
-    try:
-        with transaction.atomic():
-            figures_stored.send(TrainingSession, sessions=sessions)
-    except Exception:
-        log.exception("Boards did not follow sessions %s; run manage.py rebuildboards", sessions)
-
-
-def _check_epochs(expected: dict[int, int]) -> None:
-    marks = ", ".join(["%s"] * len(expected))
-    # Elsewhere than in SQLite, other transactions run at the same time: they must not claim it now.
-    lock = "" if connection.vendor == "sqlite" else " FOR SHARE"
-    with connection.cursor() as cursor:
-        cursor.execute(
-            f"SELECT id, epoch FROM rehab_trainingsession WHERE id IN ({marks}){lock}",  # noqa: S608
-            list(expected),
-        )
-        if dict(cursor.fetchall()) != expected:
-            raise Fenced("Another process has taken the session over.")
-
-
-def _insert_steps(rows: Sequence[StepRow]) -> None:
-    """Insert rows, many in a statement.
-
-    One statement for each row (``executemany``) releases the interpreter's lock each time and waits
-    for the event loop to return it: seconds at 1,000 sessions.
-    """
-    if not rows:
-        return
-    mark = "?" if connection.vendor == "sqlite" else "%s"
-    with connection.wrap_database_errors, closing(connection.connection.cursor()) as cursor:
-        for first in range(0, len(rows), STEPS_A_STATEMENT):
-            chunk = rows[first : first + STEPS_A_STATEMENT]
-            cursor.execute(_insert_statement(len(chunk), mark), _step_values(chunk))
+SPACING_S = 0.004  # between the beginnings of commits under load
+LATE_S = 1.0  # a commit that takes longer is told to people and robots
+CLOSE_S = 20.0  # how long a stop waits for a database that does not answer
+# Of the writer's own connection to PostgreSQL: what waits longer has failed, and is said.
+LOCK_TIMEOUT_MS = 3_000
+STATEMENT_TIMEOUT_MS = 10_000
+SQLITE_TIMEOUT_S = 10
+ALONE_LOCK_TIMEOUT_MS = 200  # of one session's rows, after a batch has failed
 
 
 class Writer:
@@ -175,10 +44,15 @@ class Writer:
     def __init__(self, call: Callable[[Callable[[], None]], object]) -> None:
         self._call = call
         self._queue: SimpleQueue[Job | None] = SimpleQueue()
-        self._failed: set[int] = set()  # id() of owners; they stay referenced in `_failed_owners`
-        self._failed_owners: list[object] = []
+        self._failed: WeakSet[object] = WeakSet()  # owners that have a gap now
+        self._finished: deque[tuple[Job, Exception | None]] = deque()
+        self._is_report_due = False
         self._closed = False
-        self._thread = threading.Thread(target=self._run, name="garry-writer")
+        self._busy_since_s: float | None = None
+        self._next_commit_s = 0.0  # not before
+        self._failure = Trouble.NONE  # of the last batch
+        # A daemon: a database that never answers must not keep the process from ending.
+        self._thread = threading.Thread(target=self._run, name="garry-writer", daemon=True)
         self._thread.start()
 
     @property
@@ -186,32 +60,52 @@ class Writer:
         """Number of jobs in the queue."""
         return self._queue.qsize()
 
+    @property
+    def trouble(self) -> Trouble:
+        """Why nothing is stored at present, if that is so."""
+        since_s = self._busy_since_s
+        if since_s is not None and time.monotonic() - since_s > LATE_S:
+            return Trouble.LATE
+        return self._failure
+
     def submit(self, job: Job) -> None:
         """Queue a job without waiting. After ``close`` it fails at once."""
         if self._closed:
-            self._call(lambda: job.done(EarlierWriteFailed("The server is stopping.")))
+            self._finish([(job, EarlierWriteFailed("The server is stopping."))])
         else:
             self._queue.put(job)
 
     def close(self) -> None:
-        """Commit what is queued, then end the thread and wait for that."""
+        """Commit what is queued, then end the thread and wait for that, but not for ever."""
         self._closed = True
         self._queue.put(None)
-        self._thread.join()
+        self._thread.join(CLOSE_S)
+        if self._thread.is_alive():
+            log.error(
+                "The database does not answer: %s job(s) were not stored, and not acknowledged",
+                self.backlog,
+            )
 
     def _run(self) -> None:
         try:
+            connections[DEFAULT_DB_ALIAS] = own_connection()
             more = True
             while more:
                 jobs, more = self._next_jobs()
                 if jobs:
+                    self._busy_since_s = began_s = time.monotonic()
                     self._write(jobs)
+                    self._busy_since_s = None
+                    self._next_commit_s = began_s + SPACING_S if len(jobs) > 1 else 0.0
         finally:
             connection.close()
 
     def _next_jobs(self) -> tuple[list[Job], bool]:
         """Wait for a job; return all that are queued, and whether the thread goes on."""
         job = self._queue.get()
+        early_s = self._next_commit_s - time.monotonic()
+        if early_s > 0:
+            time.sleep(early_s)  # meanwhile more is queued
         jobs: list[Job] = []
         rows = 0
         while job is not None:
@@ -226,32 +120,84 @@ class Writer:
         return jobs, False
 
     def _write(self, jobs: list[Job]) -> None:
-        writable = [job for job in jobs if id(job.owner) not in self._failed]
         results: list[tuple[Job, Exception | None]]
         try:
-            if len(writable) < len(jobs):
+            if any(job.owner in self._failed for job in jobs):
                 raise EarlierWriteFailed
-            commit(jobs)
+            with COMMIT_S.time():
+                commit(jobs)
+            STEPS.inc(sum(len(job.rows) for job in jobs))
             results = [(job, None) for job in jobs]
-        except Exception:  # any: all sessions depend on this thread
+            self._failure = Trouble.NONE
+        except Exception as problem:  # any: all sessions depend on this thread
+            WRITE_FAILURES.inc()
             close_old_connections()
-            results = [(job, self._write_alone(job)) for job in jobs]
-        self._call(lambda: _report(results))
+            if concerns_all(problem):
+                log.exception("Nothing could be stored")
+                self._failure = classify_failure(problem)
+                self._failed.update(job.owner for job in jobs)
+                results = [(job, problem) for job in jobs]
+            else:
+                results = self._write_each(jobs)
+        self._finish(results)
+
+    def _write_each(self, jobs: list[Job]) -> list[tuple[Job, Exception | None]]:
+        """Write each job alone, so that the failure of one affects no other session."""
+        _set_lock_timeout(ALONE_LOCK_TIMEOUT_MS)
+        try:
+            return [(job, self._write_alone(job)) for job in jobs]
+        finally:
+            _set_lock_timeout(LOCK_TIMEOUT_MS)
 
     def _write_alone(self, job: Job) -> Exception | None:
-        """Write one job alone, so that its failure affects no other session. Return the error."""
-        if id(job.owner) in self._failed:
+        """Write one job alone. Return the error."""
+        if job.owner in self._failed:
             return EarlierWriteFailed("An earlier write of this session failed.")
         try:
             commit([job])
+            STEPS.inc(len(job.rows))
         except Exception as problem:
             log.exception("Session %s could not be written", job.session_id)
-            self._failed.add(id(job.owner))
-            self._failed_owners.append(job.owner)
+            self._failed.add(job.owner)
             return problem
         return None
 
+    def _finish(self, results: list[tuple[Job, Exception | None]]) -> None:
+        """Report jobs on the event loop: all that are finished by its next turn at once."""
+        self._finished.extend(results)
+        if not self._is_report_due:
+            self._is_report_due = True
+            self._call(self._report)
 
-def _report(results: list[tuple[Job, Exception | None]]) -> None:
-    for job, problem in results:
-        job.done(problem)
+    def _report(self) -> None:
+        self._is_report_due = False  # first: what is finished from here on reports again
+        while self._finished:
+            job, problem = self._finished.popleft()
+            try:
+                job.done(problem)
+            except Exception:  # the others' steps are stored, and their sources wait to hear it
+                log.exception("Session %s could not be told what was stored", job.session_id)
+
+
+def own_connection() -> BaseDatabaseWrapper:
+    """Return a connection that waits for no pool, and gives up on a database that is stuck."""
+    own = connections.create_connection(DEFAULT_DB_ALIAS)
+    # As it is now: a test has another database than the settings say.
+    own.settings_dict = copy.deepcopy(connections[DEFAULT_DB_ALIAS].settings_dict)
+    options = own.settings_dict["OPTIONS"]
+    options.pop("pool", None)
+    if own.vendor == "sqlite":
+        options["timeout"] = SQLITE_TIMEOUT_S
+    else:
+        timeouts = f"-c lock_timeout={LOCK_TIMEOUT_MS} -c statement_timeout={STATEMENT_TIMEOUT_MS}"
+        options["options"] = f"{options.get('options', '')} {timeouts}".strip()
+    return own
+
+
+def _set_lock_timeout(milliseconds: int) -> None:
+    if connection.vendor == "postgresql":
+        try:
+            with connection.cursor() as cursor:
+                cursor.execute(f"SET lock_timeout = {milliseconds:d}")
+        except Exception:
+            log.warning("The database does not take a timeout", exc_info=True)

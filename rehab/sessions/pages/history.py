@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Any
 
 from django.core.paginator import Paginator
@@ -11,7 +11,9 @@ from django.db.models import Count, Sum
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
 from django.utils import timezone
+from django.utils.formats import date_format
 from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
 from django.views.decorators.http import require_safe
 
 from rehab.people.access import for_roles, user_of
@@ -26,6 +28,7 @@ from rehab.sessions.formatting import (
     format_state,
 )
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.noted import describe_noted
 from rehab.sessions.reports.trend import (
     load_trend,
     metrics_by_session,
@@ -35,6 +38,7 @@ from rehab.sessions.reports.trend import (
 from rehab.training.valences import VALENCES
 
 PAGE_SIZE = 20
+PERIODS = {"4": _("4 weeks"), "12": _("12 weeks"), "52": _("a year")}  # by how many weeks
 
 
 @dataclass(frozen=True)
@@ -42,12 +46,14 @@ class SessionRow:
     """A session in the list, as text."""
 
     session: TrainingSession
+    week: str
     day: str
     time: str
     duration: str
     goal: str
     score: str
     hit_rate: str
+    noted: str
     state: str
 
 
@@ -69,6 +75,12 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
         Patient.objects.visible_to(user).select_related("clinic"), pk=patient_id
     )
     mine = TrainingSession.objects.visible_to(user).filter(patient=patient)
+    today = clinic_time(timezone.now(), patient.clinic)
+    weeks = request.GET.get("weeks", "")
+    if weeks in PERIODS:
+        mine = mine.filter(created_at__gte=today - timedelta(weeks=int(weeks)))
+    else:
+        weeks = ""
     groups: list[dict[str, Any]] = [
         dict(group)
         for group in mine.order_by()
@@ -92,16 +104,20 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
         request.GET.get("page")
     )
     rows = list(page.object_list)
-    figures = metrics_by_session(user, rows)
-    trend = load_trend(user, mine.filter(simulated=simulated))
-    today = clinic_time(timezone.now(), patient.clinic)
+    figures, noted = metrics_by_session(user, rows), describe_noted(user, rows)
+    trend = load_trend(user, mine.filter(simulated=simulated), with_imported=True)
     chart = trend_chart_data(trend, today)
     context = {
         "patient": patient,
         "chips": chips,
         "chosen": chosen,
+        "periods": {"": gettext("All"), **PERIODS},
+        "weeks": weeks,
         "page": page,
-        "lines": [to_row(row, figures.get(row.pk, {}), patient, today) for row in rows],
+        "lines": [
+            to_row(row, figures.get(row.pk, {}), noted.get(row.pk, ""), patient, today)
+            for row in rows
+        ],
         "simulated": simulated,
         "totals": summarize_trend(included, trend, simulated=simulated),
         "corrected": sum(group["pk__count"] for group in groups if group["excluded"]),
@@ -112,17 +128,24 @@ def list_sessions(request: HttpRequest, patient_id: int) -> HttpResponse:
 
 
 def to_row(
-    session: TrainingSession, figures: dict[str, float], patient: Patient, now: datetime
+    session: TrainingSession,
+    figures: dict[str, float],
+    noted: str,
+    patient: Patient,
+    now: datetime,
 ) -> SessionRow:
     """Return a session as a row of the list."""
     start = clinic_time(session.began_at, patient.clinic)
+    monday = start.date() - timedelta(days=start.weekday())
     return SessionRow(
         session=session,
+        week=gettext("Week of %(day)s") % {"day": date_format(monday, "DATE_FORMAT")},
         day=format_day(start.date(), now.date()).capitalize(),
         time=f"{start:%H:%M}",
         duration=format_duration(session.active_s),
         goal=format_number(session.goal),
         score=format_number(figures.get("score"), 0),
         hit_rate=format_rate(figures.get("hit_rate")),
+        noted=noted,
         state=gettext("imported") if session.legacy_id is not None else format_state(session.state),
     )

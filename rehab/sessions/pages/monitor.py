@@ -16,18 +16,17 @@ from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.sessions.control_text import chart_marks
 from rehab.sessions.formatting import ROBOT_LEVEL_LABELS
-from rehab.sessions.live.messages import BORG_MAX
-from rehab.sessions.log import EVENTS, Remark
+from rehab.sessions.log import EVENTS, REMARK_RANGES, FallSeverity, Remark
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.setup.answers import ADAPTATIONS
 from rehab.training.plans import ROBOT_LEVELS
 
-# The icon of each remark, in the order of the buttons.
+# The icon of each remark that is noted and no more, in the order of the buttons. A fall does more.
 ICONS = {
     Remark.REST: "rest",
     Remark.PAIN: "pain",
     Remark.DIZZINESS: "dizzy",
     Remark.NEAR_FALL: "nearfall",
-    Remark.FALL: "fall",
     Remark.HANDRAIL: "rail",
     Remark.VERBAL_CUE: "voice",
     Remark.BORG: "borg",
@@ -61,7 +60,9 @@ def show_monitor(request: HttpRequest, session_id: int) -> HttpResponse:
             {"slug": what.value, "label": capfirst(EVENTS[what]), "icon": icon}
             for what, icon in ICONS.items()
         ],
-        "borg": range(BORG_MAX + 1),
+        "borg": range(REMARK_RANGES[Remark.BORG][1] + 1),
+        "adaptations": ADAPTATIONS,
+        "severities": [(each.value, capfirst(each.label)) for each in FallSeverity],
         "levels": [
             (capfirst(ROBOT_LEVEL_LABELS[name]), share) for name, share in ROBOT_LEVELS.items()
         ],

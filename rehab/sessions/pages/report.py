@@ -8,7 +8,7 @@ from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from rehab.people.access import for_roles, user_of
-from rehab.people.roles import Role
+from rehab.people.roles import Role, may_see_names
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.report import report_context
@@ -25,7 +25,7 @@ def show_report(request: HttpRequest, session_id: int) -> HttpResponse:
     session = get_object_or_404(sessions, pk=session_id)
     context = {
         "session": session,
-        "by_name": user.role != Role.RESEARCHER,
+        "by_name": may_see_names(user.role),
         "began": clinic_time(session.began_at, session.clinic),
         "now": clinic_time(timezone.now(), session.clinic),
         "report": report_context(user, session),

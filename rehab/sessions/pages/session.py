@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import datetime
+
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
@@ -10,10 +12,12 @@ from django.utils.translation import gettext
 from django.views.decorators.http import require_http_methods, require_safe
 
 from rehab.people.access import for_roles, user_of
-from rehab.people.roles import Role
+from rehab.people.models import User
+from rehab.people.roles import Role, may_see_names
 from rehab.sessions.corrections import CorrectedField, can_correct, describe_corrections
 from rehab.sessions.formatting import clinic_time, format_day, format_state
 from rehab.sessions.forms.correction import CorrectionForm
+from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.review import review_session
 from rehab.sessions.reports.summary import format_phases, format_summary
@@ -33,7 +37,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
     summary = format_summary(session.to_plan(), review)
     corrections = describe_corrections(session, user)
     notes = (entry.new for entry in corrections if entry.row.field == CorrectedField.NOTE)
-    by_name = user.role != Role.RESEARCHER
+    by_name = may_see_names(user.role)
     start = clinic_time(session.began_at, session.clinic)
     now = clinic_time(timezone.now(), session.clinic)
     context = {
@@ -48,6 +52,7 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         "corrections": corrections,
         "note": next(notes, ""),
         "review": review,
+        "incidents": _list_incidents(user, session) if by_name else [],
         "figures": [
             summary.hit_rate,
             summary.score,
@@ -58,6 +63,12 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
         "phases": format_phases(review),
     }
     return render(request, "sessions/session.html", context)
+
+
+def _list_incidents(user: User, session: TrainingSession) -> list[tuple[RobotIncident, datetime]]:
+    """Return the incidents of a session's robot, without recordings, with their local times."""
+    rows = RobotIncident.objects.visible_to(user).filter(session=session).defer("recording")
+    return [(row, clinic_time(row.at, session.clinic)) for row in rows.order_by("pk")]
 
 
 @for_roles(Role.LEAD, Role.PT)

@@ -14,14 +14,17 @@ from rehab.feedback.clinic_valences import valences_of
 from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
+from rehab.sessions.forms.initial import initial_choices, protocol_minutes
 from rehab.sessions.forms.preset import save_preset
-from rehab.sessions.forms.session import SessionForm, initial_choices, protocol_minutes
+from rehab.sessions.forms.session import SessionForm
+from rehab.sessions.setup.answers import USUAL_ANSWERS
 from rehab.sessions.setup.presets import Preset
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.builtin import first_station
 
 # Where the person who set the session up may go next.
 NEXT_PAGES = ("walk", "monitor")
+_USUAL = tuple(USUAL_ANSWERS.items())
 
 
 @for_roles(Role.LEAD, Role.PT)
@@ -57,13 +60,32 @@ def set_up(request: HttpRequest, patient_id: int) -> HttpResponse:
     else:
         initial = initial_choices(patient, user) | (chosen.to_initial(user) if chosen else {})
         form = SessionForm(initial=initial, patient=patient, by=user)
+    measures = {row.pk: row.to_rule() for row in Measure.objects.visible_to(user)}
+    measure = form.chosen_measure
     protocols = Protocol.objects.visible_to(user).prefetch_related("phases")
-    lengths = {row.pk: protocol_minutes(row) for row in protocols}
+    targets = {
+        row.pk: {"minutes": protocol_minutes(row), "wanted_hits": row.wanted_hits}
+        for row in protocols
+    }
     context = {
         "patient": patient,
         "form": form,
         "valences": valences_of(patient.clinic_id).values(),
-        "lengths": lengths,
+        "targets": targets,
+        "measure": measure,
+        "goal_format": f"{measure.goal_places}u",
+        "measures": {
+            key: {
+                "unit": rule.unit,
+                "step": rule.goal_step,
+                "places": rule.goal_places,
+                "goal": f"{rule.offered_goal:.{rule.goal_places}f}",
+            }
+            for key, rule in measures.items()
+        },
+        "answers_changed": any(
+            form[name].value() != usual for name, usual in USUAL_ANSWERS.items()
+        ),
         "presets": presets,
         "preset": chosen,
         "preset_name": name,

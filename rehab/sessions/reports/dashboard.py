@@ -12,7 +12,7 @@ from django.utils.translation import gettext
 
 from rehab.people.access import clinic_of
 from rehab.people.models import Clinic, User
-from rehab.people.roles import Right, Role, rights_of
+from rehab.people.roles import Right, Role, may_see_names, rights_of
 from rehab.sessions.formatting import clinic_time, format_duration, format_rate, midnight_of
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.stations import StationStatus, find_live_session, station_statuses
@@ -82,7 +82,7 @@ def sessions_today(user: User, clinic: Clinic, now: datetime) -> list[SessionRow
     )
     listed = [*rows.filter(IS_OPEN), *rows.exclude(IS_OPEN)[:MAX_ENDED]]
     listed.sort(key=lambda row: STATE_ORDER.index(State(row.state)))
-    by_name = user.role != Role.RESEARCHER
+    by_name = may_see_names(user.role)
     return [
         SessionRow(
             session=row,
@@ -117,7 +117,7 @@ def find_alerts(
     """Yield the problems to solve: sessions left open, devices that cannot dial in."""
     for row in today:
         too_long = row.is_open and now - row.session.began_at > OPEN_TOO_LONG
-        if too_long and user.role != Role.RESEARCHER:
+        if too_long and may_see_names(user.role):
             message = gettext("The session of %(name)s is open since %(time)s. End it.")
             names = {"name": row.patient, "time": row.time}
             yield Alert(message % names, "monitor", row.session.pk)

@@ -6,6 +6,7 @@ from collections import defaultdict
 from dataclasses import replace
 from typing import Any
 
+from django.utils.text import capfirst
 from django.utils.translation import gettext as _
 from django.utils.translation import ngettext
 
@@ -16,8 +17,9 @@ from rehab.sessions.formatting import (
     format_number,
     format_quantity,
 )
-from rehab.sessions.log import Remark, RobotEntry, SessionEvent
+from rehab.sessions.log import EVENTS, FallSeverity, Remark, RobotEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.extras import mean_extras
 from rehab.sessions.reports.report_chart import draw_chart
 from rehab.sessions.reports.review import SessionReview, review_session
 from rehab.sessions.reports.summary import Figure, format_phases, format_summary
@@ -28,7 +30,8 @@ from rehab.training.plans import SessionPlan
 # What one page has room for; omitted entries are counted, and are on the session's own page.
 MAX_PHASES, MAX_GOALS, MAX_TIMES = 9, 6, 6
 ADVERSE = (Remark.FALL, Remark.NEAR_FALL, Remark.PAIN, Remark.DIZZINESS)
-REMARKS = {kind.value for kind in Remark}
+ABOUT_A_FALL = (Remark.FALL_SEVERITY, Remark.FALL_WITHDRAWN)  # said with the fall, not beside it
+REMARKS = {kind.value for kind in Remark} - {kind.value for kind in ABOUT_A_FALL}
 
 
 def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
@@ -43,6 +46,7 @@ def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
         "phases": phases[:MAX_PHASES],
         "more_phases": max(0, len(phases) - MAX_PHASES),
         "remarks": _summarize_remarks(review.rows, session),
+        "extras": mean_extras(user, session),
         "robot": _describe_robot(review.rows),
         "chart": draw_chart(review.chart),
         "unit": plan.measure.unit,
@@ -99,29 +103,34 @@ def _describe_goals(plan: SessionPlan, review: SessionReview) -> list[str]:
 def _summarize_remarks(
     events: list[SessionEvent], session: TrainingSession
 ) -> list[dict[str, Any]]:
-    """Return each kind of remark with its times, adverse ones first; Borg with its values."""
+    """Return each kind of remark with its times, adverse ones first; Borg with its values, falls
+    with how badly they hurt. A fall that was withdrawn was none.
+    """
     times: defaultdict[Remark, list[str]] = defaultdict(list)
     for event in events:
-        if event.kind in REMARKS:
+        falls = times[Remark.FALL]
+        if event.kind == Remark.FALL_WITHDRAWN and falls:
+            falls.pop()
+        elif event.kind == Remark.FALL_SEVERITY and falls:
+            hurt = FallSeverity(int(event.value or 0)).label
+            falls[-1] = f"{falls[-1].partition(' ')[0]} ({hurt})"
+        elif event.kind in REMARKS:
             text = f"{clinic_time(event.at, session.clinic):%H:%M}"
             if event.kind == Remark.BORG:
                 text = f"{format_number(event.value, 0)} ({text})"
             times[Remark(event.kind)].append(text)
-    order = sorted(times, key=lambda kind: (kind not in ADVERSE, list(Remark).index(kind)))
+    order = sorted(
+        filter(times.get, times), key=lambda kind: (kind not in ADVERSE, list(Remark).index(kind))
+    )
     return [
         {
-            "name": _("Exertion (Borg)") if kind == Remark.BORG else _(remark_label(kind)),
+            "name": _("Exertion (Borg)") if kind == Remark.BORG else capfirst(EVENTS[kind]),
             "count": 0 if kind == Remark.BORG else len(times[kind]),
             "times": _join(times[kind]),
             "adverse": kind in ADVERSE,
         }
         for kind in order
     ]
-
-
-def remark_label(kind: Remark) -> str:
-    """Return the label of a remark, the same as on its button."""
-    return kind.value.replace("_", " ").capitalize()
 
 
 def _join(entries: list[str]) -> str:
@@ -145,7 +154,7 @@ def _describe_robot(events: list[SessionEvent]) -> str:
     parts = [ngettext("%(count)s gesture", "%(count)s gestures", count) % {"count": count}]
     if windows:
         above = sum(bool(row.data.get("above")) for row in kinds[RobotEntry.DECISION])
-        text = _("%(above)s of %(count)s windows of five seconds at or above its threshold")
+        text = _("%(above)s of %(count)s decisions at or above its threshold")
         parts.append(text % {"above": above, "count": windows})
     if stops:
         parts.append(ngettext("stopped once", "stopped %(count)s times", stops) % {"count": stops})

@@ -17,7 +17,7 @@ from rehab.sessions.formatting import (
     clinic_time,
     format_number,
 )
-from rehab.sessions.log import Remark, RobotEntry, SessionEvent, Step
+from rehab.sessions.log import FallSeverity, Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import fold_log
 from rehab.sessions.reports.trend import metrics_by_session
@@ -101,6 +101,8 @@ def describe_event(event: SessionEvent, plan: SessionPlan) -> str:
     if control is not None:
         old, value = event.data.get("old", event.old), event.data.get("value", event.value)
         return describe_change(control, old, value, plan)
+    if event.kind == Remark.FALL_SEVERITY:
+        return str(FallSeverity(int(event.value or 0)).label).capitalize()
     label = str(EVENT_LABELS.get(event.kind) or event.get_kind_display().capitalize())  # type: ignore[call-overload]
     return f"{label} {format_number(event.value, 0)}" if event.kind == Remark.BORG else label
 

@@ -20,8 +20,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import user_of
 from rehab.people.models import Patient, User
-from rehab.people.roles import Role
-from rehab.sessions.forms.session import NumberField
+from rehab.people.roles import may_see_names
+from rehab.sessions.forms.answers import NumberField
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Station
 
@@ -58,7 +58,7 @@ class SessionSearchForm(forms.Form):
             for end in ("min", "max"):
                 fields[f"{name}_{end}"].widget = forms.TextInput(attrs={"inputmode": "decimal"})
         fields["place"].queryset = Station.objects.visible_to(by)
-        if by.role == Role.RESEARCHER:
+        if not may_see_names(by.role):
             del fields["place"]
             walkers = TrainingSession.objects.visible_to(by).order_by("patient__pseudonym")
             names = walkers.values_list("patient__pseudonym", flat=True).distinct()

@@ -63,7 +63,7 @@ def summarize_for_patient(
         "steps": format_number(steps.filter(side=F("session__trained_side")).count(), 0),
         "bars": _mean_bars(points, now),
         "development": _describe_change(points),
-        "last_hits": _out_of_ten(points[-1].hit_rate) if points else None,
+        "last_hits": _out_of_ten(points[-1].hit_rate or 0.0) if points else None,
         "best_hits": _out_of_ten(best["rate"]),
         "streak": format_number(best["streak"], 0) if best["streak"] else "",
         "measure": last.measure if last else None,

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from django.db.models import Avg, Count, F, OuterRef, QuerySet, Subquery
+from django.db.models import Avg, Count, Exists, F, OuterRef, Q, QuerySet, Subquery
+from django.utils.translation import gettext
 
 from rehab.people.models import User
 from rehab.sessions.formatting import (
@@ -48,10 +49,14 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class TrendPoint:
-    """A session of the trend, with the values of its feedback phases and of its baseline."""
+    """A session of the trend, with the values of its feedback phases and of its baseline.
+
+    An imported session has its points and no hit rate.
+    """
 
     session: TrainingSession
-    hit_rate: float
+    hit_rate: float | None
+    score: float | None
     target_hit_rate: float | None
     with_feedback: Spread | None
     baseline: Spread | None
@@ -87,9 +92,16 @@ def with_metrics(user: Any, sessions: QuerySet[TrainingSession]) -> QuerySet[Tra
     )
 
 
-def load_trend(user: User, sessions: QuerySet[TrainingSession]) -> list[TrendPoint]:
-    """Return the newest of these sessions that have a hit rate, oldest first."""
-    counted = sessions.filter(metrics__slug="hit_rate", excluded=False)
+def load_trend(
+    user: User, sessions: QuerySet[TrainingSession], *, with_imported: bool = False
+) -> list[TrendPoint]:
+    """Return the newest of these sessions that have a hit rate, oldest first.
+
+    ``with_imported``: also those from the original GARRY, which have points alone.
+    """
+    rate = SessionMetric.objects.visible_to(user).filter(session=OuterRef("pk"), slug="hit_rate")
+    wanted = Exists(rate) | Q(legacy_id__isnull=False) if with_imported else Q(Exists(rate))
+    counted = sessions.filter(wanted, excluded=False)
     ended = counted.select_related("measure")
     newest = list(ended.order_by("-created_at", "-pk")[:SESSIONS])[::-1]
     figures, values = metrics_by_session(user, newest), _values_by_phase(user, newest)
@@ -99,7 +111,8 @@ def load_trend(user: User, sessions: QuerySet[TrainingSession]) -> list[TrendPoi
         points.append(
             TrendPoint(
                 session=session,
-                hit_rate=figures[session.pk]["hit_rate"],
+                hit_rate=figures[session.pk].get("hit_rate"),
+                score=figures[session.pk].get("score"),
                 target_hit_rate=plan.target.hit_rate,
                 with_feedback=_pool(parts, plan.phases, lambda phase: phase.feedback),
                 baseline=_pool(parts, plan.phases, lambda phase: phase.kind == "baseline"),
@@ -137,7 +150,7 @@ def summarize_trend(
     groups: list[dict[str, Any]], trend: list[TrendPoint], *, simulated: bool
 ) -> dict[str, Any]:
     """Return the figures above the charts."""
-    last = trend[-1] if trend else None
+    last = next((point for point in reversed(trend) if point.hit_rate is not None), None)
     counted = [group for group in groups if group["simulated"] == simulated]
     change = last.change if last else None
     means = ""
@@ -174,13 +187,18 @@ def trend_chart_data(trend: list[TrendPoint], now: datetime) -> dict[str, Any]:
     def day(point: TrendPoint) -> str:
         start = starts[point.session.pk]
         label = format_day(start.date(), now.date()).capitalize()
-        return f"{label} {start:%H:%M}" if per_day[start.date()] > 1 else label
+        label = f"{label} {start:%H:%M}" if per_day[start.date()] > 1 else label
+        is_imported = point.session.legacy_id is not None
+        return f"{label} · {gettext('imported')}" if is_imported else label
 
     comparable = [point for point in trend if point.session.measure == measure]
     return {
         "hits": {
             "days": [day(point) for point in trend],
-            "hit": [round(100 * point.hit_rate, 1) for point in trend],
+            "hit": [
+                None if point.hit_rate is None else round(100 * point.hit_rate, 1)
+                for point in trend
+            ],
             "wanted": [
                 point.target_hit_rate and round(100 * point.target_hit_rate, 1) for point in trend
             ],

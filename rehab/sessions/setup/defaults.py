@@ -5,7 +5,8 @@ They are stored in English and translated by the pages.
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import asdict
+from typing import Any, NamedTuple
 
 from django.db import transaction
 from django.utils.translation import gettext_noop
@@ -18,31 +19,73 @@ def _catch(strides: int = 12) -> Phase:
     return make_phase("catch", strides=strides)
 
 
-# The lab's sessions 2 and 3 (docs/reference/gait.md#protocol): a baseline of about a minute,
-# training at full display, then ever longer blocks shown at 85 % with catch blocks between them,
-# ten minutes of washout.
-LAB_PROTOCOL: tuple[Phase, ...] = (
+def _training(percent: int, seconds: float) -> Phase:
+    """Return a block that shows so many percent of the real push: the hidden decrement."""
+    return make_phase(
+        "training", TRAINING_NAMES[percent], gain=round(percent / 100, 2), seconds=seconds
+    )
+
+
+TRAINING_NAMES = {
+    100: gettext_noop("Training 100 %"),
+    95: gettext_noop("Training 95 %"),
+    90: gettext_noop("Training 90 %"),
+    85: gettext_noop("Training 85 %"),
+}
+
+# The lab's thirty minutes (docs/reference/gait.md#protocol): a baseline of about a minute, training
+# at full display, then ever longer blocks shown at 85 % with catch blocks between them, ten minutes
+# of washout. The first visit begins with a try of the feedback, and comes to 85 % by steps. Seconds
+# are those of the sessions 1 and 2 of HEBB_03 with the pauses of 3 to 5 s between their trials,
+# which count as walked; so both recordings have these phases, stride by stride.
+FIRST_VISIT: tuple[Phase, ...] = (
     make_phase("baseline", strides=54),
-    make_phase("training", gettext_noop("Training 100 %"), seconds=57),
+    _catch(34),
+    make_phase("familiarization", strides=30),
+    _catch(7),
+    _training(100, 60),
+    _catch(),
+    _training(95, 60),
+    _catch(),
+    _training(90, 121),
+    _catch(),
+    _training(85, 121),
+    _catch(),
+    _training(85, 183),
+    _catch(13),
+    _training(85, 242),
+    _catch(13),
+    _training(85, 182),
+    make_phase("washout", seconds=610),
+)
+LATER_VISIT: tuple[Phase, ...] = (
+    make_phase("baseline", strides=55),
+    _training(100, 61),
     *(
         phase
-        for seconds in (57, 117, 117, 179, 239, 179)
-        for phase in (
-            _catch(),
-            make_phase("training", gettext_noop("Training 85 %"), gain=0.85, seconds=seconds),
-        )
+        for seconds in (61, 121, 121, 182, 243, 183)
+        for phase in (_catch(), _training(85, seconds))
     ),
-    make_phase("washout", seconds=605),
+    make_phase("washout", seconds=608),
 )
 
-PROTOCOLS: dict[str, tuple[str, tuple[Phase, ...]]] = {
-    gettext_noop("Training only"): (
+
+class Template(NamedTuple):
+    """A shared protocol: its description, its phases, and the share of hits it asks for [%]."""
+
+    description: str
+    phases: tuple[Phase, ...]
+    wanted_hits: int | None = None
+
+
+PROTOCOLS: dict[str, Template] = {
+    gettext_noop("Training only"): Template(
         gettext_noop(
             "Feedback from the first step until the therapist ends the session. Needs a goal value."
         ),
         (make_phase("training"),),
     ),
-    gettext_noop("Baseline, training, washout"): (
+    gettext_noop("Baseline, training, washout"): Template(
         gettext_noop(
             "A minute without feedback sets the goal; ten minutes of training; two minutes without."
         ),
@@ -52,12 +95,33 @@ PROTOCOLS: dict[str, tuple[str, tuple[Phase, ...]]] = {
             make_phase("washout", seconds=120),
         ),
     ),
-    gettext_noop("Thirty minutes with catch blocks"): (
+    # The paper's example of a goal for a session (docs/reference/original.md#goal-of-a-session).
+    gettext_noop("Ten minutes at 60 %"): Template(
+        gettext_noop(
+            "Ten minutes of feedback, in which six steps of ten should hit. Needs a goal value."
+        ),
+        (make_phase("training", seconds=600),),
+        wanted_hits=60,
+    ),
+    gettext_noop("Thirty minutes with catch blocks"): Template(
         gettext_noop(
             "A laboratory protocol: the display shows 85 % of the real push, so that the goal asks "
             "for 118 % of the baseline; short blocks without feedback in between; a long washout."
         ),
-        LAB_PROTOCOL,
+        LATER_VISIT,
+    ),
+    gettext_noop("Thirty minutes with catch blocks, first visit"): Template(
+        gettext_noop(
+            "The same for somebody who has never had feedback: a try, then 100, 95, 90 and 85 %."
+        ),
+        FIRST_VISIT,
+    ),
+    gettext_noop("Retention visit"): Template(
+        gettext_noop(
+            "Two minutes without feedback show what has stayed, two with it how fast it comes "
+            "back. Needs a goal value, that of the last visit."
+        ),
+        (make_phase("retention", seconds=120), make_phase("training", seconds=120)),
     ),
 }
 
@@ -70,19 +134,12 @@ def install_defaults(using: str = "default", **_signal: Any) -> None:
         Measure.everywhere.using(using).get_or_create(
             clinic=None,
             slug=A2.slug,
-            defaults={
-                "name": A2.name,
-                "unit": A2.unit,
-                "higher_is_better": A2.higher_is_better,
-                "value_min": A2.value_min,
-                "value_max": A2.value_max,
-                "goal_min": A2.goal_min,
-                "goal_max": A2.goal_max,
-            },
+            defaults={name: value for name, value in asdict(A2).items() if name != "slug"},
         )
-        for name, (description, phases) in PROTOCOLS.items():
+        for name, template in PROTOCOLS.items():
+            about = {"description": template.description, "wanted_hits": template.wanted_hits}
             protocol, is_new = Protocol.everywhere.using(using).get_or_create(
-                clinic=None, name=name, defaults={"description": description}
+                clinic=None, name=name, defaults=about
             )
             if is_new:
                 ProtocolPhase.everywhere.using(using).bulk_create(
@@ -95,6 +152,9 @@ def install_defaults(using: str = "default", **_signal: Any) -> None:
                         gain=phase.gain,
                         strides=phase.strides,
                         seconds=phase.seconds,
+                        goal_percent=phase.goal_percent,
+                        robot=phase.robot,
+                        rest_s=phase.rest_s,
                     )
-                    for position, phase in enumerate(phases, start=1)
+                    for position, phase in enumerate(template.phases, start=1)
                 )

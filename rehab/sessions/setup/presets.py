@@ -20,13 +20,24 @@ from rehab.sessions.formatting import (
     format_quantity,
     format_rate,
 )
+from rehab.sessions.setup.answers import (
+    ADAPTATIONS,
+    CUE_RULES,
+    SCHEDULES,
+    USUAL_ANSWERS,
+    read_adaptation,
+    read_cue_timing,
+    read_schedule,
+)
 from rehab.sessions.setup.gestures import DEFAULT_GESTURE, known_gesture_choices
-from rehab.sessions.setup.protocols import Protocol
+from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.sessions.setup.sources import LIVE
 from rehab.sources.synthetic import PROFILES
+from rehab.training.cueing import COUNT_MAX, REST_MAX_S, WINDOW_MAX_S, WINDOW_MIN_S
 from rehab.training.goals import GoalRule, Target
-from rehab.training.measures import A2, InvalidSetting
+from rehab.training.measures import InvalidSetting
 from rehab.training.plans import ROBOT_LEVELS, SessionPlan
+from rehab.training.schedules import INTERVAL_MAX
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES, find_valence
 
@@ -45,13 +56,16 @@ class Preset(ClinicModel):
     valence = models.CharField(
         _("feedback type"), max_length=16, choices=[(v.slug, _(v.label)) for v in VALENCES.values()]
     )
+    measure = models.ForeignKey(
+        Measure, on_delete=models.CASCADE, related_name="presets", verbose_name=_("measure")
+    )
     goal_by = models.CharField(
         _("goal is given as"),
         max_length=8,
-        choices=[("value", A2.unit), ("percent", _("% of baseline"))],
+        choices=[("value", _("value")), ("percent", _("% of baseline"))],
         default="value",
     )
-    goal_value = models.FloatField(_("goal, W/kg"), null=True, blank=True)
+    goal_value = models.FloatField(_("goal, in the measure's unit"), null=True, blank=True)
     goal_percent = models.FloatField(_("goal, % of baseline"), null=True, blank=True)
     wanted_hits = models.PositiveSmallIntegerField(
         _("wanted hits, % of the steps"),
@@ -74,12 +88,48 @@ class Preset(ClinicModel):
         choices=[(level, capfirst(ROBOT_LEVEL_LABELS[level])) for level in ROBOT_LEVELS],
         default="normal",
     )
-    robot_above = models.CharField(
-        _("after five strong seconds"), max_length=64, default=DEFAULT_GESTURE
+    robot_above = models.CharField(_("after strong steps"), max_length=64, default=DEFAULT_GESTURE)
+    robot_below = models.CharField(_("after weak steps"), max_length=64, default=DEFAULT_GESTURE)
+    robot_threshold = models.PositiveSmallIntegerField(
+        _("robot acts from, % of the goal"),
+        default=USUAL_ANSWERS["robot_threshold"],
+        validators=[MinValueValidator(1), MaxValueValidator(200)],
     )
-    robot_below = models.CharField(
-        _("after five weak seconds"), max_length=64, default=DEFAULT_GESTURE
+    robot_answers = models.CharField(
+        _("robot answers"), max_length=16, choices=CUE_RULES, default=USUAL_ANSWERS["robot_answers"]
     )
+    robot_window = models.FloatField(
+        _("robot’s window, in seconds"),
+        default=USUAL_ANSWERS["robot_window"],
+        validators=[MinValueValidator(WINDOW_MIN_S), MaxValueValidator(WINDOW_MAX_S)],
+    )
+    robot_count = models.PositiveSmallIntegerField(
+        _("steps that the robot answers"),
+        default=USUAL_ANSWERS["robot_count"],
+        validators=[MinValueValidator(1), MaxValueValidator(COUNT_MAX)],
+    )
+    robot_rest = models.FloatField(
+        _("robot’s rest, in seconds"),
+        default=USUAL_ANSWERS["robot_rest"],
+        validators=[MinValueValidator(0), MaxValueValidator(REST_MAX_S)],
+    )
+    schedule = models.CharField(
+        _("feedback comes"), max_length=16, choices=SCHEDULES, default=USUAL_ANSWERS["schedule"]
+    )
+    schedule_steps = models.PositiveSmallIntegerField(
+        _("steps between feedback"),
+        default=USUAL_ANSWERS["schedule_steps"],
+        validators=[MinValueValidator(1), MaxValueValidator(INTERVAL_MAX)],
+    )
+    schedule_band = models.PositiveSmallIntegerField(
+        _("band without feedback, ± % of the goal"),
+        default=USUAL_ANSWERS["schedule_band"],
+        validators=[MinValueValidator(1), MaxValueValidator(50)],
+    )
+    goal_follows = models.CharField(
+        _("the goal"), max_length=16, choices=ADAPTATIONS, default=USUAL_ANSWERS["goal_follows"]
+    )
+    goal_asks = models.BooleanField(_("ask before the baseline’s goal counts"), default=False)
     source = models.CharField(
         _("steps come from"),
         max_length=64,
@@ -108,13 +158,17 @@ class Preset(ClinicModel):
 
     def clean(self) -> None:
         """Refuse what could not be walked, with the rules' own message."""
-        protocol = getattr(self, "protocol", None)
-        if protocol is None or self.valence not in VALENCES or self.robot not in ROBOT_LEVELS:
+        protocol, measure = getattr(self, "protocol", None), getattr(self, "measure", None)
+        if protocol is None or measure is None:
             return  # the field itself has the error
-        by_value = self.goal_by == "value"
+        if self.valence not in VALENCES or self.robot not in ROBOT_LEVELS:
+            return  # the field itself has the error
+        by_value, answers = self.goal_by == "value", self.answers
+        if None in answers.values():
+            return  # the field itself has the error
         try:
             SessionPlan(
-                measure=A2,
+                measure=measure.to_rule(),
                 valence=find_valence(self.valence),
                 phases=protocol.to_rules(),
                 trained_side=Side.LEFT,
@@ -123,9 +177,18 @@ class Preset(ClinicModel):
                 ),
                 target=Target(self.wanted_hits / 100 if self.wanted_hits else None),
                 robot_intensity=ROBOT_LEVELS[self.robot],
+                activation_threshold=self.robot_threshold / 100,
+                cue_timing=read_cue_timing(answers),
+                schedule=read_schedule(answers),
+                adaptation=read_adaptation(answers),
             )
         except InvalidSetting as problem:
             raise ValidationError(format_refusal(problem)) from problem
+
+    @property
+    def answers(self) -> dict[str, Any]:
+        """When robot and page answer, and whether the goal follows."""
+        return {name: getattr(self, name) for name in USUAL_ANSWERS}
 
     @property
     def summary(self) -> str:
@@ -138,7 +201,7 @@ class Preset(ClinicModel):
     def goal_label(self) -> str:
         """The goal as text."""
         if self.goal_by == "value":
-            return format_quantity(self.goal_value, A2.unit)
+            return format_quantity(self.goal_value, self.measure.unit)
         share = format_rate(self.goal_percent / 100 if self.goal_percent else None)
         return gettext("%(share)s of baseline") % {"share": share}
 
@@ -152,6 +215,7 @@ class Preset(ClinicModel):
         known = known_gesture_choices(by)
         initial: dict[str, Any] = {
             "valence": self.valence,
+            "measure": self.measure,
             "goal_by": self.goal_by,
             "wanted_hits": self.wanted_hits,
             "minutes": self.minutes,
@@ -160,6 +224,7 @@ class Preset(ClinicModel):
             "robot_above": self.robot_above if self.robot_above in known else DEFAULT_GESTURE,
             "robot_below": self.robot_below if self.robot_below in known else DEFAULT_GESTURE,
         }
+        initial |= self.answers
         goal = {"goal_value": self.goal_value, "goal_percent": self.goal_percent}
         initial |= {name: value for name, value in goal.items() if value is not None}
         return initial | ({"source": self.source} if self.source else {})

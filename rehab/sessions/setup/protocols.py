@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from django.core.exceptions import ValidationError
+from django.core.validators import MaxValueValidator, MinValueValidator, RegexValidator
 from django.db import models
 from django.db.models import F, Q
 from django.utils.translation import gettext
@@ -15,6 +16,7 @@ from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.web.refusals import format_refusal
 from rehab.training import measures as rules
 from rehab.training.phases import PHASE_KINDS, Phase
+from robot.wire.frames import NAME
 
 
 def display_name(row: Measure | Protocol) -> str:
@@ -43,6 +45,26 @@ class Measure(ClinicModel):
     value_max = models.FloatField(_("value max"), help_text=_("Largest value that can be real."))
     goal_min = models.FloatField(_("goal min"), help_text=_("A goal lies above this."))
     goal_max = models.FloatField(_("goal max"), help_text=_("A goal lies at or below this."))
+    first_goal = models.FloatField(
+        _("first goal"),
+        null=True,
+        blank=True,
+        help_text=_("Offered where a patient has no goal yet; the middle where left empty."),
+    )
+    channel = models.CharField(
+        _("channel"),
+        max_length=64,
+        blank=True,
+        validators=[
+            RegexValidator(
+                rf"^{NAME.pattern}\Z", _("Only letters, digits and . _ : - as sources send it.")
+            )
+        ],
+        help_text=_(
+            "Name of the extra value in the source's steps that holds it. Left empty, it is the "
+            "value of the step itself."
+        ),
+    )
 
     class Meta(ClinicModel.Meta):
         verbose_name = _("measure")
@@ -78,7 +100,18 @@ class Measure(ClinicModel):
             goal_min=self.goal_min,
             goal_max=self.goal_max,
             higher_is_better=self.higher_is_better,
+            channel=self.channel,
+            first_goal=self.first_goal,
         )
+
+    def clean(self) -> None:
+        """Refuse what the rules refuse, with their message."""
+        if None in (self.value_min, self.value_max, self.goal_min, self.goal_max):
+            return  # the field itself has the error
+        try:
+            self.to_rule()
+        except rules.InvalidSetting as problem:
+            raise ValidationError(format_refusal(problem)) from problem
 
 
 class Protocol(ClinicModel):
@@ -96,6 +129,13 @@ class Protocol(ClinicModel):
     )
     name = models.CharField(_("name"), max_length=64)
     description = models.TextField(_("description"), blank=True)
+    wanted_hits = models.PositiveSmallIntegerField(
+        _("wanted hits, % of the steps"),
+        null=True,
+        blank=True,
+        validators=[MinValueValidator(1), MaxValueValidator(100)],
+        help_text=_("Filled in where a session is set up with it; left empty, it stays."),
+    )
 
     class Meta(ClinicModel.Meta):
         verbose_name = _("protocol")
@@ -148,6 +188,18 @@ class ProtocolPhase(ScopedModel):
     seconds = models.FloatField(
         _("seconds"), null=True, blank=True, help_text=_("Ends after so many seconds.")
     )
+    goal_percent = models.FloatField(
+        _("goal"),
+        null=True,
+        blank=True,
+        help_text=_("Goal from here on, % of baseline; left empty, it stays."),
+    )
+    robot = models.BooleanField(
+        _("robot"), default=True, help_text=_("Whether the robot answers in this phase.")
+    )
+    rest_s = models.FloatField(
+        _("rest"), null=True, blank=True, help_text=_("Pause after it, seconds; you end it.")
+    )
 
     class Meta(ScopedModel.Meta):
         verbose_name = _("protocol phase")
@@ -171,6 +223,9 @@ class ProtocolPhase(ScopedModel):
             gain=self.gain,
             strides=self.strides,
             seconds=self.seconds,
+            goal_percent=self.goal_percent,
+            robot=self.robot,
+            rest_s=self.rest_s,
         )
 
     def clean(self) -> None:

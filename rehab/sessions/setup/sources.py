@@ -9,6 +9,7 @@ from django.conf import settings
 
 from rehab.people.models import Patient
 from rehab.sessions.formatting import RECORDING_PREFIX, SIMULATED_PREFIX
+from rehab.sessions.setup.recordings import recordings_folder
 from rehab.sources.recording.source import holds_signals
 from rehab.sources.synthetic import PROFILES
 
@@ -17,7 +18,7 @@ LIVE = "live"
 
 def list_recordings() -> list[Path]:
     """Return the recordings on this machine; none on a hosted server, where they have no clinic."""
-    folder: Path = settings.DATA_DIR / "recordings"
+    folder = recordings_folder()
     return [] if settings.HOSTED or not folder.is_dir() else sorted(folder.glob("*.csv"))
 
 
@@ -39,7 +40,7 @@ def build_source_args(kind: str, name: str, patient: Patient) -> list[str]:
         case "synthetic":
             return ["synthetic", "--profile", name, "--seed", str(secrets.randbelow(2**31))]
         case "recording":
-            file = settings.DATA_DIR / "recordings" / name
+            file = recordings_folder() / name
             mass = ["--mass", str(patient.body_mass_kg)] if holds_signals(file) else []
             return ["recording", str(file), *mass]
     return []

@@ -130,6 +130,7 @@ class SourceClient:
             "run": self.run_id,
             "last": self._queue.last,
             "speed": self._feed.speed,
+            "clock_pauses": self._feed.clock_pauses,
         }
         if self._feed.clock_s is not None:
             # A stopped clock would make all later strides look late.

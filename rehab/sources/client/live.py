@@ -35,6 +35,7 @@ class LiveFeed:
     """
 
     speed = 1.0
+    clock_pauses = False  # a sensor's runs on while the session is paused
 
     def __init__(self, monotonic: Callable[[], float] = time.monotonic) -> None:
         self.phase = make_phase("training")

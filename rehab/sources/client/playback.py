@@ -43,6 +43,8 @@ class StridePlayback:
         The phase in which the next stride is walked.
     """
 
+    clock_pauses = True  # with the session
+
     def __init__(
         self,
         open_walk: Callable[[Side], NextStride],

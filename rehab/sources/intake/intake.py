@@ -9,9 +9,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from rehab.gait import Stride
+from rehab.gait.recordings.columns import Column
 from rehab.gait.selfcheck.cures import CURES
 from rehab.sources.client import LiveFeed
-from rehab.sources.intake.alignment import Alignment, Channel, Floats
+from rehab.sources.intake.alignment import Alignment, Channel, Floats, Samples
 from rehab.sources.intake.measurements import to_measurement
 from rehab.sources.intake.pipeline import SignalPipeline
 from rehab.sources.intake.quality import SignalQuality
@@ -67,7 +68,7 @@ class Intake:
         self._pipeline: SignalPipeline | None = None
         self._recorder = SignalRecorder(settings.keep, notify) if settings.keep else None
         self._columns = {
-            column.name: ((side, channel), column.factor)
+            column.name: ((side, channel), column)
             for side, leg in settings.columns.legs.items()
             for channel, column in leg.items()
         }
@@ -224,11 +225,25 @@ class Intake:
         known = [place for place, name in enumerate(names) if name in self._columns]
         values: dict[Channel, Floats] = {}
         for place in known:
-            channel, factor = self._columns[names[place]]
-            values[channel] = table[:, place] * factor
+            channel, column = self._columns[names[place]]
+            values[channel] = table[:, place] * column.factor
         sent = np.ones((len(t_s), len(known))) if there is None else there[:, known]
-        for samples in self._alignment.add(t_s, values, sent, self._monotonic()):
+        for samples in self._align(t_s, values, sent, [self._columns[names[p]][1] for p in known]):
             self._measure(*samples)
+
+    def _align(
+        self, t_s: Floats, values: dict[Channel, Floats], sent: Floats, columns: Sequence[Column]
+    ) -> list[Samples]:
+        """Return the samples that are complete; a channel that is known to be late is put back."""
+        delays_s = [column.delay_s for column in columns]
+        complete: list[Samples] = []
+        for delay_s in dict.fromkeys(delays_s):
+            own = [place for place, one in enumerate(delays_s) if one == delay_s]
+            part = {c: v for p, (c, v) in enumerate(values.items()) if p in own}
+            complete += self._alignment.add(
+                t_s - delay_s if delay_s else t_s, part, sent[:, own], self._monotonic()
+            )
+        return complete
 
     @property
     def forces(self) -> set[str]:

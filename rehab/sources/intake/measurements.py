@@ -14,6 +14,7 @@ EXTRA = (
     *("first_double_support_s", "second_double_support_s"),
     *("step_length_m", "step_symmetry", "propulsion_n_kg"),
     *("force_peak_n_kg", "moment_peak_nm_kg", "a2_moment_nm_kg", "a2_velocity_rad_s"),
+    "a2_sd_w_kg",
     *("weight_ratio", "offset_n"),
 )
 

@@ -14,7 +14,8 @@ from rehab.gait import (
     check_signals,
 )
 from rehab.gait.recordings.columns import REQUIRED, SIDES
-from rehab.gait.settings import RATE_MIN_HZ, check_rate
+from rehab.gait.settings import check_rate
+from rehab.gait.signals.clock import estimate_rate
 from rehab.sources.intake.alignment import Channel, Floats, Samples
 from rehab.sources.reporting import Notify
 
@@ -134,27 +135,6 @@ class SignalPipeline:
             return self._detector.feed(t_s, *(_leg(values, side, t_s) for side in SIDES))
         assert self._detector is not None  # noqa: S101 (set by _begin)
         return self._detector.feed(t_s, *_leg(values, self._sides[0], t_s))
-
-
-def estimate_rate(t_s: Floats) -> float:
-    """Return the rate of samples [Hz] by their times, gaps excluded. Raises GaitInputError."""
-    steps = np.diff(t_s)
-    steps = steps[steps > 0]
-    if not len(steps):
-        raise GaitInputError("The times of the samples do not go on.")
-    usual_s = float(np.sort(steps)[len(steps) // 2])  # an actual step, not a mean of two
-    usual = steps[np.abs(steps - usual_s) < 0.5 * usual_s]
-    if len(usual) <= len(steps) / 2:
-        raise GaitInputError("The times of the samples tell no rate. Give it with --rate.")
-    # Their mean, in which jitter cancels out: an error of the rate is one of A2.
-    rate_hz = float(1 / usual.mean())
-    if rate_hz < RATE_MIN_HZ / 100:
-        raise GaitInputError(
-            f"Samples lie {1 / rate_hz:g} s apart by their own times: milliseconds? Send seconds, "
-            "or map the time with a factor (--columns time=t*0.001 …)."
-        )
-    whole_hz = float(round(rate_hz)) or 1.0
-    return whole_hz if abs(rate_hz / whole_hz - 1) < 0.001 else rate_hz
 
 
 def _values(values: dict[Channel, Floats], channel: Channel, count: int) -> Floats:

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rehab.gait import check_signals, measure_both_legs, measure_strides
-from rehab.gait.recordings.csv_files import estimate_rate, read_mass, read_signals
+from rehab.gait.recordings.csv_files import read_mass
+from rehab.gait.recordings.tables import read_signals
+from rehab.gait.signals.clock import estimate_rate
 from rehab.sources.intake.measurements import to_measurement
 from rehab.sources.recording.table import RecordingError
 from rehab.training.steps import Measurement, Side
@@ -29,7 +31,7 @@ def measure_file(
         t_s, legs = read_signals(path, columns)
     except OSError as problem:
         raise RecordingError(f"{path} cannot be read: {problem.strerror}.") from None
-    rate_hz = estimate_rate(t_s, path) if rate_hz is None else rate_hz
+    rate_hz = estimate_rate(t_s) if rate_hz is None else rate_hz
     mass_kg = read_mass(path) if mass_kg is None else mass_kg
     if len(legs) == 2:
         found = measure_both_legs(

@@ -27,8 +27,17 @@ class WalkerProfile:
         and 1.06 with few misses; the same before and after training).
     exploration_level, exploration_strides
         Mean and length of the unsuccessful search: feedback strides, familiarization included.
-    trained_level, learning_strides
-        What ``1 - exp(-n / learning_strides)`` then leads up to.
+    trained_level, trained_gain, learning_strides
+        Where ``1 - exp(-n / learning_strides)`` then leads to, if the baseline is the goal and the
+        display shows ``trained_gain`` of the value. What is shown drives it: another gain or goal
+        leads in proportion to another level, as the same share of hits is sought (85 % shown:
+        1.50 of the baseline, 1.275 of the goal).
+    plateau_sd, capacity
+        Sd of that level between walkers, as a ratio to it; and the highest one that anybody
+        reaches, however little is shown, in the same unit.
+    unlearning, discouragement
+        How fast a level that is not asked for any more is left, by how fast one is learned; and by
+        which share of the way walkers give up who never hit (both assumed).
     fatigue_per_100_strides, recovery
         Decrease of the level within a trial, and the share of it that a pause restores.
     after_effect, after_effect_strides
@@ -42,6 +51,14 @@ class WalkerProfile:
         Probability that a bad stride is multiplied by a factor from this range.
     stride_s, trained_stride_s, stride_sd_s
         Stride time without and with feedback, and its sd [s].
+    pace_memory, pace_shares
+        Lag-1 coefficients of what stride time remembers, and the shares of its variance that they
+        have; the rest is white. Together: lag-1 0.47, DFA 0.86 (recorded: 0.35 to 0.60, 0.79 to
+        0.94).
+    pace_coupling
+        Correlation of a stride's noise with its stride time (recorded: -0.39, -0.22, +0.03).
+    p_slip, slip_min, slip_max
+        Probability that a foot slips, and the range of what is left of its push-off.
     """
 
     baseline_w_kg: float = 3.9
@@ -51,11 +68,16 @@ class WalkerProfile:
     slow_sd: float = 0.06
     calm_slow_sd: float = 0.027
     slow_phi: float = 0.97
-    familiarization_level: float = 1.145
+    familiarization_level: float = 1.16
     catch_level: float = 1.08
     exploration_level: float = 0.95
-    exploration_strides: int = 150
+    exploration_strides: int = 140
     trained_level: float = 1.50
+    trained_gain: float = 0.85
+    plateau_sd: float = 0.03
+    capacity: float = 1.15
+    unlearning: float = 0.3
+    discouragement: float = 0.3
     learning_strides: float = 100.0
     fatigue_per_100_strides: float = 0.03
     recovery: float = 1.0
@@ -70,7 +92,42 @@ class WalkerProfile:
     stride_s: float = 1.08
     trained_stride_s: float = 1.04
     stride_sd_s: float = 0.03
+    pace_memory: tuple[float, ...] = (0.6, 0.95, 0.993)
+    pace_shares: tuple[float, ...] = (0.2, 0.25, 0.15)
+    pace_coupling: float = -0.2
+    p_slip: float = 0.002
+    slip_min: float = 0.5
+    slip_max: float = 0.8
 
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """How people answer a feedback type, by how they answer positive feedback.
+
+    Attributes
+    ----------
+    learning
+        How fast they learn.
+    noise
+        How much they vary from stride to stride: reward without a size is explored.
+    retention
+        How much of the after-effect stays.
+    """
+
+    learning: float = 1.0
+    noise: float = 1.0
+    retention: float = 1.0
+
+
+# Assumed; only the directions are measured: binary reward is learned by exploration, with larger
+# variability and retention (Wood 2024); a target that is seen is learned and kept better than
+# reward or punishment (Hill 2024). docs/reference/gait.md#outcomes
+ANSWERS = {
+    "positive": Answer(),
+    "negative": Answer(learning=1.2, retention=0.9),
+    "binary": Answer(learning=0.8, noise=1.2, retention=1.2),
+    "explicit": Answer(learning=1.4, noise=0.9, retention=1.1),
+}
 
 GOOD = WalkerProfile()  # learns as HEBB_03 did in session 1
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from rehab.training.adaptation import AdaptationMode, check_adaptation_mode
 from rehab.training.changes import (
     ChangeKind,
     PauseReason,
@@ -18,12 +21,12 @@ from rehab.training.controls.control import (
     ValueFormat,
     ValueKind,
 )
+from rehab.training.cueing import check_activation_threshold
 from rehab.training.marking import gettext_noop
 from rehab.training.measures import InvalidSetting, check_gain
 from rehab.training.plans import (
     ROBOT_LEVELS,
     ChartStyle,
-    check_activation_threshold,
     check_chart_style,
     check_robot_intensity,
 )
@@ -39,6 +42,12 @@ def _check_words_shown(number: float) -> bool:
 def _set_goal(session: ControlledSession, goal: float) -> None:
     session.goal = session.plan.measure.check_goal(goal)
     session.obstacle = ""
+
+
+def _set_adaptation(session: ControlledSession, mode: AdaptationMode) -> None:
+    plan = session.plan
+    replace(plan.adaptation, mode=mode).check_hit_rate(plan.target.hit_rate)
+    session.settings[ChangeKind.GOAL_ADAPTATION] = mode
 
 
 def _set_gain(session: ControlledSession, gain: float) -> None:
@@ -75,10 +84,12 @@ _CHART_STYLES: Choices = {
     ChartStyle.POINTS.value: gettext_noop("points"),
     ChartStyle.LINE.value: gettext_noop("line"),
 }
+_ADAPTATIONS: Choices = {mode.value: mode.value for mode in AdaptationMode}
 _PAUSE_REASONS: Choices = {
     PauseReason.THERAPIST.value: gettext_noop("by the therapist"),
     PauseReason.PATIENT.value: gettext_noop("on the patient’s page"),
     PauseReason.RESTART.value: gettext_noop("by a restart of the server"),
+    PauseReason.REST.value: gettext_noop("for a rest"),
 }
 
 CONTROLS: dict[str, Control] = {
@@ -147,6 +158,21 @@ CONTROLS: dict[str, Control] = {
             value_format=ValueFormat.QUANTITY,
             shows_old=True,
             mark=ChartMark("⚑", gettext_noop("goal"), ValueFormat.NUMBER),
+        ),
+        Control(
+            kind=ChangeKind.GOAL_ADAPTATION,
+            log_label=gettext_noop("automatic goal"),
+            review_label=gettext_noop("Automatic goal"),
+            value=ValueKind.NAME,
+            check=check_adaptation_mode,
+            apply=_set_adaptation,
+            current=lambda session: session.settings[ChangeKind.GOAL_ADAPTATION],
+            initial=lambda plan: plan.adaptation.mode,
+            snapshot_field="goal_adaptation",
+            value_format=ValueFormat.CHOICE,
+            choices=_ADAPTATIONS,
+            shows_old=True,
+            mark=ChartMark("F", gettext_noop("goal follows"), ValueFormat.CHOICE, _ADAPTATIONS),
         ),
         Control(
             kind=ChangeKind.GAIN,

@@ -25,6 +25,7 @@ GAP_S = 1.0
 
 BATTERY_NEAR = 2  # tenths of a volt between two frames that agree
 
+AMPERES = 0.01  # one digit of a motor's current (docs/reference/kobuki.md#feedback)
 DEGREES = 0.01  # one digit of the gyro's angle and rate (docs/reference/kobuki.md#feedback)
 
 
@@ -46,6 +47,8 @@ class Estimate:
         Bits of the buttons that are held.
     pressed
         Bits of the buttons that came to be held with this frame.
+    current_a
+        Current of both motors together [A], the lesser of two frames in a row; 0 where unknown.
     battery_v
         Voltage [V].
     is_charging
@@ -67,6 +70,7 @@ class Estimate:
     over_current: int = 0
     buttons: int = 0
     pressed: int = 0
+    current_a: float = 0.0
     battery_v: float = math.nan
     is_charging: bool = False
     restarted: bool = False
@@ -121,7 +125,10 @@ class FrameFilter:
         if now_s - self._received_s > GAP_S:
             self._accepted, self._doubted_frame = [], None
         self._received_s = now_s
-        now = _Frame(feedback.core, feedback.inertia, now_s, self._estimate)
+        current_a = 0.0
+        if feedback.current is not None:
+            current_a = AMPERES * (feedback.current.left + feedback.current.right)
+        now = _Frame(feedback.core, feedback.inertia, current_a, now_s, self._estimate)
         if self._accepted and now.repeats(self._accepted[0]):
             self.doubted += 1
             return None
@@ -160,6 +167,7 @@ class _Frame:
 
     core: CoreSensors
     inertia: Inertia
+    current_a: float
     received_s: float
     estimate: Estimate
 
@@ -208,6 +216,7 @@ class _Frame:
             cliff=_debounce(was.cliff, core_was.cliff, core.cliff),
             over_current=_debounce(was.over_current, core_was.over_current, core.over_current),
             buttons=_debounce(was.buttons, core_was.buttons, core.buttons),
+            current_a=min(before.current_a, self.current_a),
             battery_v=core.battery_v if agree_on_power else was.battery_v,
             is_charging=core.is_charging if agree_on_charger else was.is_charging,
         )

@@ -11,15 +11,10 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
-from robot.bases.base import BaseLost, BaseState, MobileBase
+from robot.bases.base import BaseLost, BaseState, Indication, MobileBase
 from robot.bases.rosbridge.client import BaseClient
-from robot.bases.rosbridge.topics import (
-    DEFAULT_PROFILE,
-    PROFILES,
-    Topics,
-    add_topic_arguments,
-    read_topics,
-)
+from robot.bases.rosbridge.options import add_topic_arguments, read_topics
+from robot.bases.rosbridge.topics import DEFAULT_PROFILE, PROFILES, Topics
 from robot.motion.twist import STILL, Twist
 from robot.ros.bridge import Bridge, find_bridge
 
@@ -29,8 +24,8 @@ GREETING_S = 3.0  # a bridge that is there has sent odometry by then
 class RosbridgeBase(MobileBase):
     """Orders a base by way of a rosbridge. A connection that is lost is made again forever.
 
-    It cannot stop the base once the connection is gone: the base's own driver has to, by a timeout
-    of its own (docs/robot.md). Every connection begins with an order to stand still.
+    It cannot stop the base once the connection is gone: the watchdog relay beside the base has to,
+    or its own driver (docs/robot.md). Every connection begins with an order to stand still.
     """
 
     name = "rosbridge"
@@ -114,6 +109,13 @@ class RosbridgeBase(MobileBase):
         """Make this place home."""
         with self._lock:
             self._client.odometry.set_home()
+
+    def show(self, indication: Indication, *, aloud: bool) -> None:
+        """Show its state by its light, and by a short sound."""
+        with self._lock:
+            self._client.show(str(indication), aloud=aloud)
+        if self._bridge is not None:
+            self._bridge.wake()
 
     def _set_topics(self, topics: Topics) -> None:
         self.abilities = topics.abilities

@@ -7,10 +7,11 @@ from collections import Counter
 from collections.abc import Iterator
 
 from robot.bases.base import BaseState, SensorState
+from robot.bases.hazards import UNORDERED, StillWatch, rim_speed_m_s
 from robot.bases.rosbridge.orders import Orders
 from robot.bases.rosbridge.perception import DeadReckoning, HazardSensors, ReportedOdometry
-from robot.bases.rosbridge.topics import Topics
-from robot.motion.twist import STILL
+from robot.bases.rosbridge.topics import ALL_HAZARDS, RELAY_ALIVE, Topics
+from robot.motion.twist import STILL, Twist
 from robot.ros.frames import (
     BadRosFrame,
     Frame,
@@ -26,12 +27,14 @@ from robot.ros.frames import (
 )
 from robot.ros.messages import (
     ODOMETRY,
-    TWIST,
     read_event,
+    read_flag,
+    read_hazards,
     read_odometry,
     read_twist,
     write_twist,
 )
+from robot.ros.signals import write_light, write_sound
 
 ODOMETRY_EVERY_MS = 20  # as often as orders go out
 LAST_STOPS = 3  # one may be lost (docs/reference/kobuki.md#orders)
@@ -40,10 +43,12 @@ LAST_STOPS = 3  # one may be lost (docs/reference/kobuki.md#orders)
 SUBSCRIBERS, PUBLISHERS = "/rosapi/subscribers", "/rosapi/publishers"
 CALL_EVERY_S = 2.0
 LATE_S = 1.0  # after this it is reported as a problem
+RELAY_SILENT_S = 0.5  # the relay reports every 0.1 s
 
 # Refusals, see ``SensorState``.
 NOBODY_LISTENS = "nobody_listens"
 SENSOR_MISSING = "feeler_missing"
+NOT_WATCHED = "nobody_watches"
 # Hazards of its own.
 RESTARTED = "restarted"
 OTHER_DRIVER = "other_driver"
@@ -59,10 +64,14 @@ class BaseClient:
             DeadReckoning() if topics.odometry is None else ReportedOdometry()
         )
         self.sensors = HazardSensors()
+        self._still_watch = StillWatch()
         self._is_open = False
         self._opened_s = now_s
         self._called_s = -math.inf
         self._missing: dict[str, str] = {}  # topic: why it must not move
+        self._relay_s = -math.inf  # when the relay was last heard
+        self._is_docked = False
+        self._state, self._signals = "", list[Frame]()  # what it shows, and what is to be sent
 
     @property
     def counters(self) -> Counter[str]:
@@ -74,19 +83,33 @@ class BaseClient:
         self.disconnect(now_s)
         self._is_open, self._opened_s, self._called_s = True, now_s, -math.inf
         topics = self.topics
-        yield advertise(topics.order)
-        yield subscribe(topics.order)
-        if topics.odometry is not None:
-            yield subscribe(topics.odometry, newest_every_ms=ODOMETRY_EVERY_MS)
-        for topic in topics.sensors.values():
-            yield subscribe(topic)
+        for topic in topics.published:
+            yield advertise(topic)
+        for topic in topics.subscribed:
+            is_odometry = topic is topics.odometry
+            yield subscribe(topic, newest_every_ms=ODOMETRY_EVERY_MS if is_odometry else 0)
+        self.show(self._state, aloud=False)
+
+    def show(self, state: str, *, aloud: bool) -> None:
+        """Show a state by light, and by sound where ``aloud``; again on each new connection."""
+        topics, self._state = self.topics, state
+        if state and self._is_open and topics.light is not None:
+            self._signals.append(publish(topics.light, write_light(topics.light.kind, state)))
+        if aloud and self._is_open and topics.sound is not None:
+            sound = write_sound(topics.sound.kind, state)
+            if sound is not None:
+                self._signals.append(publish(topics.sound, sound))
 
     def due(self, now_s: float) -> Iterator[Frame]:
         """Yield the frames to send now."""
         twist = self.orders.due(now_s)
         if twist is not None:
             self.odometry.order(twist, now_s)
-            yield publish(self.topics.order, write_twist(twist))
+            if not twist.is_still:
+                self._still_watch.order_motion(now_s)
+            yield from self._order(twist)
+        while self._signals:
+            yield self._signals.pop(0)
         if self.orders.sent.is_still and now_s - self._called_s >= CALL_EVERY_S:
             self._called_s = now_s
             name = self.topics.order.name
@@ -101,17 +124,24 @@ class BaseClient:
             return
         odometry = self.topics.odometry
         if incoming.topic == self.topics.order.name:
-            if self.orders.handle_echo(read_twist(incoming.message)):
-                self.sensors.record(OTHER_DRIVER, now_s)
+            if self.orders.handle_echo(read_twist(incoming.message, self.topics.order.kind)):
+                self.sensors.record(OTHER_DRIVER)
         elif odometry is not None and incoming.topic == odometry.name:
             pose, twist = read_odometry(incoming.message)
+            if self._still_watch.update(rim_speed_m_s(twist), now_s):
+                self.sensors.record(UNORDERED)
             if isinstance(self.odometry, ReportedOdometry) and self.odometry.update(
                 pose, twist, now_s
             ):
                 self.sensors.counters["jumped"] += 1
-                self.sensors.record(RESTARTED, now_s)
+                self.sensors.record(RESTARTED)
+        elif incoming.topic == RELAY_ALIVE.name:
+            if incoming.message.get("data") == self.topics.order.name:
+                self._relay_s = now_s
+        elif self.topics.dock is not None and incoming.topic == self.topics.dock.name:
+            self._is_docked = read_flag(incoming.message, "is_docked")
         else:
-            self._handle_event(incoming, now_s)
+            self._handle_event(incoming)
 
     def disconnect(self, now_s: float) -> None:
         """Reset orders and hazards: the connection is lost."""
@@ -120,24 +150,27 @@ class BaseClient:
         self.odometry.order(STILL, now_s)
         self.sensors.reset()
         self._missing.clear()
+        self._signals.clear()
+        self._relay_s = -math.inf
 
     def end(self, now_s: float) -> Iterator[Frame]:
         """Yield the last frames: stand still, unsubscribe, unadvertise."""
         self.disconnect(now_s)
         topics = self.topics
         for _ in range(LAST_STOPS):
-            yield publish(topics.order, write_twist(STILL))
-        for topic in (topics.order, topics.odometry, *topics.sensors.values()):
-            if topic is not None:
-                yield unsubscribe(topic)
-        yield unadvertise(topics.order)
+            yield from self._order(STILL)
+        for topic in topics.subscribed:
+            yield unsubscribe(topic)
+        for topic in topics.published:
+            yield unadvertise(topic)
 
     def state(self, now_s: float) -> BaseState:
         """Return the state of the base now."""
         self.odometry.move(now_s)
         sensors = SensorState(
-            hazards=self.sensors.hazards(now_s),
-            refusal=min(self._missing.values(), default=""),
+            hazards=self.sensors.hazards(),
+            refusal=self._refusal(now_s),
+            is_charging=self._is_docked,
             silent_s=self.silent_s(now_s),
         )
         return BaseState(self.odometry.pose, self.odometry.twist, sensors)
@@ -154,7 +187,14 @@ class BaseClient:
         if not self._is_open or now_s - self._opened_s < LATE_S:
             return ""
         if not self.orders.is_confirmed or self.orders.unconfirmed_s(now_s) > LATE_S:
-            return f"Nothing that is sent on {order} comes back: is it of the type {TWIST}?"
+            kind = self.topics.order.kind
+            return f"Nothing that is sent on {order} comes back: is it of the type {kind}?"
+        if self._refusal(now_s) == NOT_WATCHED:
+            return (
+                f"Nobody would stop the base if this program were gone: start the watchdog relay "
+                f"for {order} (deploy/ros/garry_watchdog.py), or say --own-timeout-s "
+                f"of a base that stops by itself."
+            )
         if odometry is not None and now_s - self.odometry.seen_s > LATE_S:
             return f"No {ODOMETRY} comes on {odometry.name}: does its driver run?"
         for topic, reason in self._missing.items():
@@ -163,11 +203,28 @@ class BaseClient:
             return f"Nobody publishes on {topic}: start its driver, or give none for that topic."
         return ""
 
-    def _handle_event(self, incoming: Publication, now_s: float) -> None:
+    def _order(self, twist: Twist) -> Iterator[Frame]:
+        """Yield an order: a motion by way of the relay, a stop also past it."""
+        topics = self.topics
+        message = write_twist(twist, topics.order.kind)
+        if topics.relay is not None:
+            yield publish(topics.relay, message)
+        if topics.relay is None or twist.is_still:
+            yield publish(topics.order, message)
+
+    def _refusal(self, now_s: float) -> str:
+        if self.topics.relay is not None and now_s - self._relay_s > RELAY_SILENT_S:
+            return NOT_WATCHED
+        return min(self._missing.values(), default="")
+
+    def _handle_event(self, incoming: Publication) -> None:
         for hazard, topic in self.topics.sensors.items():
+            if topic.name == incoming.topic and hazard == ALL_HAZARDS:
+                self.sensors.replace(read_hazards(incoming.message))
+                return
             if topic.name == incoming.topic:
                 which, is_detected = read_event(topic.kind, incoming.message)
-                self.sensors.update(hazard, which, is_detected, now_s)
+                self.sensors.update(hazard, which, is_detected)
                 return
         raise BadRosFrame("Nobody asked for that topic.")
 

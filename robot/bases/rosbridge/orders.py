@@ -1,14 +1,12 @@
-"""Orders to a base by ROS: the newest twist and no other, one on its way at a time."""
+"""Orders to a base by ROS: the newest twist and no other, a few on their way at a time."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter, deque
 
-from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, ORDER_HOLDS_S, Limits
+from robot.motion.limits import ORDER_HOLDS_S, WHEEL_LIMITS
 from robot.motion.twist import STILL, Twist
-
-WHEEL_LIMITS = Limits(v_m_s=CEILING_M_S, w_rad_s=CEILING_RAD_S)
 
 # A stop is repeated this often [s]: one message may be lost, and a mux
 # gives a base to somebody else after 0.2 s without one (docs/reference/kobuki.md#watchdogs).
@@ -16,15 +14,19 @@ STILL_EVERY_S = 0.1
 # Bridges write numbers with 9 digits and more; these are what we order anyhow [m/s, rad/s].
 DIGITS, SAME = 4, 1e-5
 MAX_UNCONFIRMED = 32  # twists whose echo is awaited
+# So many moving ones may be on their way: an echo that comes 40 ms late then holds nothing up (a
+# bridge without TCP_NODELAY, see docs/reference/rosbridge.md#behavior), and a network that holds
+# everything back has three of them, which are followed by a stop.
+IN_FLIGHT = 3
 
 
 class Orders:
     """The newest twist, and those that were sent and are not confirmed yet.
 
     We subscribe to the topic that we publish on: an echo has passed through ROS. A moving twist is
-    sent only when the one before it is confirmed, so that no network can pile them up; a stop is
-    sent whenever it is due. After each opening of the connection, and after a pause in the orders
-    or in the echoes, only stops are sent, until one is confirmed and ordered once more.
+    sent only while fewer than ``IN_FLIGHT`` are not confirmed, so that no network can pile them up;
+    a stop is sent whenever it is due. After each opening of the connection, and after a pause in
+    the orders or in the echoes, only stops are sent, until one is confirmed and ordered once more.
 
     Attributes
     ----------
@@ -81,7 +83,7 @@ class Orders:
         if self._wanted.is_still:
             is_due = not self.sent.is_still or now_s - self._sent_s >= STILL_EVERY_S
         else:
-            is_due = self._is_new and not self._unconfirmed
+            is_due = self._is_new and len(self._unconfirmed) < IN_FLIGHT
         if not is_due:
             return None
         self.sent, self._sent_s, self._is_new = self._wanted, now_s, False

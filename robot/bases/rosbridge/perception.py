@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 
+from robot.bases.hazards import UnreadHazards
 from robot.motion.limits import ORDER_HOLDS_S
 from robot.motion.pose import HOME, Pose, advance, wrap
 from robot.motion.twist import STILL, Twist
@@ -12,8 +13,6 @@ from robot.motion.twist import STILL, Twist
 # From one odometry message to the next a base moves no further [m, rad], at our ceilings and with a
 # second between them. Beyond that it was restarted, or another program has set its odometry.
 JUMP_M, JUMP_RAD = 0.3, 1.8
-
-HAZARD_HOLD_S = 0.1  # a hazard counts for this long after it was detected: no tick misses it
 
 
 class ReportedOdometry:
@@ -106,24 +105,28 @@ class HazardSensors:
     def __init__(self) -> None:
         self.counters: Counter[str] = Counter(jumped=0)
         self._pressed: dict[str, set[int]] = {}
-        self._detected_s: dict[str, float] = {}
+        self._unread = UnreadHazards()
 
-    def update(self, hazard: str, which: int, is_detected: bool, now_s: float) -> None:
+    def update(self, hazard: str, which: int, is_detected: bool) -> None:
         """Store an event of one sensor."""
         pressed = self._pressed.setdefault(hazard, set())
         (pressed.add if is_detected else pressed.discard)(which)
         if is_detected:
-            self._detected_s[hazard] = now_s
+            self._unread.add(hazard)
 
-    def record(self, hazard: str, now_s: float) -> None:
+    def replace(self, hazards: frozenset[str]) -> None:
+        """Store all hazards that hold now, of a base that reports them together."""
+        self._pressed = {hazard: {0} for hazard in hazards}
+        self._unread.add(*hazards)
+
+    def record(self, hazard: str) -> None:
         """Store something that happened."""
-        self._detected_s[hazard] = now_s
+        self._unread.add(hazard)
 
     def reset(self) -> None:
         """Reset what is pressed: the connection is lost."""
         self._pressed.clear()
 
-    def hazards(self, now_s: float) -> frozenset[str]:
-        """Return the hazards of now and of a moment ago."""
-        recent = {name for name, at_s in self._detected_s.items() if now_s - at_s <= HAZARD_HOLD_S}
-        return frozenset(recent | {name for name, pressed in self._pressed.items() if pressed})
+    def hazards(self) -> frozenset[str]:
+        """Return the hazards of now, and those that have not been read yet."""
+        return self._unread.take() | {name for name, on in self._pressed.items() if on}

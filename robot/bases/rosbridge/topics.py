@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-import re
-from argparse import ArgumentParser, Namespace, _ArgumentGroup
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
-from robot.bases.base import Abilities, BadOption
+from robot.bases.base import Abilities
 from robot.ros.frames import Topic
-from robot.ros.messages import BOOL, ODOMETRY, SENSOR_TYPES, TWIST
+from robot.ros.messages import DOCK, HAZARDS, ODOMETRY, STRING, TWIST, TWIST_STAMPED
 
-NAME = re.compile(r"/?[A-Za-z]\w*(/\w+)*", re.ASCII)
-NONE = "none"
 BUMP = "bump"
+# What every topic of a Create 3's hazards stands for: all of them come on one.
+ALL_HAZARDS = "hazards"
+
+# The relay that stands still for us where we are gone (deploy/ros/garry_watchdog.py): what it
+# listens to, and where it says, ten times a second, for which topic it does so.
+RELAY_INPUT = "/garry/cmd_vel"
+RELAY_ALIVE = Topic("/garry/watchdog", STRING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,16 +25,50 @@ class Topics:
     Parameters
     ----------
     order
-        Accepts geometry_msgs/Twist.
+        Accepts geometry_msgs/Twist or TwistStamped.
     odometry
         Publishes nav_msgs/Odometry; None for an open loop.
     sensors
         Topics of its hazards, by the hazard's code.
+    light, sound
+        Show and sound its state.
+    dock
+        Says whether it stands at its charger.
+    own_timeout_s
+        After this long without an order the base stops by itself, as a person has tried; None where
+        that is unknown, and the relay has to watch.
     """
 
     order: Topic
     odometry: Topic | None = None
     sensors: dict[str, Topic] = field(default_factory=dict)
+    light: Topic | None = None
+    sound: Topic | None = None
+    dock: Topic | None = None
+    own_timeout_s: float | None = None
+
+    @property
+    def relay(self) -> Topic | None:
+        """Where the relay takes orders; None for a base with a timeout of its own."""
+        return Topic(RELAY_INPUT, self.order.kind) if self.own_timeout_s is None else None
+
+    @property
+    def input(self) -> Topic:
+        """Where orders to move go."""
+        return self.relay or self.order
+
+    @property
+    def published(self) -> list[Topic]:
+        """All that we publish on."""
+        topics = (self.order, self.relay, self.light, self.sound)
+        return [topic for topic in topics if topic is not None]
+
+    @property
+    def subscribed(self) -> list[Topic]:
+        """All that we listen to."""
+        alive = RELAY_ALIVE if self.relay is not None else None
+        topics = (self.order, self.odometry, *self.sensors.values(), self.dock, alive)
+        return [topic for topic in topics if topic is not None]
 
     @property
     def abilities(self) -> Abilities:
@@ -39,86 +76,43 @@ class Topics:
         return Abilities(
             simulated=False,
             moves=True,
+            announces=self.light is not None or self.sound is not None,
             real_time=True,
             closed_loop=self.odometry is not None,
-            bumpers=BUMP in self.sensors,
+            bumpers=BUMP in self.sensors or ALL_HAZARDS in self.sensors,
         )
 
-    def chosen(self, options: Namespace) -> Topics:
-        """Return these with the topics of a command line in their place. Raises BadOption."""
-        order = replace(self.order, name=options.cmd_topic or self.order.name)
-        _check_name("--cmd-topic", order.name)
-        odometry = self.odometry
-        if options.odom_topic:
-            odometry = Topic(options.odom_topic, ODOMETRY) if options.odom_topic != NONE else None
-        if odometry is not None:
-            _check_name("--odom-topic", odometry.name)
-        sensors = dict(self.sensors)
-        for hazard, option in SENSOR_OPTIONS.items():
-            text: str = getattr(options, f"{option}_topic")
-            if text == NONE:
-                sensors.pop(hazard, None)
-            elif text:
-                kind = sensors[hazard].kind if hazard in sensors else BOOL
-                sensors[hazard] = _read_sensor(f"--{option.replace('_', '-')}-topic", text, kind)
-        return Topics(order, odometry, sensors)
 
+def _kobuki(root: str, package: str) -> Topics:
+    """Return the topics of a Kobuki's node: their root, and the package of its messages."""
+    return Topics(
+        Topic(f"{root}/commands/velocity", TWIST),
+        Topic("/odom", ODOMETRY),
+        {
+            BUMP: Topic(f"{root}/events/bumper", f"{package}/BumperEvent"),
+            "cliff": Topic(f"{root}/events/cliff", f"{package}/CliffEvent"),
+            "wheel_drop": Topic(f"{root}/events/wheel_drop", f"{package}/WheelDropEvent"),
+        },
+        light=Topic(f"{root}/commands/led1", f"{package}/Led"),
+        sound=Topic(f"{root}/commands/sound", f"{package}/Sound"),
+    )
 
-SENSOR_OPTIONS = {BUMP: "bumper", "cliff": "cliff", "wheel_drop": "wheel_drop"}
 
 PROFILES = {
     # What kobuki_node has without remappings, and the original's nodes publish on
-    # (docs/reference/original.md#robot).
-    "kobuki": Topics(
-        Topic("/mobile_base/commands/velocity", TWIST),
+    # (docs/reference/original.md#robot); on ROS 2 it is kobuki_ros
+    # (docs/reference/rosbridge.md#names-of-a-kobuki).
+    "kobuki": _kobuki("/mobile_base", "kobuki_msgs"),
+    "kobuki-ros2": _kobuki("", "kobuki_ros_interfaces/msg"),
+    # A Create 3 with a computer (docs/reference/rosbridge.md#names-of-a-turtlebot-4).
+    "turtlebot4": Topics(
+        Topic("/cmd_vel", TWIST_STAMPED),
         Topic("/odom", ODOMETRY),
-        {
-            BUMP: Topic("/mobile_base/events/bumper", "kobuki_msgs/BumperEvent"),
-            "cliff": Topic("/mobile_base/events/cliff", "kobuki_msgs/CliffEvent"),
-            "wheel_drop": Topic("/mobile_base/events/wheel_drop", "kobuki_msgs/WheelDropEvent"),
-        },
+        {ALL_HAZARDS: Topic("/hazard_detection", HAZARDS)},
+        light=Topic("/cmd_lightring", "irobot_create_msgs/LightringLeds"),
+        sound=Topic("/cmd_audio", "irobot_create_msgs/AudioNoteVector"),
+        dock=Topic("/dock_status", DOCK),
     ),
     "plain": Topics(Topic("/cmd_vel", TWIST), Topic("/odom", ODOMETRY)),
 }
 DEFAULT_PROFILE = "kobuki"
-
-
-def add_topic_arguments(group: ArgumentParser | _ArgumentGroup) -> None:
-    """Add options for the topics of a base to a command line."""
-    group.add_argument(
-        "--ros-robot",
-        choices=sorted(PROFILES),
-        default=DEFAULT_PROFILE,
-        help="which topics it has: a Kobuki's with its sensors, or /cmd_vel and /odom alone "
-        f"(default: {DEFAULT_PROFILE})",
-    )
-    group.add_argument("--cmd-topic", metavar="TOPIC", help="that takes Twists")
-    group.add_argument(
-        "--odom-topic", metavar="TOPIC", help=f"that gives Odometry; {NONE}: an open loop"
-    )
-    for hazard, option in SENSOR_OPTIONS.items():
-        group.add_argument(
-            f"--{option.replace('_', '-')}-topic",
-            metavar="TOPIC[:TYPE]",
-            help=f"that stops it ({hazard}), of the type {BOOL} or a Kobuki's; {NONE}: has none",
-        )
-
-
-def read_topics(options: Namespace) -> Topics:
-    """Return the topics of a command line. Raises BadOption."""
-    return PROFILES[options.ros_robot].chosen(options)
-
-
-def _read_sensor(option: str, text: str, kind: str) -> Topic:
-    name, _, named = text.partition(":")
-    _check_name(option, name)
-    if named and named not in SENSOR_TYPES:
-        raise BadOption(
-            f"{option}: no {named} is read here. Known types: {', '.join(SENSOR_TYPES)}."
-        )
-    return Topic(name, named or kind)
-
-
-def _check_name(option: str, name: str) -> None:
-    if NAME.fullmatch(name) is None:
-        raise BadOption(f"{option}: {name!r} is no ROS topic. Write it like /cmd_vel.")

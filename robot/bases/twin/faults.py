@@ -7,6 +7,14 @@ import random
 from dataclasses import dataclass
 from typing import Any
 
+from robot.bases.drive_train import (
+    DEAD_TIME_S,
+    DRIFT_DEG_MIN,
+    GYRO_NOISE_DEG_S,
+    LAG_S,
+    STICTION_M_S,
+)
+
 
 class BadFault(ValueError):
     """A fault that does not exist, or a value outside its limits."""
@@ -14,7 +22,8 @@ class BadFault(ValueError):
 
 @dataclass
 class Faults:
-    """Faults that hold now; each may be changed while the twin runs.
+    """Faults that hold now; each may be changed while the twin runs. At first it is ordinary: late,
+    gradual, and with a gyro that drifts.
 
     Parameters
     ----------
@@ -26,8 +35,13 @@ class Faults:
         Voltage of the battery [V]; 16.7 is full (docs/reference/kobuki.md#feedback).
     left_scale, right_scale
         Size of the wheels over what the firmware assumes: 1.02 rolls 2 % too far, either way.
-    drift_deg_min
-        How far the gyro turns by itself [°/min].
+    drift_deg_min, gyro_noise_deg_s
+        How far the gyro turns by itself [°/min], and the noise of its rate [°/s].
+    dead_time_s, lag_s, stiction_m_s
+        From an order to the first motion [s]; time constant of the motors [s]; a wheel that stands
+        is not moved by an order below this [m/s].
+    held
+        Share of its speed that something takes from it, 0 to 1: 1 is a foot in its way.
     drop, flip, duplicate
         How probable it is that a byte of either direction is lost, has a bit flipped, comes twice.
     false_header
@@ -43,7 +57,12 @@ class Faults:
     battery_v: float = 16.7
     left_scale: float = 1.0
     right_scale: float = 1.0
-    drift_deg_min: float = 0.0
+    drift_deg_min: float = DRIFT_DEG_MIN
+    gyro_noise_deg_s: float = GYRO_NOISE_DEG_S
+    dead_time_s: float = DEAD_TIME_S
+    lag_s: float = LAG_S
+    stiction_m_s: float = STICTION_M_S
+    held: float = 0.0
     drop: float = 0.0
     flip: float = 0.0
     duplicate: float = 0.0
@@ -92,6 +111,11 @@ LIMITS: dict[str, tuple[float, float]] = {
     "left_scale": (0.5, 1.5),
     "right_scale": (0.5, 1.5),
     "drift_deg_min": (-600, 600),
+    "gyro_noise_deg_s": (0, 10),
+    "dead_time_s": (0, 1),
+    "lag_s": (0, 1),
+    "stiction_m_s": (0, 0.1),
+    "held": (0, 1),
     "drop": (0, 1),
     "flip": (0, 1),
     "duplicate": (0, 1),

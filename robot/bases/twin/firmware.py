@@ -7,6 +7,7 @@ import random
 from collections import deque
 from typing import NamedTuple
 
+from robot.bases.drive_train import DriveTrain
 from robot.bases.kobuki_protocol import (
     FRAME_S,
     STOP,
@@ -58,6 +59,7 @@ GYRO_DIGIT_DEG_S = 0.00875  # (docs/reference/kobuki.md#feedback)
 # A wheel draws 3 A, where the motor is switched off, at its largest torque; in 10 mA
 # (docs/reference/kobuki.md#watchdogs). That it grows in proportion is our own.
 CURRENT_N_M = 300.0
+WHEEL_M = 0.035  # radius (docs/reference/kobuki.md#twin)
 ORDERS_KEPT = 1024
 NO_DOCK, NO_INPUT = DockIr(), GpInput()
 
@@ -116,6 +118,7 @@ class Firmware:
     def switch_on(self) -> None:
         """Start as after its power was off: all counters at 0, standing still."""
         self.reader = FrameReader(decode_commands)
+        self.drive_train = DriveTrain()
         self.control, self._ordered_s = STOP, -math.inf
         self.output, self.sounds = int(Output.POWER), 0
         self._frames = 0
@@ -135,8 +138,11 @@ class Firmware:
     def step(self, now_s: float) -> bytes:
         """Simulate one frame's time, and return the frame as it arrives at the driver."""
         if self.watchdog_s is not None and now_s - self._ordered_s > self.watchdog_s:
-            self.control = STOP
-        faults, (left_m_s, right_m_s) = self.faults, self.wheels_m_s
+            self._order(STOP, now_s)
+        faults, train = self.faults, self.drive_train
+        train.dead_time_s, train.lag_s = faults.dead_time_s, faults.lag_s
+        train.stiction_m_s, train.held = faults.stiction_m_s, faults.held
+        left_m_s, right_m_s = train.step(now_s, FRAME_S)
         self.body.roll(left_m_s * faults.left_scale, right_m_s * faults.right_scale)
         self._count(faults.left_scale, faults.right_scale)
         self._frames += 1
@@ -148,9 +154,13 @@ class Firmware:
     @property
     def wheels_m_s(self) -> tuple[float, float]:
         """Speeds that the wheels are held at, left and right [m/s]; none is above its largest."""
-        left_m_s, right_m_s = wheel_speeds(control_to_twist(self.control))
+        return self.drive_train.wheels_m_s
+
+    def _order(self, control: BaseControl, now_s: float) -> None:
+        left_m_s, right_m_s = wheel_speeds(control_to_twist(control))
         too_fast = max(abs(left_m_s) / WHEEL_MAX_M_S, abs(right_m_s) / WHEEL_MAX_M_S, 1.0)
-        return left_m_s / too_fast, right_m_s / too_fast
+        self.control = control
+        self.drive_train.order((left_m_s / too_fast, right_m_s / too_fast), now_s)
 
     def carry_home(self) -> None:
         """Carry the body to where it began, unnoticed by the gyro."""
@@ -161,7 +171,8 @@ class Firmware:
     def _execute(self, command: Command, now_s: float) -> None:
         match command:
             case BaseControl():
-                self.control, self._ordered_s = command, now_s
+                self._ordered_s = now_s
+                self._order(command, now_s)
                 self.orders.append(Order(now_s, command))
             case RequestExtra(flags):
                 names = {"hardware": Extra.HARDWARE, "firmware": Extra.FIRMWARE, "udid": Extra.UDID}
@@ -179,9 +190,12 @@ class Firmware:
         faults, touch, number = self.faults, self.body.touch(), self._frames
         turned_deg = math.degrees(self.body.pose.heading_rad - self._heading_from_rad)
         rate_deg_s = math.degrees(self.body.turn_rad_s) + faults.drift_deg_min / 60
+        rate_deg_s += self._chance.gauss(0.0, 1.0) * faults.gyro_noise_deg_s
         rate_deg_s = max(-GYRO_MAX_DEG_S, min(GYRO_MAX_DEG_S, rate_deg_s))
         angle = math.remainder(100 * (turned_deg + self._drifted_deg), 36_000)
-        left_n_m, right_n_m = touch.torque_n_m
+        # What holds a wheel is not the body's to know.
+        held_n_m = self.drive_train.force_n * WHEEL_M / 2
+        left_n_m, right_n_m = (max(abs(torque), held_n_m) for torque in touch.torque_n_m)
         sample = (0, 0, round(rate_deg_s / GYRO_DIGIT_DEG_S))
         requested, self._requested = self._requested, set()
         return Feedback(

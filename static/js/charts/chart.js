@@ -9,8 +9,8 @@ export function color(name) {
 
 function axis(extra) {
   const font = `500 14px ${getComputedStyle(document.body).fontFamily}`;
-  const lines = { stroke: color("border"), width: 1 };
-  return { font, stroke: color("muted"), grid: lines, ticks: { show: false }, gap: 8, ...extra };
+  const lines = { stroke: () => color("border"), width: 1 };
+  return { font, stroke: () => color("muted"), grid: lines, ticks: { show: false }, gap: 8, ...extra };
 }
 
 // Draw a chart that fills its element and keeps its size. `under(marks)` draws before the series and
@@ -32,6 +32,7 @@ export function draw(element, { data, series, xAxis, yAxis, under, paint, onCurs
   };
   const chart = new uPlot(options, data, element);
   new ResizeObserver(() => chart.setSize(size())).observe(element);
+  new MutationObserver(() => chart.redraw()).observe(document.documentElement, { attributeFilter: ["data-pt"] });
   return chart;
 }
 

@@ -36,7 +36,8 @@ function showReadout(index) {
 }
 
 function pointSeries(size, width, stroke, fill) {
-  return { paths: () => null, points: { show: true, size, width, stroke, fill, space: 0 } };
+  const [ring, inside] = [() => color(stroke), () => color(fill)];
+  return { paths: () => null, points: { show: true, size, width, stroke: ring, fill: inside, space: 0 } };
 }
 
 function drawPhases(marks) {
@@ -111,9 +112,9 @@ function drawStrides(element) {
     ],
     series: [
       { paths: () => null, points: { show: false } },
-      pointSeries(size, width, color("c-miss"), color("card")),
-      pointSeries(size, width, color("c-hit"), color("c-hit")),
-      { stroke: color("c-goal"), width: 2.5, paths: paths.stepped({ align: 1 }), points: { show: false } },
+      pointSeries(size, width, "c-miss", "card"),
+      pointSeries(size, width, "c-hit", "c-hit"),
+      { stroke: () => color("c-goal"), width: 2.5, paths: paths.stepped({ align: 1 }), points: { show: false } },
     ],
     scales: { x: { time: false }, y: { range: () => [0, top] } },
     padding: [56, 26, 0, 0],

@@ -28,11 +28,12 @@ function drawHits(element) {
   draw(element, {
     ...days(hits.days),
     data: [hits.days.map((_, index) => index), hits.hit],
-    series: [{ stroke: color("c-hit"), width: 3, points: { show: false } }],
+    series: [{ stroke: () => color("c-hit"), width: 3, points: { show: false } }],
     scales: { ...sessions(count), y: { range: () => [0, 100] } },
     yAxis: { values: (_, ticks) => ticks.map((tick) => `${number(tick)} %`), incrs: [20, 25, 50] },
     paint: (marks) => {
       hits.hit.forEach((hit, index) => {
+        if (hit === null) return; // imported: only its points are known
         const wanted = hits.wanted[index];
         if (wanted) marks.dash(index, wanted, color("c-goal"), count);
         marks.disc(index, hit, 7, color("c-hit"));
@@ -52,6 +53,7 @@ function drawValues(element) {
     ...(values.mean[i] === null ? [] : span(i)),
     ...[values.goal[i], values.baseline[i]].filter((value) => value !== null),
   ]);
+  if (!seen.length) return; // imported sessions alone, which kept no values
   const [low, high] = [Math.min(...seen), Math.max(...seen)];
   const air = 0.08 * (high - low || 1);
   draw(element, {

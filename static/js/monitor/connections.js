@@ -1,8 +1,8 @@
 // How well sensor, tablet and robot are heard, in text and a sign before it: ✓ well, ! needs a look, – not there.
 
 import { _, fill } from "garry/shared/language";
+import { SILENT_S } from "garry/monitor/state";
 
-const SILENT_S = { stride: 5, tablet: 12 };
 const ENOUGH = 0.8; // valid strides among the last 20; fewer and the goal is met by chance
 const LAST = 20;
 
@@ -33,7 +33,7 @@ function describeTablets(count, silent_s) {
   return ["✓", fill(_("%(what)s, heard %(ago)s"), { what, ago: ago(silent_s) })];
 }
 
-export function createConnections({ state }, robot) {
+export function createConnections({ state, show }, robot) {
   function describeAll({ presence, state: sessionState }) {
     const silent = (seconds) => (seconds == null ? null : seconds + state.sincePresence_s);
     const strides = state.strides.slice(-LAST);
@@ -47,6 +47,10 @@ export function createConnections({ state }, robot) {
 
   return {
     draw(session) {
+      const { about, presence } = session;
+      const isSeen = presence.tablets > 0;
+      show("mirror", isSeen ? fill(_("%(name)s sees"), { name: about.nickname }) : _("Patient’s page"));
+      show("mirrored", isSeen ? _("now") : _("no tablet"));
       const described = describeAll(session);
       for (const row of document.querySelectorAll("[data-presence]")) {
         const [sign, words] = described[row.dataset.presence];

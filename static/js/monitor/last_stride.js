@@ -2,7 +2,7 @@
 
 import { _, fill, number } from "garry/shared/language";
 import { percent, signed } from "garry/shared/format";
-import { phaseName, reasonName } from "garry/shared/labels";
+import { clockCures, phaseName, reasonName } from "garry/shared/labels";
 
 export function createLastStride({ state, show }) {
   const dot = document.querySelector(".verdict .dot");
@@ -43,9 +43,10 @@ export function createLastStride({ state, show }) {
       show("value", describeValue(stride, session.unit));
       show(
         "extras",
-        Object.entries(stride.extra ?? {})
-          .map(describeExtra)
-          .join("\n"),
+        [
+          ...clockCures([...(stride.reasons ?? []), ...Object.keys(stride.extra ?? {})]),
+          ...Object.entries(stride.extra ?? {}).map(describeExtra),
+        ].join("\n"),
       );
       show("verdict", describeVerdict(stride, session.phase));
       dot.hidden = !isJudged;

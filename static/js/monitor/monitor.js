@@ -5,10 +5,14 @@
 
 import { _ } from "garry/shared/language";
 import { connect } from "garry/shared/session_socket";
+import { soundAlarm } from "garry/monitor/alarm_tone";
+import { createAlarms } from "garry/monitor/alarms";
 import { createConnections } from "garry/monitor/connections";
 import { createActivationThreshold } from "garry/monitor/controls/activation_threshold";
+import { createFall } from "garry/monitor/controls/fall";
 import { createFeedbackType } from "garry/monitor/controls/feedback_type";
 import { createGain } from "garry/monitor/controls/gain";
+import { createGoalCoach } from "garry/monitor/controls/goal_coach";
 import { createGoal } from "garry/monitor/controls/goal";
 import { createPatientPage } from "garry/monitor/controls/patient_page";
 import { createPhase } from "garry/monitor/controls/phase";
@@ -16,6 +20,7 @@ import { createRemarks } from "garry/monitor/controls/remarks";
 import { createRobotLevel } from "garry/monitor/controls/robot_level";
 import { createRunState } from "garry/monitor/controls/run_state";
 import { createLastStride } from "garry/monitor/last_stride";
+import { createReadiness } from "garry/monitor/readiness";
 import { RobotPanel } from "garry/monitor/robot";
 import { MonitorState } from "garry/monitor/state";
 import { createStrideCharts } from "garry/monitor/stride_charts";
@@ -72,6 +77,7 @@ const socket = connect(root.dataset.socket, {
       link === "lost"
         ? _("No connection to the server. What the patient walks is stored; this page comes back by itself.")
         : reason;
+    if (link === "lost" && state.session) soundAlarm();
     if (link === "closed" && state.session) leaveWhenEnded();
   },
 });
@@ -82,8 +88,11 @@ const page = {
   announce,
   onPress,
   change: (kind, value) => socket.change(kind, value).catch((problem) => announce(problem.message)),
-  remark: (what, value) => socket.ask({ type: "remark", what, value }).catch((problem) => announce(problem.message)),
+  note: (what, value) => socket.ask({ type: "remark", what, value }),
+  remark: (what, value) => page.note(what, value).catch((problem) => announce(problem.message)),
   orderRobot: (order) => socket.send({ type: "robot", order }),
+  driveRobot: (ahead, left) => socket.send({ type: "robot", order: "drive", ahead, left }),
+  orderStop: () => robot.order("stop"),
 };
 const robot = new RobotPanel(document.querySelector(".robot"), page);
 const connections = createConnections(page, robot);
@@ -95,12 +104,16 @@ const parts = [
   createFeedbackType(page),
   createPatientPage(page),
   createGoal(page),
+  createGoalCoach(page),
   createActivationThreshold(page),
   createRobotLevel(page),
   createGain(page),
   createRemarks(page),
+  createFall(page),
   createStrideCharts(page),
   robot,
+  createAlarms(page, robot),
+  createReadiness(robot),
 ];
 
 function leaveWhenEnded() {

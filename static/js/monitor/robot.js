@@ -2,8 +2,9 @@
 
 import { _, fill } from "garry/shared/language";
 import { percent } from "garry/shared/format";
+import { RobotPlacing } from "garry/monitor/robot_placing";
 import { cureOf, describeReason, describeState } from "garry/monitor/robot_text";
-import { drawTrail } from "garry/monitor/robot_trail";
+import { RobotScene } from "garry/shared/robot_scene";
 
 const KEPT_POSES = 240;
 const ANSWER_MS = 2_000; // after which an open but silent connection counts as lost
@@ -23,8 +24,13 @@ const NOTABLE = new Set([
   "button",
   "nobody_listens",
   "feeler_missing",
+  "nobody_watches",
   "other_driver",
+  "unordered_motion",
 ]);
+
+// In these a person has to look at it, and let it move.
+const WAITING_STATES = new Set(["stopped", "disarmed", "away"]);
 
 export class RobotPanel {
   #page;
@@ -38,11 +44,17 @@ export class RobotPanel {
   #pendingOrder = "";
   #orderFailure = "";
   #timer;
+  #placing;
+  #scene;
+  wasStoppedHere = false; // by a tap on this page
 
   constructor(root, page) {
     this.#root = root;
     this.#page = page;
-    page.onPress("[data-robot]", ({ dataset }) => this.#order(dataset.robot));
+    this.#scene = new RobotScene(root.querySelector("svg.fill"));
+    page.onPress("[data-enlarge]", (button) => this.#enlarge(button));
+    page.onPress("[data-robot]", ({ dataset }) => this.order(dataset.robot));
+    this.#placing = new RobotPlacing(root.querySelector("[data-placing]"), page.driveRobot);
   }
 
   reset({ robot, robot_stopped: stopped, presence }) {
@@ -74,7 +86,15 @@ export class RobotPanel {
     }
     const isBroken = report.kind === "gesture" && report.phase === "ended" && report.outcome !== "done";
     if (isBroken) this.#breakReason = report.outcome;
+    if (report.kind === "incident") this.#linkIncident(report.incident);
     this.#keepPose();
+  }
+
+  // Of the last stop; the session's page has all of them.
+  #linkIncident(key) {
+    const link = this.#root.querySelector("[data-incident]");
+    link.href = link.dataset.incident.replace("/0/", `/${key}/`);
+    link.hidden = false;
   }
 
   #keepPose() {
@@ -85,9 +105,10 @@ export class RobotPanel {
   }
 
   // Show an order as sent while an answer may come; say so when it cannot be sent or is not answered.
-  #order(order) {
+  order(order) {
     this.#forgetOrder();
     this.#orderFailure = "";
+    this.wasStoppedHere = order === "stop";
     if (this.#page.orderRobot(order)) {
       this.#pendingOrder = order;
       this.#button(order).classList.add("asked");
@@ -124,7 +145,7 @@ export class RobotPanel {
   }
 
   #button(order) {
-    return this.#root.querySelector(`[data-robot=${order}]`);
+    return document.querySelector(`[data-robot=${order}]`);
   }
 
   draw() {
@@ -137,22 +158,35 @@ export class RobotPanel {
     show("robot-last", this.#isHeld || this.#orderFailure ? "" : this.#describeDecision());
     // A real base waits for a person from the start; a stop stays until a person lifts it.
     this.#root.classList.toggle("still", this.#isHeld);
-    this.#button("stop").hidden = this.#isStopped;
+    show("robot-stop", this.#isStopped ? _("Robot stopped") : _("Stop robot"));
+    this.#button("stop").classList.toggle("done", this.#isStopped);
     this.#button("arm").hidden = !this.#isHeld;
-    drawTrail(this.#root.querySelector("svg"), this.#trail);
+    this.#placing.show(this.#isPlaceable);
+    this.#scene.draw({ poses: this.#trail, lights: this.#status?.lights, mood: this.#status?.mood });
+  }
+
+  #enlarge(button) {
+    const isLarge = this.#root.classList.toggle("large");
+    button.setAttribute("aria-pressed", isLarge);
+  }
+
+  // Whether a person may drive it to its mark: a real one that may move, while nobody walks.
+  get #isPlaceable() {
+    const isReal = this.#status?.simulated === false;
+    return this.#isConnected && isReal && !this.#isHeld && this.#page.state.session?.state !== "running";
   }
 
   // Whether a person has to arm it before it moves.
   get #isHeld() {
     if (this.#isStopped) return true;
     const { state, reason } = this.#status ?? {};
-    return this.#isConnected && (state === "stopped" || state === "disarmed" || reason === "place_unknown");
+    return this.#isConnected && (WAITING_STATES.has(state) || reason === "place_unknown");
   }
 
   #describeState() {
     if (!this.#isConnected) return _("not connected");
-    if (!this.#status) return "";
     if (this.#isStopped) return _("stopped");
+    if (!this.#status) return "";
     return this.#status.gesture ? `${this.#status.gesture}…` : describeState(this.#status.state);
   }
 
@@ -163,8 +197,17 @@ export class RobotPanel {
   }
 
   #describeCure() {
-    const cure = cureOf(this.#status?.reason);
-    return this.#isHeld ? `${cure} ${_("Put it on its mark, nobody near it, then:")}`.trim() : cure;
+    const parts = [cureOf(this.#status?.reason), this.#describeBattery()];
+    if (this.#isHeld) parts.push(_("Put it on its mark, nobody near it, then:"));
+    return parts.filter(Boolean).join(" ");
+  }
+
+  // Whether it asks to be charged, before it has to stop for that.
+  #describeBattery() {
+    const { battery_low: isLow, battery_share: share, reason } = this.#status ?? {};
+    if (!this.#isConnected || !isLow || reason === "charging") return "";
+    const words = _("“Charge me”: battery %(share)s. It stands on its mark after each gesture; carry it from there.");
+    return fill(words, { share: percent(share ?? 0) });
   }
 
   // What the last window came to, and what followed.
@@ -180,9 +223,26 @@ export class RobotPanel {
     });
   }
 
-  // Return its line among those who are connected; `isLow` asks for a charger.
+  // Return why it stands although somebody walks, with the cure; "" where it does not.
+  get alarm() {
+    if (!this.#isConnected || !(this.#isStopped || this.#status?.state === "stopped")) return "";
+    const why = describeReason(this.#status?.reason || "stopped");
+    const cure = cureOf(this.#status?.reason);
+    const again = _("“Let it move” is in its panel.");
+    return [fill(_("The robot stands: %(why)s."), { why }), cure, again].filter(Boolean).join(" ");
+  }
+
+  // Return [sign, text] of whether it may take part.
+  get readiness() {
+    if (!this.#isConnected) return ["–", _("No robot")];
+    if (this.#isHeld) return ["!", _("Robot stopped: let it move first, in its panel")];
+    return this.connection.isLow ? ["!", `${_("Robot")}: ${this.connection.text}`] : ["✓", _("Robot")];
+  }
+
+  // Return its line among those who are connected; `isLow` asks for a look.
   get connection() {
     if (!this.#isConnected) return { text: _("none"), isLow: false };
+    if (this.#isHeld) return { text: this.#describeState(), isLow: true };
     const { battery_share: share, battery_low: low, simulated, open_loop: open, bumpers } = this.#status ?? {};
     const lacks = simulated === false ? `${open ? _(", open loop") : ""}${bumpers ? "" : _(", no bumper")}` : "";
     if (share == null) return { text: _("connected") + lacks, isLow: false };

@@ -33,8 +33,10 @@ const REASONS = {
   button: _("its stop button was pressed"),
   restarted: _("the base was restarted"),
   nobody_listens: _("no driver listens to it"),
-  feeler_missing: _("what should feel for it is not there"),
+  feeler_missing: _("a sensor that protects it is missing"),
+  nobody_watches: _("nothing would stop it if the connection were lost"),
   other_driver: _("another program drives it"),
+  unordered_motion: _("it moved without an order"),
   open_loop: _("too long for a base that does not tell where it is"),
   place_unknown: _("nobody has looked for long whether it is at its place"),
   firmware_unknown: _("the base's version is not known yet"),
@@ -46,10 +48,13 @@ const REASONS = {
   bad_odometry: _("it does not know where it is"),
   no_link: _("the connection was lost"),
   replaced: _("another session began"),
+  base_lost: _("the base was lost"),
+  worker_died: _("its program died"),
 };
 
 // What has to be done before it may move again.
 const CURES = {
+  away_from_home: _("Carry it back, turned as it stood."),
   bump: _("Clear its way."),
   cliff: _("Take it away from the edge."),
   wheel_drop: _("Put it down on both wheels."),
@@ -63,9 +68,17 @@ const CURES = {
   button: _("Let go of its button."),
   nobody_listens: _("Start its driver."),
   feeler_missing: _("Start its driver."),
+  nobody_watches: _("Start the watchdog relay beside its driver."),
   other_driver: _("Stop the other program."),
+  unordered_motion: _("Stop other programs that drive it, and do not push it."),
 };
-const STATES = { idle: _("waiting"), performing: _("moving"), stopped: _("stopped"), disarmed: _("not armed") };
+const STATES = {
+  idle: _("waiting"),
+  performing: _("moving"),
+  stopped: _("stopped"),
+  disarmed: _("not armed"),
+  away: _("away from its place"),
+};
 
 export const describeReason = (reason) => REASONS[reason] ?? reason;
 export const cureOf = (reason) => CURES[reason] ?? "";

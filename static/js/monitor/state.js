@@ -1,5 +1,7 @@
 // What the PT's page knows of its session: the server's snapshot, kept current by events. Nothing is computed here.
 
+// After which a sensor or tablet counts as silent; a tablet is heard at every heartbeat, 5 s.
+export const SILENT_S = { stride: 4, tablet: 8 };
 const KEPT_STRIDES = 400;
 const TOTALS = ["hit_rate", "hits", "judged", "score"];
 const TIMES = ["active_s", "phase_s", "phase_strides"];
@@ -15,6 +17,7 @@ export class MonitorState {
   annotations = []; // changes and remarks, each after a stride
   lastStride = null;
   #presenceAt = 0;
+  #runningAt = null;
 
   reset(snapshot) {
     this.session = snapshot;
@@ -22,6 +25,7 @@ export class MonitorState {
     this.annotations = snapshot.marks;
     this.lastStride ??= this.strides.at(-1) ?? null;
     this.#presenceAt = performance.now();
+    this.#keepRunning();
   }
 
   // Add strides that were walked while the connection was lost.
@@ -40,6 +44,12 @@ export class MonitorState {
     }
   }
 
+  // Keep since when it runs, as far as this page has seen it.
+  #keepRunning() {
+    if (this.session.state !== "running") this.#runningAt = null;
+    else this.#runningAt ??= performance.now();
+  }
+
   #addStride(event) {
     const { session } = this;
     update(session, event, TIMES);
@@ -53,6 +63,12 @@ export class MonitorState {
     session.presence.stride_ago_s = 0;
     session.presence.tablet_ago_s = tablet == null ? null : tablet + this.sincePresence_s;
     this.#presenceAt = performance.now();
+  }
+
+  // Seconds since it was started or resumed.
+  get sinceRunning_s() {
+    this.#keepRunning();
+    return this.#runningAt === null ? 0 : (performance.now() - this.#runningAt) / 1000;
   }
 
   // Seconds since the server said who is connected.

@@ -26,6 +26,8 @@ export function createStrideCharts({ state, show }) {
     legend.replaceChildren(...items);
   }
 
+  const isBeforeGoal = ({ goal }) => goal === null && state.strides.every(({ performance }) => performance == null);
+
   function describeLast() {
     const judged = state.strides.filter(({ performance }) => performance !== null).slice(-LAST);
     const hits = judged.filter(({ hit }) => hit).length;
@@ -39,7 +41,11 @@ export function createStrideCharts({ state, show }) {
 
   return {
     draw(session) {
-      drawStrip(strip, state.strides, state.annotations, session.phases);
+      show(
+        "strip",
+        isBeforeGoal(session) ? fill(_("Strides in %(unit)s, mean ± SD"), session) : _("Strides against the goal"),
+      );
+      drawStrip(strip, state.strides, state.annotations, session);
       drawLegend();
       show("of-twenty", describeLast());
       drawLastStrides(twenty, state.strides.slice(-LAST), LAST);

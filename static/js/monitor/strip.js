@@ -1,43 +1,97 @@
-// The strip of recent strides against the goal, with phases, changes and remarks. Shape repeats the meaning of
-// color: hits are solid, misses hollow, missing ones a dash.
+// The strip of recent strides, by minutes: against the goal, or before there is one, in the measure's own unit with
+// their running mean ± SD. Shape repeats the meaning of color: hits are solid, misses hollow, missing ones a dash.
 
-import { number } from "garry/shared/language";
+import { _, number } from "garry/shared/language";
 import { percent } from "garry/shared/format";
 import { phaseName } from "garry/shared/labels";
-import { fitViewBox, shape, text, title } from "garry/shared/svg";
-import { badgeOf, describe, isRemark } from "garry/monitor/annotations";
+import { fitViewBox, shape, text } from "garry/shared/svg";
+import { drawAnnotations } from "garry/monitor/strip_annotations";
 
-const [LOWEST, HIGHEST] = [0.5, 1.5]; // performance
+const RANGE = [0.5, 1.5]; // performance
 const SPACING = 4; // pixels between strides, at least
 const FEWEST = 60; // strides that the width is made for
 const LETTER = 8; // pixels
+const AXIS = 18; // pixels, for the minutes
+const MINUTE_S = 60;
 
 const path = (kind, d) => shape("path", { class: kind, d });
 
-export function drawStrip(svg, strides, annotations, phases) {
+// Return the running mean and standard deviation at each stride; null before the second valid one.
+export function runningMeans(values) {
+  let [count, mean, squares] = [0, 0, 0]; // Welford's
+  return values.map((value) => {
+    if (value != null) {
+      count += 1;
+      const off = value - mean;
+      mean += off / count;
+      squares += off * (value - mean);
+    }
+    return count < 2 ? null : { mean, sd: Math.sqrt(squares / (count - 1)) };
+  });
+}
+
+// Return what is plotted: [lowest, highest], the value of a stride, and the lines of the scale.
+function scaleOf(shown, { goal, unit }) {
+  if (goal !== null || shown.some(({ performance }) => performance != null)) {
+    const lines = [0.5, 1, 1.5].map((share) => [share, percent(share)]);
+    return { range: RANGE, isJudged: true, valueOf: ({ performance }) => performance, lines };
+  }
+  const valueOf = ({ valid, value }) => (valid ? (value ?? null) : null);
+  const highest = Math.max(1e-9, ...shown.map((stride) => valueOf(stride) ?? 0));
+  const size = 10 ** Math.floor(Math.log10(highest / 2));
+  const step = [1, 2, 5, 10].map((n) => n * size).find((one) => highest / one <= 4);
+  const top = step * Math.ceil(highest / step);
+  const places = Math.max(0, -Math.floor(Math.log10(step)));
+  const lines = Array.from({ length: Math.round(top / step) + 1 }, (_each, n) => [
+    n * step,
+    number(n * step, places) + (n * step === top ? ` ${unit}` : ""),
+  ]);
+  return { range: [0, top], isJudged: false, valueOf, lines };
+}
+
+export function drawStrip(svg, strides, annotations, session) {
   const [width, height] = fitViewBox(svg);
-  const shown = strides.slice(-Math.max(20, Math.floor((width - 60) / SPACING)));
-  const dx = (width - 60) / Math.max(shown.length - 1, FEWEST);
-  const x = (index) => 46 + index * dx;
-  const y = (performance) => {
-    const inside = Math.min(Math.max(performance, LOWEST), HIGHEST);
-    return height - 8 - ((inside - LOWEST) * (height - 34)) / (HIGHEST - LOWEST);
+  const shown = strides.slice(-Math.max(20, Math.floor((width - 70) / SPACING)));
+  const dx = (width - 70) / Math.max(shown.length - 1, FEWEST);
+  const floor = height - AXIS;
+  const { range, isJudged, valueOf, lines } = scaleOf(shown, session);
+  const x = (index) => 56 + index * dx;
+  const y = (value) => {
+    const inside = Math.min(Math.max(value, range[0]), range[1]);
+    return floor - 6 - ((inside - range[0]) * (floor - 36)) / (range[1] - range[0]);
   };
 
   function drawScale() {
-    const size = { x: 40, y: y(HIGHEST), width: width - 40, height: y(1) - y(HIGHEST) };
-    const labels = [0.5, 1, 1.5].map((share) => text(percent(share), { x: 0, y: y(share) + 5 }));
-    return [shape("rect", { class: "above", ...size }), ...labels, path("goal", `M40 ${y(1)}H${width}`)];
+    const labels = lines.map(([value, label]) => text(label, { x: 0, y: y(value) + 4 }));
+    if (!isJudged) return [...labels, ...drawMeans()];
+    const size = { x: 50, y: y(range[1]), width: width - 50, height: y(1) - y(range[1]) };
+    return [shape("rect", { class: "above", ...size }), ...labels, path("goal", `M50 ${y(1)}H${width}`)];
   }
 
-  function drawStride({ performance, hit, valid }, index) {
-    if (performance == null) {
-      return valid
-        ? shape("circle", { class: "calm", cx: x(index), cy: height - 10, r: 3.2 })
-        : path("gap", `M${x(index)} ${height - 8}v-10`);
+  function drawMeans() {
+    const means = runningMeans(shown.map(valueOf));
+    const known = [...means.keys()].filter((index) => means[index]);
+    if (!known.length) return [];
+    const line = (at) => known.map((index) => `${x(index)} ${y(at(means[index]))}`);
+    const upper = line(({ mean, sd }) => mean + sd);
+    const lower = line(({ mean, sd }) => mean - sd).reverse();
+    return [
+      path("spread", `M${[...upper, ...lower].join("L")}Z`),
+      path("mean", `M${line(({ mean }) => mean).join("L")}`),
+    ];
+  }
+
+  function drawStride(stride, index) {
+    const value = valueOf(stride);
+    if (value == null) {
+      return stride.valid
+        ? shape("circle", { class: "calm", cx: x(index), cy: floor - 8, r: 3.2 })
+        : path("gap", `M${x(index)} ${floor - 4}v-10`);
     }
-    const r = index === shown.length - 1 ? 6 : 3.2;
-    return shape("circle", { class: hit ? "hit" : "miss", cx: x(index), cy: y(performance), r });
+    const kind = !isJudged ? "calm" : stride.hit ? "hit" : "miss";
+    if (value > range[1]) return path(kind, `M${x(index)} ${y(range[1]) - 5}l5 9h-10z`);
+    if (value < range[0]) return path(kind, `M${x(index)} ${y(range[0]) + 5}l5 -9h-10z`);
+    return shape("circle", { class: kind, cx: x(index), cy: y(value), r: index === shown.length - 1 ? 6 : 3.2 });
   }
 
   function drawPhases() {
@@ -47,58 +101,35 @@ export function drawStrip(svg, strides, annotations, phases) {
     return starts.map((index, n) => {
       const left = x(index) - dx / 2;
       const room = (n + 1 < starts.length ? x(starts[n + 1]) : width) - left;
-      const name = phaseName(phases[shown[index].phase]?.name ?? "");
+      const name = phaseName(session.phases[shown[index].phase]?.name ?? "");
       const label = room < LETTER * name.length ? "" : text(name, { class: "part", x: left + 5, y: 40 });
-      return path("bound", `M${left} 4V${height - 8}`) + label;
+      return path("bound", `M${left} 24V${floor}`) + label;
     });
   }
 
-  function drawAnnotations() {
-    let level = 0; // remarks at the same stride stand above each other
-    let previous = null;
-    let free = 0; // badges and flags stand in a row on top and never cover each other
-
-    function drawGoal(at, value) {
-      const left = Math.min(Math.max(at, free), width - 56);
-      free = left + 57;
-      return (
-        path("flag", `M${at} 4V${height - 8}`) +
-        path("cloth", `M${left} 2h54v20h-54z`) +
-        text(number(value, 2), { class: "on-cloth", x: left + 27, y: 17 })
-      );
+  // The minutes before the newest stride, by the source's clock.
+  function drawMinutes() {
+    if (!shown.length) return [];
+    const now = shown.at(-1).time_s;
+    const newest = x(shown.length - 1);
+    const marks = [text(_("now"), { class: "minute", x: Math.min(newest, width - 22), y: height - 3 })];
+    let free = newest - 40;
+    for (let minutes = 1; minutes * MINUTE_S <= now - shown[0].time_s; minutes++) {
+      const at = x(shown.findIndex(({ time_s }) => time_s >= now - minutes * MINUTE_S));
+      if (at > free) continue;
+      free = at - 44;
+      const label = text(`${number(-minutes)} min`, { class: "minute", x: at, y: height - 3 });
+      marks.push(path("bound", `M${at} ${floor}v4`) + label);
     }
-
-    function drawChange(at, change) {
-      const cx = Math.min(Math.max(at, free + 9), width - 10);
-      free = cx + 11;
-      return shape(
-        "g",
-        { class: "change" },
-        title(describe(change)) +
-          path("flag", `M${at} 21V${height - 8}`) +
-          shape("circle", { cx, cy: 12, r: 9 }) +
-          text(badgeOf(change), { x: cx, y: 16 }),
-      );
-    }
-
-    function drawRemark(at, remark) {
-      level = remark.after === previous ? level + 1 : 0;
-      previous = remark.after;
-      const place = { x: Math.min(Math.max(at, 80), width - 40), y: height - 16 - 13 * level };
-      return (
-        path("remark", `M${at} ${height - 4}l-6 -9h12z`) + text(describe(remark), { class: "remark-words", ...place })
-      );
-    }
-
-    return annotations.map((annotation) => {
-      const { after, kind, value } = annotation;
-      if (!shown.length || after < shown[0].number) return "";
-      const next = shown.findIndex((stride) => stride.number > after);
-      const at = next < 0 ? x(shown.length) : x(next) - dx / 2;
-      if (kind === "goal") return value === null ? "" : drawGoal(at, value);
-      return isRemark(annotation) ? drawRemark(at, annotation) : drawChange(at, annotation);
-    });
+    return marks;
   }
 
-  svg.innerHTML = [...drawScale(), ...shown.map(drawStride), ...drawPhases(), ...drawAnnotations()].join("");
+  const place = { width, floor, dx, x };
+  svg.innerHTML = [
+    ...drawScale(),
+    ...shown.map(drawStride),
+    ...drawPhases(),
+    ...drawMinutes(),
+    ...drawAnnotations(shown, annotations, place),
+  ].join("");
 }

@@ -2,11 +2,11 @@
 
 for (const step of document.querySelectorAll(".step")) {
   const field = step.querySelector("input");
-  const size = Number(step.dataset.step),
-    places = Number(step.dataset.places);
   step.addEventListener("click", (event) => {
     const button = event.target.closest("button");
     if (!button) return;
+    const size = Number(step.dataset.step),
+      places = Number(step.dataset.places);
     // Go to the next multiple of the step: 3.91 goes to 3.95, not to 3.96.
     const now = (Number(field.value.replace(",", ".")) || 0) / size,
       up = button.value === "1";
@@ -23,10 +23,30 @@ function showGoal() {
 choices.forEach((choice) => choice.addEventListener("change", showGoal));
 showGoal();
 
-// A protocol whose phases all have an end sets the minutes.
-const lengths = JSON.parse(document.getElementById("lengths").textContent);
+// Another measure brings its unit, its steps and its first goal.
+const measures = JSON.parse(document.getElementById("measures").textContent);
+document.querySelector("select[name=measure]")?.addEventListener("change", ({ target }) => {
+  const { unit, step, places, goal } = measures[target.value];
+  const buttons = document.querySelector(".step[data-for=value]");
+  Object.assign(buttons.dataset, { step, places });
+  buttons.querySelector("input").value = goal;
+  document.querySelector("[data-unit]").textContent = unit;
+});
+
+// Only the numbers that the chosen rule asks for.
+for (const row of document.querySelectorAll("[data-of]")) {
+  const choice = document.querySelector(`select[name=${row.dataset.of}]`);
+  const show = () => (row.hidden = !row.dataset.is.split(" ").includes(choice.value));
+  choice.addEventListener("change", show);
+  show();
+}
+
+// A protocol whose phases all have an end sets the minutes, and one that asks for a share of hits that share.
+const targets = JSON.parse(document.getElementById("targets").textContent);
 for (const choice of document.querySelectorAll("input[name=protocol]")) {
   choice.addEventListener("change", () => {
-    if (lengths[choice.value]) document.querySelector("input[name=minutes]").value = lengths[choice.value];
+    for (const [name, value] of Object.entries(targets[choice.value])) {
+      if (value) document.querySelector(`input[name=${name}]`).value = value;
+    }
   });
 }

@@ -8,6 +8,8 @@ const PHASES = {
   Familiarization: _("Familiarization"),
   Training: _("Training"),
   "Training 100 %": _("Training 100 %"),
+  "Training 95 %": _("Training 95 %"),
+  "Training 90 %": _("Training 90 %"),
   "Training 85 %": _("Training 85 %"),
   Catch: _("Catch"),
   Washout: _("Washout"),
@@ -19,6 +21,8 @@ const REMARKS = {
   dizziness: _("dizziness"),
   near_fall: _("near fall"),
   fall: _("fall"),
+  fall_severity: _("hurt by the fall"),
+  fall_withdrawn: _("it was no fall"),
   handrail: _("handrail"),
   verbal_cue: _("verbal cue"),
   borg: _("Borg"),
@@ -31,7 +35,8 @@ const REASONS = {
   time_backwards: _("the sensor’s clock jumped"),
   paused: _("paused"),
   flagged: _("doubtful"),
-  gap: _("samples are missing"),
+  gap: _("samples are lost"),
+  late: _("samples came late"),
   rate: _("another sampling rate"),
   force_lost: _("the force is missing"),
   force_too_large: _("the force is too large"),
@@ -55,6 +60,17 @@ const REASONS = {
   no_push_off: _("no push-off"),
 };
 
+// What to do about the signals' clock: late, lost, drifting (rehab/gait/selfcheck/cures.py).
+const CURES = {
+  time_backwards: _("Send the sensors’ own times."),
+  gap: _("Lost: look at the network and the recorder."),
+  flag_lost: _("Lost: look at the network and the recorder."),
+  late: _("Late: close other programs on the lab’s computer."),
+  flag_late: _("Late, and put back: close other programs on the lab’s computer."),
+  moment_out_of_step: _("Out of time or drifting: let one clock stamp all channels."),
+  angle_out_of_step: _("Out of time or drifting: let one clock stamp all channels."),
+};
+
 // What ends a page's connection or refuses an order, by its code; others come with a text of their own.
 const REFUSALS = {
   sign_in: _("Sign in again, or pair the tablet again."),
@@ -67,4 +83,5 @@ export const refusal = ({ code, message }) => REFUSALS[code] ?? message;
 export const typeName = (slug, label = slug) => TYPES[slug] ?? label;
 export const phaseName = (name) => PHASES[name] ?? name;
 export const remarkName = (kind) => REMARKS[kind] ?? kind.replaceAll("_", " ");
+export const clockCures = (names) => [...new Set(names.map((name) => CURES[name]).filter(Boolean))];
 export const reasonName = (reason) => REASONS[reason] ?? reason.replaceAll("_", " ");

@@ -15,7 +15,8 @@ import { refusal } from "garry/shared/labels";
 const wire = JSON.parse(document.getElementById("wire").textContent); // robot/wire/
 const SILENCE_MS = 2.4 * wire.heartbeat_ms;
 const DOUBT_MS = 1.2 * wire.heartbeat_ms; // after which an old socket is not trusted when the tablet wakes up
-const CONFIRM_MS = 50;
+const CONFIRM_MS = 1_000;
+const CONFIRM_FRAMES = 8; // after so many at once: the server waits for its page
 const ANSWER_MS = 8_000;
 const FIRST_PAUSE_MS = 200;
 const LONGEST_PAUSE_MS = 5_000;
@@ -30,6 +31,7 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
   let receivedAt = 0;
   let lastNumber = null; // the last step that this page has
   let catchUpTo = null; // steps up to this one are being sent after a break
+  let confirmedFrame = 0;
   let requests = 0;
 
   function open() {
@@ -86,23 +88,30 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
         closeReason = refusal(message);
         if (message.id) settle(message.id, new Error(closeReason));
     }
-    if (message.frame) confirm(message.frame);
+    if (message.frame) confirm(message.frame, message.type === "steps");
   }
 
   function caughtUp() {
     lastNumber = Math.max(lastNumber, catchUpTo);
   }
 
-  // Confirm the newest frame, at most 20 times a second.
-  function confirm(frame) {
-    if (confirmation) confirmation.frame = Math.max(confirmation.frame, frame);
-    else {
-      const own = (confirmation = { frame, socket });
-      setTimeout(() => {
-        confirmation = null;
-        if (own.socket === socket) send({ type: "seen", frame: own.frame });
-      }, CONFIRM_MS);
-    }
+  // Confirm the newest frame: within a second, and at once where many have come or past steps wait.
+  function confirm(frame, now = false) {
+    confirmation ??= { frame: 0, timer: setTimeout(sendConfirmation, CONFIRM_MS) };
+    confirmation.frame = Math.max(confirmation.frame, frame);
+    if (now || frame - confirmedFrame >= CONFIRM_FRAMES) sendConfirmation();
+  }
+
+  function sendConfirmation() {
+    const { frame } = forgetConfirmation();
+    if (send({ type: "seen", frame })) confirmedFrame = Math.max(confirmedFrame, frame);
+  }
+
+  function forgetConfirmation() {
+    const forgotten = confirmation;
+    clearTimeout(forgotten?.timer);
+    confirmation = null;
+    return forgotten;
   }
 
   function send(message) {
@@ -121,7 +130,8 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
 
   function handleClose(code) {
     socket = null;
-    confirmation = null;
+    forgetConfirmation();
+    confirmedFrame = 0;
     clearInterval(watchdog);
     for (const id of [...pending.keys()]) settle(id, new Error(_("The connection was lost. Try again.")));
     if (FINAL.has(code)) {
@@ -159,6 +169,7 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
     const old = socket;
     socket = null;
     state = "closed";
+    forgetConfirmation();
     clearTimeout(retryTimer);
     clearInterval(watchdog);
     removeEventListener("online", reconnectIfStale);

@@ -25,7 +25,7 @@ export const icon = (id) =>
 
 // Let a drawing's units be pixels; return its width and height.
 export function fitViewBox(svg) {
-  const { width, height } = svg.getBoundingClientRect();
+  const [width, height] = [svg.clientWidth, svg.clientHeight]; // not as the page is magnified
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   return [width, height];
 }

@@ -1,19 +1,24 @@
-// A waiting tablet asks the server where to go: on once its code is approved, to its station's next session.
+// A tablet that waits, or shows old scores, asks the server where to go: on once its code is approved, to its
+// station's next session.
 
-const EVERY_MS = 2_000;
-const note = document.querySelector(".note");
+const EVERY_MS = 1_000;
+const note = document.querySelector("[data-offline]");
+
+function showOffline(isOffline) {
+  if (note) note.hidden = !isOffline;
+}
 
 async function ask() {
   try {
     const answer = await fetch(document.body.dataset.state, { cache: "no-store" });
     const { go } = await answer.json();
-    note.hidden = true;
+    showOffline(false);
     if (go) {
       location.replace(go);
       return;
     }
   } catch {
-    note.hidden = false;
+    showOffline(true);
   }
   setTimeout(ask, EVERY_MS);
 }

@@ -21,6 +21,13 @@ export function createControls(body, socket, showQuestion) {
     hideTimer = setTimeout(() => (note.hidden = true), NOTE_MS);
   }
 
+  // Show what the patient cannot mend, for as long as it lasts.
+  function tellTherapist(message) {
+    clearTimeout(hideTimer);
+    note.textContent = message;
+    note.hidden = false;
+  }
+
   async function change(button) {
     button.disabled = true;
     try {
@@ -42,14 +49,14 @@ export function createControls(body, socket, showQuestion) {
   // Show at once that the tap was registered; the server says when the robot is stopped.
   function stopRobot() {
     const sent = socket.send({ type: "robot", order: "stop" });
-    if (!sent) notify(_("No connection. Use the robot's own button."));
+    if (!sent) notify(_("No connection. Call your therapist."));
     showOrder(sent ? _("Stop sent") : _("Not sent"));
     clearTimeout(orderTimer);
     orderTimer = setTimeout(sent ? reportUnanswered : () => showOrder(""), sent ? ANSWER_MS : NOTE_MS);
   }
 
   function reportUnanswered() {
-    if (!isStopped) notify(_("No answer. Use the robot's own button."));
+    if (!isStopped) notify(_("No answer. Call your therapist."));
     showOrder("");
   }
 
@@ -90,5 +97,5 @@ export function createControls(body, socket, showQuestion) {
     drawRobot();
   }
 
-  return { showRobot, keepFocus };
+  return { showRobot, keepFocus, tellTherapist };
 }

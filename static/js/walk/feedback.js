@@ -84,7 +84,11 @@ export function createFeedback(body) {
     beads.forEach((bead, i) => bead.classList.toggle("on", streak > i));
     set(
       runWords,
-      streak === null ? fill(_("Step %(number)s"), { number }) : n_("%(count)s in a row", "%(count)s in a row", streak),
+      last?.summary
+        ? fill(_("%(hits)s of %(steps)s steps"), last.summary)
+        : streak === null
+          ? fill(_("Step %(number)s"), { number })
+          : n_("%(count)s in a row", "%(count)s in a row", streak),
     );
   }
 
@@ -95,8 +99,8 @@ export function createFeedback(body) {
     set(partWords, left);
   }
 
-  // Draw a screen of the session; `reason` is why the connection ended.
-  return function draw(screen, session, reason) {
+  // Draw a screen of the session.
+  return function draw(screen, session) {
     if (session) set(time, timeLeft(session));
     if (session) body.dataset.chart = session.chart;
     if (screen === "feedback") {
@@ -104,7 +108,7 @@ export function createFeedback(body) {
       drawTotals(session);
       return;
     }
-    const [text, more] = messageFor(screen, session, name, reason);
+    const [text, more] = messageFor(screen, session, name, body.classList.contains("alone"));
     setPhrase(text);
     delete phrase.dataset.fit;
     set(sub, more);

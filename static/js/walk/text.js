@@ -4,9 +4,11 @@ import { clock } from "garry/shared/format";
 import { _, fill, n_, number } from "garry/shared/language";
 
 const SAFE = _("Your score is safe.");
+const KEEP_WALKING = _("Keep walking if you feel well.");
 
-// Return what a screen without a step says: [the phrase, the line below it]. `reason`: why the connection ended.
-export function messageFor(screen, session, name, reason) {
+// Return what a screen without a step says: [the phrase, the line below it].
+// `isAlone`: on a tablet that cannot go on by itself.
+export function messageFor(screen, session, name, isAlone) {
   const safe = session?.has_points === false ? "" : SAFE;
   switch (screen) {
     case "ready":
@@ -21,21 +23,22 @@ export function messageFor(screen, session, name, reason) {
     case "waiting":
       return [_("Waiting for the sensor."), _("Please wait. No score yet.")];
     case "lost":
-      return [_("The sensor is silent."), safe || _("Please wait.")];
+      return [_("The sensor is silent."), `${KEEP_WALKING} ${safe}`];
     case "still":
-      return [_("Waiting for your next step."), safe];
+      return [_("No steps arrive."), `${KEEP_WALKING} ${safe}`];
     case "paused":
-      if (session.pause_reason === "restart") return [_("Pause."), _("The server was restarted; nothing was lost.")];
-      if (session.pause_reason === "therapist") return [_("Pause."), `${_("Your therapist paused.")} ${safe}`];
-      return [_("Pause."), `${_("Rest now.")} ${safe}`];
+      return [
+        _("Pause."),
+        [_("Rest now."), isAlone && _("Your therapist starts again."), safe].filter(Boolean).join(" "),
+      ];
     case "ask":
-      return [_("End this session?"), _("You cannot walk on after that.")];
+      return [_("End this session?"), safe];
     case "offline":
-      return [_("No connection."), `${_("Please wait.")} ${safe}`];
+      return [_("No connection."), `${KEEP_WALKING} ${safe}`];
     case "ended":
-      return [_("This session has ended."), _("Your scores come next.")];
+      return [_("You have finished."), _("Your scores come next.")];
     case "closed":
-      return [_("This screen has stopped."), reason];
+      return [_("This screen has stopped."), _("Please call your therapist.")];
   }
   return ["", ""];
 }

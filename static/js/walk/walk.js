@@ -12,7 +12,7 @@ import { applyEvent, fromSnapshot, screenOf } from "garry/walk/state";
 import { createSounds } from "garry/walk/sounds";
 
 const PATIENCE_MS = 2_000; // a shorter break of the connection is not shown
-const STILL_MS = 10_000; // after so long without a step the last one is no longer shown as current
+const STILL_MS = 4_000; // after so long without a step the last one is no longer shown as current
 const LEAVE_MS = 1_500;
 const NOT_WALKING = new Set(["presence", "robot_stopped"]); // events that are no sign of walking
 
@@ -24,7 +24,7 @@ const sound = isMirror ? () => {} : createSounds(body.querySelector(".sound"));
 const drawFeedback = createFeedback(body);
 const fitCalm = createFitting(body);
 const page = { link: "", asking: false, still: false };
-let session, closeReason, stillTimer, linkTimer, frame, leaveTimer;
+let session, stillTimer, linkTimer, frame, leaveTimer;
 let confetti = "none";
 
 const socket = connect(body.dataset.socket, {
@@ -45,14 +45,14 @@ const socket = connect(body.dataset.socket, {
     clearTimeout(linkTimer);
     const note = () => {
       page.link = state;
-      closeReason = reason;
+      if (state === "closed") tellTherapist(reason);
       redraw();
     };
     if (state === "lost") linkTimer = setTimeout(note, PATIENCE_MS);
     else note();
   },
 });
-const { showRobot, keepFocus } = createControls(body, socket, (asking) => {
+const { showRobot, keepFocus, tellTherapist } = createControls(body, socket, (asking) => {
   page.asking = asking;
   redraw();
 });
@@ -80,7 +80,7 @@ function draw() {
   const hasChanged = body.dataset.look !== screen;
   if (hasChanged) body.dataset.look = screen;
   if (screen !== "paused" && screen !== "ask") page.asking = false;
-  drawFeedback(screen, session, closeReason);
+  drawFeedback(screen, session);
   if (session) showRobot(session);
   if (hasChanged) keepFocus();
   if (screen !== "feedback") fitCalm();
@@ -95,9 +95,10 @@ function draw() {
   } else clear();
   confetti = "none";
   if (session) body.dataset.step = session.number;
-  if (screen === "ended" && !isMirror) leaveTimer ??= setTimeout(() => location.replace(body.dataset.scores), LEAVE_MS);
+  if (screen === "ended" && !isMirror) leaveTimer ??= setTimeout(() => location.replace(body.dataset.ending), LEAVE_MS);
 }
 
+addEventListener("resize", redraw); // words fit another place
 redraw();
 if (!isMirror) {
   keepAwake();

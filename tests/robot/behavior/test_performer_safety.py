@@ -1,12 +1,15 @@
 """What a base feels, who watches, how a gesture is announced: what stops a robot."""
 
+from dataclasses import replace
+
 import pytest
 
 from robot.bases import Indication, SensorState
+from robot.motion.gestures import GESTURES
 from robot.motion.limits import TICK_S
 from robot.motion.pose import HOME
 from robot.motion.twist import STILL
-from tests.support.robot_stage import CUE, WELCOME, Stage
+from tests.support.robot_stage import CUE, WELCOME, FeelingBase, Stage
 
 
 def test_a_gesture_is_announced_half_a_second_before_it_moves(felt):
@@ -14,7 +17,8 @@ def test_a_gesture_is_announced_half_a_second_before_it_moves(felt):
     felt.hear(type="step", time_s=5.0, performance=1.0)
     begun_s = felt.now_s
     felt.wait(TICK_S)
-    assert felt.base.shown[-1] == (Indication.MOVING, True)
+    assert felt.base.shown[-1] == (Indication.MOVING, False)
+    assert len(felt.base.played) == len(felt.base.lit) == 1  # its score has begun
     assert felt.robot.player.is_busy
     while felt.base.read().twist.is_still:
         felt.wait(TICK_S)
@@ -45,6 +49,8 @@ def test_quiet_gestures_make_no_sound(felt):
         Indication.STOPPED,
     }
     assert not any(aloud for _, aloud in felt.base.shown)
+    assert felt.base.lit
+    assert not felt.base.played
 
 
 def test_an_intensity_of_0_is_off(felt):
@@ -160,3 +166,40 @@ def test_the_battery_is_told_as_people_read_it(felt, battery_v, share, low):
     assert status["battery_v"] == battery_v
     assert status["battery_share"] == (share if share is None else pytest.approx(share, abs=0.01))
     assert status["battery_low"] is low
+
+
+class KeepingBase(FeelingBase):
+    """A base that keeps a bump until it is read, and no longer."""
+
+    def __init__(self, monotonic):
+        super().__init__(monotonic)
+        self.bumped = False
+
+    def read(self):
+        there, bumped = super().read(), getattr(self, "bumped", False)
+        self.bumped = False
+        hazards = frozenset({"bump"} if bumped else ())
+        return replace(there, sensors=replace(there.sensors, hazards=hazards))
+
+
+@pytest.mark.parametrize("reader", ["nobody", "a step", "an arming"])
+def test_a_bump_of_50_ms_in_a_hang_of_0_2_s_is_never_lost(reader):
+    """Also where another than the one who stops it has read it first: 100 of 100."""
+    stage = Stage(KeepingBase)
+    stage.hear(**WELCOME)
+    for number in range(100):
+        stage.wait(1.1)  # an arming sooner than that is refused
+        stage.hear(type="arm")
+        stage.robot.play_alone(GESTURES["sway"], stage.now_s)
+        stage.wait(0.6 + number * 0.01)
+        assert stage.robot.player.is_busy
+        stage.base.bumped = True  # and over, before anyone looks
+        stage.now_s += 0.2
+        stage.hear(type="heartbeat")
+        if reader == "a step":
+            stage.robot.senses.read()
+        elif reader == "an arming":
+            stage.hear(type="arm")
+        stage.robot.tick(stage.now_s)
+        assert stage.robot.safety.latch == "bump"
+        assert not stage.robot.player.is_busy

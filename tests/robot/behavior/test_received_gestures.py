@@ -6,13 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot.bases.kinematic import KinematicBase
 from robot.behavior.performer import Performer
 from robot.motion.gesture_spec import Move, to_data
 from robot.motion.gestures import GESTURES
 from robot.motion.limits import DEFAULT_LIMITS
 from robot.motion.pose import HOME
-from tests.support.robot_stage import CUE, WELCOME, RealBase, Stage
+from tests.support.robot_stage import CUE, WELCOME, IdealBase, RealBase, Stage
 
 WAVE = to_data("wave", [Move(turn_rad=0.6), Move(turn_rad=-1.2), Move(turn_rad=0.6)])
 FAR = to_data("far", [Move(forward_m=0.4), Move(forward_m=-0.4)])
@@ -40,7 +39,7 @@ def test_a_composed_gesture_needs_no_new_robot(stage):
         (WAVE | {"steps": [{"turn_rad": 1.0}]}, "It ends turned by 57°"),
     ],
 )
-@pytest.mark.parametrize("make", [KinematicBase, RealBase])
+@pytest.mark.parametrize("make", [IdealBase, RealBase])
 def test_a_gesture_that_does_not_validate_here_moves_nothing(make, data, words):
     stage = Stage(make)
     name = data["name"]
@@ -72,7 +71,7 @@ def test_a_robot_s_own_gesture_is_not_replaced(stage):
 
 
 def test_a_slower_robot_refuses_what_it_cannot_reach_in_time(stage):
-    slow = Stage(KinematicBase)
+    slow = Stage(IdealBase)
     slow.robot = Performer(slow.base, DEFAULT_LIMITS.scaled(0.1))
     slow.hear(**WELCOME | {"cue": CUE | {"above": "wave", "gestures": [WAVE]}})
     slow.walk(*[1.2] * 6)

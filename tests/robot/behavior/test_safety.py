@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from robot.bases import Abilities, BaseState, SensorState
 from robot.behavior import safety as rules
+from robot.behavior.resistance import MISSED_M, WORK_J
 from robot.behavior.safety import Safety
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.pose import HOME, Pose
@@ -139,26 +140,67 @@ def test_the_tether(performing):
     assert watch.look(far, performing=performing) == ("tether", 0.02)
 
 
+@pytest.mark.parametrize("share", [1, 0.5, 0.3])  # normal, gentle, small and gentle
 @pytest.mark.parametrize(
-    ("ordered", "moving", "found"),
+    ("ordered", "follows", "found"),
     [
-        (AHEAD, STILL, "stalled"),
-        (AHEAD, Twist(0.11, 0), ""),
-        (AHEAD, Twist(-0.05, 0), "stalled"),
-        (STILL, Twist(0.15, 0), "stalled"),
-        (Twist(0, 1.5), STILL, "stalled"),
-        (Twist(0, 1.5), Twist(0, 0.8), ""),
-        (Twist(0, -1.5), Twist(0, 0.3), "stalled"),
+        (AHEAD, 0.0, "stalled"),
+        (AHEAD, 0.9, ""),
+        (AHEAD, -0.25, "stalled"),
+        (Twist(-0.2, 0), 0.0, "stalled"),
+        (Twist(0, 1.5), 0.0, "stalled"),
+        (Twist(0, 1.5), 0.9, ""),
+        (Twist(0, -1.5), -0.2, "stalled"),
     ],
     ids=str,
 )
-def test_wheels_that_go_astray_for_half_a_second(ordered, moving, found):
+def test_a_base_that_is_held_is_noticed_at_any_speed(share, ordered, follows, found):
+    """Half a second after what it should do, as fast or as gently as it goes."""
     watch = Watch()
-    state = replace(FINE, twist=moving)
-    assert watch.look(state, ordered, for_s=0.5) == ("", 0.5)
-    assert watch.look(FINE, STILL) == ("", 0.02)  # and on again: it counts anew
-    assert watch.look(state, ordered, for_s=0.5) == ("", 0.5)
-    assert watch.look(state, ordered, for_s=0.04)[0] == found
+    should = Twist(ordered.v_m_s * share, ordered.w_rad_s * share)
+    does = Twist(should.v_m_s * follows, should.w_rad_s * follows)
+    latch, after_s = watch.look(replace(FINE, twist=does), should, for_s=0.54)
+    assert latch == found
+    assert after_s <= 0.54
+
+
+@pytest.mark.parametrize("pushed", [Twist(0.15, 0), Twist(0.05, 0), Twist(0, 0.5)], ids=str)
+def test_a_base_that_moves_unordered_is_noticed(pushed):
+    watch = Watch()
+    state = replace(FINE, twist=pushed)
+    assert watch.look(state, for_s=0.5) == ("", 0.5)
+    assert watch.look(FINE) == ("", 0.02)  # and on again: it counts anew
+    assert watch.look(state, for_s=0.5) == ("", 0.5)
+    assert watch.look(state, for_s=0.04)[0] == "stalled"
+
+
+def test_way_that_it_misses_is_bounded_however_slow_it_is():
+    """A third of the way, for longer and longer: 3 cm of it, and the motors' work with that."""
+    for speed_m_s in (0.2, 0.15, 0.1):
+        watch = Watch()
+        state = replace(FINE, twist=Twist(speed_m_s * 0.6, 0))
+        found, after_s = watch.look(state, Twist(speed_m_s, 0), for_s=3)
+        assert found == "stalled"
+        assert speed_m_s * 0.4 * after_s <= 2 * MISSED_M
+
+
+def test_a_late_base_makes_up_for_it():
+    watch = Watch()
+    for _ in range(10):
+        for should, does in ((AHEAD, STILL), (AHEAD, AHEAD), (STILL, AHEAD)):
+            assert watch.look(replace(FINE, twist=does), should, for_s=0.12) == ("", 0.12)
+
+
+def test_motors_that_push_while_the_wheels_slip():
+    """As against a foot behind, where there is no bumper: the wheels turn as they should."""
+    for speed_m_s in (0.2, 0.05, 0.02):
+        watch, should = Watch(), Twist(-speed_m_s, 0)
+        rolling = replace(feeling(push_n=6.0), twist=should)
+        assert watch.look(rolling, should, for_s=10) == ("", 10)
+        pushing = replace(feeling(push_n=30.0), twist=should)
+        found, after_s = watch.look(pushing, should, for_s=3)
+        assert found == "stalled"
+        assert 30.0 * speed_m_s * after_s <= 2 * WORK_J
 
 
 def test_wheels_and_gyro_that_disagree_about_a_gesture():
@@ -206,6 +248,11 @@ def test_home():
     assert Safety.is_at_home(replace(FINE, pose=Pose(0.03, 0.03, math.tau + 0.08)))
     assert not Safety.is_at_home(replace(FINE, pose=Pose(0.04, 0.04, 0)))
     assert not Safety.is_at_home(replace(FINE, pose=Pose(0, 0, -0.1)))
+
+
+@pytest.mark.parametrize(("doubt_deg", "at_home"), [(0, True), (1.9, True), (2.1, False)])
+def test_where_wheels_and_gyro_disagree_since_home_nobody_knows_its_heading(doubt_deg, at_home):
+    assert Safety.is_at_home(feeling(doubt_rad=math.radians(doubt_deg))) is at_home
 
 
 states = st.builds(

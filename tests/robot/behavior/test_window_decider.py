@@ -206,3 +206,72 @@ def test_strong_walking_is_answered_strongly_within_bounds(mean, threshold):
     else:
         assert strength <= replace(decision, mean=mean + 0.1).strength
         assert replace(decision, mean=threshold).strength == 0.5
+
+
+def decisions(cue, *performances):
+    """Return number, side and mean of each decision, for steps one second apart."""
+    decider = WindowDecider(cue)
+    found = [decider.add(float(at), one) for at, one in enumerate(performances)]
+    return [(n, one.above, one.steps) for n, one in enumerate(found, 1) if one is not None]
+
+
+def test_streaks_answer_so_many_steps_in_a_row_on_one_side():
+    cue = replace(CUE, rule="streaks", count=3)
+    assert decisions(cue, 1, 1, 0.5, 1, 0.9, 1, 1, 1, 1) == [(6, True, 3), (9, True, 3)]
+    assert decisions(cue, 0.1, 0.2, 0.3, 0.1, 1, 0.1) == [(3, False, 3)]
+
+
+def test_steps_answer_the_mean_of_each_so_many():
+    cue = replace(CUE, rule="steps", count=4)
+    assert decisions(cue, 1, 1, 0.9, 0.8, 0.1, 0.1, 0.1, 3, 1) == [(4, True, 4), (8, False, 4)]
+    assert decisions(replace(cue, count=1), 1, 0.5) == [(1, True, 1), (2, False, 1)]
+
+
+@given(steps, st.integers(1, 9))
+def test_a_streak_is_on_one_side_and_no_step_counts_twice(walk, count):
+    decider = WindowDecider(replace(CUE, rule="streaks", count=count))
+    performances = [percent / 100 for _gap, percent in walk]
+    last = 0
+    for at, performance in enumerate(performances, 1):
+        decision = decider.add(float(at), performance)
+        if decision is None:
+            continue
+        sides = {one >= CUE.threshold for one in performances[at - count : at]}
+        assert sides == {decision.above}
+        assert decision.from_s == at - count + 1 > last
+        assert not decision.is_late
+        last = at
+
+
+def test_a_streak_rests_and_a_pause_ends_it():
+    decider = WindowDecider(replace(CUE, rule="streaks", count=2, rest_s=10))
+    decider.add(0, 1.0)
+    decider.drop_window()
+    assert decider.add(1, 1.0) is None
+    first = decider.add(2, 1.0)
+    assert not decider.blocking_reason(first, performing=False)
+    decider.mark_started(first)
+    decider.add(3, 1.0)
+    assert decider.blocking_reason(decider.add(4, 1.0), performing=False) == RESTING
+
+
+def test_a_clock_that_is_set_back_begins_a_new_streak():
+    decider = WindowDecider(replace(CUE, rule="steps", count=2, rest_s=10))
+    decider.mark_started(Decision(90, 100, 100, 2, 1, 0.9, True))
+    assert decider.add(100, 1.0) is None
+    assert decider.add(3, 1.0) is None
+    decision = decider.add(4, 1.0)
+    assert (decision.from_s, decision.steps) == (3, 2)
+    assert decider.blocking_reason(decision, performing=False) == RESTING
+    for at in range(5, 13):
+        decider.add(at, 1.0)
+    decision = decider.add(13, 1.0) or decider.add(14, 1.0)
+    assert not decider.blocking_reason(decision, performing=False)
+
+
+@pytest.mark.parametrize("wrong", [{"rule": "dances"}, {"rule": "steps", "count": 0}])
+def test_a_cue_with_a_rule_that_is_none_is_refused(wrong):
+    sent = {"above": "celebrate", "below": None, "threshold": 0.9, "window_s": 5, "rest_s": 5}
+    assert Cue.read({**sent, "intensity": 1}).rule == "windows"  # of a server from before
+    with pytest.raises(BadFrame):
+        Cue.read({**sent, "intensity": 1, **wrong})

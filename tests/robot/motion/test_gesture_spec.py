@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot.bases.kinematic import KinematicBase
 from robot.motion.dry_run import dry_run, validate_gesture
 from robot.motion.gesture import REACH_M, TETHER_M
 from robot.motion.gesture_errors import BadGesture
@@ -25,6 +24,7 @@ from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.limits import DEFAULT_LIMITS, TICK_S
 from robot.motion.player import DONE, Player
 from robot.motion.pose import HOME
+from tests.support.robot_stage import IdealBase
 
 QUARTER = math.pi / 2
 NOD = [Move(forward_m=0.1), Move(forward_m=-0.1)]
@@ -161,7 +161,7 @@ anything = st.lists(
 def perform(gesture, pace):
     """Play it on a kinematic base, orders first and odometry after; not the trial's own way."""
     now_s = 0.0
-    base = KinematicBase(lambda: now_s)
+    base = IdealBase(lambda: now_s)
     player, ordered = Player(DEFAULT_LIMITS), [(0.0, 0.0)]
     player.start(gesture, 0.0, base.read().pose, pace=pace)
     while player.is_busy:
@@ -226,3 +226,8 @@ def test_a_trial_tells_how_long_and_how_far():
     assert trial.farthest_m == pytest.approx(0.1, abs=0.01)
     slow = dry_run(build_gesture("wave", NOD), pace=0.5)
     assert slow.took_s > trial.took_s
+
+
+def test_what_nobody_would_see_is_refused():
+    with pytest.raises(BadGesture, match="Let it go 2 cm or turn by 6°"):
+        build_gesture("wink", [Move(turn_rad=0.05), Move(turn_rad=-0.05)])

@@ -43,12 +43,12 @@ def is_at_home(pose):
 
 
 @each_gesture
-def test_a_gesture_is_over_within_4_s_and_ends_at_home(gesture):
+def test_a_gesture_is_over_within_3_s_and_ends_at_home(gesture):
     player, floor = Player(Limits()), Floor()
     player.start(gesture, 0.0, HOME)
     floor.play(player)
     assert player.outcome == DONE
-    assert floor.time_s <= 4.0
+    assert floor.time_s <= 3.0
     assert floor.farthest_m + abs(floor.pose.heading_rad) > 0  # something was to be seen
     assert is_at_home(floor.pose)
     assert floor.orders[-1] == STILL

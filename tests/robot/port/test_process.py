@@ -1,15 +1,19 @@
 """The process that owns a port: it stops the base whatever becomes of its owner."""
 
+import json
+import os
 import signal
 import sys
 import time
+from itertools import count
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 
-from robot.port.owner import PortOwner
-from tests.support.fake_kobuki import STOP_FRAME, FakeKobuki
+from robot.port.owner import LEAVE_S, PortOwner
+from tests.support.fake_kobuki import FORWARD_200, STOP_FRAME, FakeKobuki
 from tests.support.port_process import Owner, owning
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pty")
@@ -89,6 +93,33 @@ def test_a_base_that_takes_nothing_is_lost_and_found():
         owner.order(STOP_FRAME, once="00")
         kobuki.is_flooded = False
         kobuki.until(lambda: not kobuki.is_moving)
+
+
+@pytest.mark.realtime
+def test_it_outlives_who_orders_until_a_lost_base_is_stopped(tmp_path):
+    port = tmp_path / "kobuki"
+    with FakeKobuki() as kobuki:
+        port.symlink_to(kobuki.url)
+        owner = Owner(str(port))
+        while not owner.hear()["bytes"]:
+            pass
+        owner.drive(0.3)
+        port.unlink()
+        kobuki.unplug()
+        while not owner.hear()["owes_stop"]:
+            pass
+        owner.process.stdin.close()
+        owner.process.stdout.close()
+        time.sleep(0.5)
+        with FakeKobuki() as again:
+            back_s = time.monotonic()
+            port.symlink_to(again.url)
+            again.until(lambda: len(again.orders) >= 3)
+            assert time.monotonic() - back_s < 0.3
+            assert owner.process.wait(5) == 0
+            assert not any(speed for _, speed, _ in again.orders)
+    assert owner.process.stderr.read() == b""
+    owner.process.stderr.close()
 
 
 @pytest.mark.realtime
@@ -193,13 +224,59 @@ def test_whatever_a_driver_raises_the_port_is_opened_anew_and_stopped(problem):
     assert bench.told[-1]["opened"] == 2
 
 
-def test_it_tries_again_with_longer_and_longer_pauses():
+def test_a_lost_port_is_tried_again_twenty_times_a_second_for_as_long_as_it_takes():
     bench = Bench(refuses=True)
     bench.run(20.0)
     pauses = [after - before for before, after in zip(bench.tries, bench.tries[1:], strict=False)]
-    assert pauses[0] < 0.3
-    assert 1.9 < max(pauses) < 2.2
+    assert max(pauses) < 0.08
     assert bench.told[-1]["problem"] == "no such port"
+
+
+def order(number, frame, at_s):
+    return json.dumps({"number": number, "sent_s": at_s, "frame": frame.hex()}).encode()
+
+
+@pytest.mark.parametrize("back_s", [0.3, 30.0])
+def test_a_base_whose_port_was_lost_while_it_moved_is_stopped_after_the_end(back_s):
+    bench = Bench()
+    numbers = count(1)
+
+    def each():
+        if bench.now_s < 10.5:
+            frame = FORWARD_200 if bench.ports and len(bench.ports[0].sent) > 3 else STOP_FRAME
+            bench.owner.setpoint.store(order(next(numbers), frame, bench.now_s), bench.now_s)
+        elif bench.now_s < 11.0 + back_s:
+            bench.ports[0].problem, bench.refuses = OSError(5, "unplugged"), True
+        else:
+            bench.refuses = False
+
+    bench.run(1.0, each)  # its end comes while the port is away
+    first, second = bench.ports
+    assert FORWARD_200 in first.sent
+    assert set(second.sent) == {STOP_FRAME}
+    assert not second.is_open
+    assert bench.now_s - (11.0 + back_s) < 0.1
+    assert any(told["owes_stop"] for told in bench.told)
+
+
+def test_one_that_stood_is_left_at_once():
+    bench = Bench()
+
+    def each():
+        if bench.now_s > 10.5:
+            bench.ports[0].problem, bench.refuses = OSError(5, "unplugged"), True
+
+    bench.run(1.0, each)
+    assert bench.now_s < 11.1
+    assert not any(told["owes_stop"] for told in bench.told)
+
+
+def test_a_port_that_never_comes_back_is_given_up():
+    bench = Bench()
+    bench.owner._unsure = 1
+    bench.refuses = True
+    bench.run(1.0)
+    assert bench.now_s == pytest.approx(10.0 + 1.0 + LEAVE_S, abs=0.2)
 
 
 def test_an_exception_of_its_own_stops_the_base():
@@ -216,3 +293,31 @@ def test_an_exception_of_its_own_stops_the_base():
         bench.run(1.0, fail)
     assert bench.ports[0].sent[-3:] == [STOP_FRAME] * 3
     assert not bench.ports[0].is_open
+
+
+@pytest.mark.realtime
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no guard")
+def test_killed_together_with_its_parent_its_guard_stops_the_base(kobuki):
+    with owning(kobuki) as owner:
+        owner.drive(0.3)
+        assert kobuki.is_moving
+        since_s = time.monotonic()
+        owner.process.kill()  # nobody else supervises it here
+        kobuki.until(lambda: not kobuki.is_moving)
+        assert kobuki.moved_after(since_s) <= 0.5
+        kobuki.until(lambda: zeros_at_the_end(kobuki) == 3)
+
+
+@pytest.mark.realtime
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no guard")
+def test_its_guard_leaves_with_it(kobuki):
+    with owning(kobuki) as owner:
+        (guard,) = psutil.Process(owner.process.pid).children()
+        owner.drive(0.1)
+        owner.process.stdin.close()
+        owner.process.stdin = None
+        owner.process.wait(5)
+        orders = len(kobuki.orders)
+        guard.wait(2)
+        time.sleep(0.1)
+        assert len(kobuki.orders) == orders

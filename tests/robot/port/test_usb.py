@@ -94,6 +94,7 @@ def test_the_rule_in_the_documentation_is_the_one_that_is_told():
 
 
 @POSIX
+@pytest.mark.server
 def test_the_doctor_listens_to_a_base(capsys):
     with FakeKobuki() as kobuki:
         main(["doctor", "--port", kobuki.url])
@@ -114,6 +115,7 @@ def test_the_doctor_listens_to_a_base(capsys):
 
 
 @POSIX
+@pytest.mark.server
 def test_the_doctor_and_a_port_that_is_taken_or_not_there(capsys, tmp_path):
     from tests.support.port_process import owning
 

@@ -3,6 +3,8 @@
 import json
 import math
 from contextlib import suppress
+from functools import partial
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -23,7 +25,14 @@ from robot.ros.frames import (
     unadvertise,
     unsubscribe,
 )
-from robot.ros.messages import EVENTS, read_event, read_odometry, read_twist, write_twist
+from robot.ros.messages import (
+    EVENTS,
+    read_event,
+    read_hazards,
+    read_odometry,
+    read_twist,
+    write_twist,
+)
 from tests.support.json_values import ANYTHING
 
 CMD = Topic("/cmd_vel", "geometry_msgs/Twist")
@@ -179,7 +188,9 @@ def test_an_event_is_read(kind, message, event):
 
 @given(ANYTHING)
 def test_no_message_does_more_than_be_refused(message):
-    for read in (read_twist, read_odometry, *(lambda m, k=k: read_event(k, m) for k in EVENTS)):
+    readers: list[Any] = [read_twist, read_odometry, read_hazards]
+    readers += [partial(read_event, kind) for kind in EVENTS]
+    for read in readers:
         with suppress(BadRosFrame):
             read(message if isinstance(message, dict) else {"twist": message, "pose": message})
     with suppress(BadRosFrame):

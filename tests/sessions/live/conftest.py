@@ -6,12 +6,14 @@ import asyncio
 import logging
 import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from importlib import import_module
 from typing import Any
 
 import pytest
 from asgiref.sync import sync_to_async
 from django.db import connections
 
+from rehab.sessions.live import commits
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import writer as writers
 from rehab.sessions.log import Step
@@ -48,6 +50,7 @@ async def live_path(
     transactional_db: None, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> AsyncIterator[None]:
     """Run what the test dials in to; nothing of it is left afterwards, nothing failed unseen."""
+    import_module("garry_site.asgi")  # sets the log up: before caplog looks at this test's
     monkeypatch.setattr(runtimes, "_current", None)
     Caller.open_ones.clear()
     threads = set(threading.enumerate())
@@ -71,7 +74,7 @@ async def live_path(
 @pytest.fixture
 def stall(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stall]:
     """Return the hand on the writer."""
-    hold, commit = Stall(), writers.commit
+    hold, commit = Stall(), commits.commit
 
     def commit_when_open(jobs: Any) -> None:
         hold.wait()

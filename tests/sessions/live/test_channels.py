@@ -151,7 +151,7 @@ async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch)
     robot, tablet = await place.robot().dial(), place.tablet(session)
     await robot.hello()
     await tablet.watch()
-    monkeypatch.setattr(runtimes, "_checkpoint", move_log)
+    monkeypatch.setattr(runtimes, "move_database_log", move_log)
     monkeypatch.setattr(runtimes, "extend_sign_ins", extend_sign_ins)
     monkeypatch.setattr(owners, "release", release)
     await runtimes.current().session((await ready(place, at_station=False)).pk)  # soon idle
@@ -182,7 +182,7 @@ async def test_heartbeats_and_housekeeping_go_on_whatever_fails(place, begun, mo
     session = await begun(place)
     robot = await place.robot().dial()
     await robot.hello()
-    for name in ("_checkpoint", "extend_sign_ins"):
+    for name in ("move_database_log", "extend_sign_ins"):
         monkeypatch.setattr(runtimes, name, fail(name))
     with monkeypatch.context() as patch:
         patch.setattr(LiveSession, "is_watched", property(fail("robots")))

@@ -6,11 +6,12 @@ from types import SimpleNamespace
 
 import pytest
 
+from rehab.sessions.live import runtime as runtime_module
 from rehab.sessions.live.consumers import source as source_module
 from rehab.sessions.live.lateness import Lateness
 from rehab.sessions.log import Step
 from rehab.training.clocks import DRIFT_MAX, LATE_S
-from tests.support.callers import a_step
+from tests.support.callers import a_step, change
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 2.0, 10.0])
@@ -47,16 +48,16 @@ def test_a_clock_that_was_told_late_is_corrected_by_a_quicker_step():
 
 
 def test_a_clock_that_stood_still_with_the_session_makes_nothing_late():
-    lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0)
+    lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0, clock_pauses=True)
     assert not lateness.is_late(1.0, 1.0)
-    lateness.allow_standstill(31.0)  # the session goes on after half a minute
+    lateness.resume(31.0)  # the session goes on after half a minute
     assert not lateness.is_late(2.0, 32.0)
     assert lateness.is_late(3.0, 38.1)  # and what is late from then on is late
 
 
 def test_a_pause_excuses_no_more_than_itself():
-    lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0)
-    lateness.allow_standstill(10.0)
+    lateness = Lateness("r", 0.0, clock_s=0.0, speed=1.0, clock_pauses=True)
+    lateness.resume(10.0)
     assert lateness.is_late(1.0, 80.0)
 
 
@@ -120,3 +121,33 @@ async def test_a_device_that_begins_anew_is_live_again_at_once(place, begun):
     assert [event["live"] for event in steps] == [True] * 6
     await robot.overhear()  # the fourth does not count: its time runs backwards
     assert [m["number"] for m in robot.heard if m["type"] == "step"] == [1, 2, 3, 5, 6]
+
+
+@pytest.mark.parametrize(
+    ("told", "fresh"), [({}, [1, 3]), ({"clock_pauses": True}, [1, 2, 3])], ids=["sensor", "played"]
+)
+async def test_after_a_pause_steps_of_before_are_late_unless_the_clock_stood(
+    place, begun, monkeypatch, told, fresh
+):
+    now = SimpleNamespace(s=1000.0)
+    clock = SimpleNamespace(monotonic=lambda: now.s, time=lambda: now.s)
+    monkeypatch.setattr(source_module, "time", clock)
+    monkeypatch.setattr(runtime_module, "time", clock)
+    session = await begun(place)
+    tablet, robot = place.tablet(session), place.robot()
+    await tablet.watch()
+    await (await robot.dial()).hello()
+    source = await place.source().dial()
+    await source.hello(clock_s=0.0, **told)
+    await source.walk(4.0, time_s=0.0)
+    now.s += 5.0
+    await change(session, "pause")
+    now.s += 25.0
+    await change(session, "resume")
+    await source.walk(4.0, time_s=5.0)  # measured before the pause
+    await source.walk(4.0, time_s=30.0)
+    await tablet.until_step(3)
+    steps = [event for event in tablet.events if event["kind"] == "step"]
+    assert [event["number"] for event in steps if event["live"]] == fresh
+    await robot.overhear()
+    assert [m["number"] for m in robot.heard if m["type"] == "step"] == fresh

@@ -12,6 +12,7 @@ from django.utils import timezone
 
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
+from rehab.people.sign_in.browser_sessions import digest_of
 from rehab.sessions.live import runtime as runtimes
 from tests.support.callers import (
     Message,
@@ -78,7 +79,17 @@ async def test_from_elsewhere_people_watch_with_consent_and_the_tablet_stays(pla
     assert await code_of(PatientPage, "203.0.113.9", token=place.tokens["tablet"]) is None
 
 
-@pytest.mark.parametrize("origin", ["https://evil.example", None, "http://localhost.evil.example"])
+@pytest.mark.parametrize(
+    "origin",
+    [
+        *("https://evil.example", None, "http://localhost.evil.example"),
+        "http://localhost:9000",  # another program of the same machine
+        "http://localhost",
+        "https://localhost:8000",
+        "http://127.0.0.1:8000",  # another name of the server: cookies are not shared with it
+        "http://user@localhost:8001",
+    ],
+)
 async def test_cookies_count_on_sockets_of_our_own_pages_only(place, begun, origin):
     session = await begun(place)
     for kind in (PatientPage, MonitorPage):
@@ -87,10 +98,29 @@ async def test_cookies_count_on_sockets_of_our_own_pages_only(place, begun, orig
         assert (await page.sent_away())[0] == 4001
 
 
-async def test_cookies_count_from_every_name_of_the_server(place, begun):
+@pytest.mark.parametrize(
+    ("headers", "origin"),
+    [
+        ([], "http://localhost:8000"),
+        ([(b"host", b"127.0.0.1")], "http://127.0.0.1"),
+        ([(b"host", b"[::1]:8000")], "http://[::1]:8000"),
+    ],
+)
+async def test_cookies_count_from_every_name_of_the_server(place, begun, headers, origin):
     session = await begun(place)
-    for origin in ("http://localhost:8000", "http://127.0.0.1", "http://[::1]:8000"):
-        await MonitorPage(session.pk, user=place.pt, origin=origin).watch()
+    await MonitorPage(session.pk, user=place.pt, headers=headers, origin=origin).watch()
+
+
+async def test_behind_a_proxy_the_scheme_is_the_browsers(place, begun, settings):
+    settings.SECURE_PROXY_SSL_HEADER = ("HTTP_X_FORWARDED_PROTO", "https")
+    settings.ALLOWED_HOSTS = ["garry.example"]
+    session = await begun(place)
+    proxied = [(b"host", b"garry.example:443"), (b"x-forwarded-proto", b"https")]
+    for origin in ("https://garry.example", "https://garry.example:443"):
+        await MonitorPage(session.pk, user=place.pt, headers=proxied, origin=origin).watch()
+    page = MonitorPage(session.pk, user=place.pt, headers=proxied, origin="http://garry.example")
+    await page.dial()
+    assert (await page.sent_away())[0] == 4001
 
 
 async def test_a_switched_off_account_opens_nothing(place, begun):
@@ -120,7 +150,7 @@ async def test_open_sockets_end_with_their_token_or_sign_in(place, begun, monkey
         await device.asave()
     assert (await source.sent_away())[0] == 4001
     assert (await tablet.sent_away())[0] == 4001
-    await Session.objects.filter(session_key=sign_in(place.pt)).adelete()  # signed out
+    await Session.objects.filter(session_key=digest_of(sign_in(place.pt))).adelete()  # signed out
     assert (await monitor.sent_away())[0] == 4001
     await robot.hear("heartbeat")
     assert other.code is None

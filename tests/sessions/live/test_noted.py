@@ -9,7 +9,7 @@ from asgiref.sync import sync_to_async
 from django.db import DatabaseError
 
 from rehab.people.audit import audit_log
-from rehab.people.audit.audit_log import Act, AuditEntry, RecentViews
+from rehab.people.audit.audit_log import SIGN_IN_ACTS, Act, AuditEntry, RecentEntries, RecentViews
 from rehab.sessions.live import audit_queue as notes_module
 from rehab.sessions.live import runtime as runtimes
 from tests.support.callers import turns
@@ -23,15 +23,15 @@ ARM = {"type": "robot", "order": "arm"}
 @pytest.fixture(autouse=True)
 def nothing_noted_yet(monkeypatch):
     monkeypatch.setattr(audit_log, "recent_views", RecentViews())
+    monkeypatch.setattr(audit_log, "recent_entries", RecentEntries())
 
 
 async def noted(count: int) -> list[tuple[Any, ...]]:
     """Return the entries once there are so many."""
     names = ("act", "by", "through", "patient", "about")
+    entries = AuditEntry.everywhere.exclude(act__in=SIGN_IN_ACTS).order_by("pk")
     for _ in range(500):
-        rows = await sync_to_async(
-            lambda: list(AuditEntry.everywhere.order_by("pk").values_list(*names))
-        )()
+        rows = await sync_to_async(lambda: list(entries.all().values_list(*names)))()
         if len(rows) >= count:
             return rows
         await turns()
@@ -69,6 +69,20 @@ async def test_who_stops_and_arms_the_robot_is_noted_each_time(place, begun):
         await monitor.say(order)
     acts = [row[0] for row in (await noted(4))]
     assert acts == [Act.VIEW, Act.ROBOT_STOP, Act.ROBOT_ARM, Act.ROBOT_STOP]
+
+
+async def test_a_tablets_stops_in_some_minutes_are_one_entry_with_their_number(place, begun):
+    session = await begun(place)
+    tablet = place.tablet(session)
+    await tablet.watch()
+    for _ in range(3):
+        for _ in range(20):
+            await tablet.say(STOP)
+        await tablet.overhear()
+        await runtimes.current().audit_queue.join()
+    await noted(2)
+    stops = AuditEntry.everywhere.filter(act=Act.ROBOT_STOP)
+    assert await sync_to_async(lambda: [stop.count for stop in stops])() == [60]
 
 
 async def test_an_order_is_noted_though_its_page_is_gone_at_once(place, begun):

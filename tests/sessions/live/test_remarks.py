@@ -6,7 +6,7 @@ from asgiref.sync import ThreadSensitiveContext, sync_to_async
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.aggregate import SessionAggregate
-from rehab.sessions.log import Remark, SessionEvent
+from rehab.sessions.log import REMARK_RANGES, Remark, SessionEvent
 from rehab.sessions.services import SessionRequest, change_session, create_session
 from rehab.training.changes import ChangeKind
 from rehab.training.goals import GoalRule
@@ -63,23 +63,23 @@ async def test_remarks_are_kept_in_the_log_and_alter_no_score(place, begun):
     for page in (monitor, other, tablet):
         await page.watch()
     for index, what in enumerate(Remark):
-        value = {"value": 7} if what is Remark.BORG else {}
+        value = {"value": 3} if what in REMARK_RANGES else {}
         await monitor.say({"type": "remark", "what": what.value, "id": f"r{index}", **value})
         assert (await monitor.hear("done"))["id"] == f"r{index}"
         seen = await other.until(lambda event, what=what: event.get("what") == what.value)
-        assert (seen["number"], seen["value"]) == (2, 7.0 if value else None)
+        assert (seen["number"], seen["value"]) == (2, 3.0 if value else None)
     await source.walk(4.0)
     assert (await tablet.until_step(3))["score"] == 3
     assert not [event for event in tablet.events if event["kind"] == "remark"]
     rows = SessionEvent.everywhere.filter(session=session, kind__in=list(Remark)).order_by("pk")
     kept = [row async for row in rows.values_list("kind", "after_number", "value", "by")]
     assert kept == [
-        (what.value, 2, 7.0 if what is Remark.BORG else None, place.pt.pk) for what in Remark
+        (what.value, 2, 3.0 if what in REMARK_RANGES else None, place.pt.pk) for what in Remark
     ]
     rebuilt = await sync_to_async(SessionAggregate.load)(session)
     assert rebuilt.fold.score == 3
     marks = [
-        {"after": 2, "kind": what.value, "value": 7.0 if what is Remark.BORG else None}
+        {"after": 2, "kind": what.value, "value": 3.0 if what in REMARK_RANGES else None}
         for what in Remark
     ]
     assert list(rebuilt.marks) == (await place.monitor(session).watch())["marks"] == marks
@@ -95,7 +95,13 @@ async def test_what_cannot_be_noted(place, begun):
     await change(session, "abort")
     await monitor.say({"type": "remark", "what": "pain", "id": "r"})
     assert (await monitor.hear("error"))["message"] == "The session has ended."
-    for bad in ({"what": "joy"}, {"what": "borg"}, {"what": "borg", "value": 11}, {}):
+    for bad in (
+        {"what": "joy"},
+        {"what": "borg"},
+        {"what": "borg", "value": 11},
+        {"what": "fall_severity", "value": 4},
+        {},
+    ):
         page = place.monitor(session)
         await page.watch()
         await page.say({"type": "remark", "id": "r", **bad})

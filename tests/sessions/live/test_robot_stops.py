@@ -8,49 +8,13 @@ from typing import Any
 import pytest
 from django.db import OperationalError
 
+from rehab.sessions.live import commits
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import writer as writers
 from rehab.sessions.live.session import NotStored
-from rehab.sessions.log import SessionEvent
-from rehab.sessions.models import TrainingSession
-from tests.support.callers import Message, change, restart, turns
+from tests.support.callers import change, restart, turns
+from tests.support.robot_reports import ARM, STOP, is_stopped, log_of
 from tests.support.world import NOW
-
-STATUS = {
-    "kind": "status",
-    "base": "kinematic",
-    "state": "performing",
-    "gesture": "celebrate",
-    "pose": {"x_m": 0.01, "y_m": 0, "heading_rad": -0.2},
-    "reason": "",
-}
-DECISION = {
-    "kind": "decision",
-    "from_s": 1.1,
-    "until_s": 6.1,
-    "steps": 4,
-    "mean": 1.2,
-    "threshold": 0.9,
-    "above": True,
-    "gesture": "celebrate",
-    "reason": "",
-    "activated_share": 0.75,
-}
-GESTURE = {"kind": "gesture", "name": "celebrate", "phase": "ended", "outcome": "done"}
-
-STOP = {"type": "robot", "order": "stop"}
-ARM = {"type": "robot", "order": "arm"}
-
-
-async def log_of(session: TrainingSession) -> list[Message]:
-    """Return what the log has of the session's robot."""
-    events = SessionEvent.everywhere.filter(session=session, kind__startswith="robot_")
-    fields = ("kind", "by", "data", "after_number")
-    return [row async for row in events.order_by("pk").values(*fields)]
-
-
-def is_stopped(stopped: bool) -> Any:
-    return lambda event: event == {"kind": "robot_stopped", "stopped": stopped}
 
 
 async def test_anyone_stops_the_robot_and_only_a_person_arms_it(place, begun):
@@ -85,7 +49,7 @@ async def test_anyone_stops_the_robot_and_only_a_person_arms_it(place, begun):
     assert kinds == [("robot_arm", by), ("robot_stop", by), ("robot_arm", by)]
 
 
-@pytest.mark.parametrize("message", [ARM, {"type": "robot"}, {"type": "robot", "order": "drive"}])
+@pytest.mark.parametrize("message", [ARM, {"type": "robot"}, {"type": "robot", "order": "dance"}])
 async def test_a_patients_page_only_stops(place, begun, message):
     session = await begun(place)
     robot = await place.robot().dial()
@@ -180,7 +144,7 @@ async def test_a_stop_waits_for_no_disk_and_overtakes_an_arming(place, begun, st
 
 def break_disk(patch: pytest.MonkeyPatch, session_id: int | None = None) -> None:
     """Let nothing, or nothing of a session, be committed until ``patch`` takes it back."""
-    sound = writers.commit
+    sound = commits.commit
 
     def commit(jobs: Any) -> None:
         if any(session_id in (None, job.session_id) for job in jobs):

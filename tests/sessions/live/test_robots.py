@@ -14,46 +14,10 @@ from rehab.sessions.live import hub
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
-from rehab.sessions.models import TrainingSession
 from rehab.training.valences import CueGestures
 from robot.motion.dry_run import validate_gesture
 from tests.support.callers import Message, restart
-
-STATUS = {
-    "kind": "status",
-    "base": "kinematic",
-    "state": "performing",
-    "gesture": "celebrate",
-    "pose": {"x_m": 0.01, "y_m": 0, "heading_rad": -0.2},
-    "reason": "",
-}
-DECISION = {
-    "kind": "decision",
-    "from_s": 1.1,
-    "until_s": 6.1,
-    "steps": 4,
-    "mean": 1.2,
-    "threshold": 0.9,
-    "above": True,
-    "gesture": "celebrate",
-    "reason": "",
-    "activated_share": 0.75,
-}
-GESTURE = {"kind": "gesture", "name": "celebrate", "phase": "ended", "outcome": "done"}
-
-STOP = {"type": "robot", "order": "stop"}
-ARM = {"type": "robot", "order": "arm"}
-
-
-async def log_of(session: TrainingSession) -> list[Message]:
-    """Return what the log has of the session's robot."""
-    events = SessionEvent.everywhere.filter(session=session, kind__startswith="robot_")
-    fields = ("kind", "by", "data", "after_number")
-    return [row async for row in events.order_by("pk").values(*fields)]
-
-
-def is_stopped(stopped: bool) -> Any:
-    return lambda event: event == {"kind": "robot_stopped", "stopped": stopped}
+from tests.support.robot_reports import ARM, DECISION, GESTURE, STATUS, is_stopped, log_of
 
 
 async def test_reports_are_shown_and_decisions_and_gestures_kept(place, begun):

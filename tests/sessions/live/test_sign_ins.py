@@ -10,6 +10,7 @@ from django.contrib.sessions.models import Session
 from django.utils import timezone
 
 from rehab.people.models import Clinic
+from rehab.people.sign_in.browser_sessions import SIGNED_IN_AT, SessionStore, digest_of
 from rehab.sessions.live import runtime as runtimes
 from tests.support.callers import sign_in
 
@@ -24,11 +25,11 @@ def _hasty(monkeypatch):
 async def end_in(key: str, minutes: float) -> None:
     """Let a sign-in end soon."""
     end = timezone.now() + timedelta(minutes=minutes)
-    await Session.objects.filter(pk=key).aupdate(expire_date=end)
+    await Session.objects.filter(pk=digest_of(key)).aupdate(expire_date=end)
 
 
 async def minutes_left(key: str) -> float:
-    row = await Session.objects.aget(pk=key)
+    row = await Session.objects.aget(pk=digest_of(key))
     return (row.expire_date - timezone.now()).total_seconds() / 60
 
 
@@ -58,8 +59,6 @@ async def test_a_working_day_ends_though_a_training_runs(place, begun, settings)
 
 
 def _signed_in_since(key: str, hours: float, settings) -> str:
-    from rehab.people.sign_in.browser_sessions import SIGNED_IN_AT, SessionStore
-
     settings.SESSION_MINUTES = 30
     store = SessionStore(key)
     store[SIGNED_IN_AT] = int((timezone.now() - timedelta(hours=hours)).timestamp())

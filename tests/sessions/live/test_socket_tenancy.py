@@ -24,6 +24,7 @@ from rehab.stations.models import Device, Station
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
 from tests.support.callers import OWN_PAGE, Caller
+from tests.support.identities import find_identities, identifying_texts
 from tests.support.world import Actor, World, all_actors, build_world, signed_in
 
 # Who gets in, by the words of docs/protocol.md: roles, and kinds of device.
@@ -117,6 +118,9 @@ async def hears(everyone: Everyone, actor: Actor, path: str, session: TrainingSe
 
 async def find_leaks(everyone: Everyone) -> tuple[list[str], Counter[str]]:
     leaks, opened = [], Counter[str]()
+    hidden = {
+        actor.label: await sync_to_async(identifying_texts)(actor) for actor in everyone.actors
+    }
     for route, consumer in routing.SOCKETS.items():
         assert consumer in MAY_OPEN, f"{route}: say in MAY_OPEN who may open it"
         for world in everyone.worlds:
@@ -138,6 +142,10 @@ async def find_leaks(everyone: Everyone) -> tuple[list[str], Counter[str]]:
                     leaks.append(f"{actor.label}: {route} shows {other.name}")
                 elif not may and not told and code not in NOT_YOURS:
                     leaks.append(f"{actor.label}: {route} closes with {code}")
+                leaks += [
+                    f"{actor.label}: {route} names {whose}"
+                    for whose in find_identities(hidden[actor.label], str(heard))
+                ]
                 opened[route] += there
     return leaks, opened
 
@@ -164,6 +172,14 @@ async def test_a_leak_is_caught(everyone, monkeypatch):
     assert f"pt of amber: {route} of birch, None" in leaks
     assert f"tablet of birch: {route} of amber, None" in leaks
     assert not any("researcher" in leak or "stranger" in leak for leak in leaks)
+
+
+async def test_a_patient_whom_a_researcher_hears_of_is_caught(everyone, monkeypatch):
+    everybody = frozenset(Role)
+    monkeypatch.setattr(screens.ScreenConsumer, "people", everybody)
+    leaks, _ = await find_leaks(everyone)
+    route = "ws/session/<int:session_id>/monitor/"
+    assert f"researcher of amber: {route} names a patient by nickname" in leaks
 
 
 async def test_a_device_at_another_clinics_station_is_caught(everyone, monkeypatch):

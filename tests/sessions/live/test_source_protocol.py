@@ -13,12 +13,13 @@ from rehab.sessions.live.consumers import source as source_module
 from rehab.sessions.live.consumers.base import Socket
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.setup.protocols import Measure
 from rehab.training.changes import Change, ChangeKind, PauseReason
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
-from robot.bases.kinematic import KinematicBase
 from robot.behavior.performer import Performer
 from tests.support.callers import SourceCaller, a_step, change, turns
+from tests.support.robot_stage import IdealBase
 from tests.support.world import NOW
 
 
@@ -225,6 +226,27 @@ async def test_the_same_step_again_is_acked_again(place, begun):
     assert await rows(session, "number") == [1, 2, 3]
 
 
+async def test_a_measure_may_be_an_extra_value_of_the_steps(place, begun):
+    pulse = await Measure.everywhere.acreate(
+        clinic=place.patient.clinic, slug="pulse", name="heart rate", unit="1/min",
+        channel="heart_rate", value_min=30, value_max=220, goal_min=40, goal_max=200,
+    )  # fmt: skip
+    session = await begun(place, measure=pulse, goal=GoalRule(value=100))
+    source = await place.source().dial()
+    assert (await source.hello())["unit"] == "1/min"
+    steps = [a_step(1, 4.0, extra={"heart_rate": 104}), a_step(2, 4.1), a_step(3, None)]
+    for step in [*steps, *steps]:  # the same ones again are the same
+        await source.say(step)
+        await source.hear()
+    assert await rows(session, "value", "shown", "hit", "reasons", "extra") == [
+        (104, 104, True, [], {"heart_rate": 104, "sent_value": 4.0}),
+        (None, None, None, ["missing"], {"sent_value": 4.1}),
+        (None, None, None, ["missing"], {}),
+    ]
+    await source.say(a_step(1, 4.0, extra={"heart_rate": 105}))
+    assert (await source.hear())["code"] == "conflict"
+
+
 async def test_the_same_step_again_while_it_is_on_its_way_is_no_error(place, begun, stall):
     session = await begun(place)
     source = await place.source().dial()
@@ -333,7 +355,7 @@ async def test_a_robot_answers_plain_text(place, begun):
     source = await place.source().dial()
     await source.say("4.02, 3.0")
     step = await robot.hear("step")
-    performer = Performer(KinematicBase(lambda: 0.0))
+    performer = Performer(IdealBase(lambda: 0.0))
     performer.handle(robot.heard[0], 0.0)
     performer.handle(step, 0.0)
     assert (performer.is_linked, performer.bad_messages) == (True, 0)

@@ -190,6 +190,7 @@ async def test_pages_hear_who_paused_a_session(place, begun):
     await monitor.change("resume")
     await runtime.current().drain()
     runtime._current = None
+    await TrainingSession.everywhere.filter(pk=session.pk).aupdate(owner="gone|1|1")  # a crash
     await runtime.current().recover()
     shown = await place.monitor(session).watch()
     assert (shown["state"], shown["pause_reason"]) == ("paused", "restart")

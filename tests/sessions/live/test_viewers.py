@@ -55,6 +55,36 @@ def apply(page: Page) -> Message:
     return totals
 
 
+async def test_a_tablet_hears_no_session_from_before_the_last_one(place, ready):
+    session = await ready(place)
+    await change(session, "start")
+    await change(session, "finish")
+    tablet = place.tablet(session)
+    assert (await tablet.watch())["state"] == "finished"  # it has just ended
+    await tablet.hang_up()
+    following = await ready(place)
+    await change(following, "start")
+    tablet = await place.tablet(session).dial()
+    assert (await tablet.sent_away())[0] == 4004
+
+
+async def test_a_tablet_hears_an_ended_session_until_the_next_one_starts(place, ready):
+    session = await ready(place)
+    await change(session, "start")
+    tablet, monitor = place.tablet(session), place.monitor(session)
+    for page in (tablet, monitor):
+        await page.watch()
+    await change(session, "finish")
+    await runtimes.current()._check_sign_ins()
+    await tablet.overhear()
+    assert tablet.code is None
+    await change(await ready(place), "start")
+    await runtimes.current()._check_sign_ins()
+    assert (await tablet.sent_away())[0] == 4001
+    await monitor.overhear()
+    assert monitor.code is None
+
+
 @pytest.mark.parametrize("valence", ["positive", "negative", "binary", "explicit"])
 async def test_snapshot_and_events_give_a_fresh_snapshot(place, ready, valence):
     chance = random.Random(f"live {valence}")
@@ -125,6 +155,7 @@ async def test_after_gives_exactly_the_missing_steps_once(place, begun):
     assert not [m for m in up_to_date.heard if m["type"] == "steps"]
 
 
+@pytest.mark.long
 async def test_a_long_past_is_fed_as_fast_as_it_is_read(place, begun):
     """A page asks for 5,000 steps and reads slowly; a page beside it notices nothing."""
     session = await begun(place)

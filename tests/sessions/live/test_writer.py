@@ -1,32 +1,24 @@
-"""What is committed has happened, and nothing else: the writer, owners, recovery, the drain."""
+"""What is committed has happened, and nothing else: the writer."""
 
 from __future__ import annotations
 
 import asyncio
-import os
-import re
-import shutil
-import socket
-import subprocess
-import sys
-import threading
-from concurrent.futures import ThreadPoolExecutor
+import gc
 from typing import Any
 
 import pytest
 from asgiref.sync import sync_to_async
-from django.db import DatabaseError, connection
+from django.db import DatabaseError
 
-from rehab.sessions.live import owners
-from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live import commits
 from rehab.sessions.live import writer as writers
 from rehab.sessions.live.aggregate import SessionAggregate
-from rehab.sessions.live.writer import EarlierWriteFailed, Fenced, Job, Writer
-from rehab.sessions.log import SessionEvent, Step
+from rehab.sessions.live.commits import EarlierWriteFailed, Fenced, Job
+from rehab.sessions.live.writer import Writer
+from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.steps import Measurement, Side
-from tests.support.callers import a_step, change, turns
 from tests.support.world import NOW
 
 pytestmark = pytest.mark.postgres
@@ -39,7 +31,7 @@ class Bench:
         self.stall = stall
         self.batches: list[list[int]] = []
         self.done: list[tuple[int, Exception | None]] = []
-        commit = writers.commit
+        commit = commits.commit
 
         def counted(jobs: Any) -> None:
             self.batches.append([job.session_id for job in jobs])
@@ -91,14 +83,14 @@ async def until_done(bench: Bench, count: int) -> None:
 
 def fail_on(monkeypatch: pytest.MonkeyPatch, session_id: int, problem: Exception) -> None:
     """Let writes of one session fail until ``monkeypatch`` takes it back."""
-    insert = writers._insert_steps
+    insert = commits._insert_steps
 
     def failing(rows: Any) -> None:
         if any(row.session_id == session_id for row in rows):
             raise problem
         insert(rows)
 
-    monkeypatch.setattr(writers, "_insert_steps", failing)
+    monkeypatch.setattr(commits, "_insert_steps", failing)
 
 
 async def test_what_is_queued_is_committed_in_one_transaction(bench, aggregates):
@@ -157,6 +149,38 @@ async def test_nothing_is_written_after_a_failed_job_of_the_same_owner(
     assert await Step.everywhere.acount() == 1
 
 
+async def test_one_report_that_fails_keeps_no_other_from_its_source(bench, aggregates, caplog):
+    await until_done(bench, 3)
+
+    def fail(_: Exception | None) -> None:
+        raise RuntimeError("a bug of one session")
+
+    session = aggregates[0].session
+    bench.stall.begin()
+    bench.writer.submit(Job(aggregates[0], session.pk, session.epoch, [], None, fail))
+    bench.walk(aggregates[1])
+    bench.stall.end()
+    await until_done(bench, 4)
+    assert bench.done[-1] == (aggregates[1].session.pk, None)
+    assert f"Session {session.pk} could not be told" in caplog.text
+
+
+async def test_an_owner_that_failed_is_not_kept_for_ever(bench, aggregates, monkeypatch):
+    monkeypatch.setattr(writers.log, "exception", lambda *_: None)  # caplog keeps tracebacks
+    await until_done(bench, 3)
+    with monkeypatch.context() as patch:
+        fail_on(patch, aggregates[0].session.pk, DatabaseError("disk"))
+        bench.walk(aggregates[0])
+        await until_done(bench, 4)
+    assert len(bench.writer._failed) == 1
+    del aggregates[0]
+    bench.done[-1] = (0, None)  # its traceback knows the owner, too
+    bench.walk(aggregates[0])  # another one: the thread holds the last batch until the next
+    await until_done(bench, 5)
+    gc.collect()
+    assert len(bench.writer._failed) == 0
+
+
 async def test_a_session_that_was_taken_over_is_fenced(bench, aggregates):
     await until_done(bench, 3)
     bench.done.clear()
@@ -183,6 +207,29 @@ async def test_a_session_that_was_taken_over_is_fenced(bench, aggregates):
     assert await Step.everywhere.filter(session=lost.session).acount() == 0
 
 
+async def test_commits_keep_a_distance_only_while_several_steps_come_at_once(
+    bench, aggregates, monkeypatch
+):
+    bench.walk(aggregates[0])  # the sessions' starts came at once
+    await until_done(bench, 4)
+    waited: list[float] = []
+    monkeypatch.setattr("rehab.sessions.live.writer.time.sleep", waited.append)
+    monkeypatch.setattr(writers, "SPACING_S", 1000.0)
+    for count in range(5, 7):  # each alone
+        bench.walk(aggregates[0])
+        await until_done(bench, count)
+    assert waited == []
+    bench.stall.begin()
+    for aggregate in (aggregates[0], *aggregates):
+        bench.walk(aggregate)
+    bench.stall.end()
+    await until_done(bench, 10)
+    bench.walk(aggregates[0])
+    await until_done(bench, 11)
+    assert len(waited) >= 1
+    assert all(0 < seconds <= 1000 for seconds in waited)
+
+
 async def test_close_commits_everything_that_is_queued(bench, aggregates):
     for _ in range(200):
         bench.walk(aggregates[0])
@@ -191,262 +238,3 @@ async def test_close_commits_everything_that_is_queued(bench, aggregates):
     assert len(bench.done) == 203
     assert not bench.writer._thread.is_alive()
     bench.writer.close()
-
-
-# --- owners ---------------------------------------------------------------------------------------
-
-HOST = socket.gethostname()
-
-
-def dead_pid() -> int:
-    gone = subprocess.Popen([sys.executable, "-c", ""])
-    gone.wait()
-    return gone.pid
-
-
-@pytest.mark.parametrize(
-    ("owner", "alive"),
-    [
-        ("", False),
-        ("nonsense", False),
-        (f"{HOST}|1", False),
-        ("elsewhere|1|1", False),  # one machine that was given another name
-        (f"{HOST}|{os.getpid()}|1", False),  # the number was given to another process since
-    ],
-    ids=["nobody", "nonsense", "no start", "another name", "another process"],
-)
-def test_which_owners_live(owner, alive):
-    assert owners.is_alive(owner) == alive
-
-
-def test_a_process_that_has_ended_is_dead_and_this_one_lives():
-    assert not owners.is_alive(f"{HOST}|{dead_pid()}|5")
-    assert owners.is_alive(owners.own_name())
-    parent = os.getppid()
-    assert owners.is_alive(f"{HOST}|{parent}|{owners._start_time(parent)}")
-
-
-def call_processes(monkeypatch: pytest.MonkeyPatch) -> threading.local:
-    """Let threads stand for processes that all live; each says its name in what this gives."""
-    process = threading.local()
-    monkeypatch.setattr(owners, "own_name", lambda: process.name)
-    monkeypatch.setattr(owners, "is_alive", lambda owner: owner.startswith("process"))
-    return process
-
-
-async def test_of_two_that_claim_a_session_at_once_one_has_it(place, ready, monkeypatch):
-    session = await ready(place)
-    process = call_processes(monkeypatch)
-    one, two = [await reread(session) for _ in range(2)]
-    refresh, refused = TrainingSession.refresh_from_db, list[Any]()
-
-    def refresh_late(read: TrainingSession, *args: Any, **options: Any) -> None:
-        if read is one and not refused:  # the other one comes as the first one reads back
-            process.name = "process|2|0"
-            with pytest.raises(owners.OwnedElsewhere) as problem:
-                owners.claim(two)
-            refused.append(problem)
-            process.name = "process|1|0"
-        refresh(read, *args, **options)
-
-    def claim() -> None:
-        process.name = "process|1|0"
-        owners.claim(one)
-
-    monkeypatch.setattr(TrainingSession, "refresh_from_db", refresh_late)
-    await sync_to_async(claim)()
-    stored = await reread(session)
-    assert (stored.owner, stored.epoch) == ("process|1|0", session.epoch + 1)
-    assert (one.owner, one.epoch) == (stored.owner, stored.epoch)
-    assert refused
-
-
-async def test_of_many_that_claim_a_session_at_once_one_has_it(place, ready, monkeypatch):
-    process, count = call_processes(monkeypatch), 4
-    for _ in range(5):
-        session = await ready(place, at_station=False)
-        together = threading.Barrier(count)
-
-        def claim(
-            number: int, pk: int = session.pk, together: threading.Barrier = together
-        ) -> int | None:
-            process.name = f"process|{number}|0"
-            mine = TrainingSession.everywhere.get(pk=pk)
-            together.wait(10)
-            try:
-                owners.claim(mine)
-            except owners.OwnedElsewhere:
-                return None
-            else:
-                return mine.epoch
-            finally:
-                connection.close()
-
-        with ThreadPoolExecutor(count) as threads:
-            epochs = await asyncio.gather(
-                *(
-                    asyncio.get_running_loop().run_in_executor(threads, claim, n)
-                    for n in range(count)
-                )
-            )
-        assert [epoch for epoch in epochs if epoch is not None] == [session.epoch + 1]
-        await own(session, "")
-
-
-FAKE_PS = """#!/bin/sh
-test "$*" = "-o lstart= -p {pid}" || exit 1
-echo "$LC_ALL $TZ  {when}  "
-"""
-
-
-def test_where_no_folder_tells_of_processes_ps_tells_when_they_started(tmp_path, monkeypatch):
-    monkeypatch.setattr(owners, "PROC_DIR", tmp_path / "none")
-    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
-    pid = os.getppid()
-    ps = tmp_path / "ps"
-    ps.write_text(FAKE_PS.format(pid=pid, when="Sat Nov  7 09:05:01 2026"))
-    ps.chmod(0o755)
-    started = owners._start_time(pid)
-    assert started == "C UTC Sat Nov 7 09:05:01 2026"
-    owner = f"{HOST}|{pid}|{started}"
-    assert owners.is_alive(owner)
-    # After a crash and a restart of the computer the number is another process's.
-    ps.write_text(FAKE_PS.format(pid=pid, when="Sun Nov  8 08:00:00 2026"))
-    assert not owners.is_alive(owner)
-    assert owners._start_time(1) == ""
-    ps.unlink()
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert owners._start_time(pid) == ""
-
-
-@pytest.mark.skipif(shutil.which("ps") is None, reason="this machine has no ps")
-def test_what_the_real_ps_tells(tmp_path, monkeypatch):
-    monkeypatch.setattr(owners, "PROC_DIR", tmp_path / "none")
-    started = owners._start_time(os.getpid())
-    assert re.fullmatch(r"\w{3} \w{3} \d{1,2} [\d:]{8} \d{4}", started)
-    assert owners._start_time(dead_pid()) == ""
-
-
-async def own(session: TrainingSession, owner: str) -> None:
-    await TrainingSession.everywhere.filter(pk=session.pk).aupdate(owner=owner)
-
-
-async def reread(session: TrainingSession) -> Any:
-    return await TrainingSession.everywhere.aget(pk=session.pk)
-
-
-async def test_a_session_is_claimed_from_the_dead_and_given_up_at_the_drain(place, ready):
-    session = await ready(place)
-    await own(session, f"{HOST}|{dead_pid()}|5")
-    await runtimes.current().session(session.pk)
-    claimed = await reread(session)
-    assert (claimed.owner, claimed.epoch) == (owners.own_name(), session.epoch + 1)
-    await runtimes.current().drain()
-    assert (await reread(session)).owner == ""
-
-
-# --- recovery -------------------------------------------------------------------------------------
-
-
-async def left_running(place: Any, begun: Any, steps: int) -> TrainingSession:
-    """Leave a session as a process that was killed leaves it."""
-    session: TrainingSession = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
-    await source.walk(*[4.0] * steps)
-    await source.hang_up()
-    await runtimes.current().drain()
-    runtimes._current = None
-    await own(session, f"{HOST}|{dead_pid()}|5")
-    return session
-
-
-async def test_sessions_left_running_come_back_paused_and_complete(place, begun, ready):
-    session = await left_running(place, begun, 5)
-    waiting = await ready(place, at_station=False)
-    assert await runtimes.current().recover() == 1
-    assert (await reread(session)).state == "paused"
-    assert (await reread(waiting)).state == "ready"
-    event = await SessionEvent.everywhere.filter(session=session).alast()
-    assert (event.kind, event.after_number, event.by_id) == ("pause", 5, None)
-    source = await place.source().dial()
-    welcome = await source.hello(session=session.pk)
-    assert (welcome["state"], welcome["next"]) == ("paused", 6)
-    await change(session, "resume")
-    await source.walk(4.0)
-    tablet = place.tablet(session)
-    assert (await tablet.watch())["score"] == 6
-    assert await runtimes.current().recover() == 0
-
-
-async def test_a_session_that_was_given_up_in_good_order_goes_on(place, begun):
-    session = await begun(place)
-    await runtimes.current().drain()
-    runtimes._current = None
-    source = await place.source().dial()
-    assert (await source.hello())["state"] == "running"
-    assert not await SessionEvent.everywhere.filter(session=session, kind="pause").aexists()
-
-
-async def test_a_session_of_a_dead_server_is_paused_by_whoever_takes_it_over(
-    place, begun, stall, caplog
-):
-    session = await left_running(place, begun, 3)
-    stall.problem = DatabaseError("disk")
-    source = await place.source().dial()
-    await source.say({"type": "hello", "version": 1, "run": "r1", "last": 3})
-    assert (await source.sent_away())[0] == 4011
-    stall.problem = None
-    assert (await reread(session)).owner == owners.own_name()
-    source = await place.source().dial()
-    welcome = await source.hello()
-    assert (welcome["state"], welcome["next"]) == ("paused", 4)
-    assert f"Session {session.pk} was left running" in caplog.text
-    events = SessionEvent.everywhere.filter(session=session, kind="pause")
-    assert [event.data async for event in events] == [{"value": "restart"}]
-    await change(session, "resume")
-    await source.walk(4.0)
-
-
-async def test_a_session_that_runs_elsewhere_is_left_alone(place, begun, settings):
-    session = await left_running(place, begun, 1)
-    parent = os.getppid()
-    settings.HOSTED = True  # there, other machines share the database
-    for owner in (f"{HOST}|{parent}|{owners._start_time(parent)}", "elsewhere|1|1"):
-        await own(session, owner)
-        assert await runtimes.current().recover() == 0
-    assert (await reread(session)).state == "running"
-
-
-async def test_one_broken_session_keeps_no_other_from_coming_back(place, elsewhere, begun):
-    broken = await left_running(place, begun, 1)
-    sound = await left_running(elsewhere, begun, 2)
-    await TrainingSession.everywhere.filter(pk=broken.pk).aupdate(plan={})
-    await runtimes.current().recover()
-    assert (await reread(sound)).state == "paused"
-
-
-# --- drain ----------------------------------------------------------------------------------------
-
-
-async def test_the_drain_commits_and_closes_every_socket_with_4012(place, begun, stall):
-    session = await begun(place)
-    source = await place.source().dial()
-    await source.hello()
-    callers = [place.tablet(session), place.monitor(session), place.robot()]
-    for caller in callers:
-        await caller.dial()
-    await callers[2].hello()
-    stall.begin()
-    await source.say({"type": "steps", "steps": [a_step(n) for n in range(1, 101)]})
-    await turns()
-    draining = asyncio.create_task(runtimes.current().drain())
-    await turns()
-    late = await place.source().dial()
-    assert (await late.sent_away())[0] == 4012
-    stall.end()
-    await draining
-    for caller in (source, *callers):
-        assert (await caller.sent_away())[0] == 4012
-    assert await Step.everywhere.filter(session=session).acount() == 100
-    assert runtimes.peek() is None

@@ -78,7 +78,14 @@ async def test_a_walk_is_stored_whole_and_in_order(garry):
     assert garry.numbers == list(range(1, 1001))
     assert {step["side"] for step in garry.log} == {"right"}  # the leg that the session trains
     assert garry.hellos == [
-        {"type": "hello", "version": 1, "run": "b7c1", "last": 0, "speed": None}
+        {
+            "type": "hello",
+            "version": 1,
+            "run": "b7c1",
+            "last": 0,
+            "speed": None,
+            "clock_pauses": True,
+        }
     ]
     assert acks[-1] == (7, 1000)
     assert (client.acknowledged, client.unacknowledged, client.lost) == (1000, 0, 0)

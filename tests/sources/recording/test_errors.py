@@ -258,6 +258,7 @@ def test_huge_cells(parse, size):
     refuse(parse, f"time_s,value,{'x' * size}\n0,1,2\n")
 
 
+@pytest.mark.long
 def test_endless_rows(parse):
     refuse(parse, "\n" * 250_000, "has more than 200000 rows. Split it")
 

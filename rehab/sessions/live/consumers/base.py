@@ -10,11 +10,14 @@ from typing import Any
 
 from channels.exceptions import StopConsumer
 from channels.generic.websocket import AsyncWebsocketConsumer
+from django.db import DatabaseError
 
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.auth import Actor
+from rehab.sessions.live.frames import WRITE_NOW
 from rehab.sessions.live.session import LiveSession, NotStored
+from rehab.sessions.live.trouble import describe_failure
 from rehab.sessions.payloads import Message
 from robot.wire.close_codes import CloseCode
 from robot.wire.frames import BadFrame, read_object
@@ -24,6 +27,10 @@ log = logging.getLogger(__name__)
 FIRST_FRAME_S = 10.0
 FRAMES_PER_S = 200.0
 FRAME_BURST = 1000.0
+
+
+def _cannot_write(_: str) -> bool:
+    return False
 
 
 class CloseSocket(Exception):
@@ -36,19 +43,29 @@ class CloseSocket(Exception):
 
 
 class Outbox:
-    """Queued messages of one socket: callers never wait, one task sends."""
+    """Queued messages of one socket: callers never wait.
 
-    def __init__(self, send: Callable[[str], Awaitable[None]]) -> None:
+    What can be written at once is, at the end of the event loop's turn; a task sends the rest.
+    """
+
+    def __init__(
+        self,
+        send: Callable[[str], Awaitable[None]],
+        write: Callable[[str], bool] = lambda _: False,
+    ) -> None:
         self._send = send
+        self._write = write
         self._texts: list[str] = []
         self._ends_with_ack = False
+        self._is_due = False  # to be flushed at the end of this turn
+        self._is_waiting = False  # the task has sent all there was
         self._awake = asyncio.Event()
 
     def tell(self, message: Message) -> None:
         """Queue a message."""
         self._texts.append(to_text(message))
         self._ends_with_ack = False
-        self._awake.set()
+        self._wake()
 
     def acknowledge(self, number: int) -> None:
         """Queue an ack; a newer one replaces it, since an ack covers all steps before."""
@@ -56,12 +73,33 @@ class Outbox:
             self._texts.pop()
         self._texts.append(f'{{"type":"ack","number":{number}}}')
         self._ends_with_ack = True
-        self._awake.set()
+        self._wake()
+
+    def _wake(self) -> None:
+        if not self._is_due:
+            self._is_due = True
+            asyncio.get_running_loop().call_soon(self._flush)
+
+    def _flush(self) -> None:
+        """Write what there is; wake the task for what has to wait."""
+        self._is_due = False
+        texts = self._texts
+        if self._is_waiting:
+            while texts and self._write(texts[0]):
+                del texts[0]
+        if texts:
+            self._awake.set()
+        else:
+            self._ends_with_ack = False
 
     async def run(self) -> None:
         """Send until cancelled."""
         while True:
-            await self._awake.wait()
+            self._is_waiting = True
+            try:
+                await self._awake.wait()
+            finally:
+                self._is_waiting = False
             self._awake.clear()
             texts, self._texts, self._ends_with_ack = self._texts, [], False
             for text in texts:
@@ -87,7 +125,8 @@ class Socket(AsyncWebsocketConsumer):
         self.base_send: Any = send
         self.runtime = runtimes.current()
         self.is_closed = False
-        self.outbox = Outbox(self.send)
+        self._write_now = scope.get("extensions", {}).get(WRITE_NOW, _cannot_write)
+        self.outbox = Outbox(self.send, self.write)
         self._tasks: set[asyncio.Task[None]] = set()
         self._context = contextvars.copy_context()
         self._budget, self._budget_at = FRAME_BURST, self.runtime.loop.time()
@@ -142,8 +181,15 @@ class Socket(AsyncWebsocketConsumer):
             await self.close_with_error(CloseCode.NOT_PROTOCOL, problem.code, str(problem))
         except CloseSocket as problem:
             await self.close_with_error(problem.code, problem.error, str(problem))
+        except runtimes.Draining:
+            await self.close_now(CloseCode.RESTARTING)
         except NotStored as problem:
             await self.close_with_error(CloseCode.NOT_STORED, "not_stored", str(problem))
+        except DatabaseError as problem:
+            log.exception("A socket could not read or write the database")
+            await self.close_with_error(
+                CloseCode.NOT_STORED, "not_stored", describe_failure(problem)
+            )
         except Exception:
             log.exception("A socket failed")
             await self.close_with_error(
@@ -174,6 +220,10 @@ class Socket(AsyncWebsocketConsumer):
         """Send a text frame, unless the socket is closed."""
         if not self.is_closed and text_data is not None:
             await self._send_raw({"type": "websocket.send", "text": text_data})
+
+    def write(self, text: str) -> bool:
+        """Write a text frame now; return False where it has to wait its turn (``send``)."""
+        return self.is_closed or self._write_now(text)
 
     async def send_message(self, message: Message) -> None:
         """Send a message now."""

@@ -18,6 +18,7 @@ from rehab.sessions.live.consumers.base import CloseSocket, Socket
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import LiveSession, Peer
 from rehab.sessions.payloads import Message
+from rehab.sessions.replay import DamagedLog
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED_STATES
 from robot.wire.close_codes import CloseCode
@@ -112,6 +113,8 @@ class DeviceSocket(Socket):
             live = await self.runtime.settled_session(session_id)
         except OwnedElsewhere as problem:
             raise CloseSocket(CloseCode.BUSY, "busy", str(problem)) from None
+        except DamagedLog as problem:
+            raise CloseSocket(CloseCode.NO_SESSION, "damaged_log", str(problem)) from None
         other: Peer | None = getattr(live, self.slot)
         if other is not None and other is not self:
             if other.device_id != self.device_id:

@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 import asyncio
+import logging
+from datetime import datetime, timedelta
 
+from channels.db import database_sync_to_async
+from django.db import DatabaseError
 from django.utils import timezone
 
+from rehab.sessions.incidents import store_incident
 from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.hub import Lagged, Subscriber
-from rehab.sessions.live.messages import read_report
+from rehab.sessions.live.messages import Incident, read_incident, read_report
 from rehab.sessions.live.session import LiveSession
 from rehab.sessions.payloads import Message, describe_cue
 from rehab.stations.models import Device
 from rehab.training.controls import Audience
 from robot.wire.frames import BadFrame, read_name
 from robot.wire.limits import MAX_REPORT_CHARS
+
+log = logging.getLogger(__name__)
+
+INCIDENTS_WAITING = 4  # of one robot, for the disk
 
 
 class RobotConsumer(DeviceSocket):
@@ -24,6 +33,7 @@ class RobotConsumer(DeviceSocket):
     slot = "robot"
     subscriber: Subscriber | None = None
     _pumping: asyncio.Task[None] | None = None
+    _incidents_waiting = 0
 
     async def on_message(self, message: Message, text: str) -> None:
         """Handle hello and reports."""
@@ -33,8 +43,10 @@ class RobotConsumer(DeviceSocket):
                 await self.join_station(None)
             case "report":
                 self._handle_report(message, text)
+            case "incident":
+                self._keep_incident(read_incident(message))
             case _:
-                raise BadFrame('A robot sends "hello" and "report".')
+                raise BadFrame('A robot sends "hello", "report" and "incident".')
 
     async def on_attach(self, live: LiveSession) -> None:
         """Send this session's events, and no more of the previous one's."""
@@ -45,10 +57,12 @@ class RobotConsumer(DeviceSocket):
     async def _pump(self, live: LiveSession) -> None:
         """Send the cue and then steps. Steps that a robot missed are not sent again."""
         while self.live is live:
-            _, subscriber = await live.subscribe(Audience.ROBOT, self.send, timezone.now())
+            _, subscriber = await live.subscribe(
+                Audience.ROBOT, self.send, timezone.now(), self.write
+            )
             self.subscriber = subscriber
             fold = live.aggregate.fold
-            cue, state = describe_cue(fold), fold.state.value
+            cue, state = describe_cue(fold), live.state_for_robot
             stopped, watched = live.robot_stopped, live.is_watched
             welcome = {"type": "welcome", "session": live.id, "state": state, "cue": cue}
             welcome["valence"] = fold.valence.slug
@@ -72,6 +86,31 @@ class RobotConsumer(DeviceSocket):
                 session.stop_robot(None, timezone.now(), told)
         else:
             self.live.record_robot_report(report, timezone.now())
+
+    def _keep_incident(self, incident: Incident) -> None:
+        """Have an incident stored, if it is of the present session; nothing waits for it."""
+        if self.live is None or self.live.id != incident.session:
+            return
+        if self._incidents_waiting >= INCIDENTS_WAITING:
+            log.warning("An incident of session %s was dropped: others wait.", incident.session)
+            return  # the robot's own disk has it
+        self._incidents_waiting += 1
+        self.start(self._store_incident(self.live, incident, timezone.now()))
+
+    async def _store_incident(self, live: LiveSession, incident: Incident, now: datetime) -> None:
+        """Store what a robot recorded around a stop, and tell the pages where it is."""
+        at = now - timedelta(seconds=incident.ago_s)
+        try:
+            stored = await database_sync_to_async(store_incident)(
+                incident.session, at, incident.reason, incident.recording
+            )
+        except DatabaseError:  # the robot's own disk has it; its stops must go on
+            log.exception("An incident of session %s could not be stored.", incident.session)
+            return
+        finally:
+            self._incidents_waiting -= 1
+        if stored is not None:
+            live.record_robot_report({"kind": "incident", "incident": stored}, now)
 
     def on_disconnect(self) -> None:
         """Unsubscribe, and free the session's slot."""

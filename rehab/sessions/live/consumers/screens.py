@@ -32,12 +32,13 @@ from rehab.sessions.live.messages import (
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import LiveSession, NotStored
 from rehab.sessions.payloads import Message
+from rehab.sessions.replay import DamagedLog
 from rehab.stations.models import Device
 from rehab.training.changes import ChangeKind, PauseReason
 from rehab.training.controls import CONTROLS, Audience, Requester
 from rehab.training.measures import InvalidSetting
 from robot.wire.close_codes import CloseCode
-from robot.wire.frames import BadFrame, read_name, read_object, read_whole
+from robot.wire.frames import BadFrame, read_name, read_number, read_object, read_whole
 
 
 class ScreenConsumer(Socket):
@@ -72,6 +73,8 @@ class ScreenConsumer(Socket):
             self.live = live = await self.runtime.session(session_id)
         except OwnedElsewhere as problem:
             raise CloseSocket(CloseCode.BUSY, "busy", str(problem)) from None
+        except DamagedLog as problem:
+            raise CloseSocket(CloseCode.NO_SESSION, "damaged_log", str(problem)) from None
         if isinstance(self.actor, Device):
             live.tablets += 1
             live.tablet_heard_at = timezone.now()
@@ -92,7 +95,9 @@ class ScreenConsumer(Socket):
     async def _pump(self, live: LiveSession, after: int | None) -> None:
         """Send a snapshot, missed steps, then events; start again if the page lags."""
         while True:
-            snapshot, subscriber = await live.subscribe(self.audience, self.send, timezone.now())
+            snapshot, subscriber = await live.subscribe(
+                self.audience, self.send, timezone.now(), self.write
+            )
             self.subscriber = subscriber
             if isinstance(self.actor, Device) or self.audience is Audience.MONITOR:
                 live.announce_presence(timezone.now())
@@ -117,12 +122,12 @@ class ScreenConsumer(Socket):
         self, live: LiveSession, subscriber: Subscriber, after: int, until: int
     ) -> None:
         """Send the steps after a number from the log, oldest first."""
-        plan = live.aggregate.fold.plan
+        plan, told = live.aggregate.fold.plan, tuple(live.aggregate.fold.told)
         while after < until:
             steps = await read_backlog(live.id, after, until)
             if not steps:
                 return
-            entries = (history_entry(self.audience, plan, step) for step in steps)
+            entries = (history_entry(self.audience, plan, step, told) for step in steps)
             texts = [to_text(entry) for entry in entries if entry is not None]
             if texts:
                 await subscriber.send_backlog(texts)
@@ -142,6 +147,8 @@ class ScreenConsumer(Socket):
                     self.live.tablet_heard_at = timezone.now()
             case "change":
                 await self._change(message)
+            case "robot" if message.get("order") == "drive":
+                self._drive_robot(message)
             case "robot":
                 await self._order_robot(message)
             case "remark":
@@ -214,6 +221,15 @@ class ScreenConsumer(Socket):
         if by is not None or order == "stop":  # queued: no robot waits for the audit log
             act = Act(f"robot_{order}")
             self.runtime.audit_queue.add(act, self.actor, live.id, self.scope, timezone.now())
+
+    def _drive_robot(self, message: Message) -> None:
+        """Pass on that a person holds a button to drive the robot to its mark."""
+        shares = {"ahead": (0, 1), "left": (-1, 1)}
+        drive = {name: read_number(message, name, *ends) for name, ends in shares.items()}
+        if self.audience is not Audience.MONITOR or not isinstance(self.actor, User):
+            raise BadFrame("The robot is driven on the therapist's page.")
+        if self.live is not None and self.live.robot is not None:
+            self.live.robot.tell({"type": "drive", **drive})
 
     async def _refuse(self, request_id: str, code: str, message: str) -> None:
         await self.send_message(

@@ -26,7 +26,7 @@ from robot.wire.close_codes import CloseCode
 from robot.wire.frames import BadFrame
 from robot.wire.limits import MAX_STEPS
 
-PLAIN_HELLO = Hello(run="text", last=0, session=None, clock_s=None, speed=1.0, token=None)
+PLAIN_HELLO = Hello(run="text", last=0, session=None, clock_s=None, speed=1.0)
 
 
 class SourceConsumer(DeviceSocket):
@@ -55,7 +55,13 @@ class SourceConsumer(DeviceSocket):
             raise BadFrame('A source sends "hello", "step" and "steps".')
 
     async def _handle_hello(self, hello: Hello) -> None:
-        self.lateness = Lateness(hello.run, time.monotonic(), hello.clock_s, hello.speed)
+        self.lateness = Lateness(
+            hello.run,
+            time.monotonic(),
+            hello.clock_s,
+            hello.speed,
+            clock_pauses=hello.clock_pauses,
+        )
         await self.join_station(hello.session)
 
     async def on_attach(self, live: LiveSession) -> None:
@@ -108,13 +114,8 @@ class SourceConsumer(DeviceSocket):
                     "not_running", "The session has not started. Wait for start."
                 )
                 return
-            elif live.next_number - live.committed > MAX_STEPS:
-                raise CloseSocket(
-                    CloseCode.TOO_MANY,
-                    "flood",
-                    f"Wait for acks: at most {MAX_STEPS} steps may be open.",
-                )
             else:
+                _check_open_steps(live)
                 late = self.lateness.is_late(measurement.time_s, now)
                 live.record_step(measurement, received_at, late=late)
 
@@ -143,6 +144,7 @@ class SourceConsumer(DeviceSocket):
         fold = live.aggregate.fold
         if goal is not None and goal != fold.goal:
             live.feed.publish(source_goal_event(fold, goal))
+        _check_open_steps(live)
         side = Side(fold.plan.trained_side)
         time_s = self._time_plain(fold.last_time_s)
         live.record_step(Measurement(live.next_number, time_s, side, value), timezone.now())
@@ -162,3 +164,11 @@ class SourceConsumer(DeviceSocket):
 
     async def _send_error(self, code: str, message: str) -> None:
         await self.send_message({"type": "error", "code": code, "message": message})
+
+
+def _check_open_steps(live: LiveSession) -> None:
+    """Check that a source waits for its steps to be stored. Raises CloseSocket."""
+    if live.next_number - live.committed > MAX_STEPS:
+        raise CloseSocket(
+            CloseCode.TOO_MANY, "flood", f"Wait for acks: at most {MAX_STEPS} steps may be open."
+        )

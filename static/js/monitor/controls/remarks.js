@@ -2,17 +2,14 @@
 
 import { _, fill } from "garry/shared/language";
 import { describe } from "garry/monitor/annotations";
+import { openDialog } from "garry/monitor/controls/open_dialog";
 
 export function createRemarks({ state, announce, onPress, remark }) {
   const exertion = document.getElementById("exertion");
 
   onPress("[data-remark]", ({ dataset }) => {
-    if (dataset.remark === "borg") exertion.showModal();
+    if (dataset.remark === "borg") openDialog(exertion, (felt) => felt && remark("borg", Number(felt)));
     else remark(dataset.remark);
-  });
-  exertion.addEventListener("close", () => {
-    if (exertion.returnValue) remark("borg", Number(exertion.returnValue));
-    exertion.returnValue = "";
   });
 
   return {

@@ -3,6 +3,7 @@
 import { _, fill } from "garry/shared/language";
 import { clock } from "garry/shared/format";
 import { icon } from "garry/shared/svg";
+import { openDialog } from "garry/monitor/controls/open_dialog";
 import { update } from "garry/monitor/state";
 
 // The one main button, by the session's state: the change it asks for, its label and icon.
@@ -14,6 +15,7 @@ const MAIN = {
 const PAUSE_REASONS = {
   restart: _("The server was restarted; nothing was lost. Go on when ready."),
   patient: _("Paused on the patient’s page. Go on when ready."),
+  rest: _("The plan has a rest of %(time)s here. Go on when ready."),
   therapist: _("Paused by the therapist."),
 };
 
@@ -24,11 +26,11 @@ export function createRunState({ state, show, onPress, change }) {
   const pauseNote = document.querySelector(".notice.why");
 
   onPress("[data-main]", ({ value }) => change(value));
-  onPress("[data-end]", () => confirmEnd.showModal());
-  confirmEnd.addEventListener("close", () => {
-    if (confirmEnd.returnValue === "end") change(state.session.state === "ready" ? "abort" : "finish");
-    confirmEnd.returnValue = "";
-  });
+  onPress("[data-end]", () =>
+    openDialog(confirmEnd, (answer) => {
+      if (answer === "end") change(state.session.state === "ready" ? "abort" : "finish");
+    }),
+  );
 
   function drawTime({ active_s: active, target, completed }) {
     const planned = target.duration_s;
@@ -41,7 +43,8 @@ export function createRunState({ state, show, onPress, change }) {
 
   function drawPause(session) {
     pauseNote.hidden = session.state !== "paused";
-    const text = PAUSE_REASONS[session.pause_reason] ?? _("Paused.");
+    const reason = PAUSE_REASONS[session.pause_reason] ?? _("Paused.");
+    const text = fill(reason, { time: clock(session.rest_s ?? 0) });
     if (pauseNote.textContent !== text) pauseNote.textContent = text; // announced once, not with each drawing
   }
 
@@ -60,7 +63,7 @@ export function createRunState({ state, show, onPress, change }) {
       drawButtons(session);
     },
     events: {
-      state: (session, event) => update(session, event, ["state", "pause_reason"]),
+      state: (session, event) => update(session, event, ["state", "pause_reason", "rest_s"]),
     },
   };
 }

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from robot.bases import BASES
 from robot.bases.rosbridge import RosbridgeBase
+from robot.bases.rosbridge.orders import IN_FLIGHT
 from robot.behavior.safety import BASE_SILENT_S
 from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, TICK_S
 from robot.motion.pose import HOME
@@ -87,16 +88,16 @@ def test_headings_add_up_over_full_turns(stage):
 # --- drop, never queue --------------------------------------------------------------------------
 
 
-def test_one_order_is_on_its_way_and_the_newest_waits(stage):
+def test_three_orders_are_on_their_way_and_the_newest_waits(stage):
     stage.is_frozen = True
     for number in range(1, 10):
         stage.wait(TICK_S, Twist(number / 100, 0))
-    assert len(stage.outbox) == 1
+    assert len(stage.outbox) == IN_FLIGHT == 3
     stage.is_frozen = False
     stage.pass_on()  # it comes back, and only the newest follows
     stage.pass_on()
-    assert [order[1] for order in moving(stage)] == [0.01, 0.09]
-    assert stage.base.counters["dropped"] == 7
+    assert [order[1] for order in moving(stage)] == [0.01, 0.02, 0.03, 0.09]
+    assert stage.base.counters["dropped"] == 5
 
 
 def test_what_arrives_late_is_followed_by_standing_still(stage):
@@ -104,8 +105,8 @@ def test_what_arrives_late_is_followed_by_standing_still(stage):
     stage.wait(2.0, Twist(0.1, 0))
     stage.is_frozen = False
     stage.pass_on()
-    assert [order[1] for order in moving(stage)] == [0.1]
-    assert not stage.robot.is_moving
+    assert [order[1] for order in moving(stage)] == [0.1] * IN_FLIGHT
+    assert stage.robot.orders[-1][1:] == (0.0, 0.0)
     stage.wait(0.5, Twist(0.1, 0))
     assert not stage.robot.is_moving
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -63,7 +64,7 @@ def test_a_bump_stops_it_in_place_and_holds(stage):
 
 
 def test_a_kobuki_s_own_feelers():
-    stage = Stage(PROFILES["kobuki"])
+    stage = Stage(replace(PROFILES["kobuki"], own_timeout_s=0.6))
     for hazard, field in (("bump", "bumper"), ("cliff", "sensor"), ("wheel_drop", "wheel")):
         topic = PROFILES["kobuki"].sensors[hazard].name
         stage.tell(topic, {field: 1, "state": 1})
@@ -127,6 +128,7 @@ frames = st.one_of(
 
 @settings(max_examples=200)
 @given(st.lists(frames, max_size=5))
+@pytest.mark.long
 def test_no_frame_of_a_bridge_moves_it_or_ends_it(said):
     stage = Stage()
     for frame in said:

@@ -1,0 +1,88 @@
+"""What a plate reads while nobody stands on it."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+
+from rehab.gait.signals.filters import Floats, find_upper_median
+
+OFFSET_MAX = 0.15  # of body weight; a plate that reads more in swing needs its own zero button
+OFFSET_SWINGS = 10
+# A zero drifts by less from swing to swing; one that was set anew is the same in each, a drag not.
+ZERO_STEP_N = 15.0
+ZERO_SWINGS, ZERO_SPREAD_N = 3, 5.0
+QUIET_N = 8.0  # by which the parts of a swing differ that nothing loads
+
+
+class PlateZero:
+    """Tracks the zero of a plate [N] from what it reads in swing.
+
+    It is learned only where the plate is unloaded in height and in time: a drag is another force in
+    each swing, or loads a part of it.
+
+    Parameters
+    ----------
+    weight_n
+        Body weight [N].
+    least
+        Samples that a swing has at least.
+    """
+
+    def __init__(self, weight_n: float, least: int) -> None:
+        self.offset_n = 0.0
+        self._most_n = OFFSET_MAX * weight_n
+        self._least = least
+        self._offsets: deque[float] = deque(maxlen=OFFSET_SWINGS)
+        self._zeros: deque[float] = deque(maxlen=ZERO_SWINGS)
+
+    def learn(self, swing: Floats) -> None:
+        """Learn from the middle of a swing, shape (n,)."""
+        if len(swing) < self._least:
+            return
+        zero = _find_zero(swing)
+        self._zeros.append(zero)
+        is_near = abs(zero - self.offset_n) <= ZERO_STEP_N
+        is_steady = (
+            len(self._zeros) == ZERO_SWINGS and max(self._zeros) - min(self._zeros) < ZERO_SPREAD_N
+        )
+        if abs(zero) <= self._most_n and (is_near or is_steady):
+            if not is_near:
+                self._offsets.clear()
+            self._offsets.append(zero)
+            self.offset_n = sorted(self._offsets)[len(self._offsets) // 2]
+
+    def reset(self, lowest_n: float) -> bool:
+        """Take another zero, where a contact does not end; return whether that is possible."""
+        if abs(lowest_n) > self._most_n or abs(lowest_n - self.offset_n) < 5.0:
+            return False
+        self.offset_n = lowest_n
+        self._offsets.clear()
+        return True
+
+
+def _find_zero(swing: Floats) -> float:
+    """Return what a plate reads in a swing [N]: in its quietest part, where a drag loads another.
+
+    A part is a quarter; where all of them agree, it is the whole.
+    """
+    zero = find_finite_median(swing)
+    quarter = max(1, len(swing) // 4)
+    if len(swing) >= 4 and math.isfinite(zero) and math.isfinite(swing.sum()):
+        quarters = swing[: 4 * quarter].reshape(4, quarter).copy()
+        quarters.partition(quarter // 2, axis=1)
+        middle = quarters[:, quarter // 2]
+        lowest = float(middle[middle.argmin()])
+        return lowest if zero - lowest > QUIET_N else zero
+    lowest = min(find_finite_median(swing[n * quarter :][:quarter]) for n in range(4))
+    return lowest if zero - lowest > QUIET_N else zero
+
+
+def find_finite_median(values: Floats) -> float:
+    """Return the median of the finite values, infinity without one."""
+    if math.isfinite(values.sum()) or np.isfinite(values).all():
+        return find_upper_median(values)
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if len(finite) else np.inf

@@ -1,0 +1,86 @@
+"""Tables of recorded signals, whatever kind of file they are in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from rehab.gait.recordings import c3d_files, csv_files, motion_files
+from rehab.gait.recordings.columns import find_layout, read_column_map
+from rehab.gait.recordings.csv_files import apply_columns
+from rehab.gait.signals.filters import Floats
+from rehab.gait.signals.samples import LegSamples
+from rehab.gait.strides import GaitInputError
+
+BYTES_MAX = 512 * 1024 * 1024
+
+READERS: dict[str, Callable[[Path], dict[str, Floats]]] = {
+    ".csv": csv_files.read_table,
+    ".c3d": c3d_files.read_table,
+    ".mot": motion_files.read_storage,
+    ".sto": motion_files.read_storage,
+    ".trc": motion_files.read_markers,
+}
+
+
+def read_any_table(path: Path) -> dict[str, Floats]:
+    """Return the columns of a file by name, shape (n,) each, all at the fastest channel's rate.
+
+    Kinds are told by their endings: CSV (also gzipped, and the ASCII of Visual3D and Nexus), C3D,
+    OpenSim's .mot, .sto and .trc. Times are in a column that is called time, in seconds.
+
+    Raises
+    ------
+    GaitInputError
+        With the cure, for a file that is of no known kind, too large, or damaged.
+    OSError
+        For a file that cannot be read.
+    """
+    if path.stat().st_size > BYTES_MAX:
+        raise GaitInputError(
+            f"{path.name} has more than {BYTES_MAX // 2**20} MiB. Export a minute of walking."
+        )
+    endings = [ending.lower() for ending in path.suffixes if ending.lower() != ".gz"]
+    reader = READERS.get(endings[-1] if endings else ".csv", csv_files.read_table)
+    if reader is csv_files.read_table and motion_files.is_exported(path):
+        reader = motion_files.read_export
+    return reader(path)
+
+
+def read_signals(
+    path: Path, pairs: Sequence[str] | None = None
+) -> tuple[Floats, dict[str, LegSamples]]:
+    """Return times [s] and each leg's channels of a recording.
+
+    Parameters
+    ----------
+    path
+        The file. A cell that is not a number is a missing sample: NaN.
+    pairs
+        Which column is which channel, as for ``read_column_map``; None to decide by the header.
+
+    Returns
+    -------
+    Times, shape (n,), and ``LegSamples`` of shape (n,) by side, in SI units with our signs.
+
+    Raises
+    ------
+    GaitInputError
+        With the cure, for columns that are missing or empty and for a file without samples.
+    OSError
+        For a file that cannot be read.
+    """
+    table = read_any_table(path)
+    columns = read_column_map(pairs) if pairs else find_layout(list(table))
+    names = [column.name for column in columns.columns]
+    missing = [name for name in names if name not in table]
+    if missing:
+        raise GaitInputError(
+            f"{path.name} has no column {', '.join(missing)}. It has: {', '.join(table)}."
+        )
+    empty = [name for name in names if np.isnan(table[name]).all()]
+    if empty:
+        raise GaitInputError(f"{path.name}: column {', '.join(empty)} holds no numbers.")
+    return apply_columns(table, columns)

@@ -1,0 +1,1 @@
+"""What a lab's columns are: proposed from half a minute of walking, for a person to confirm."""

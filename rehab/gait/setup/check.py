@@ -1,0 +1,226 @@
+"""A whole set-up checked: what its columns are, and whether they are in time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+
+from rehab.gait.offline import measure_both_legs, measure_strides
+from rehab.gait.recordings.columns import REQUIRED, Column, ColumnMap
+from rehab.gait.recordings.csv_files import apply_columns
+from rehab.gait.selfcheck.checks import check_signals
+from rehab.gait.selfcheck.lag import PERSON_TOLERANCE_S, find_deceleration_peak
+from rehab.gait.setup.proposal import Proposal, propose
+from rehab.gait.signals.clock import SampleClock
+from rehab.gait.signals.filters import Floats
+from rehab.gait.signals.samples import LegSamples
+from rehab.gait.stances.lag_watch import DECELERATION_S, find_moment_lag
+from rehab.gait.stances.timing import LATE_S
+from rehab.gait.strides import GaitInputError, Stride
+
+# Moment and force fall together within 11 ms (moore2013: +8 and +5; simulated: -11 to -3).
+MOMENT_TOLERANCE_S = 0.012
+DELAY_TOLERANCES_S = {"angle": PERSON_TOLERANCE_S, "moment": MOMENT_TOLERANCE_S}
+SAME_FACTOR = 0.02
+STRIDES_MIN = 8
+
+
+@dataclass(frozen=True, slots=True)
+class SetupCheck:
+    """What a set-up is found to be.
+
+    Attributes
+    ----------
+    proposal
+        Columns, units, signs, legs, mass.
+    columns
+        The same as a map to measure with.
+    delays_s
+        By how much each moment and angle comes late [s], by side and channel; None where it cannot
+        be told.
+    late, lost
+        Samples that came late, and times without samples.
+    strides, valid
+        Of the recording, measured with this.
+    findings
+        What a person should look at, with the cure.
+    """
+
+    proposal: Proposal
+    columns: ColumnMap
+    delays_s: dict[tuple[str, str], float | None]
+    late: int
+    lost: int
+    strides: int
+    valid: int
+    findings: tuple[str, ...]
+
+    @property
+    def proposed_delays_s(self) -> dict[tuple[str, str], float]:
+        """Delays to take out [s], of the channels that come later or earlier than people differ."""
+        return {
+            key: round(delay_s, 3)
+            for key, delay_s in self.delays_s.items()
+            if delay_s is not None and abs(delay_s) > DELAY_TOLERANCES_S[key[1]]
+        }
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether nothing is left to look at."""
+        return not self.findings
+
+
+def check_setup(columns: Mapping[str, Floats], mass_kg: float | None = None) -> SetupCheck:
+    """Return what the columns of half a minute of walking are, and whether they are in time.
+
+    Parameters
+    ----------
+    columns
+        By name, shape (n,) each.
+    mass_kg
+        Body mass if known.
+
+    Raises
+    ------
+    GaitInputError
+        With the cure, where nothing is recognized.
+    """
+    proposal = propose(columns, mass_kg)
+    found = _make_map(proposal)
+    time_s, legs = apply_columns(columns, found)
+    strides = _measure(time_s, legs, proposal)
+    delays = {
+        (side, channel): _find_delay(channel, time_s, leg, [s for s in strides if s.side == side])
+        for side, leg in legs.items()
+        for channel in ("moment", "angle")
+    }
+    (times, *_), late_s = SampleClock().add([time_s])
+    late = 0 if late_s is None else int((late_s > LATE_S).sum())
+    lost = 0 if times is None else int((np.diff(times) > 2.5 / proposal.rate_hz).sum())
+    check = check_signals(
+        time_s,
+        legs.get("left"),
+        legs.get("right"),
+        rate_hz=proposal.rate_hz,
+        mass_kg=proposal.mass_kg,
+    )
+    findings = [
+        f"{guess.column}: {guess.doubt}." for guess in proposal.guesses.values() if guess.doubt
+    ]
+    findings += _describe_missing(proposal) + _describe_delays(delays)
+    findings += [finding.message for finding in check.findings if finding.code != "lag"]
+    return SetupCheck(
+        proposal=proposal,
+        columns=found,
+        delays_s=delays,
+        late=late,
+        lost=lost,
+        strides=len(strides),
+        valid=sum(stride.valid for stride in strides),
+        findings=tuple(dict.fromkeys(findings)),
+    )
+
+
+def compare_with_setup(check: SetupCheck, columns: ColumnMap) -> list[str]:
+    """Return what a person's map of columns has wrong, with what was seen; empty if nothing."""
+    wrong = []
+    if columns.time.name != check.proposal.time:
+        wrong.append(f"The time is {check.proposal.time}, not {columns.time.name}.")
+    for side, leg in columns.legs.items():
+        for channel, column in leg.items():
+            guess = check.proposal.guesses.get((side, channel))
+            if guess is None:
+                continue
+            what = f"{side}.{channel}={column.name}"
+            if guess.column != column.name:
+                wrong.append(f"{what}: {guess.column} looks like it, {column.name} does not.")
+            elif guess.factor * column.factor < 0:
+                wrong.append(f"{what}: its sign is turned. Give a factor of {guess.factor:.6g}.")
+            elif abs(column.factor / guess.factor - 1) > SAME_FACTOR and guess.is_certain:
+                wrong.append(
+                    f"{what}: it is in {guess.unit}. Give a factor of {guess.factor:.6g}, "
+                    f"not {column.factor:.6g}."
+                )
+    return wrong
+
+
+def _make_map(proposal: Proposal) -> ColumnMap:
+    legs: dict[str, dict[str, Column]] = {}
+    for (side, channel), guess in proposal.guesses.items():
+        legs.setdefault(side, {})[channel] = Column(guess.column, guess.factor)
+    whole = {side: leg for side, leg in legs.items() if leg.keys() >= set(REQUIRED)}
+    if not whole:
+        seen = ", ".join(f"{s} {c} {g.column}" for (s, c), g in proposal.guesses.items())
+        raise GaitInputError(
+            f"No leg is whole: a vertical force, an ankle moment and an ankle angle are needed, "
+            f"seen was {seen}. Let the lab send what is missing."
+        )
+    return ColumnMap(Column(proposal.time, proposal.time_factor), whole)
+
+
+def _measure(time_s: Floats, legs: dict[str, LegSamples], proposal: Proposal) -> list[Stride]:
+    if len(legs) == 2:
+        return measure_both_legs(
+            time_s,
+            legs["left"],
+            legs["right"],
+            rate_hz=proposal.rate_hz,
+            mass_kg=proposal.mass_kg,
+        )
+    ((side, leg),) = legs.items()
+    return measure_strides(
+        time_s, *leg, rate_hz=proposal.rate_hz, mass_kg=proposal.mass_kg, side=side
+    )
+
+
+def _find_delay(
+    channel: str, time_s: Floats, leg: LegSamples, strides: list[Stride]
+) -> float | None:
+    """Return by how much a channel comes later than the force [s], None where it cannot be told."""
+    if channel == "angle":
+        peak_s = find_deceleration_peak(time_s, leg.angle_rad, strides)
+        return None if peak_s is None else peak_s - DECELERATION_S
+    force, moment = np.asarray(leg.force_n), np.asarray(leg.moment_nm)
+    lags = []
+    for stride in strides:
+        length = stride.terminal_contact_s - stride.initial_contact_s
+        begin_s = stride.terminal_contact_s - 0.28 * length
+        part = slice(*np.searchsorted(time_s, (begin_s, stride.terminal_contact_s)))
+        if part.stop - part.start < 6:
+            continue
+        rate_hz = (part.stop - part.start - 1) / float(time_s[part.stop - 1] - time_s[part.start])
+        lag_s = find_moment_lag(force[part] - stride.offset_n, moment[part], rate_hz)
+        if lag_s is not None and math.isfinite(lag_s):
+            lags.append(lag_s)
+    return median(lags) if len(lags) >= STRIDES_MIN else None
+
+
+def _describe_missing(proposal: Proposal) -> list[str]:
+    sides = {side for side, _ in proposal.guesses}
+    return [
+        f"No {side} {channel} was recognized."
+        for side in sorted(sides)
+        for channel in REQUIRED
+        if (side, channel) not in proposal.guesses
+    ]
+
+
+def _describe_delays(delays: dict[tuple[str, str], float | None]) -> list[str]:
+    found = []
+    for (side, channel), delay_s in delays.items():
+        if delay_s is None:
+            found.append(
+                f"Whether the {side} {channel} is in time cannot be told: too few strides."
+            )
+        elif abs(delay_s) > DELAY_TOLERANCES_S[channel]:
+            order = "late" if delay_s > 0 else "early"
+            found.append(
+                f"The {side} {channel} comes {abs(delay_s) * 1000:.0f} ms {order}, by which A2 is "
+                f"about {abs(delay_s) * 1400:.0f} % off. Synchronize it, or give its delay: "
+                f"{side}.{channel}=COLUMN@{delay_s:.3f}"
+            )
+    return found

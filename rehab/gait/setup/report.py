@@ -1,0 +1,89 @@
+"""A checked set-up, told: as lines to read, as data for a page, as arguments to measure with."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rehab.gait.recordings.columns import Column
+from rehab.gait.setup.check import SetupCheck
+from rehab.gait.setup.proposal import Guess
+
+
+def describe_setup(check: SetupCheck) -> list[str]:
+    """Return a set-up check as lines to read."""
+    proposal = check.proposal
+    measured = "measured with the plates" if proposal.is_mass_measured else "as given"
+    lines = [
+        f"time   {proposal.time} × {proposal.time_factor:g}, {proposal.rate_hz:.1f} Hz; "
+        f"{check.late} samples late, {check.lost} times lost",
+        f"mass   {proposal.mass_kg:.1f} kg, {measured}",
+    ]
+    for (side, channel), guess in sorted(proposal.guesses.items()):
+        lines.append(f"{side:5}  {_describe_guess(guess, check.delays_s.get((side, channel)))}")
+    lines.append(f"{check.strides} strides, {check.valid} valid")
+    lines += [f"! {text}" for text in check.findings]
+    return [*lines, "", "If that is right, measure with:", "  " + format_arguments(check)]
+
+
+def _describe_guess(guess: Guess, delay_s: float | None) -> str:
+    sign = "turned, " if guess.factor < 0 else ""
+    timing = "" if delay_s is None else f", {1000 * delay_s:+.0f} ms"
+    sure = "sure" if guess.is_certain else "look at it"
+    return f"{guess.channel:7} {guess.column} in {guess.unit} ({sign}{sure}{timing})"
+
+
+def format_arguments(check: SetupCheck) -> str:
+    """Return the command line's arguments that measure with this set-up."""
+    pairs = [f"time={_format_column(check.columns.time)}"]
+    pairs += [
+        f"{side}.{channel}={_format_column(column)}"
+        for side, leg in check.columns.legs.items()
+        for channel, column in leg.items()
+    ]
+    quoted = " ".join(f"'{pair}'" if " " in pair or "*" in pair else pair for pair in pairs)
+    return f"--mass {check.proposal.mass_kg:.1f} --columns {quoted}"
+
+
+def _format_column(column: Column) -> str:
+    factor = "" if column.factor == 1 else f"*{column.factor:.9g}"
+    return f"{column.name}{factor}"
+
+
+def setup_to_json(check: SetupCheck, columns: list[str]) -> dict[str, Any]:
+    """Return a set-up check as plain data.
+
+    Parameters
+    ----------
+    check
+        What was found.
+    columns
+        Names of all columns that there are.
+    """
+    proposal = check.proposal
+    return {
+        "columns": columns,
+        "time": {"column": proposal.time, "factor": proposal.time_factor},
+        "rate_hz": proposal.rate_hz,
+        "mass_kg": round(proposal.mass_kg, 1),
+        "is_mass_measured": proposal.is_mass_measured,
+        "late": check.late,
+        "lost": check.lost,
+        "strides": check.strides,
+        "valid": check.valid,
+        "findings": list(check.findings),
+        "channels": [
+            {
+                "side": side,
+                "channel": channel,
+                "column": guess.column,
+                "factor": guess.factor,
+                "unit": guess.unit,
+                "is_certain": guess.is_certain,
+                "doubt": guess.doubt,
+                "delay_s": check.delays_s.get((side, channel)),
+                "proposed_delay_s": check.proposed_delays_s.get((side, channel), 0.0),
+            }
+            for (side, channel), guess in sorted(proposal.guesses.items())
+        ],
+        "arguments": format_arguments(check),
+    }

@@ -1,0 +1,231 @@
+"""When samples were taken, where their stamps say when they came.
+
+A sensor samples evenly, and no sample can arrive before it was taken: the truth is the lower
+envelope of stamp against sample number. A sample above it is *late* if the stamps come back to the
+line, and after a *loss* if they do not. (docs/reference/gait.md#time-base)
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rehab.gait.signals.filters import Floats
+from rehab.gait.strides import GaitInputError
+
+FIRST_SAMPLES = 64  # from which the period is known
+LINE_SAMPLES = 256  # of the newest, through which the line is drawn
+ANCHOR_SAMPLES = 32
+LATE_PERIODS, LATE_S = 0.5, 0.003  # beyond a period; jitter is a fifth of that (moore2013)
+# After a loss the stamps go on at the sensors' rate; after a stall they come in a burst, of half
+# a period a sample and less, until the line is reached.
+BURST_PACE = 0.9
+EVEN_S, EVEN_SAMPLES = 0.02, 3
+UNDECIDED_S = 1.0
+SLOWEST_S = 2.0  # between samples; what lies further apart is in milliseconds
+
+Columns = list[Floats | None]
+
+
+class SampleClock:
+    """Puts late samples back to when they were taken; the rest keep the times that they have.
+
+    Samples are held back from a gap on until it is known whether they are late. What comes out
+    does not depend on how the samples are cut into chunks.
+    """
+
+    def __init__(self) -> None:
+        self._period_s: float | None = None
+        self._newest: deque[Floats] = deque()  # times without a gap
+        self._count = 0  # of them
+        self._stamp_s = math.nan  # of the newest sample
+        self._held: Columns | None = None
+
+    def add(self, chunk: Columns) -> tuple[Columns, Floats | None]:
+        """Return the samples whose times are known now, and by how much each was late.
+
+        Parameters
+        ----------
+        chunk
+            Stamps [s], then any channels, shape (n,) each; None for a channel that is not sent.
+
+        Returns
+        -------
+        As many columns as were given, with times in place of stamps, and the stamps' lateness [s],
+        shape (n,), or None where none is late.
+        """
+        if self._held is not None:
+            chunk, self._held = _join(self._held, chunk), None
+        stamps = chunk[0]
+        assert stamps is not None  # noqa: S101 (times are always sent)
+        times, late = stamps, None
+        done = self._pass_even(stamps) if len(stamps) else 0
+        if done == len(stamps):
+            return chunk, None
+        while done < len(stamps):
+            if even := self._pass_even(stamps[done:]):
+                done += even
+                continue
+            settled = self._settle(stamps[done:])
+            if settled is None:
+                self._held = [None if one is None else one[done:] for one in chunk]
+                chunk = [None if one is None else one[:done] for one in chunk]
+                break
+            if late is None:
+                times, late = stamps.copy(), np.zeros(len(stamps))
+            part = slice(done, done + len(settled))
+            times[part], late[part] = settled, np.maximum(stamps[part] - settled, 0)
+            self._extend(settled, stamps[part])
+            done = part.stop
+            if self._period_s is None:
+                self._begin_line(self._line[-1:])
+        return [times[:done], *chunk[1:]], None if late is None else late[:done]
+
+    def finish(self) -> Columns | None:
+        """Return the samples that are still held back, with the times that they have."""
+        held, self._held = self._held, None
+        return held
+
+    def _pass_even(self, stamps: Floats) -> int:
+        """Return how many samples come evenly, and follow them with the line; 0 for a gap."""
+        count = len(stamps)
+        if self._period_s is None:
+            count = min(count, FIRST_SAMPLES - self._count)
+        else:
+            limit = self._period_s + _find_tolerance(self._period_s)
+            if not stamps[0] - self._stamp_s <= limit:
+                return 0
+            steps = stamps[1:] - stamps[:-1]
+            if count > 1 and not steps[steps.argmax()] <= limit:
+                count = int(np.flatnonzero(~(steps <= limit))[0]) + 1
+        self._extend(stamps[:count], stamps[:count])
+        if self._period_s is None and self._count >= FIRST_SAMPLES:
+            self._period_s = find_period(self._line)
+            if self._period_s is None:
+                self._begin_line(np.empty(0))
+        return count
+
+    def _extend(self, times: Floats, stamps: Floats) -> None:
+        self._stamp_s = float(stamps[-1])
+        self._newest.append(times)
+        self._count += len(times)
+        while self._count - len(self._newest[0]) >= LINE_SAMPLES:
+            self._count -= len(self._newest.popleft())
+
+    @property
+    def _line(self) -> Floats:
+        """Times of the newest samples, without a gap, through which the line is drawn."""
+        return np.concatenate([np.empty(0), *self._newest])[-LINE_SAMPLES:]
+
+    def _begin_line(self, times: Floats) -> None:
+        self._newest, self._count = deque([times]), len(times)
+
+    def _settle(self, stamps: Floats) -> Floats | None:
+        """Return the times of the samples from a gap on to where it is decided; None if it is not.
+
+        The first sample is after the gap.
+        """
+        assert self._period_s is not None  # noqa: S101 (no gap is looked for before)
+        recent = self._line
+        period_s = find_period(recent) or self._period_s
+        tolerance_s = _find_tolerance(period_s)
+        anchor = recent[-ANCHOR_SAMPLES:]
+        behind = np.arange(1 - len(anchor), 1) * period_s
+        last_s = float(np.median(anchor - behind))
+        line = last_s + period_s * np.arange(1, len(stamps) + 1)
+        lateness = stamps - line
+        steps = np.diff(stamps, prepend=self._stamp_s)
+        even = max(EVEN_SAMPLES, math.ceil(EVEN_S / period_s))
+        broken = _first(~(steps >= 0) | ~(lateness >= -tolerance_s))
+        back = _first(lateness <= 0.5 * period_s)
+        lost = _first_even(stamps, steps, even, period_s, tolerance_s)
+        undecided = _first(stamps - stamps[0] > UNDECIDED_S)
+        at = min(broken, back, lost, undecided)
+        if at == len(stamps):
+            return None
+        if at == broken:  # the sensor's clock was set
+            self._begin_line(np.empty(0))
+            self._period_s = None
+            return stamps[: at + 1]
+        if at == back:
+            back_s: Floats = line[: at + 1].astype(np.float64)
+            return back_s
+        level_s = float(lateness[max(0, at - even + 1) : at + 1].min())
+        self._begin_line(np.empty(0))  # it goes on from here, higher by what was lost
+        times: Floats = np.minimum(stamps[: at + 1], line[: at + 1] + level_s)
+        return times
+
+
+def find_period(times: Floats) -> float | None:
+    """Return the mean of the usual steps between times [s], None where no step is usual."""
+    steps = np.diff(times)
+    steps = steps[steps > 0]
+    if not len(steps):
+        return None
+    middle = float(np.sort(steps)[len(steps) // 2])  # an actual step, not a mean of two
+    usual = steps[np.abs(steps - middle) < 0.5 * middle]
+    return float(usual.mean()) if len(usual) > len(steps) / 2 else None
+
+
+def estimate_rate(t_s: Floats) -> float:
+    """Return the rate of samples [Hz] by their times, gaps excluded.
+
+    Their mean, in which jitter cancels out: an error of the rate is one of A2.
+
+    Raises
+    ------
+    GaitInputError
+        With the cure, where the times tell no rate.
+    """
+    if not (np.diff(t_s) > 0).any():
+        raise GaitInputError("The times of the samples do not go on. Map another time column.")
+    period_s = find_period(t_s)
+    if period_s is None:
+        raise GaitInputError("The times of the samples tell no rate. Give it with --rate.")
+    if period_s > SLOWEST_S:
+        raise GaitInputError(
+            f"Samples lie {period_s:g} s apart by their own times: milliseconds? Send seconds, or "
+            "map the time with a factor (--columns time=t*0.001 …)."
+        )
+    whole_hz = float(round(1 / period_s)) or 1.0
+    return whole_hz if abs(1 / period_s / whole_hz - 1) < 0.001 else 1 / period_s
+
+
+def _find_tolerance(period_s: float) -> float:
+    return max(LATE_PERIODS * period_s, LATE_S)
+
+
+def _first(found: NDArray[np.bool_]) -> int:
+    """Return the index of the first true value, the length without one."""
+    at = int(found.argmax())
+    return at if found[at] else len(found)
+
+
+def _first_even(
+    stamps: Floats, steps: Floats, even: int, period_s: float, tolerance_s: float
+) -> int:
+    """Return the first sample at which the stamps have gone on evenly for ``even`` samples."""
+    if len(stamps) <= even:
+        return len(stamps)
+    pace = (stamps[even:] - stamps[:-even]) / even
+    gaps = np.cumsum(steps > period_s + tolerance_s)
+    at = _first((pace >= BURST_PACE * period_s) & (gaps[even:] == gaps[:-even]))
+    return at + even if at < len(pace) else len(stamps)
+
+
+def _join(first: Columns, second: Columns) -> Columns:
+    lengths = [len(columns[0]) for columns in (first, second) if columns[0] is not None]
+    return [
+        None
+        if one is None and other is None
+        else np.concatenate(
+            [
+                np.full(length, np.nan) if part is None else part
+                for part, length in zip((one, other), lengths, strict=True)
+            ]
+        )
+        for one, other in zip(first, second, strict=True)
+    ]

@@ -1,0 +1,144 @@
+"""The end of a session in the patient's words: today beside last time, and one honest sentence.
+
+What is told follows the rules of the feedback type: a row of steps at the goal only where hits earn
+points, and under the explicit type the value without a verdict. Fewer is never blamed, and a goal
+that was moved is said before steps at the goal are compared.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import date
+from typing import Any
+
+from django.utils.translation import gettext as _
+
+from rehab.patients.visits import Visit
+from rehab.sessions.formatting import format_number, format_quantity
+from rehab.sessions.log import SessionMetric, Step
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.trend import load_trend
+from rehab.training.changes import State
+
+SAME_RATE = 0.05  # hit rates of sessions that differ by less are called as many steps
+SAME_GOAL = 0.02  # of the goal
+
+
+@dataclass(frozen=True, slots=True)
+class Walked:
+    """What one session came to: hit rate, mean value with feedback, and goal at its end."""
+
+    hit_rate: float
+    mean: float | None
+    goal: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """A session's figure as a bar; ``percent`` of the bar's room."""
+
+    label: str
+    value: str
+    percent: float
+
+
+def describe_ending(actor: Any, session: TrainingSession) -> dict[str, Any]:
+    """Return what the page at a session's end tells its patient.
+
+    Without judged steps, and in a blinded study, there is no figure to tell: `title` is empty.
+    """
+    plan = session.to_plan()
+    today, last = _find_walked(actor, session)
+    if session.patient.blinded or today is None:
+        return {"title": "", "bars": [], "streak": "", "sentence": ""}
+    streak = SessionMetric.objects.visible_to(actor).filter(session=session, slug="best_streak")
+    best = streak.values_list("value", flat=True).first() if plan.valence.rewards else None
+    if not plan.valence.has_points:
+        title, bars = _("Your push, on average"), _mean_bars(today, last, plan.measure.unit)
+        if plan.measure.slug != "a2":
+            title = _("Your value, on average")
+        sentence = ""
+    else:
+        title, bars = _("Steps at the goal"), _hit_bars(today, last)
+        sentence = describe_change(today, last)
+    return {
+        "title": title,
+        "bars": bars,
+        "streak": format_number(best, 0) if best else "",
+        "sentence": sentence,
+    }
+
+
+def describe_change(today: Walked, last: Walked | None) -> str:
+    """Return one sentence that is true of today and last time, and blames nobody."""
+    if last is None:
+        return _("Next time you can compare with today.")
+    raised = (today.goal or 0) - (last.goal or 0)
+    fewer = today.hit_rate < last.hit_rate - SAME_RATE
+    if last.goal and raised > SAME_GOAL * last.goal:
+        if fewer:
+            return _("The goal was higher than last time.")
+        return _("The goal was higher than last time, and you reached it as often.")
+    if last.goal and raised < -SAME_GOAL * last.goal:
+        return _("The goal was lower than last time.")
+    if fewer:
+        return _("Fewer steps at the goal than last time. Days differ.")
+    if today.hit_rate > last.hit_rate + SAME_RATE:
+        return _("More steps at the goal than last time.")
+    return _("As many steps at the goal as last time.")
+
+
+def next_visit(actor: Any, session: TrainingSession, today: date) -> Visit | None:
+    """Return the visit that the patient is expected for next, after today."""
+    visits = Visit.objects.visible_to(actor).filter(patient=session.patient_id, day__gt=today)
+    return visits.order_by("day").first()
+
+
+def _find_walked(actor: Any, session: TrainingSession) -> tuple[Walked | None, Walked | None]:
+    """Return this session and the one before that compares: same measure, walked alike, counted."""
+    seen = TrainingSession.objects.visible_to(actor)
+    before = seen.filter(
+        patient=session.patient_id,
+        measure=session.measure_id,
+        trained_side=session.trained_side,
+        simulated=session.simulated,
+        state=State.FINISHED,
+        excluded=False,
+        created_at__lt=session.created_at,
+        metrics__slug="hit_rate",
+    ).order_by("-created_at", "-pk")
+    wanted = [session.pk, *before.values_list("pk", flat=True)[:1]]
+    found: dict[int, Walked] = {}
+    for point in load_trend(actor, seen.filter(pk__in=wanted)):
+        if point.hit_rate is None:  # nobody counted hits there
+            continue
+        steps = Step.objects.visible_to(actor).filter(session=point.session, goal__isnull=False)
+        goal = steps.order_by("-number").values_list("goal", flat=True).first()
+        mean = point.with_feedback.mean if point.with_feedback else None
+        found[point.session.pk] = Walked(point.hit_rate, mean, goal)
+    return found.get(session.pk), found.get(wanted[-1]) if len(wanted) > 1 else None
+
+
+def _hit_bars(today: Walked, last: Walked | None) -> list[Bar]:
+    return [
+        Bar(
+            label,
+            _("%(hits)s of 10") % {"hits": round(10 * walked.hit_rate)},
+            round(100 * walked.hit_rate, 1),
+        )
+        for label, walked in _labeled(today, last)
+    ]
+
+
+def _mean_bars(today: Walked, last: Walked | None, unit: str) -> list[Bar]:
+    known = [(label, one.mean) for label, one in _labeled(today, last) if one.mean is not None]
+    longest = max((mean for _label, mean in known), default=0.0)
+    return [
+        Bar(label, format_quantity(mean, unit), round(100 * max(mean, 0.0) / longest, 1))
+        for label, mean in known
+        if longest > 0
+    ]
+
+
+def _labeled(today: Walked, last: Walked | None) -> list[tuple[str, Walked]]:
+    return [(_("Today"), today), *([(_("Last time"), last)] if last else [])]

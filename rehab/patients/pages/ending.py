@@ -1,0 +1,43 @@
+"""The page that a patient sees when a session has ended, before the scores."""
+
+from __future__ import annotations
+
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
+from django.utils import timezone
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_safe
+
+from rehab.patients.ending import describe_ending, next_visit
+from rehab.people.access import actor_of, for_roles
+from rehab.people.roles import Role
+from rehab.people.web.language import activate_patient_language
+from rehab.sessions.formatting import clinic_time, format_duration
+from rehab.sessions.models import TrainingSession
+from rehab.training.changes import OPEN_STATES, State
+
+
+@for_roles(Role.LEAD, Role.PT, tablets=True)
+@never_cache
+@require_safe
+def show_ending(request: HttpRequest, session_id: int) -> HttpResponse:
+    """Show a session's end to its patient; an open one goes on walking."""
+    actor = actor_of(request)
+    sessions = TrainingSession.objects.visible_to(actor).select_related("patient__clinic")
+    session = get_object_or_404(sessions, pk=session_id)
+    activate_patient_language(session.patient)
+    if State(session.state) in OPEN_STATES:
+        return redirect("walk", session_id=session.pk)
+    tablet = not request.user.is_authenticated
+    after = reverse("tablet") if tablet else reverse("patient", args=[session.patient_id])
+    if not session.patient.blinded:
+        after = reverse("scores", args=[session.pk])
+    context = {
+        "session": session,
+        "tablet": tablet,
+        "walked": format_duration(session.active_s),
+        "visit": next_visit(actor, session, clinic_time(timezone.now(), session.clinic).date()),
+        "after": after,
+    } | describe_ending(actor, session)
+    return render(request, "patients/ending.html", context)

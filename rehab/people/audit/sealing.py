@@ -1,0 +1,62 @@
+"""What makes a row of a log provable: a digest of its values, stored with it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from typing import Any, ClassVar
+
+from django.core.serializers.json import DjangoJSONEncoder
+from django.db import models
+
+from rehab.people.scope import ScopedModel
+
+
+class SealableModel(ScopedModel):
+    """A row of a log, with a digest of its values.
+
+    The digest outlives the values: an erasure empties these and removes the salt, without which
+    nobody can try out what they were. `seals` chains the digests.
+    """
+
+    sealed_fields: ClassVar[tuple[str, ...]]
+
+    salt = models.CharField(max_length=32, blank=True, editable=False)
+    digest = models.CharField(max_length=64, default="", editable=False)
+    erased = models.BooleanField(default=False, editable=False)
+
+    class Meta(ScopedModel.Meta):
+        abstract = True
+
+    def save(self, *args: Any, **kwargs: Any) -> None:
+        """Store the row, a new one with its digest."""
+        if self._state.adding:
+            self.set_digest()
+        super().save(*args, **kwargs)
+
+    def set_digest(self) -> None:
+        """Set salt and digest of a new row."""
+        self.salt = secrets.token_hex(16)
+        self.digest = self.compute_digest()
+
+    def compute_digest(self) -> str:
+        """Return the digest of the values as they are."""
+        return digest_of(self, self.sealed_fields)
+
+
+def digest_of(row: Any, names: Iterable[str]) -> str:
+    """Return the digest of a row's salt and of these of its values."""
+    fields = [row._meta.get_field(name) for name in names]
+    values = {field.name: _plain(getattr(row, field.attname)) for field in fields}
+    text = json.dumps(values, sort_keys=True, ensure_ascii=False)
+    return hashlib.sha256(f"{row.salt}\n{text}".encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as every database gives it back."""
+    if isinstance(value, datetime):
+        return value.astimezone(UTC).isoformat(timespec="microseconds")
+    return json.loads(json.dumps(value, cls=DjangoJSONEncoder))

@@ -1,0 +1,195 @@
+"""Seals on the logs: a chain of digests for each clinic and log, checked by `manage.py doctor`.
+
+Rows are sealed in batches some minutes after they were added, in transactions of their own, so that
+no training waits. Who changes, adds or removes a sealed row afterwards breaks the chain from there
+on; a copy of the seals elsewhere (`manage.py shiplogs`) shows it also of who writes a new chain.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator
+from datetime import datetime, timedelta
+from itertools import groupby
+from typing import Any, ClassVar
+
+from django.db import IntegrityError, models, transaction
+from django.db.models import F, Q
+from django.utils import timezone
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.audit.audit_log import AuditEntry
+from rehab.people.audit.history import HistoryEntry
+from rehab.people.models import Clinic
+from rehab.people.scope import Scope, ScopedModel
+
+SEALED_AFTER = timedelta(minutes=10)  # until then repeats of an entry are counted in it
+BATCH_ROWS = 1_000
+LOGS: dict[str, type[Any]] = {"AuditEntry": AuditEntry, "HistoryEntry": HistoryEntry}
+
+
+class LogSeal(ScopedModel):
+    """A batch of a log's rows with their common digest, which includes that of the batch before.
+
+    ``cut_at``: when its rows were deleted because they were too old. It stays, as an anchor.
+    """
+
+    scope = Scope(clinic="clinic")
+
+    log = models.CharField(max_length=16, choices=[(name, name) for name in LOGS])
+    clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="+", null=True)
+    number = models.PositiveIntegerField()
+    first_id = models.BigIntegerField()
+    last_id = models.BigIntegerField()
+    last_at = models.DateTimeField()
+    previous = models.CharField(max_length=64, blank=True)
+    digest = models.CharField(max_length=64)
+    sealed_at = models.DateTimeField(default=timezone.now)
+    cut_at = models.DateTimeField(null=True)
+
+    class Meta(ScopedModel.Meta):
+        verbose_name = _("seal of a log")
+        ordering: ClassVar = ["log", "clinic", "number"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(fields=["log", "clinic", "number"], name="log_sealed_in_order"),
+            models.UniqueConstraint(
+                fields=["log", "number"],
+                condition=Q(clinic__isnull=True),
+                name="log_of_hosts_sealed_in_order",
+            ),
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.log} {self.first_id}–{self.last_id}"
+
+    def rows(self) -> models.QuerySet[Any]:
+        """Return the rows that it covers, in their order."""
+        rows = rows_of(self.log, self.clinic_id)
+        return rows.filter(pk__range=(self.first_id, self.last_id))
+
+    def compute_digest(self, rows: Iterable[Any]) -> str:
+        """Return the digest of these rows behind the previous seal."""
+        head = f"{self.previous}\n{self.log}\n{self.clinic_id}\n{self.number}\n"
+        lines = (f"{row.pk} {getattr(row, 'count', 1)} {row.digest}\n" for row in rows)
+        return hashlib.sha256((head + "".join(lines)).encode()).hexdigest()
+
+
+def rows_of(log: str, clinic_id: int | None) -> models.QuerySet[Any]:
+    """Return a clinic's rows of a log, in their order; None for those of no clinic."""
+    rows: models.QuerySet[Any] = LOGS[log].everywhere.filter(**_of(clinic_id)).order_by("pk")
+    return rows
+
+
+def _of(clinic_id: int | None) -> dict[str, Any]:
+    return {"clinic__isnull": True} if clinic_id is None else {"clinic": clinic_id}
+
+
+def _chains() -> Iterator[tuple[str, int | None]]:
+    """Yield the logs of each clinic, and those of no clinic."""
+    keys = [None, *Clinic.everywhere.order_by("pk").values_list("pk", flat=True)]
+    yield from ((log, key) for log in LOGS for key in keys)
+
+
+def seal_logs(until: datetime) -> int:
+    """Seal all rows from before a moment. Return how many."""
+    sealed = 0
+    for log, clinic_id in _chains():
+        try:
+            while count := _seal_batch(log, clinic_id, until):
+                sealed += count
+        except IntegrityError:  # another process seals this chain at this moment
+            continue
+    return sealed
+
+
+def _seal_batch(log: str, clinic_id: int | None, until: datetime) -> int:
+    """Seal the next rows of a chain, of one day at most. Return how many."""
+    last = LogSeal.everywhere.filter(log=log, **_of(clinic_id)).order_by("number").last()
+    rows = list(rows_of(log, clinic_id).filter(pk__gt=last.last_id if last else 0)[:BATCH_ROWS])
+    days = groupby(rows, key=lambda row: row.at < until and row.at.date())
+    is_due, group = next(days, (False, iter(())))
+    batch = list(group)
+    if not is_due:
+        return 0
+    seal = LogSeal(
+        log=log,
+        clinic_id=clinic_id,
+        number=last.number + 1 if last else 1,
+        first_id=batch[0].pk,
+        last_id=batch[-1].pk,
+        last_at=max(row.at for row in batch),
+        previous=last.digest if last else "",
+        sealed_at=until,
+    )
+    seal.digest = seal.compute_digest(batch)
+    with transaction.atomic():  # this alone: rows are read while trainings go on
+        seal.save()
+    return len(batch)
+
+
+def cut_before(log: str, clinic_id: int, moment: datetime, now: datetime) -> int:
+    """Delete a clinic's rows of a log from before a moment, by whole batches. Return how many."""
+    seal_logs(now)
+    old = LogSeal.everywhere.filter(
+        log=log, clinic=clinic_id, last_at__lt=moment, cut_at__isnull=True
+    )
+    deleted = 0
+    for seal in old:
+        LogSeal.everywhere.filter(pk=seal.pk).update(cut_at=now)
+        # Not the append-only queryset's: the database admits it for a batch that is cut.
+        deleted += models.QuerySet(LOGS[log]).filter(pk__in=seal.rows().values("pk")).delete()[0]
+    return deleted
+
+
+def find_broken() -> Iterator[str]:
+    """Yield what is wrong with the logs: where a chain or a row is not what was sealed."""
+    for log, clinic_id in _chains():
+        previous, number = "", 0
+        for seal in LogSeal.everywhere.filter(log=log, **_of(clinic_id)).order_by("number"):
+            where = f"{log}, clinic {clinic_id or 'none'}, rows {seal.first_id} to {seal.last_id}"
+            if (seal.previous, seal.number) != (previous, number + 1):
+                yield f"{where}: the seal before is another one"
+            previous, number = seal.digest, seal.number
+            if seal.cut_at is not None:
+                continue
+            rows = list(seal.rows())
+            if seal.compute_digest(rows) != seal.digest:
+                yield f"{where}: rows were added, removed or counted anew"
+            for row in rows:
+                if not _is_genuine(row):
+                    yield f"{where}: row {row.pk} was changed"
+
+
+def _is_genuine(row: Any) -> bool:
+    if not row.erased:
+        return bool(row.compute_digest() == row.digest)
+    if isinstance(row, AuditEntry):
+        return row.patient_id is None and not row.about
+    return not any(row.changes.values())
+
+
+def count_unsealed(before: datetime) -> int:
+    """Return how many rows from before a moment have no seal."""
+    unsealed = 0
+    for log, clinic_id in _chains():
+        last = LogSeal.everywhere.filter(log=log, **_of(clinic_id)).order_by("number").last()
+        rows = rows_of(log, clinic_id).filter(pk__gt=last.last_id if last else 0, at__lt=before)
+        unsealed += rows.count()
+    return unsealed
+
+
+def shipped_lines(after: int) -> Iterator[dict[str, Any]]:
+    """Yield each seal after a key with its rows, as plain data, oldest first."""
+    for seal in LogSeal.everywhere.filter(pk__gt=after, cut_at__isnull=True).order_by("pk"):
+        names = ("id", *LOGS[seal.log].sealed_fields, "salt", "digest", "erased")
+        extra = {"count": F("count")} if seal.log == "AuditEntry" else {}
+        yield {
+            "seal": seal.pk,
+            "log": seal.log,
+            "clinic": seal.clinic_id,
+            "number": seal.number,
+            "previous": seal.previous,
+            "digest": seal.digest,
+            "sealed_at": seal.sealed_at,
+            "rows": list(seal.rows().values(*names, *extra)),
+        }

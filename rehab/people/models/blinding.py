@@ -1,0 +1,38 @@
+"""Whose sessions an account must not see, since it would learn what a study hides from it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from django.db.models import QuerySet
+
+from rehab.people.models.patients import Patient
+from rehab.people.roles import Role
+
+if TYPE_CHECKING:
+    from rehab.people.models.accounts import User
+
+RUNNING = "running"  # a study's state while it enrolls and walks
+
+
+def hidden_patients(user: User) -> QuerySet[Patient]:
+    """Return the patients whose sessions somebody must not see until their study is closed.
+
+    Points, words and colors betray the feedback type. So an assessor of a study sees no session of
+    its participants, and a researcher only with the mark that allows looks at unfinished studies.
+    Participants who have withdrawn stay hidden. The lookups are those of `rehab.studies.models`.
+    """
+    if user.role == Role.RESEARCHER:
+        in_study = Patient.everywhere.filter(enrollments__study__state=RUNNING)
+        return in_study.exclude(pk__in=_marked(user, "interim").values("pk"))
+    return _marked(user, "assessor")
+
+
+def _marked(user: User, task: str) -> QuerySet[Patient]:
+    """Return the participants of running studies in which somebody has a mark."""
+    return Patient.everywhere.filter(
+        enrollments__study__state=RUNNING,
+        enrollments__study__marks__user=user,
+        enrollments__study__marks__task=task,
+        enrollments__study__marks__ended_at=None,
+    )

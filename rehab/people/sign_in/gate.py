@@ -1,0 +1,108 @@
+"""The gate before the sign-in: what a flood of attempts may cost the server.
+
+It stands before Django, so that an attempt which is refused costs next to nothing: training
+sessions run in the same process. It keeps its counts in memory; those that lock accounts are in the
+database (`attempts`).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+from django.utils import translation
+from django.utils.translation import gettext as _
+from django.utils.translation.trans_real import parse_accept_lang_header
+
+from rehab.people.networks import resolve_client_address
+
+PATH = "/sign-in/"
+BURST = 30  # attempts at once from one address: the staff of a clinic may share one
+INTERVAL_S = 2.0  # between further ones
+MAX_ADDRESSES = 10_000
+AT_ONCE = 4  # attempts inside Django, from all addresses
+MAX_WAITING = 16
+
+
+class AddressLimit:
+    """How often each address may try: a burst, then one attempt in each interval."""
+
+    def __init__(self, burst: int = BURST, interval_s: float = INTERVAL_S) -> None:
+        self._burst_s = (burst - 1) * interval_s
+        self._interval_s = interval_s
+        self._free_at: OrderedDict[str, float] = OrderedDict()  # when all of a burst is there again
+
+    def wait_s(self, address: str, now_s: float) -> float:
+        """Count an attempt; return 0, or how long to wait where it is refused and not counted."""
+        free_at = max(now_s, self._free_at.pop(address, now_s))
+        wait_s = max(0.0, free_at - now_s - self._burst_s)
+        self._free_at[address] = free_at if wait_s else free_at + self._interval_s
+        if len(self._free_at) > MAX_ADDRESSES:
+            self._free_at.popitem(last=False)
+        return wait_s
+
+
+class SignInGate:
+    """An ASGI application that lets so many attempts to sign in through to another one."""
+
+    def __init__(self, inner: Any, clock: Callable[[], float] = time.monotonic) -> None:
+        self._inner = inner
+        self._clock = clock
+        self._addresses = AddressLimit()
+        self._turns = asyncio.Semaphore(AT_ONCE)
+        self._inside = 0
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        """Pass a request on; refuse an attempt to sign in that is one too many."""
+        if (
+            scope["type"] != "http"
+            or scope["method"] != "POST"
+            or not scope["path"].startswith(PATH)
+        ):
+            await self._inner(scope, receive, send)
+            return
+        headers = {name: value.decode("latin-1") for name, value in scope["headers"]}
+        peer = (scope.get("client") or [""])[0]
+        address = resolve_client_address(headers.get(b"x-forwarded-for", ""), peer)
+        wait_s = self._addresses.wait_s(address, self._clock())
+        if wait_s or self._inside >= AT_ONCE + MAX_WAITING:
+            await _refuse(send, headers.get(b"accept-language", ""), int(wait_s) + 1)
+            return
+        self._inside += 1
+        try:
+            async with self._turns:
+                await self._inner(scope, receive, send)
+        finally:
+            self._inside -= 1
+
+
+async def _refuse(send: Any, languages: str, wait_s: int) -> None:
+    headers = [
+        (b"content-type", b"text/plain; charset=utf-8"),
+        (b"retry-after", str(wait_s).encode()),
+        (b"cache-control", b"no-store"),
+    ]
+    await send({"type": "http.response.start", "status": 429, "headers": headers})
+    await send({"type": "http.response.body", "body": _words(languages[:100], wait_s)})
+
+
+@lru_cache(maxsize=256)
+def _words(languages: str, wait_s: int) -> bytes:
+    """Return what a refused person reads, in a language of the browser."""
+    for language, _quality in parse_accept_lang_header(languages):
+        try:
+            chosen = translation.get_supported_language_variant(language)
+        except LookupError:
+            continue
+        with translation.override(chosen):
+            return _refusal(wait_s)
+    return _refusal(wait_s)
+
+
+def _refusal(wait_s: int) -> bytes:
+    words = _("Too many tries to sign in. Wait %(seconds)d seconds, and try again.")
+    return (words % {"seconds": wait_s}).encode()

@@ -1,0 +1,44 @@
+"""Whole text messages as websocket frames (RFC 6455, 5.2), past the layers of servers and ASGI.
+
+Through daphne, autobahn and Twisted, or through uvicorn and websockets, a message passes layers
+that look for what we never do: bytes, fragments, compression. Both servers take this way for what
+is plain, and their own for all else (websockets.py, uvicorn_server.py).
+"""
+
+from __future__ import annotations
+
+MAX_WAITING_BYTES = 256 * 1024  # received of a client, and not handled yet
+MESSAGE_BYTES = 512  # what a message takes beside its text
+TEXT = 0x81  # a whole message, not a part of one
+MASKED = 0x80
+# In a connection's scope ("extensions"): writes a text frame at once, or returns False.
+WRITE_NOW = "garry.write_now"
+
+
+def text_frame(text: str) -> bytes:
+    """Return a server's frame of a whole text message."""
+    data = text.encode()
+    size = len(data)
+    if size < 126:
+        return bytes((TEXT, size)) + data
+    if size < 65536:
+        return bytes((TEXT, 126)) + size.to_bytes(2) + data
+    return bytes((TEXT, 127)) + size.to_bytes(8) + data
+
+
+def read_text_frame(data: bytes) -> bytes | None:
+    """Return the text of a client's frame where the bytes are one whole text message, else None."""
+    if len(data) < 6 or data[0] != TEXT or not data[1] & MASKED:
+        return None
+    size, begin = data[1] & 0x7F, 6
+    if size == 126:
+        size, begin = int.from_bytes(data[2:4]), 8
+        if size < 126:
+            return None  # not the shortest way to write it: a fault
+    elif size == 127:
+        return None  # longer than any frame may be
+    if not 0 < size == len(data) - begin:
+        return None
+    mask = data[begin - 4 : begin] * (size // 4 + 1)
+    plain = int.from_bytes(data[begin:]) ^ int.from_bytes(mask[:size])
+    return plain.to_bytes(size)

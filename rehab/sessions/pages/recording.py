@@ -1,0 +1,179 @@
+"""The page on which recorded signals are checked, before anybody walks with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from django.conf import settings
+from django.http import HttpRequest, HttpResponse, JsonResponse
+from django.shortcuts import render
+from django.utils.translation import gettext as _
+from django.views.decorators.http import require_http_methods, require_POST
+
+from rehab.people.access import for_roles, user_of
+from rehab.people.models import SIDES as LEGS
+from rehab.people.roles import Role
+from rehab.sessions.setup.recordings import (
+    BYTES_MAX,
+    CHANNELS,
+    ENDINGS,
+    MASS_MAX_KG,
+    MASS_MIN_KG,
+    PART_BYTES,
+    SIDES,
+    Checked,
+    UploadRefused,
+    add_part,
+    check_upload,
+    name_recording,
+    recordings_folder,
+    uploaded_file,
+    write_columns,
+)
+
+
+@for_roles(Role.LEAD, Role.PT, patients=False)
+@require_POST
+def add_recording_part(request: HttpRequest) -> HttpResponse:
+    """Take a part of a file; ``at`` is where it belongs, ``ending`` what kind of file it is."""
+    at = request.GET.get("at", "")
+    try:
+        file = uploaded_file(user_of(request).pk, request.GET.get("ending", "").lower())
+        if not at.isdecimal():
+            raise UploadRefused
+        add_part(file, request.body, int(at))
+    except UploadRefused:
+        return JsonResponse({"message": _refusal()}, status=400)
+    return JsonResponse({"next": int(at) + len(request.body)})
+
+
+@for_roles(Role.LEAD, Role.PT, patients=False)
+@require_http_methods(["GET", "HEAD", "POST"])
+def check_recording(request: HttpRequest) -> HttpResponse:
+    """Show what an upload's columns are taken for; store it once a person has confirmed them."""
+    asked = request.POST
+    context: dict[str, Any] = {
+        "endings": ",".join(ENDINGS),
+        "bytes_max": BYTES_MAX,
+        "mib_max": BYTES_MAX // 2**20,
+        "part_bytes": PART_BYTES,
+        "mass": asked.get("mass", ""),
+        "name": asked.get("name", "")[:60],
+        "is_hosted": settings.HOSTED,
+    }
+    if request.method == "POST":
+        file = _find_upload(request)
+        mass_kg = _read_mass(context["mass"])
+        if file is None:
+            context["problems"] = [_refusal()]
+        elif context["mass"].strip() and mass_kg is None:
+            context["problems"] = [
+                _("Give the body mass in kg, %(least)d to %(most)d.")
+                % {"least": MASS_MIN_KG, "most": MASS_MAX_KG}
+            ]
+        else:
+            context |= {"ending": file.suffix} | _answer(request, file, mass_kg)
+    return render(request, "sessions/recording.html", context)
+
+
+def _answer(request: HttpRequest, file: Path, mass_kg: float | None) -> dict[str, Any]:
+    """Return what the page shows of a check, or of a recording that was confirmed."""
+    asked = request.POST
+    if "confirm" not in asked:
+        checked = check_upload(file, mass_kg)
+        return _describe(checked, _proposed(checked))
+    chosen = {
+        f"{side}.{channel}": {
+            part: asked.get(f"{side}.{channel}.{part}", "")[:200]
+            for part in ("column", "factor", "delay_ms")
+        }
+        for side in SIDES
+        for channel in CHANNELS
+    }
+    time = {part: asked.get(f"time.{part}", "")[:200] for part in ("column", "factor")}
+    try:
+        columns = write_columns(chosen, time)
+    except ValueError as problem:
+        problems = [_("%(text)s is no number.") % {"text": problem}]
+        return _describe(check_upload(file, mass_kg), chosen) | {"problems": problems}
+    name = name_recording(asked.get("name", ""))
+    if not settings.HOSTED and not name:
+        problems = [_("Give the recording a name.")]
+        return _describe(check_upload(file, mass_kg), chosen) | {"problems": problems}
+    save = None if settings.HOSTED else recordings_folder() / name
+    checked = check_upload(file, mass_kg, columns, save)
+    shown = _describe(checked, chosen)
+    if not shown["problems"]:
+        file.unlink(missing_ok=True)
+        shown |= {"stored": name, "found": None, "command": " ".join(map(_quote, columns))}
+    return shown
+
+
+def _describe(checked: Checked, chosen: dict[str, dict[str, str]]) -> dict[str, Any]:
+    found = checked.found
+    guesses = {f"{c['side']}.{c['channel']}": c for c in found["channels"]} if found else {}
+    words = {"force": _("Vertical force"), "moment": _("Ankle moment"), "angle": _("Ankle angle")}
+    legs = dict(LEGS)
+    channels = [
+        {
+            "key": f"{side}.{channel}",
+            "label": f"{legs[side]}: {words[channel]}",
+            "guess": guesses.get(f"{side}.{channel}"),
+            "chosen": chosen.get(f"{side}.{channel}", {}),
+        }
+        for side in SIDES
+        for channel in CHANNELS
+    ]
+    problems = checked.wrong
+    if found is None and not problems:
+        problems = [_("This file cannot be read. Export half a minute of walking again.")]
+    walked = (
+        {}
+        if found is None
+        else {
+            "rate": round(found["rate_hz"]),
+            "kg": found["mass_kg"],
+            **{name: found[name] for name in ("strides", "valid", "late", "lost")},
+        }
+    )
+    return {"found": found, "channels": channels, "problems": problems, **walked}
+
+
+def _proposed(checked: Checked) -> dict[str, dict[str, str]]:
+    """Return what the check found as a person would write it, with the delays it proposes."""
+    return {
+        f"{one['side']}.{one['channel']}": {
+            "column": one["column"],
+            "factor": f"{one['factor']:.9g}",
+            "delay_ms": f"{1000 * one['proposed_delay_s']:.0f}" if one["proposed_delay_s"] else "",
+        }
+        for one in (checked.found or {"channels": []})["channels"]
+    }
+
+
+def _find_upload(request: HttpRequest) -> Path | None:
+    try:
+        file = uploaded_file(user_of(request).pk, request.POST.get("ending", ""))
+    except UploadRefused:
+        return None
+    return file if file.exists() else None
+
+
+def _read_mass(text: str) -> float | None:
+    try:
+        mass_kg = float(text.replace(",", "."))
+    except ValueError:
+        return None
+    return mass_kg if MASS_MIN_KG <= mass_kg <= MASS_MAX_KG else None
+
+
+def _quote(pair: str) -> str:
+    return f"'{pair}'"
+
+
+def _refusal() -> str:
+    return _("Choose a file of %(kinds)s with at most %(most)d MiB.") % {
+        "kinds": ", ".join(ENDINGS),
+        "most": BYTES_MAX // 2**20,
+    }

@@ -1,0 +1,144 @@
+"""Recorded signals that a person uploads, has checked, and stores as a recording to walk with.
+
+A file comes in parts, none longer than the server takes of any request. Whatever reads it runs as a
+process of its own with bounds, so that a damaged file cannot take the server down.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from django.conf import settings
+from django.utils.text import slugify
+
+from robot.wire.limits import TIME_MAX_S
+
+BYTES_MAX = 64 * 1024 * 1024  # five minutes of 1 kHz as CSV; half a minute is enough
+PART_BYTES = 1024 * 1024
+WAIT_S = 90.0
+# What `rehab.gait.recordings.tables` reads; it is not imported, as servers do without numpy.
+ENDINGS = (".c3d", ".csv", ".mot", ".sto", ".txt")
+SIDES, CHANNELS = ("left", "right"), ("force", "moment", "angle")
+MASS_MIN_KG, MASS_MAX_KG = 10, 300
+
+
+class UploadRefused(Exception):
+    """A part of a file that cannot be taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What the check of a file came to.
+
+    Attributes
+    ----------
+    found
+        As ``rehab.gait.setup.report.setup_to_json``; None where nothing was recognized.
+    wrong
+        What speaks against it, or against the columns that were given.
+    """
+
+    found: dict[str, Any] | None
+    wrong: list[str]
+
+
+def recordings_folder() -> Path:
+    """Return the folder of the recordings that the set-up offers."""
+    folder: Path = settings.DATA_DIR / "recordings"
+    return folder
+
+
+def uploaded_file(person: int, ending: str) -> Path:
+    """Return where a person's upload is kept; another one replaces it.
+
+    Raises UploadRefused for a kind of file that cannot be read.
+    """
+    if ending not in ENDINGS:
+        raise UploadRefused
+    folder: Path = settings.DATA_DIR / "uploads"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    return folder / f"{person}{ending}"
+
+
+def add_part(file: Path, part: bytes, at: int) -> None:
+    """Add a part of an upload at its place; the first one begins the file anew.
+
+    Raises UploadRefused for a part that does not follow the one before, and beyond the largest
+    file.
+    """
+    is_known = file.exists() if at else True
+    if not is_known or at < 0 or len(part) > PART_BYTES or at + len(part) > BYTES_MAX:
+        raise UploadRefused
+    if at and file.stat().st_size != at:
+        raise UploadRefused
+    if not at:
+        for ending in ENDINGS:
+            file.with_suffix(ending).unlink(missing_ok=True)
+    with file.open("ab") as opened:
+        opened.write(part)
+
+
+def check_upload(
+    file: Path, mass_kg: float | None, columns: list[str] | None = None, save: Path | None = None
+) -> Checked:
+    """Return what the columns of an upload are, compared with those given; store it if asked.
+
+    It is stored in SI units, and only where nothing is wrong.
+    """
+    arguments = [sys.executable, "-m", "rehab.gait", "check", str(file), "--json", "--bounded"]
+    arguments += ["--mass", f"{mass_kg:g}"] if mass_kg else []
+    arguments += ["--save", str(save)] if save else []
+    arguments += ["--columns", *columns] if columns else []
+    if save:
+        save.parent.mkdir(exist_ok=True)
+    try:
+        done = subprocess.run(
+            arguments,
+            cwd=settings.BASE_DIR,
+            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+            capture_output=True,
+            text=True,
+            timeout=WAIT_S,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return Checked(None, [])
+    said = [line for line in done.stderr.splitlines() if line.strip()]
+    if done.returncode not in (0, 1, 2) or (said and said[0].startswith("Traceback")):
+        return Checked(None, [])
+    return Checked(json.loads(done.stdout) if done.stdout else None, said)
+
+
+def name_recording(text: str) -> str:
+    """Return a file's name from what a person calls the recording; empty where nothing is left."""
+    stem = slugify(text)[:60]
+    return f"{stem}.csv" if stem else ""
+
+
+def write_columns(chosen: dict[str, dict[str, str]], time: dict[str, str]) -> list[str]:
+    """Return chosen columns as ``rehab.gait`` reads them: ``left.force=Fz1*-1@0.01``.
+
+    Raises
+    ------
+    ValueError
+        For a factor or delay that is no number.
+    """
+    pairs = [f"time={time['column']}*{_number(time['factor'], 1):.9g}"]
+    for channel, one in chosen.items():
+        if one["column"]:
+            factor, delay_s = _number(one["factor"], 1), _number(one["delay_ms"], 0) / 1000
+            pairs.append(f"{channel}={one['column']}*{factor:.9g}@{delay_s:.9g}")
+    return pairs
+
+
+def _number(text: str, usual: float) -> float:
+    number = float(text.replace(",", ".")) if text.strip() else usual
+    if not abs(number) < TIME_MAX_S:
+        raise ValueError(text)
+    return number

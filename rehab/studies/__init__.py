@@ -1,0 +1,1 @@
+"""Studies: arms, allocation, blinding, planned visits; who must not know what."""

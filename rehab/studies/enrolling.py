@@ -1,0 +1,154 @@
+"""Enrolling patients, allocating them, and what happens when one withdraws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+
+from django.db import transaction
+from django.utils.translation import gettext
+
+from rehab.patients.visits import plan_visit
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import active_consents
+from rehab.people.models import Patient, User
+from rehab.people.random_codes import random_code
+from rehab.sessions.formatting import clinic_time
+from rehab.studies.allocation.groups import Allocated
+from rehab.studies.models import Study, StudyMark, StudyState, has_mark
+from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
+from rehab.studies.registration import (
+    check_no_open_session,
+    check_secret,
+    current_version,
+    lock,
+    note,
+    set_blinded,
+)
+from rehab.training.measures import InvalidSetting
+
+ERASED_CODE = "E-"  # begins the code of a participant who was erased
+
+
+def enroll(
+    study: Study,
+    patient: Patient,
+    levels: Sequence[str],
+    *,
+    keep_data: bool,
+    by: User | None,
+    now: datetime,
+) -> Enrollment:
+    """Take a patient into a running study: allocate, plan the visits, blind.
+
+    Raises InvalidSetting for a patient who has not consented to research, is in another study or
+    has an open session, and for a study that is not running, is full, or has run out of its list.
+    """
+    with transaction.atomic():
+        lock(study)  # of two at once, the second is allocated after the first
+        patient.lock()
+        _check_may_enter(study, patient)
+        if by is not None and has_mark(study, by, StudyMark.Task.ASSESSOR):
+            raise InvalidSetting(
+                gettext("You assess in this study. A colleague who treats takes patients in.")
+            )
+        version = current_version(study)
+        before = Allocation.everywhere.filter(enrollment__study=study).order_by("pk")
+        earlier = [
+            Allocated(tuple(past.enrollment.levels), past.group)
+            for past in before.select_related("enrollment")
+        ]
+        group = study.scheme().allocate(check_secret(study), earlier, levels)
+        enrollment = Enrollment.everywhere.create(
+            clinic_id=study.clinic_id,
+            study=study,
+            patient=patient,
+            version=version,
+            code=f"{study.code}-{len(earlier) + 1:03}",
+            levels=list(levels),
+            keep_data=keep_data,
+            enrolled_at=now,
+            enrolled_by=by,
+        )
+        Allocation.everywhere.create(enrollment=enrollment, group=group, at=now)
+        note(study, StudyEvent.Kind.ENROLLED, by, now, enrollment=enrollment)
+        _plan_visits(enrollment, len(group.split("-")), now)
+        set_blinded(patient)
+    return enrollment
+
+
+def _check_may_enter(study: Study, patient: Patient) -> None:
+    if study.state != StudyState.RUNNING:
+        raise InvalidSetting(gettext("Only a running study takes patients in. Start it first."))
+    if study.enrollments.count() >= study.participants:
+        message = gettext(
+            "The study has all its %(count)s participants. Close it, or revise the number."
+        )
+        raise InvalidSetting(message % {"count": study.participants})
+    names = {"patient": patient.nickname}
+    if patient.ended_at is not None:
+        raise InvalidSetting(gettext("%(patient)s's program has ended. Reopen it first.") % names)
+    other = patient.enrollments.filter(study__state=StudyState.RUNNING).select_related("study")
+    if (found := other.first()) is not None:
+        message = gettext(
+            "%(patient)s is in the study %(study)s already, or has withdrawn from it. One study a "
+            "patient: wait until that one is closed."
+        )
+        raise InvalidSetting(message % (names | {"study": found.study.code}))
+    if not patient.simulated and Purpose.RESEARCH not in active_consents(patient):
+        message = gettext(
+            "%(patient)s has not consented to research. Note the consent on the page “Consent and "
+            "data” first."
+        )
+        raise InvalidSetting(message % names)
+    check_no_open_session(study, patient)
+
+
+def _plan_visits(enrollment: Enrollment, periods: int, now: datetime) -> None:
+    """Store the study's visits, and expect the patient on their days."""
+    first_day = clinic_time(now, enrollment.study.clinic).date()
+    for planned in enrollment.study.visit_plan.plan(periods, first_day):
+        StudyVisit.everywhere.create(
+            enrollment=enrollment, number=planned.number, period=planned.period, day=planned.day
+        )
+        if not enrollment.patient.visits.filter(day=planned.day).exists():
+            plan_visit(enrollment.patient, planned.day, None)
+
+
+def withdraw(enrollment: Enrollment, by: User | None, now: datetime, reason: str = "") -> None:
+    """Record that a participant leaves the study; sessions count as was agreed at enrollment.
+
+    An open session goes on, as a session of care, until the therapist ends it.
+    """
+    with transaction.atomic():
+        lock(enrollment.study)
+        enrollment.refresh_from_db()
+        if enrollment.withdrawn_at is not None:
+            return
+        enrollment.withdrawn_at = now
+        enrollment.save(update_fields=["withdrawn_at"])
+        note(
+            enrollment.study,
+            StudyEvent.Kind.WITHDRAWN,
+            by,
+            now,
+            enrollment=enrollment,
+            reason=reason,
+        )
+        set_blinded(enrollment.patient)
+
+
+def withdraw_everywhere(patient: Patient, by: User | None, now: datetime) -> None:
+    """Withdraw a patient from every running study, as when consent to research is withdrawn."""
+    running = patient.enrollments.filter(withdrawn_at=None, study__state=StudyState.RUNNING)
+    for enrollment in running.select_related("study", "patient"):
+        withdraw(enrollment, by, now)
+
+
+def anonymize(patient: Patient, by: User | None, now: datetime) -> None:
+    """Remove what leads from studies to an erased patient; the numbers of the study stay right."""
+    withdraw_everywhere(patient, by, now)
+    for enrollment in patient.enrollments.exclude(code__startswith=ERASED_CODE):
+        enrollment.code = f"{ERASED_CODE}{random_code(8)}"
+        enrollment.save(update_fields=["code"])
+    StudyEvent.everywhere.filter(enrollment__patient=patient).update(reason="", about="")

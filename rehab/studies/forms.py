@@ -1,0 +1,271 @@
+"""The forms of studies: planning without code, taking a patient in, starting a visit's session."""
+
+from __future__ import annotations
+
+import secrets
+from typing import Any
+
+from django import forms
+from django.core.exceptions import ValidationError
+from django.db import transaction
+from django.utils.text import capfirst
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.models import Patient, User
+from rehab.people.web.refusals import format_refusal
+from rehab.sessions.formatting import format_source
+from rehab.sessions.forms.answers import NumberField
+from rehab.sessions.services import check_station_is_free
+from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.sources import build_source_args, source_choices
+from rehab.stations.models import Station
+from rehab.studies.allocation.lists import read_list
+from rehab.studies.allocation.scheme import Method, Secret
+from rehab.studies.models import OUTCOMES, Arm, Study
+from rehab.studies.registration import check_secret, describe
+from rehab.studies.sealing import seal, unseal
+from rehab.studies.visits import Place
+from rehab.training.measures import A2, InvalidSetting
+
+SEED_BYTES = 16  # of a study's seed: more than anybody could try
+LIST_LETTERS_MAX = 500_000
+ARMS_OFFERED = 4  # rows on the page of a new study
+# What allocates is fixed by the registration.
+ALLOCATION_FIELDS = (
+    "code",
+    "crossover",
+    "method",
+    "block_sizes",
+    "factors_text",
+    "allocation_list",
+)
+
+
+class StudyForm(forms.ModelForm):
+    """The plan of a study. A registered one keeps its allocation, and says why it is changed."""
+
+    block_sizes = forms.CharField(
+        label=_("sizes of blocks"),
+        initial="4, 6",
+        required=False,
+        help_text=_("Of permuted blocks, drawn by chance. Sealed: who enrolls does not see them."),
+    )
+    factors_text = forms.CharField(
+        label=_("factors to balance"),
+        required=False,
+        widget=forms.Textarea(attrs={"rows": 3, "placeholder": _("Severity: mild, severe")}),
+        help_text=_("One a line, with its levels: “Severity: mild, severe”. Empty: none."),
+    )
+    allocation_list = forms.CharField(
+        label=_("list of allocations"),
+        max_length=LIST_LETTERS_MAX,
+        required=False,
+        widget=forms.Textarea(attrs={"rows": 4}),
+        help_text=_(
+            "Only for a list of your own: paste its CSV, with the columns number, each factor, and "
+            "group. It is sealed, and not shown again."
+        ),
+    )
+    secondary_outcomes = forms.MultipleChoiceField(
+        label=_("secondary outcomes"),
+        choices=OUTCOMES,
+        required=False,
+        widget=forms.CheckboxSelectMultiple,
+    )
+    reason = forms.CharField(
+        label=_("why it is changed"), max_length=1000, widget=forms.Textarea(attrs={"rows": 2})
+    )
+
+    class Meta:
+        model = Study
+        fields = (
+            *("code", "title", "question", "participants", "months_since_stroke", "crossover"),
+            *("visits", "days_between", "washout_days", "goal_percent"),
+            *("primary_outcome", "secondary_outcomes", "method"),
+        )
+        widgets = {"question": forms.Textarea(attrs={"rows": 4})}
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        study: Study = self.instance
+        if study.is_draft:
+            del self.fields["reason"]
+            lines = (f"{name}: {', '.join(levels)}" for name, levels in study.factors)
+            self.initial["factors_text"] = "\n".join(lines)
+            if study.sealed:
+                sizes = unseal(study.sealed).block_sizes
+                self.initial["block_sizes"] = ", ".join(map(str, sizes))
+        else:
+            for name in ALLOCATION_FIELDS:
+                del self.fields[name]
+
+    def clean_block_sizes(self) -> tuple[int, ...]:
+        """Return the sizes, as whole numbers."""
+        words = self.cleaned_data["block_sizes"].replace(";", ",").split(",")
+        try:
+            return tuple(int(word) for word in words if word.strip())
+        except ValueError:
+            raise ValidationError(_("Give whole numbers with commas, such as “4, 6”.")) from None
+
+    def clean_factors_text(self) -> list[list[Any]]:
+        """Return the factors with their levels."""
+        factors = []
+        for line in filter(str.strip, self.cleaned_data["factors_text"].splitlines()):
+            name, colon, levels = line.partition(":")
+            if not colon:
+                message = _("“%(line)s” has no levels. Write it as “Severity: mild, severe”.")
+                raise ValidationError(message, params={"line": line})
+            factors.append([name.strip(), [level.strip() for level in levels.split(",")]])
+        return factors
+
+    def seal_allocation(self) -> None:
+        """Set the study's factors and sealed secret from the form; the arms are stored already.
+
+        Raises InvalidSetting for what does not fit the arms.
+        """
+        study, data = self.instance, self.cleaned_data
+        study.factors = data["factors_text"]
+        before = unseal(study.sealed) if study.sealed else Secret(secrets.token_hex(SEED_BYTES))
+        listed = before.listed
+        if data["allocation_list"]:
+            scheme = study.scheme()
+            listed = read_list(data["allocation_list"], scheme.groups, scheme.factors)
+        is_list, is_blocks = study.method == Method.LIST, study.method == Method.BLOCKS
+        secret = Secret(
+            before.seed, data["block_sizes"] if is_blocks else (), listed if is_list else ()
+        )
+        study.sealed = seal(secret)
+        check_secret(study)
+
+
+class ArmForm(forms.ModelForm):
+    """One arm of a study. Empty rows are left out."""
+
+    gain = NumberField(label=_("gain"), initial=1.0)
+
+    class Meta:
+        model = Arm
+        fields = (
+            *("code", "name", "valence", "gain", "robot_intensity", "measure", "protocol"),
+            "weight",
+        )
+
+    def __init__(self, *args: Any, by: User, is_fixed: bool, **options: Any) -> None:
+        super().__init__(*args, **options)
+        fields: dict[str, Any] = self.fields
+        fields["measure"].queryset = Measure.objects.visible_to(by)
+        fields["protocol"].queryset = Protocol.objects.visible_to(by)
+        if self.instance.pk is None:
+            usual = fields["measure"].queryset.filter(clinic=None, slug=A2.slug).first()
+            self.initial["measure"] = usual and usual.pk
+        for name in ("code", "weight"):
+            fields[name].disabled = is_fixed
+
+
+def build_arm_forms(study: Study, by: User, data: Any = None) -> Any:
+    """Return the rows of a study's arms: a draft's with empty ones to fill in."""
+    is_fixed = not study.is_draft
+    stored = study.arms.count() if study.pk else 0
+    factory: Any = forms.inlineformset_factory(
+        Study,
+        Arm,
+        form=ArmForm,
+        extra=0 if is_fixed else max(ARMS_OFFERED - stored, 1),
+        can_delete=not is_fixed,
+    )
+    return factory(data, instance=study, form_kwargs={"by": by, "is_fixed": is_fixed}, prefix="arm")
+
+
+def save_arms(arms: Any, study: Study) -> None:
+    """Store the arms of a valid formset, in the order of the rows."""
+    arms.instance = study
+    arms.save(commit=False)
+    for row in arms.deleted_objects:
+        row.delete()
+    kept = [f for f in arms.forms if f.instance.code and f not in arms.deleted_forms]
+    for position, form in enumerate(kept):
+        form.instance.study, form.instance.position = study, position
+        form.instance.save()
+
+
+def save_draft(form: StudyForm, arms: Any) -> Study:
+    """Store a draft with its arms. Raises InvalidSetting, and stores nothing, if it cannot run."""
+    with transaction.atomic():
+        study: Study = form.save()
+        save_arms(arms, study)
+        form.seal_allocation()
+        study.save()
+        describe(study)
+    return study
+
+
+class EnrollmentForm(forms.Form):
+    """Who is taken into a study, with the level of each factor."""
+
+    patient: forms.ModelChoiceField[Patient] = forms.ModelChoiceField(queryset=None)
+    keep_data = forms.TypedChoiceField(
+        label=_("If the patient leaves the study, its sessions"),
+        choices=[("yes", _("stay in its results")), ("no", _("are left out of its results"))],
+        coerce=lambda answer: answer == "yes",
+        widget=forms.RadioSelect,
+    )
+
+    def __init__(self, *args: Any, study: Study, by: User, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.study = study
+        fields: dict[str, Any] = self.fields
+        fields["patient"].queryset = Patient.objects.visible_to(by).filter(
+            ended_at=None, erased_at=None
+        )
+        fields["patient"].label = capfirst(gettext("patient"))
+        for number, (name, levels) in enumerate(study.factors):
+            fields[f"level_{number}"] = forms.ChoiceField(
+                label=name, choices=[(level, level) for level in levels], widget=forms.RadioSelect
+            )
+
+    @property
+    def levels(self) -> tuple[str, ...]:
+        """The chosen level of each factor."""
+        return tuple(self.cleaned_data[f"level_{n}"] for n in range(len(self.study.factors)))
+
+
+class PlaceForm(forms.Form):
+    """Where a visit's session is walked, and where its steps come from."""
+
+    station: forms.ModelChoiceField[Station] = forms.ModelChoiceField(
+        queryset=None, empty_label=None
+    )
+    source = forms.ChoiceField()
+
+    def __init__(self, *args: Any, patient: Patient, by: User, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.patient = patient
+        fields: dict[str, Any] = self.fields
+        fields["station"].queryset = Station.objects.visible_to(by)
+        fields["station"].label = capfirst(gettext("station"))
+        fields["source"].label = capfirst(gettext("source"))
+        fields["source"].choices = [
+            (name, format_source(label)) for name, label in source_choices()
+        ]
+
+    def clean_station(self) -> Station:
+        """Return the station. Refuses one with an open session."""
+        station: Station = self.cleaned_data["station"]
+        try:
+            check_station_is_free(station)
+        except InvalidSetting as problem:
+            raise ValidationError(format_refusal(problem)) from problem
+        return station
+
+    @property
+    def place(self) -> Place:
+        """The chosen place."""
+        data = self.cleaned_data
+        kind, _between, name = data["source"].partition(" ")
+        return Place(
+            station=data["station"],
+            source=dict(source_choices())[data["source"]],
+            simulated=kind == "synthetic",
+            source_args=tuple(build_source_args(kind, name, self.patient)),
+        )

@@ -1,0 +1,119 @@
+"""Pages of a study's participants: enrollment, visits, leaving, revealing an arm."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.utils import timezone
+from django.utils.translation import gettext as _
+from django.views.decorators.http import require_http_methods, require_POST, require_safe
+
+from rehab.people.access import for_roles, user_of
+from rehab.people.models import User
+from rehab.people.roles import Role
+from rehab.people.web.refusals import format_refusal
+from rehab.stations.builtin import first_station
+from rehab.studies.blinding import reveal_arms
+from rehab.studies.enrolling import enroll, withdraw
+from rehab.studies.forms import EnrollmentForm, PlaceForm
+from rehab.studies.pages.planning import get_study, is_assessor
+from rehab.studies.participants import Enrollment
+from rehab.studies.visits import next_visit, start_session
+from rehab.training.measures import InvalidSetting
+
+
+def get_enrollment(user: User, enrollment_id: int) -> Enrollment:
+    """Return a participant whom a user may see. Raises Http404 for any other."""
+    rows = Enrollment.objects.visible_to(user).select_related("study__clinic", "patient__clinic")
+    return get_object_or_404(rows, pk=enrollment_id)
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_http_methods(["GET", "HEAD", "POST"])
+def enroll_patient(request: HttpRequest, study_id: int) -> HttpResponse:
+    """Take a patient into a running study."""
+    user = user_of(request)
+    study = get_study(user, study_id)
+    form = EnrollmentForm(request.POST or None, study=study, by=user)
+    if request.method == "POST" and form.is_valid():
+        patient, keep_data = form.cleaned_data["patient"], form.cleaned_data["keep_data"]
+        try:
+            enrollment = enroll(
+                study, patient, form.levels, keep_data=keep_data, by=user, now=timezone.now()
+            )
+        except InvalidSetting as problem:
+            form.add_error(None, format_refusal(problem))
+        else:
+            return redirect("participant", enrollment_id=enrollment.pk)
+    return render(request, "studies/enroll.html", {"study": study, "form": form})
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_safe
+def show_participant(request: HttpRequest, enrollment_id: int) -> HttpResponse:
+    """Show a participant's visits, and what can be done. The arm is told by revealing it alone."""
+    enrollment = get_enrollment(user_of(request), enrollment_id)
+    return render_participant(request, enrollment)
+
+
+def render_participant(
+    request: HttpRequest, enrollment: Enrollment, status: int = 200, **more: Any
+) -> HttpResponse:
+    """Return the page, with a form as it was sent or the arms that were revealed."""
+    user = user_of(request)
+    first_station(enrollment.patient.clinic)
+    blind = is_assessor(enrollment.study, user)
+    context = {
+        "enrollment": enrollment,
+        "study": enrollment.study,
+        "visits": enrollment.visits.select_related("session"),
+        "next": next_visit(enrollment),
+        "blind": blind,
+        "place": PlaceForm(patient=enrollment.patient, by=user),
+        **more,
+    }
+    return render(request, "studies/participant.html", context, status=status)
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_POST
+def start_visit(request: HttpRequest, enrollment_id: int) -> HttpResponse:
+    """Create the session of the next visit, with the arm's condition, and go to it."""
+    user = user_of(request)
+    enrollment = get_enrollment(user, enrollment_id)
+    form = PlaceForm(request.POST, patient=enrollment.patient, by=user)
+    if form.is_valid():
+        try:
+            session = start_session(enrollment, form.place, user, timezone.now())
+        except InvalidSetting as problem:
+            form.add_error(None, format_refusal(problem))
+        else:
+            return redirect("monitor", session_id=session.pk)
+    return render_participant(request, enrollment, place=form)
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_POST
+def leave_study(request: HttpRequest, enrollment_id: int) -> HttpResponse:
+    """Record that a participant leaves the study."""
+    user = user_of(request)
+    enrollment = get_enrollment(user, enrollment_id)
+    withdraw(enrollment, user, timezone.now(), request.POST.get("reason", "")[:1000])
+    return redirect("participant", enrollment_id=enrollment.pk)
+
+
+@for_roles(Role.LEAD, Role.PT)
+@require_POST
+def reveal(request: HttpRequest, enrollment_id: int) -> HttpResponse:
+    """Show a participant's arms, with a reason; the study's events and the audit log have it."""
+    user = user_of(request)
+    enrollment = get_enrollment(user, enrollment_id)
+    reason = request.POST.get("reason", "")[:1000]
+    emergency = request.POST.get("emergency") == "yes"
+    try:
+        arms = reveal_arms(enrollment, reason, emergency=emergency, by=user, now=timezone.now())
+    except InvalidSetting as problem:
+        return render_participant(request, enrollment, 403, refused=format_refusal(problem))
+    return render_participant(request, enrollment, revealed=arms, told=_("The arm is revealed."))

@@ -1,0 +1,238 @@
+"""Pages that list, plan, register and close studies, and say who is what in them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from datetime import datetime
+from typing import Any
+
+from django.contrib import messages
+from django.core.exceptions import PermissionDenied
+from django.db import transaction
+from django.db.models import Count, QuerySet
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.utils import timezone
+from django.views.decorators.http import (
+    require_GET,
+    require_http_methods,
+    require_POST,
+    require_safe,
+)
+
+from rehab.people.access import clinic_of, for_roles, user_of
+from rehab.people.models import User
+from rehab.people.roles import Role, may_see_names
+from rehab.people.web.refusals import format_refusal
+from rehab.studies.blinding import MARKABLE, Task, give_mark, take_mark
+from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draft
+from rehab.studies.models import Study, StudyMark, StudyState, has_mark
+from rehab.studies.participants import Allocation, Enrollment, StudyEvent
+from rehab.studies.protocol_pdf import write_pdf
+from rehab.studies.registration import close, register, revise, start
+from rehab.studies.sealing import unseal
+from rehab.studies.visits import next_visit
+from rehab.training.measures import InvalidSetting
+
+# What moves a study on, by the name of its button.
+Step = Callable[[Study, User, datetime], Any]
+STEPS: dict[str, Step] = {"register": register, "start": start, "close": close}
+
+
+def get_study(user: User, study_id: int) -> Study:
+    """Return a study that a user may see. Raises Http404 for any other."""
+    return get_object_or_404(Study.objects.visible_to(user).select_related("clinic"), pk=study_id)
+
+
+def is_assessor(study: Study, user: User) -> bool:
+    """Return whether the arms are hidden from somebody now."""
+    return study.state != StudyState.CLOSED and has_mark(study, user, Task.ASSESSOR)
+
+
+@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
+@require_safe
+def list_studies(request: HttpRequest) -> HttpResponse:
+    """List the clinic's studies; drafts are a lead's."""
+    user = user_of(request)
+    studies = Study.objects.visible_to(user).annotate(count=Count("enrollments"))
+    if user.role != Role.LEAD:
+        studies = studies.exclude(state=StudyState.DRAFT)
+    return render(request, "studies/list.html", {"studies": studies})
+
+
+@for_roles(Role.LEAD, patients=False)
+@require_http_methods(["GET", "HEAD", "POST"])
+def plan_study(request: HttpRequest, study_id: int | None = None) -> HttpResponse:
+    """Plan a study; a registered one is changed by a new version, with a reason."""
+    user = user_of(request)
+    study = get_study(user, study_id) if study_id else Study(clinic=clinic_of(user))
+    if study.state == StudyState.CLOSED:
+        return redirect("study", study_id=study.pk)
+    study.created_by = study.created_by or user
+    data = request.POST if request.method == "POST" else None
+    form = StudyForm(data, instance=study)
+    arms = build_arm_forms(study, user, data)
+    # Both, so that all errors are seen at once.
+    if data is not None and all([form.is_valid(), arms.is_valid()]):
+        try:
+            if study.is_draft:
+                study = save_draft(form, arms)
+            else:
+                with transaction.atomic():
+                    save_arms(arms, study)
+                    revise(study, form.cleaned_data["reason"], user, timezone.now())
+        except InvalidSetting as problem:
+            form.add_error(None, format_refusal(problem))
+            if study_id is None:
+                study.pk = None
+        else:
+            return redirect("study", study_id=study.pk)
+    context = {"form": form, "arms": arms, "study": study if study_id else None}
+    return render(request, "studies/form.html", context)
+
+
+@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
+@require_safe
+def show_study(request: HttpRequest, study_id: int) -> HttpResponse:
+    """Show a study: its plan, participants and events. From assessors the arms are hidden."""
+    user = user_of(request)
+    study = get_study(user, study_id)
+    if study.is_draft and user.role != Role.LEAD:
+        raise PermissionDenied
+    return render(request, "studies/study.html", study_context(study, user))
+
+
+def study_context(study: Study, user: User) -> dict[str, Any]:
+    """Return what somebody sees of a study."""
+    blind, is_lead = is_assessor(study, user), user.role == Role.LEAD
+    by_name = may_see_names(user.role)
+    return {
+        "study": study,
+        "blind": blind,
+        "is_lead": is_lead,
+        "by_name": by_name,
+        "may_treat": user.role in {Role.LEAD, Role.PT} and not blind,
+        "arms": () if blind else study.arms.select_related("measure", "protocol"),
+        "participants": _participants(study, user),
+        "versions": study.versions.all(),
+        "events": () if blind else _events(study, user),
+        "marks": study.marks.filter(ended_at=None).select_related("user") if is_lead else (),
+        "tasks": _markable(study) if is_lead else (),
+    }
+
+
+def _participants(study: Study, user: User) -> list[dict[str, Any]]:
+    """Return the participants that somebody may see; groups only once the study is closed."""
+    rows = Enrollment.objects.visible_to(user).filter(study=study).select_related("patient")
+    groups: dict[int, str] = {}
+    if study.state == StudyState.CLOSED:
+        allocations = Allocation.objects.visible_to(user).filter(enrollment__study=study)
+        groups = dict(allocations.values_list("enrollment_id", "group"))
+    return [
+        {"enrollment": row, "next": next_visit(row), "group": groups.get(row.pk, "")}
+        for row in rows.order_by("pk")
+    ]
+
+
+def _events(study: Study, user: User) -> QuerySet[StudyEvent]:
+    return StudyEvent.objects.visible_to(user).filter(study=study).select_related("by")
+
+
+def _markable(study: Study) -> list[tuple[str, Any, list[User]]]:
+    """Return the marks that a lead can give, and whom each could be given to."""
+    people = User.everywhere.filter(clinic=study.clinic_id, is_active=True).order_by("username")
+    return [
+        (task.value, task.label, list(people.filter(role=role))) for task, role in MARKABLE.items()
+    ]
+
+
+@for_roles(Role.LEAD, patients=False)
+@require_POST
+def change_state(request: HttpRequest, study_id: int) -> HttpResponse:
+    """Register, start or close a study."""
+    user = user_of(request)
+    study = get_study(user, study_id)
+    step = STEPS.get(request.POST.get("step", ""))
+    if step is not None:
+        _try(request, lambda: step(study, user, timezone.now()))
+    return redirect("study", study_id=study.pk)
+
+
+@for_roles(Role.LEAD, patients=False)
+@require_POST
+def change_marks(request: HttpRequest, study_id: int) -> HttpResponse:
+    """Change who is an assessor, and who may look before the end."""
+    user, now = user_of(request), timezone.now()
+    study = get_study(user, study_id)
+    if "take" in request.POST:
+        mark = get_object_or_404(StudyMark, study=study, pk=_number(request.POST["take"]))
+        take_mark(mark, user, now)
+    else:
+        people = User.objects.visible_to(user)
+        person = get_object_or_404(people, pk=_number(request.POST.get("user", "")))
+        task = request.POST.get("task", "")
+        if task in Task.values:
+            _try(request, lambda: give_mark(study, person, Task(task), user, now))
+    return redirect("study", study_id=study.pk)
+
+
+@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
+@require_GET
+def download_protocol(request: HttpRequest, study_id: int) -> HttpResponse:
+    """Return the registered study with all its versions; of a closed one also the seed."""
+    user = user_of(request)
+    study = get_study(user, study_id)
+    if is_assessor(study, user) or study.is_draft:
+        raise PermissionDenied
+    told: dict[str, Any] = {
+        "registered_at": study.registered_at,
+        "closed_at": study.closed_at,
+        "versions": [
+            {
+                "number": version.number,
+                "at": version.at,
+                "reason": version.reason,
+                "sha256": version.digest,
+                "study": version.document,
+            }
+            for version in study.versions.all()
+        ],
+    }
+    if study.state == StudyState.CLOSED and study.sealed:
+        told["allocation_secret"] = asdict(unseal(study.sealed))
+    text = json.dumps(told, indent=2, ensure_ascii=False, default=_plain)
+    name = f"{study.code}-protocol.json"
+    response = HttpResponse(text + "\n", content_type="application/json")
+    response["Content-Disposition"] = f'attachment; filename="{name}"'
+    return response
+
+
+@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
+@require_GET
+def download_protocol_pdf(request: HttpRequest, study_id: int) -> HttpResponse:
+    """Return the registered study as a document on paper."""
+    user = user_of(request)
+    study = get_study(user, study_id)
+    if is_assessor(study, user) or study.is_draft:
+        raise PermissionDenied
+    response = HttpResponse(write_pdf(study), content_type="application/pdf")
+    response["Content-Disposition"] = f'attachment; filename="{study.code}-protocol.pdf"'
+    return response
+
+
+def _plain(value: datetime) -> str:
+    return value.isoformat()
+
+
+def _number(text: str) -> int:
+    return int(text) if text.isdecimal() and len(text) < 19 else 0
+
+
+def _try(request: HttpRequest, act: Callable[[], Any]) -> None:
+    """Do something, or tell why it cannot be done."""
+    try:
+        act()
+    except InvalidSetting as problem:
+        messages.error(request, format_refusal(problem))

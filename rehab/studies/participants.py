@@ -1,0 +1,147 @@
+"""Participants: their enrollment, allocation and visits, and what happened in the study."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from django.db import models
+from django.utils import timezone
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.consent.models import PatientScope
+from rehab.people.models import Clinic, Patient, User
+from rehab.people.scope import ClinicModel, ScopedModel
+from rehab.sessions.models import TrainingSession
+from rehab.studies.append_only import AppendOnlyModel
+from rehab.studies.models import Arm, Study, StudyVersion
+
+
+class Enrollment(ClinicModel):
+    """A patient's part in a study. ``code`` names the participant wherever the arm is hidden."""
+
+    scope = PatientScope(clinic="clinic", tells_condition=False)
+
+    clinic = models.ForeignKey(Clinic, on_delete=models.PROTECT, related_name="+")
+    study = models.ForeignKey(Study, on_delete=models.PROTECT, related_name="enrollments")
+    patient = models.ForeignKey(Patient, on_delete=models.PROTECT, related_name="enrollments")
+    version = models.ForeignKey(StudyVersion, on_delete=models.PROTECT, related_name="+")
+    code = models.CharField(_("code"), max_length=24)
+    levels = models.JSONField(default=list)
+    keep_data = models.BooleanField(
+        _("data may be kept after a withdrawal"),
+        help_text=_("As the patient agreed. Else sessions are left out of the study's results."),
+    )
+    enrolled_at = models.DateTimeField(_("enrolled"), default=timezone.now)
+    enrolled_by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
+    withdrawn_at = models.DateTimeField(_("withdrawn"), null=True)
+
+    class Meta(ClinicModel.Meta):
+        verbose_name = _("participant")
+        ordering: ClassVar = ["study", "pk"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(fields=["study", "patient"], name="enrolled_once_per_study"),
+            models.UniqueConstraint(fields=["study", "code"], name="participant_code_once"),
+        ]
+
+    def __str__(self) -> str:
+        return self.code
+
+    @property
+    def is_analyzed(self) -> bool:
+        """Whether the sessions count in the study's results."""
+        return self.withdrawn_at is None or self.keep_data
+
+
+class Allocation(AppendOnlyModel):
+    """The group that a participant was allocated to: an arm's code, or codes in their order."""
+
+    scope = PatientScope(clinic="enrollment__clinic", patient="enrollment__patient")
+
+    enrollment = models.OneToOneField(
+        Enrollment, on_delete=models.PROTECT, related_name="allocation"
+    )
+    group = models.CharField(max_length=64)
+    at = models.DateTimeField(default=timezone.now)
+
+    class Meta(AppendOnlyModel.Meta):
+        verbose_name = _("allocation")
+        ordering: ClassVar = ["pk"]
+
+    def __str__(self) -> str:
+        return f"{self.enrollment}"  # never the group: this text may be logged
+
+    def arm_of_period(self, period: int) -> Arm:
+        """Return the arm of a period, counted from 0."""
+        return self.enrollment.study.arms.get(code=self.group.split("-")[period])
+
+
+class StudyVisit(ScopedModel):
+    """A visit that the study plans. A session that was broken off leaves room for another try."""
+
+    scope = PatientScope(
+        clinic="enrollment__clinic", patient="enrollment__patient", tells_condition=False
+    )
+
+    enrollment = models.ForeignKey(Enrollment, on_delete=models.PROTECT, related_name="visits")
+    number = models.PositiveSmallIntegerField()
+    attempt = models.PositiveSmallIntegerField(default=1)
+    period = models.PositiveSmallIntegerField()
+    day = models.DateField(_("day"))
+    session = models.OneToOneField(
+        TrainingSession, on_delete=models.PROTECT, related_name="study_visit", null=True
+    )
+    # Which version of the study its session was created from.
+    version = models.ForeignKey(StudyVersion, on_delete=models.PROTECT, related_name="+", null=True)
+
+    class Meta(ScopedModel.Meta):
+        verbose_name = _("study visit")
+        ordering: ClassVar = ["enrollment", "number", "attempt"]
+        constraints: ClassVar = [
+            models.UniqueConstraint(
+                fields=["enrollment", "number", "attempt"], name="study_visit_once"
+            )
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.enrollment} / {self.number}"
+
+
+class StudyEvent(AppendOnlyModel):
+    """Something that happened in a study: who did it, and why."""
+
+    class Kind(models.TextChoices):
+        """The kind of event."""
+
+        REGISTERED = "registered", _("Registered")
+        STARTED = "started", _("Started")
+        REVISED = "revised", _("Changed: a new version")
+        CLOSED = "closed", _("Closed")
+        ENROLLED = "enrolled", _("Enrolled")
+        WITHDRAWN = "withdrawn", _("Withdrew")
+        MARKED = "marked", _("Mark given")
+        UNMARKED = "unmarked", _("Mark taken")
+        UNBLINDED = "unblinded", _("Arm revealed")
+        EMERGENCY = "emergency", _("Arm revealed in an emergency")
+        REFUSED = "refused", _("Revealing the arm was refused")
+
+    # Reasons may name the condition.
+    scope = PatientScope(clinic="study__clinic", patient="enrollment__patient")
+
+    study = models.ForeignKey(Study, on_delete=models.PROTECT, related_name="events")
+    enrollment = models.ForeignKey(
+        Enrollment, on_delete=models.PROTECT, related_name="events", null=True
+    )
+    kind = models.CharField(_("what"), max_length=12, choices=Kind.choices)
+    about = models.CharField(_("about"), max_length=120, blank=True)
+    reason = models.TextField(_("reason"), max_length=1000, blank=True)
+    by = models.ForeignKey(
+        User, on_delete=models.SET_NULL, related_name="+", null=True, verbose_name=_("by")
+    )
+    at = models.DateTimeField(_("at"), default=timezone.now)
+
+    class Meta(AppendOnlyModel.Meta):
+        verbose_name = _("event")
+        ordering: ClassVar = ["pk"]
+
+    def __str__(self) -> str:
+        return f"{self.study.code}: {self.get_kind_display()}"

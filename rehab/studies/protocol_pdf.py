@@ -1,0 +1,134 @@
+"""The registered study as a document on paper (PDF), the same bytes for the same study."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from typing import Any
+from xml.sax.saxutils import escape
+
+from django.utils.translation import gettext
+from reportlab.lib.pagesizes import A4
+from reportlab.lib.styles import getSampleStyleSheet
+from reportlab.lib.units import mm
+from reportlab.platypus import Flowable, Paragraph, SimpleDocTemplate, Spacer, Table, TableStyle
+
+from rehab.studies.allocation.scheme import Method
+from rehab.studies.models import METHODS, OUTCOMES, Study, StudyVersion
+
+MARGIN = 20 * mm
+LINES = TableStyle(
+    [
+        ("GRID", (0, 0), (-1, -1), 0.4, "#999999"),
+        ("VALIGN", (0, 0), (-1, -1), "TOP"),
+        ("BACKGROUND", (0, 0), (-1, 0), "#eeeeee"),
+    ]
+)
+STYLES = getSampleStyleSheet()
+
+
+def write_pdf(study: Study) -> bytes:
+    """Return the study with all its versions, newest first."""
+    target = io.BytesIO()
+    document = SimpleDocTemplate(
+        target,
+        pagesize=A4,
+        title=str(study),
+        author=study.clinic.name,
+        leftMargin=MARGIN,
+        rightMargin=MARGIN,
+        invariant=1,  # no date of making and no random number in the file
+        pageCompression=0,
+    )
+    parts: list[Flowable] = []
+    for version in study.versions.order_by("-number"):
+        parts += _version_parts(version)
+    document.build(parts)
+    return target.getvalue()
+
+
+def _text(words: object, style: str = "BodyText") -> Paragraph:
+    return Paragraph(escape(str(words)).replace("\n", "<br/>"), STYLES[style])
+
+
+def _version_parts(version: StudyVersion) -> Iterator[Flowable]:
+    """Yield what stands on paper of one version."""
+    told = version.document
+    yield _text(f"{told['code']}: {told['title']}", "Title")
+    made = gettext("Version %(number)d of %(moment)s UTC, %(clinic)s")
+    moment = f"{version.at:%Y-%m-%d %H:%M}"
+    yield _text(made % {"number": version.number, "moment": moment, "clinic": told["clinic"]})
+    if version.reason:
+        yield _text(gettext("Changed because: %(reason)s") % {"reason": version.reason})
+    yield _text(gettext("Question and hypothesis"), "Heading2")
+    yield _text(told["question"])
+    yield _text(gettext("Arms"), "Heading2")
+    yield _table(_arm_rows(told))
+    for arm in told["arms"]:
+        yield _text(
+            gettext("Phases of %(arm)s (%(protocol)s): %(phases)s")
+            % {
+                "arm": arm["code"],
+                "protocol": arm["protocol"],
+                "phases": "; ".join(map(_phase_text, arm["phases"])),
+            }
+        )
+    yield _text(gettext("Plan"), "Heading2")
+    yield _table(_plan_rows(told))
+    yield _text(gettext("Seals (SHA-256)"), "Heading2")
+    yield _text(gettext("Of this version, as JSON with sorted keys and without blanks:"))
+    yield _text(version.digest, "Code")
+    yield _text(gettext("Of the seed, block sizes or list that participants are allocated by:"))
+    yield _text(told["allocation"]["commitment_sha256"], "Code")
+    yield Spacer(1, 10 * mm)
+
+
+def _table(rows: list[tuple[object, ...]]) -> Table:
+    cells = [[_text("–" if cell in (None, "") else cell) for cell in row] for row in rows]
+    return Table(cells, style=LINES, hAlign="LEFT", repeatRows=1)
+
+
+def _arm_rows(told: dict[str, Any]) -> list[tuple[object, ...]]:
+    heads = ("Code", "Name", "Ratio", "Feedback type", "Gain", "Robot", "Measure")
+    keys = ("code", "name", "weight", "feedback_type", "gain", "robot_intensity", "measure")
+    return [
+        tuple(gettext(head) for head in heads),
+        *(tuple(arm[key] for key in keys) for arm in told["arms"]),
+    ]
+
+
+def _phase_text(phase: dict[str, Any]) -> str:
+    """Return a phase in a few words: its name, lengths, gain, whether it gives feedback."""
+    strides, seconds = phase["strides"], phase["seconds"]
+    parts = [phase["name"]]
+    if strides:
+        parts.append(gettext("%(count)d strides") % {"count": strides})
+    if seconds:
+        parts.append(f"{seconds:g} s")
+    if phase["feedback"]:
+        parts.append(gettext("feedback, gain %(gain)g") % {"gain": phase["gain"]})
+    return ", ".join(parts)
+
+
+def _plan_rows(told: dict[str, Any]) -> list[tuple[object, ...]]:
+    """Return everything else as rows of name and value."""
+    outcomes, visits, allocation = dict(OUTCOMES), told["visits"], told["allocation"]
+    factors = (f"{row['name']}: {', '.join(row['levels'])}" for row in allocation["factors"])
+    months = told["months_since_stroke_at_least"]
+    secondary = ", ".join(str(outcomes[slug]) for slug in told["secondary_outcomes"])
+    return [
+        (gettext("What"), gettext("Planned")),
+        (gettext("Participants"), told["participants"]),
+        (gettext("Months since the stroke, at least"), months),
+        (gettext("Design"), told["design"]),
+        (gettext("Allocation"), METHODS[Method(allocation["method"])]),
+        (gettext("Groups"), ", ".join("-".join(row["arms"]) for row in allocation["groups"])),
+        (gettext("Factors"), "; ".join(factors)),
+        (gettext("Visits in each period"), visits["in_each_period"]),
+        (gettext("Days between visits"), visits["days_between"]),
+        (gettext("Days between periods"), visits["days_between_periods"]),
+        (gettext("Goal (% of baseline)"), f"{told['goal_percent_of_baseline']:g}"),
+        (gettext("Primary outcome"), outcomes[told["primary_outcome"]]),
+        (gettext("Secondary outcomes (others are exploratory)"), secondary),
+        (gettext("Version of the scoring rules"), told["scoring_rules_version"]),
+    ]

@@ -1,0 +1,247 @@
+"""A study's way: registered before the first patient, started, changed in versions, closed."""
+
+from __future__ import annotations
+
+import json
+from datetime import datetime
+from hashlib import sha256
+from typing import Any
+
+from django.db import transaction
+from django.utils.translation import gettext
+
+from rehab.people.models import Patient, User
+from rehab.sessions.models import TrainingSession
+from rehab.studies.allocation.scheme import Secret
+from rehab.studies.models import Study, StudyState, StudyVersion
+from rehab.studies.participants import StudyEvent
+from rehab.studies.sealing import unseal
+from rehab.training.changes import OPEN_STATES
+from rehab.training.goals import GoalRule
+from rehab.training.measures import InvalidSetting
+from rehab.training.plans import SessionPlan
+from rehab.training.scoring import RULES_VERSION
+from rehab.training.steps import Side
+from rehab.training.valences import find_valence
+
+Kind = StudyEvent.Kind
+# What a version may change of a study; of its arms, their names and conditions.
+REVISABLE = (
+    *("title", "question", "participants", "months_since_stroke", "goal_percent"),
+    *("visits", "days_between", "washout_days", "primary_outcome", "secondary_outcomes"),
+)
+
+
+def lock(study: Study) -> None:
+    """Reload a study and lock its row until the end of the transaction."""
+    study.refresh_from_db(from_queryset=Study.everywhere.select_for_update(no_key=True))
+
+
+def describe(study: Study) -> dict[str, Any]:
+    """Return the study as it is registered: all that decides what participants walk.
+
+    Raises InvalidSetting for a study that could not be run.
+    """
+    scheme = study.scheme()
+    plan = study.visit_plan
+    document = {
+        "code": study.code,
+        "title": study.title,
+        "clinic": study.clinic.name,
+        "question": study.question,
+        "participants": study.participants,
+        "months_since_stroke_at_least": study.months_since_stroke,
+        "design": "crossover" if study.crossover else "parallel",
+        "arms": [_describe_arm(study, arm) for arm in study.arms.select_related("measure")],
+        "allocation": scheme.to_json() | {"commitment_sha256": study.commitment},
+        "visits": {
+            "in_each_period": plan.visits,
+            "days_between": plan.days_between,
+            "days_between_periods": plan.washout_days,
+        },
+        "goal_percent_of_baseline": study.goal_percent,
+        "primary_outcome": study.primary_outcome,
+        "secondary_outcomes": study.secondary_outcomes,
+        "scoring_rules_version": RULES_VERSION,
+    }
+    stored: dict[str, Any] = json.loads(json.dumps(document))  # so that tuples are lists
+    return stored
+
+
+def _describe_arm(study: Study, arm: Any) -> dict[str, Any]:
+    phases = arm.phases()
+    SessionPlan(  # raises InvalidSetting for one that could not be walked
+        measure=arm.measure.to_rule(),
+        valence=find_valence(arm.valence),
+        phases=phases,
+        trained_side=Side.LEFT,
+        goal=GoalRule(percent_of_baseline=study.goal_percent),
+    )
+    return {
+        "code": arm.code,
+        "name": arm.name,
+        "weight": arm.weight,
+        "feedback_type": arm.valence,
+        "gain": arm.gain,
+        "robot_intensity": arm.robot_intensity,
+        "measure": arm.measure.slug,
+        "protocol": arm.protocol.name,
+        "phases": [
+            {
+                "kind": phase.kind,
+                "name": phase.name,
+                "feedback": phase.feedback,
+                "gain": phase.gain,
+                "strides": phase.strides,
+                "seconds": phase.seconds,
+            }
+            for phase in phases
+        ],
+    }
+
+
+def digest_of(document: dict[str, Any]) -> str:
+    """Return the SHA-256 of a document, as JSON with sorted keys and without blanks."""
+    text = json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return sha256(text.encode()).hexdigest()
+
+
+def note(study: Study, kind: Kind, by: User | None, now: datetime, **details: Any) -> StudyEvent:
+    """Store that something happened in a study."""
+    return StudyEvent.everywhere.create(study=study, kind=kind, by=by, at=now, **details)
+
+
+def _expect(study: Study, state: StudyState) -> None:
+    if study.state != state:
+        message = gettext("This study is %(state)s. Load the page again to see what can be done.")
+        raise InvalidSetting(message % {"state": study.get_state_display().lower()})
+
+
+def _add_version(study: Study, by: User | None, now: datetime, reason: str = "") -> StudyVersion:
+    document = describe(study)
+    number = study.versions.count() + 1
+    return StudyVersion.everywhere.create(
+        study=study,
+        number=number,
+        document=document,
+        digest=digest_of(document),
+        reason=reason,
+        by=by,
+        at=now,
+    )
+
+
+def check_secret(study: Study) -> Secret:
+    """Return what the study allocates by. Raises InvalidSetting where it does not fit the arms."""
+    secret = unseal(study.sealed)
+    study.scheme().check_secret(secret)
+    return secret
+
+
+def register(study: Study, by: User | None, now: datetime) -> StudyVersion:
+    """Fix a study's plan, before the first patient. Raises InvalidSetting if it cannot be run."""
+    with transaction.atomic():
+        lock(study)
+        _expect(study, StudyState.DRAFT)
+        secret = check_secret(study)
+        study.state, study.registered_at = StudyState.REGISTERED, now
+        study.commitment = secret.commitment
+        version = _add_version(study, by, now)
+        study.save(update_fields=["state", "registered_at", "commitment"])
+        note(study, Kind.REGISTERED, by, now, about=version.digest)
+    return version
+
+
+def start(study: Study, by: User | None, now: datetime) -> None:
+    """Open a registered study to participants."""
+    with transaction.atomic():
+        lock(study)
+        _expect(study, StudyState.REGISTERED)
+        study.state, study.started_at = StudyState.RUNNING, now
+        study.save(update_fields=["state", "started_at"])
+        note(study, Kind.STARTED, by, now)
+
+
+def current_version(study: Study) -> StudyVersion:
+    """Return the version that sessions are created from. Raises InvalidSetting if it is outdated.
+
+    Measures and protocols are rows that a clinic edits: where one was, the study does not silently
+    go on with something else.
+    """
+    version = study.versions.last()
+    if version is None:
+        raise InvalidSetting(gettext("Register the study first."))
+    if digest_of(describe(study)) != version.digest:
+        raise InvalidSetting(
+            gettext(
+                "What this study was registered with has been changed since: a protocol, a measure "
+                "or an arm. Change it back, or let a lead make a new version on the study's page."
+            )
+        )
+    return version
+
+
+def revise(study: Study, reason: str, by: User | None, now: datetime) -> StudyVersion:
+    """Make a new version of a study that was changed after its registration.
+
+    Raises InvalidSetting without a reason or without a change, and where groups, ratio or factors
+    would be others: what was allocated cannot be allocated again.
+    """
+    with transaction.atomic():
+        stored = Study.everywhere.select_for_update(no_key=True).get(pk=study.pk)
+        if stored.state not in {StudyState.REGISTERED, StudyState.RUNNING}:
+            raise InvalidSetting(gettext("Only a registered or running study has versions."))
+        last = stored.versions.latest("number")
+        document = describe(study)
+        if not reason.strip():
+            raise InvalidSetting(gettext("Say why the study is changed: it is registered as well."))
+        if digest_of(document) == last.digest:
+            raise InvalidSetting(gettext("Nothing is different from the last version."))
+        if document["allocation"] != last.document["allocation"]:
+            raise InvalidSetting(
+                gettext(
+                    "Arms' codes, ratio, factors and allocation stay as they were registered. "
+                    "Close this study and plan a new one to change them."
+                )
+            )
+        study.save(update_fields=REVISABLE)
+        version = _add_version(study, by, now, reason.strip())
+        note(study, Kind.REVISED, by, now, about=version.digest, reason=reason.strip())
+    return version
+
+
+def close(study: Study, by: User | None, now: datetime) -> None:
+    """Close a study: nobody enters or walks any more, and nothing is hidden from here on.
+
+    Raises InvalidSetting while a session of a participant is open.
+    """
+    with transaction.atomic():
+        lock(study)
+        _expect(study, StudyState.RUNNING)
+        check_no_open_session(study)
+        study.state, study.closed_at = StudyState.CLOSED, now
+        study.save(update_fields=["state", "closed_at"])
+        note(study, Kind.CLOSED, by, now)
+        for enrollment in study.enrollments.select_related("patient"):
+            set_blinded(enrollment.patient)
+
+
+def check_no_open_session(study: Study, patient: Patient | None = None) -> None:
+    """Raise InvalidSetting while a participant, or a patient who is to be one, has a session."""
+    states = [state.value for state in OPEN_STATES]
+    of_whom = {"patient__enrollments__study": study} if patient is None else {"patient": patient}
+    if TrainingSession.everywhere.filter(state__in=states, **of_whom).exists():
+        raise InvalidSetting(
+            gettext("A session is still open. End it first: its page may show what is hidden now.")
+        )
+
+
+def set_blinded(patient: Patient) -> None:
+    """Let a patient's boards and scores follow the enrollments: none during a study."""
+    patient.lock()
+    blinded = patient.enrollments.filter(
+        study__state=StudyState.RUNNING, withdrawn_at=None
+    ).exists()
+    if patient.blinded != blinded and patient.erased_at is None:
+        patient.blinded = blinded
+        patient.save_fields("blinded")

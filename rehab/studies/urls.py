@@ -1,0 +1,25 @@
+"""URLs of studies and their participants."""
+
+from django.urls import path
+
+from rehab.studies.pages import participants, planning
+
+urlpatterns = [
+    path("studies/", planning.list_studies, name="studies"),
+    path("studies/new/", planning.plan_study, name="new-study"),
+    path("studies/<int:study_id>/", planning.show_study, name="study"),
+    path("studies/<int:study_id>/plan/", planning.plan_study, name="plan-study"),
+    path("studies/<int:study_id>/state/", planning.change_state, name="study-state"),
+    path("studies/<int:study_id>/marks/", planning.change_marks, name="study-marks"),
+    path("studies/<int:study_id>/protocol.json", planning.download_protocol, name="study-protocol"),
+    path(
+        "studies/<int:study_id>/protocol.pdf",
+        planning.download_protocol_pdf,
+        name="study-protocol-pdf",
+    ),
+    path("studies/<int:study_id>/enroll/", participants.enroll_patient, name="enroll"),
+    path("participants/<int:enrollment_id>/", participants.show_participant, name="participant"),
+    path("participants/<int:enrollment_id>/start/", participants.start_visit, name="start-visit"),
+    path("participants/<int:enrollment_id>/leave/", participants.leave_study, name="leave-study"),
+    path("participants/<int:enrollment_id>/reveal/", participants.reveal, name="reveal"),
+]

@@ -1,0 +1,94 @@
+"""Sessions of a study: created from the arm, once for each planned visit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from django.db import transaction
+from django.utils.translation import gettext
+
+from rehab.people.models import User
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.services import SessionRequest, create_session
+from rehab.stations.models import Station
+from rehab.studies.models import StudyState
+from rehab.studies.participants import Enrollment, StudyVisit
+from rehab.studies.registration import current_version
+from rehab.training.changes import State
+from rehab.training.goals import GoalRule
+from rehab.training.measures import InvalidSetting
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a session's steps come from, and at which station it is walked."""
+
+    station: Station | None = None
+    source: str = ""
+    simulated: bool = False
+    source_args: tuple[str, ...] = ()
+
+
+def next_visit(enrollment: Enrollment) -> StudyVisit | None:
+    """Return the first planned visit without a session that counts; None after the last one."""
+    latest: dict[int, StudyVisit] = {}
+    for visit in enrollment.visits.select_related("session"):
+        latest[visit.number] = visit  # ordered by attempt: the last one of each number
+    for visit in latest.values():
+        if visit.session is None or visit.session.state == State.ABORTED:
+            return visit
+    return None
+
+
+def start_session(
+    enrollment: Enrollment, place: Place, by: User | None, now: datetime
+) -> TrainingSession:
+    """Create the session of a participant's next visit, with the arm's condition.
+
+    Raises InvalidSetting for a participant who has withdrawn or walked all visits, a study that is
+    not running or was changed, a person to whom the arm is hidden, and what `create_session`
+    refuses.
+    """
+    study = enrollment.study
+    with transaction.atomic():
+        locked = Enrollment.everywhere.select_for_update(no_key=True, of=("self",))
+        enrollment.refresh_from_db(from_queryset=locked)
+        if study.state != StudyState.RUNNING or enrollment.withdrawn_at is not None:
+            raise InvalidSetting(
+                gettext("The study is closed, or %(code)s has withdrawn: no session of it starts.")
+                % {"code": enrollment.code}
+            )
+        visit = next_visit(enrollment)
+        if visit is None:
+            raise InvalidSetting(
+                gettext("%(code)s has walked all visits of the study.") % {"code": enrollment.code}
+            )
+        if visit.session is not None:  # it was broken off
+            visit = StudyVisit(
+                enrollment=enrollment,
+                number=visit.number,
+                attempt=visit.attempt + 1,
+                period=visit.period,
+                day=now.date(),
+            )
+        visit.version = current_version(study)
+        arm = enrollment.allocation.arm_of_period(visit.period)
+        visit.session = create_session(
+            SessionRequest(
+                patient=enrollment.patient,
+                valence=arm.valence,
+                goal=GoalRule(percent_of_baseline=study.goal_percent),
+                phases=arm.phases(),
+                protocol=arm.protocol,
+                measure=arm.measure,
+                robot_intensity=arm.robot_intensity,
+                station=place.station,
+                created_by=by,
+                source=place.source,
+                simulated=place.simulated,
+                source_args=place.source_args,
+            )
+        )
+        visit.save()
+    return visit.session

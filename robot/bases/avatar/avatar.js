@@ -1,0 +1,95 @@
+// The avatar: shows what the robot's program tells it, and never decides anything.
+
+const MOUTHS = {
+  rest: "M176 164 Q200 168 224 164",
+  celebrate: "M168 156 Q200 190 232 156",
+  droop: "M176 172 Q200 152 224 172",
+};
+// Notes [Hz]: success rises, a miss falls, softly; neither ever has the other's.
+const CUES = { celebrate: [523, 659, 784], droop: [392, 330, 262] };
+const NOTE_S = 0.16;
+const LOUDNESS = { celebrate: 0.25, droop: 0.12 };
+const RETRY_MS = 500;
+const PIXELS_M = 400; // how far the figure goes on the screen for each meter
+
+const body = document.body;
+const figure = document.getElementById("figure");
+const mouth = document.getElementById("mouth");
+const soundButton = document.getElementById("sound");
+
+let sound = null; // the AudioContext; browsers allow it after a tap only
+let playing = [];
+let heard = null; // number of the last answer that was given
+
+function allowSound() {
+  sound ??= new AudioContext();
+  sound.resume();
+  soundButton.hidden = true;
+}
+
+function silence() {
+  for (const tone of playing) tone.stop();
+  playing = [];
+  speechSynthesis.cancel();
+}
+
+function say(words) {
+  if (sound !== null && words) speechSynthesis.speak(new SpeechSynthesisUtterance(words));
+}
+
+function play(mood) {
+  silence();
+  if (sound === null) return;
+  CUES[mood].forEach((frequency, index) => {
+    const tone = sound.createOscillator();
+    const volume = sound.createGain();
+    const begins = sound.currentTime + index * NOTE_S;
+    tone.type = "sine";
+    tone.frequency.setValueAtTime(frequency, begins);
+    volume.gain.setValueAtTime(0, begins);
+    volume.gain.linearRampToValueAtTime(LOUDNESS[mood], begins + 0.02);
+    volume.gain.linearRampToValueAtTime(0, begins + NOTE_S);
+    tone.connect(volume).connect(sound.destination);
+    tone.start(begins);
+    tone.stop(begins + NOTE_S);
+    playing.push(tone);
+  });
+}
+
+function show({ state, pose, answer, answers }) {
+  const [ahead, aside, turned] = pose;
+  const mood = answer === null ? "rest" : answer.glad ? "celebrate" : "droop";
+  body.dataset.state = state;
+  body.dataset.mood = mood;
+  mouth.setAttribute("d", MOUTHS[mood]);
+  // Seen from the front: ahead is towards the viewer, its left is our right, a turn leans it.
+  const scale = 1 + ahead;
+  figure.setAttribute(
+    "transform",
+    `translate(${aside * PIXELS_M + 200} 360) rotate(${-20 * Math.sin(turned)}) scale(${scale}) translate(-200 -360)`,
+  );
+  if (state === "stopped") silence();
+  const isNew = heard !== null && answers !== heard;
+  heard = answers;
+  if (isNew && answer !== null && !answer.quiet) {
+    play(mood);
+    say(answer.words);
+  }
+}
+
+function connect() {
+  const socket = new WebSocket(`ws://${location.host}/avatar`);
+  socket.onmessage = ({ data }) => {
+    delete body.dataset.lost;
+    show(JSON.parse(data));
+  };
+  socket.onclose = () => {
+    body.dataset.lost = "";
+    silence();
+    heard = null; // what was missed meanwhile is past
+    setTimeout(connect, RETRY_MS);
+  };
+}
+
+soundButton.addEventListener("click", allowSound);
+connect();

@@ -1,0 +1,122 @@
+"""The topics of a base on a command line."""
+
+from __future__ import annotations
+
+import re
+from argparse import ArgumentParser, Namespace, _ArgumentGroup
+from collections.abc import Collection
+from dataclasses import replace
+
+from robot.bases.base import BadOption
+from robot.bases.rosbridge.topics import BUMP, DEFAULT_PROFILE, PROFILES, RELAY_INPUT, Topics
+from robot.ros.frames import Topic
+from robot.ros.messages import BOOL, ODOMETRY, SENSOR_TYPES, TWISTS, without_msg
+from robot.ros.signals import LIGHT_TYPES, SOUND_TYPES
+
+NAME = re.compile(r"/?[A-Za-z]\w*(/\w+)*", re.ASCII)
+NONE = "none"
+SENSOR_OPTIONS = {BUMP: "bumper", "cliff": "cliff", "wheel_drop": "wheel_drop"}
+
+# A base that goes on for longer than this [s] without orders is not watched by its own timeout.
+LONGEST_TIMEOUT_S = 1.0
+
+
+def add_topic_arguments(group: ArgumentParser | _ArgumentGroup) -> None:
+    """Add options for the topics of a base to a command line."""
+    group.add_argument(
+        "--ros-robot",
+        choices=sorted(PROFILES),
+        default=DEFAULT_PROFILE,
+        help="which topics it has: a Kobuki's (of ROS 1 or 2), a TurtleBot 4's, or /cmd_vel and "
+        f"/odom alone (default: {DEFAULT_PROFILE})",
+    )
+    group.add_argument(
+        "--cmd-topic", metavar="TOPIC[:TYPE]", help="that takes Twists, or TwistStamped"
+    )
+    group.add_argument(
+        "--odom-topic", metavar="TOPIC", help=f"that gives Odometry; {NONE}: an open loop"
+    )
+    for hazard, option in SENSOR_OPTIONS.items():
+        group.add_argument(
+            f"--{option.replace('_', '-')}-topic",
+            metavar="TOPIC[:TYPE]",
+            help=f"that stops it ({hazard}), of the type {BOOL} or a Kobuki's; {NONE}: has none",
+        )
+    for name in ("light", "sound"):
+        group.add_argument(
+            f"--{name}-topic",
+            metavar="TOPIC:TYPE",
+            help=f"of its {name}, which announces that it moves; {NONE}: has none",
+        )
+    group.add_argument(
+        "--own-timeout-s",
+        type=float,
+        metavar="S",
+        help="the base itself stands still after so long without an order, as you have tried with "
+        f"its wheels off the floor; without this the watchdog relay at {RELAY_INPUT} has to run",
+    )
+
+
+def read_topics(options: Namespace) -> Topics:
+    """Return the topics of a command line. Raises BadOption."""
+    profile = PROFILES[options.ros_robot]
+    order = profile.order
+    if options.cmd_topic:
+        order = _read_topic("--cmd-topic", options.cmd_topic, TWISTS, order.kind)
+    odometry = profile.odometry
+    if options.odom_topic:
+        odometry = None
+        if options.odom_topic != NONE:
+            odometry = _read_topic("--odom-topic", options.odom_topic, (ODOMETRY,), ODOMETRY)
+    sensors = dict(profile.sensors)
+    for hazard, option in SENSOR_OPTIONS.items():
+        text: str = getattr(options, f"{option}_topic")
+        if text == NONE:
+            sensors.pop(hazard, None)
+        elif text:
+            kind = sensors[hazard].kind if hazard in sensors else BOOL
+            name = f"--{option.replace('_', '-')}-topic"
+            sensors[hazard] = _read_topic(name, text, SENSOR_TYPES, kind)
+    light, sound = (
+        _read_signal(f"--{name}-topic", getattr(options, f"{name}_topic"), types, was)
+        for name, types, was in (
+            ("light", LIGHT_TYPES, profile.light),
+            ("sound", SOUND_TYPES, profile.sound),
+        )
+    )
+    timeout_s = options.own_timeout_s
+    if timeout_s is not None and not 0 < timeout_s <= LONGEST_TIMEOUT_S:
+        raise BadOption(
+            f"--own-timeout-s: a base that goes on for {timeout_s:g} s is not watched; up to "
+            f"{LONGEST_TIMEOUT_S:g} s is. Leave it out, and start the watchdog relay."
+        )
+    return replace(
+        profile,
+        order=order,
+        odometry=odometry,
+        sensors=sensors,
+        light=light,
+        sound=sound,
+        own_timeout_s=timeout_s,
+    )
+
+
+def _read_signal(
+    option: str, text: str | None, types: Collection[str], profile: Topic | None
+) -> Topic | None:
+    if not text:
+        return profile
+    if text == NONE:
+        return None
+    return _read_topic(option, text, types, profile.kind if profile is not None else "")
+
+
+def _read_topic(option: str, text: str, types: Collection[str], kind: str) -> Topic:
+    name, _, named = text.partition(":")
+    if NAME.fullmatch(name) is None:
+        raise BadOption(f"{option}: {name!r} is no ROS topic. Write it like /cmd_vel.")
+    kind = named or kind
+    if without_msg(kind) not in types:
+        known = ", ".join(types)
+        raise BadOption(f"{option}: no {kind or 'type'} is read here. Known types: {known}.")
+    return Topic(name, kind)

@@ -1,0 +1,38 @@
+"""Driving a robot to its mark by a button that is held. Time is a parameter.
+
+A dead man's button: whoever lets go, or whose page or network is gone, stops it. It drives ahead
+and turns; it does not back up, since nothing feels what is behind it (docs/safety.md).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from robot.motion.twist import STILL, Twist
+from robot.wire.frames import read_number
+
+# Our choice: half a gesture's speed and less, so that nobody is run into who steps in its way.
+SPEED_M_S, TURN_RAD_S = 0.1, 0.5
+HOLDS_S = 0.3  # a page that is held repeats its order every 0.1 s
+
+
+class Placing:
+    """What the held button orders now."""
+
+    def __init__(self) -> None:
+        self._twist, self._ordered_s = STILL, -math.inf
+
+    def order(self, message: Mapping[str, Any], now_s: float) -> None:
+        """Store an order: shares of the speeds, ahead 0 to 1 and to the left -1 to 1."""
+        ahead, left = read_number(message, "ahead", 0, 1), read_number(message, "left", -1, 1)
+        self._twist, self._ordered_s = Twist(ahead * SPEED_M_S, left * TURN_RAD_S), now_s
+
+    def end(self) -> None:
+        """Drop the order."""
+        self._twist = STILL
+
+    def twist(self, now_s: float) -> Twist:
+        """Return what is ordered now; standing still where nobody holds the button."""
+        return self._twist if 0 <= now_s - self._ordered_s <= HOLDS_S else STILL

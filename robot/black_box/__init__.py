@@ -1,0 +1,1 @@
+"""Records what a robot heard, ordered, did and said, so that a stop can be looked at later."""

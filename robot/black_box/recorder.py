@@ -1,0 +1,177 @@
+"""The black box of a robot: the last minutes on its disk, kept where something stopped it.
+
+Nothing here holds up the loop that drives the base: it appends to a list in memory, and a thread
+writes. Where the disk is too slow, the oldest records are dropped and counted. A power cut may lose
+the last seconds: they are written every half second, but the disk is not told to hurry.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+from robot.black_box.ring import Ring
+from robot.wire.incident import Record, pack, read_lines, to_lines
+
+WAITING = 6_000  # records in memory: of a minute
+WRITE_EVERY_S = 0.5
+BEFORE_S, AFTER_S = 30.0, 5.0  # of an incident
+KEPT_FILES = 50  # the newest; some 0.6 MB each
+TO_SEND = 4  # incidents that wait for the server
+
+CLOSED = "closed"
+DIED = "worker_died"
+
+
+class Incident(NamedTuple):
+    """A kept recording: why, in which session, when by our clock [s], its records as one text."""
+
+    reason: str
+    session: int | None
+    at_s: float
+    recording: str
+
+
+class _Keeping(NamedTuple):
+    """What is to be kept once its last seconds are recorded."""
+
+    reason: str
+    session: int | None
+    at: datetime
+    at_s: float
+
+
+class BlackBox:
+    """Records on a thread of its own, as a context manager.
+
+    Parameters
+    ----------
+    folder
+        Of this robot alone; made where it does not exist.
+    monotonic
+        The clock of the records [s].
+    now
+        The time of day.
+
+    Attributes
+    ----------
+    incidents
+        Those to send, oldest first; the sender pops them from the left.
+    lost
+        How many records were dropped.
+    problem
+        Why nothing is written, for people; empty where it is.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        monotonic: Callable[[], float] = time.monotonic,
+        now: Callable[[], datetime] = lambda: datetime.now(UTC),
+    ) -> None:
+        self.folder = folder
+        self.incidents: deque[Incident] = deque(maxlen=TO_SEND)
+        self.lost, self.problem = 0, ""
+        self._monotonic, self._now = monotonic, now
+        self._ring = Ring(folder)
+        self._waiting: deque[Record] = deque()
+        self._told_lost = 0
+        self._keeping: _Keeping | None = None
+        self._is_closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="black box", daemon=True)
+
+    def __enter__(self) -> Self:
+        """Begin to record. What a run before it left without closing is kept."""
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        problem: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Write the rest, for a second at most, where the disk answers."""
+        self.note(kept=CLOSED)
+        self._is_closing.set()
+        self._thread.join(1.0)
+
+    def note(self, **what: Any) -> None:
+        """Record something that happened now. Never waits, and never raises."""
+        if len(self._waiting) >= WAITING:
+            self._waiting.popleft()
+            self.lost += 1
+        self._waiting.append({"at_s": round(self._monotonic(), 3), **what})
+
+    def keep(self, reason: str, session: int | None) -> None:
+        """Keep the recording around now; within that of an earlier reason only note this one."""
+        is_first = self._keeping is None
+        self.note(kept=reason, is_first=is_first)
+        if is_first:
+            self._keeping = _Keeping(reason, session, self._now(), self._monotonic())
+
+    def begin(self) -> None:
+        """Make the folder, and keep what a worker that died has left. Raises OSError."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        left = read_lines(self._ring.begin())
+        if left and left[-1].get("kept") != CLOSED:
+            self._store(_Keeping(DIED, None, self._now(), left[-1]["at_s"]), left)
+
+    def write(self) -> None:
+        """Write what waits, and an incident that is over. Raises OSError."""
+        records: list[Record] = []
+        if self.lost > self._told_lost:
+            records.append(
+                {"at_s": round(self._monotonic(), 3), "lost": self.lost - self._told_lost}
+            )
+            self._told_lost = self.lost
+        while self._waiting:
+            records.append(self._waiting.popleft())
+        try:
+            self._ring.append(to_lines(records))
+        except OSError:
+            self.lost += len(records)
+            raise
+        keeping = self._keeping
+        if keeping is not None and (
+            self._is_closing.is_set() or self._monotonic() - keeping.at_s >= AFTER_S
+        ):
+            self._keeping = None
+            kept = self._store(keeping, read_lines(self._ring.read()))
+            incident = Incident(keeping.reason, keeping.session, keeping.at_s, pack(kept))
+            self.incidents.append(incident)
+
+    def _store(self, keeping: _Keeping, recorded: list[dict[str, Any]]) -> list[Record]:
+        """Write the file of an incident, and return its records; remove the oldest files."""
+        from_s, until_s = keeping.at_s - BEFORE_S, keeping.at_s + AFTER_S
+        kept: list[Record] = [one for one in recorded if from_s <= one["at_s"] <= until_s]
+        path = self.folder / f"incident-{keeping.at:%Y%m%dT%H%M%S%fZ}-{keeping.reason}.jsonl"
+        unfinished = path.with_suffix(".new")
+        with unfinished.open("w", encoding="utf-8") as file:
+            file.write(to_lines(kept))
+            file.flush()
+            os.fsync(file.fileno())
+        unfinished.replace(path)
+        for old in sorted(self.folder.glob("incident-*.jsonl"))[:-KEPT_FILES]:
+            old.unlink()
+        return kept
+
+    def _run(self) -> None:
+        has_begun = is_over = False
+        while not is_over:
+            is_over = self._is_closing.wait(WRITE_EVERY_S)
+            try:
+                if not has_begun:
+                    self.begin()
+                    has_begun = True
+                self.write()
+                self.problem = ""
+            except OSError as problem:
+                self.problem = f"The black box {self.folder} cannot be written: {problem}."

@@ -1,0 +1,146 @@
+"""`python -m robot calibrate --base BASE`: measures how a base answers, and stores it.
+
+It stands still for some seconds, then drives and turns a little, twice. That takes 1 m × 1 m and
+arms a real base: stand at its switch. Measured are how late it answers, how large its wheels are
+(by its gyro), and how fast its gyro turns at rest. Do it once for each base, and after each repair.
+Exit status: 0 it was measured; 1 it was not, or the base does not answer; 2 the command line cannot
+be used; 130 Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from robot.base_options import add_base_arguments, make_base
+from robot.bases import BASES, BadOption, BaseLost, MobileBase
+from robot.behavior.control_loop import control_loop
+from robot.behavior.performer import Performer
+from robot.calibration import BadCalibration, store_calibration
+from robot.motion.gesture import Gesture, Waypoint
+from robot.motion.limits import TICK_S
+from robot.motion.player import DONE
+from robot.motion.response import Response
+from robot.play_gesture import VirtualClock
+
+REST_S = 4.0
+TIMES = 2
+TURN_RAD = 1.5
+MEASURED = Gesture(
+    "calibrate",
+    "Calibrate",
+    (
+        Waypoint(0.1, 0.0, 0.0, within_s=3.0),
+        Waypoint(0.0, 0.0, 0.0, within_s=3.0),
+        Waypoint(0.0, 0.0, TURN_RAD, within_s=3.5),
+        Waypoint(0.0, 0.0, -TURN_RAD, within_s=4.5),
+        Waypoint(0.0, 0.0, 0.0, within_s=3.5),
+    ),
+)
+
+
+class NotMeasured(RuntimeError):
+    """A base that could not be measured; the message says why."""
+
+
+@dataclass
+class TurnsByWheels:
+    """How far the wheels say that it turned, for each turn by the gyro."""
+
+    products: float = 0.0
+    squares: float = 0.0
+
+    def add(self, heading_rad: float, slip_rad: float) -> None:
+        """Add a heading by the gyro, and what the wheels say more [rad]."""
+        self.products += heading_rad * (heading_rad + slip_rad)
+        self.squares += heading_rad**2
+
+    @property
+    def scale(self) -> float:
+        """The slope of a line through the origin."""
+        return self.products / self.squares
+
+
+def measure(
+    base: MobileBase, monotonic: Callable[[], float], sleep: Callable[[float], object]
+) -> Response:
+    """Return how an open base answers; a real one is armed by this.
+
+    Raises
+    ------
+    NotMeasured
+        Where it does not perform, or does not follow its orders.
+    BaseLost
+        Where it does not answer any more.
+    """
+    base.calibrate(Response())
+    performer, turns = Performer(base), TurnsByWheels()
+    for _ in range(round(REST_S / TICK_S)):
+        base.stop()
+        base.read()
+        sleep(TICK_S)
+    for _ in range(TIMES):
+        refused = performer.play_alone(MEASURED, monotonic())
+        if refused:
+            raise NotMeasured(f"The base may not move: {refused}.")
+        for pause_s in control_loop(performer, monotonic, lambda: not performer.player.is_busy):
+            there = performer.senses.state
+            turns.add(there.pose.heading_rad, there.sensors.slip_rad)
+            sleep(pause_s)
+        if performer.player.outcome != DONE:
+            raise NotMeasured(f"It did not get there: {performer.player.outcome}.")
+    delay_s = performer.player.measured_delay_s
+    if delay_s is None:
+        raise NotMeasured("It moves, and not as it is ordered. Look at its wheels and the floor.")
+    lag_s = min(Response().lag_s, delay_s)  # the rest is dead time: only their sum is seen
+    return Response(
+        dead_time_s=round(delay_s - lag_s, 4),
+        lag_s=lag_s,
+        wheel_scale=round(turns.scale, 4),
+        gyro_bias_rad_s=round(base.read().sensors.drift_rad_s, 6),
+    )
+
+
+def format_result(response: Response) -> str:
+    """Return a measurement as a line for people."""
+    drift_deg_min = 60 * math.degrees(response.gyro_bias_rad_s)
+    return (
+        f"It answers after {1000 * response.delay_s:.0f} ms (dead time and lag), its wheels roll "
+        f"{response.wheel_scale:.3f} m for each, and its gyro turns by {drift_deg_min:.1f}°/min at "
+        f"rest."
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure the base of the command line, and return the exit status."""
+    parser = ArgumentParser(
+        prog="python -m robot calibrate",
+        description=__doc__,
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    able = sorted(
+        name for name, base in BASES.items() if base.abilities.moves and base.abilities.closed_loop
+    )
+    add_base_arguments(parser, able)
+    options = parser.parse_args(arguments)
+    clock = VirtualClock()
+    is_real = BASES[options.base].abilities.real_time
+    monotonic, sleep = (time.monotonic, time.sleep) if is_real else (clock.monotonic, clock.sleep)
+    try:
+        with make_base(options, monotonic) as base:
+            response = measure(base, monotonic, sleep)
+            path = store_calibration(base, response)
+    except (BaseLost, BadCalibration, NotMeasured) as problem:
+        sys.stderr.write(f"{problem}\n")
+        return 1
+    except BadOption as problem:
+        sys.stderr.write(f"{problem}\n")
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    sys.stdout.write(f"{format_result(response)}\nStored in {path}.\n")
+    return 0

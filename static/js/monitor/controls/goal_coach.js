@@ -1,0 +1,53 @@
+// One line about the goal, with one tap: the goal that the latest strides suggest, or what the baseline says so far;
+// and whether the goal follows by itself.
+
+import { percent } from "garry/shared/format";
+import { _, fill, number } from "garry/shared/language";
+import { update } from "garry/monitor/state";
+
+const FIELDS = ["suggested_goal", "wanted_hit_rate", "baseline"];
+
+export function createGoalCoach({ show, onPress, change }) {
+  const line = document.querySelector(".coach");
+  const button = line.querySelector("button");
+  const mode = document.querySelector("[data-adaptation]");
+
+  mode.addEventListener("change", () => change("goal_adaptation", mode.value));
+  onPress("[data-coach]", (_button, session) => change("goal", session.suggested_goal));
+
+  function describeBaseline({ baseline: { mean, sd, count, needed, goal, asks }, unit }) {
+    if (mean === null) return "";
+    const values = { mean: number(mean, 2), sd: sd === null ? "–" : number(sd, 2), unit, count, needed };
+    if (goal === null) return fill(_("Baseline: mean %(mean)s %(unit)s, SD %(sd)s, %(count)s strides."), values);
+    const text = _(
+      "Baseline: mean %(mean)s %(unit)s, SD %(sd)s, %(count)s of %(needed)s strides. Goal: %(goal)s %(unit)s.",
+    );
+    const told = fill(text, { ...values, goal: number(goal, 2) });
+    return asks ? `${told} ${_("Go to the next phase to accept it.")}` : told;
+  }
+
+  function describeSuggestion({ suggested_goal: goal, wanted_hit_rate: wanted, unit, goal: now }) {
+    if (goal === null || now === null || goal === now) return "";
+    const text = _("By the last 20 strides, a goal of %(goal)s %(unit)s gives %(hits)s hits.");
+    return fill(text, { goal: number(goal, 2), unit, hits: percent(wanted) });
+  }
+
+  return {
+    draw(session) {
+      if (document.activeElement !== mode) mode.value = session.goal_adaptation;
+      const isBaseline = session.baseline && session.phase.kind === "baseline";
+      const text = isBaseline ? describeBaseline(session) : "";
+      const suggestion = session.goal_adaptation === "suggest" ? describeSuggestion(session) : "";
+      line.hidden = !(text || suggestion);
+      show("coach", text || suggestion);
+      button.hidden = !suggestion || Boolean(text);
+      button.textContent = suggestion ? fill(_("Set %(goal)s"), { goal: number(session.suggested_goal, 2) }) : "";
+    },
+    events: {
+      step: (session, event) => update(session, event, FIELDS),
+      goal_adaptation(session, event) {
+        session.goal_adaptation = event.value;
+      },
+    },
+  };
+}

@@ -1,0 +1,47 @@
+// Buttons that drive the robot to its mark while they are held; letting go, leaving, or losing the page stops it.
+
+const REPEAT_MS = 100; // the robot holds an order for 0.3 s
+
+export class RobotPlacing {
+  #root;
+  #drive;
+  #timer = 0;
+
+  // `drive` sends an order: shares of the speeds ahead and to the left.
+  constructor(root, drive) {
+    this.#root = root;
+    this.#drive = drive;
+    for (const button of root.querySelectorAll("[data-drive]")) {
+      const [ahead, left] = button.dataset.drive.split(" ").map(Number);
+      button.addEventListener("pointerdown", (event) => {
+        if (event.isPrimary && event.button === 0) this.#hold(ahead, left);
+      });
+      button.addEventListener("keydown", (event) => {
+        if (event.key === " " && !event.repeat) this.#hold(ahead, left);
+      });
+      for (const end of ["pointerup", "pointercancel", "pointerleave", "keyup", "blur", "contextmenu"])
+        button.addEventListener(end, () => this.#release());
+    }
+    addEventListener("blur", () => this.#release());
+    addEventListener("pagehide", () => this.#release());
+    document.addEventListener("visibilitychange", () => this.#release());
+  }
+
+  show(isShown) {
+    if (!isShown) this.#release();
+    this.#root.hidden = !isShown;
+  }
+
+  #hold(ahead, left) {
+    clearInterval(this.#timer);
+    this.#drive(ahead, left);
+    this.#timer = setInterval(() => this.#drive(ahead, left), REPEAT_MS);
+  }
+
+  #release() {
+    if (!this.#timer) return;
+    clearInterval(this.#timer);
+    this.#timer = 0;
+    this.#drive(0, 0);
+  }
+}

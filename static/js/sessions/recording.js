@@ -1,0 +1,42 @@
+// A recording goes to the server in parts, then the form asks what its columns are.
+
+const form = document.getElementById("upload");
+const { parts, partBytes, bytesMax, failed, tooLarge } = form.dataset;
+const problem = form.querySelector(".problem");
+const button = form.querySelector("button");
+
+function tell(text) {
+  problem.textContent = text;
+  problem.hidden = !text;
+  button.disabled = false;
+}
+
+async function send(file, ending) {
+  const token = form.elements.csrfmiddlewaretoken.value;
+  for (let at = 0; at < file.size || at === 0; at += Number(partBytes)) {
+    const answer = await fetch(`${parts}?${new URLSearchParams({ at, ending })}`, {
+      method: "POST",
+      headers: { "X-CSRFToken": token, "Content-Type": "application/octet-stream" },
+      body: file.slice(at, at + Number(partBytes)),
+    });
+    if (!answer.ok) throw new Error((await answer.json()).message);
+  }
+}
+
+form.addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const [file] = form.querySelector("[type=file]").files;
+  const ending = file.name.slice(file.name.lastIndexOf(".")).toLowerCase();
+  button.disabled = true;
+  tell("");
+  if (file.size > Number(bytesMax)) return tell(tooLarge);
+  button.disabled = true;
+  try {
+    await send(file, ending);
+  } catch (refused) {
+    return tell(refused instanceof TypeError ? failed : refused.message || failed);
+  }
+  form.elements.ending.value = ending;
+  form.elements.name.value = file.name.slice(0, file.name.lastIndexOf(".")).slice(0, 60);
+  form.submit();
+});

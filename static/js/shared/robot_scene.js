@@ -1,0 +1,119 @@
+// The robot from above, in its own frame: home in the middle, ahead is up. Drawn once; then what moves is moved.
+
+import { _, number } from "garry/shared/language";
+import { append, shape, text } from "garry/shared/svg";
+
+const TETHER_M = 0.3; // it never leaves this circle (docs/safety.md)
+const BASE_M = 0.175;
+const HALF_M = 0.5; // of the drawing, to each side
+const MOVE_MS = 250; // between two reports of a robot that moves
+const COLORS = { off: "none", green: "#1f9d55", orange: "#e0861a", red: "#d03434" };
+// The mouth of each mood, seen as the robot's face is seen by who stands before it.
+const MOUTHS = { calm: "M-.045 -.02h.09", glad: "M-.055 -.035q.055 .07 .11 0", sad: "M-.055 0q.055 -.07 .11 0" };
+
+const FLOOR =
+  shape("circle", {
+    class: "tether",
+    r: TETHER_M,
+    fill: "none",
+    stroke: "currentColor",
+    "stroke-width": 0.006,
+    "stroke-dasharray": ".025 .018",
+    opacity: 0.6,
+  }) +
+  shape("path", { d: "M-.03 0h.06M0 -.03v.06", stroke: "currentColor", "stroke-width": 0.006, opacity: 0.6 }) +
+  shape("path", {
+    d: "M.26 .46h.2M.26 .44v.04M.46 .44v.04",
+    stroke: "currentColor",
+    "stroke-width": 0.006,
+    opacity: 0.6,
+  });
+
+const label = (words, x, y) =>
+  text(words, {
+    class: "scene-words",
+    x,
+    y,
+    "font-size": 0.05,
+    "text-anchor": "middle",
+    fill: "currentColor",
+    opacity: 0.8,
+  });
+
+// The treadmill stands for the walker's side; how far away it is, is not drawn to scale.
+const treadmill = () =>
+  shape("rect", {
+    class: "treadmill",
+    x: -0.5,
+    y: 0.36,
+    width: 0.42,
+    height: 0.14,
+    rx: 0.02,
+    fill: "currentColor",
+    opacity: 0.14,
+  }) +
+  shape("path", { d: "M-.46 .39h.34M-.46 .48h.34", stroke: "currentColor", "stroke-width": 0.004, opacity: 0.4 }) +
+  label(_("treadmill"), -0.29, 0.45);
+
+const BASE =
+  shape("circle", { r: BASE_M, fill: "currentColor", opacity: 0.22 }) +
+  shape("path", { class: "heading", d: `M-.05 -.13L0 -.215L.05 -.13Z`, fill: "currentColor" }) +
+  shape("circle", { class: "light", cx: -0.07, cy: -0.075, r: 0.026, stroke: "currentColor", "stroke-width": 0.006 }) +
+  shape("circle", { class: "light", cx: 0.07, cy: -0.075, r: 0.026, stroke: "currentColor", "stroke-width": 0.006 }) +
+  shape("path", {
+    class: "mood",
+    fill: "none",
+    stroke: "currentColor",
+    "stroke-width": 0.014,
+    "stroke-linecap": "round",
+  });
+
+const point = ({ x_m: x, y_m: y }) => `${(-y).toFixed(4)} ${(-x).toFixed(4)}`;
+
+export class RobotScene {
+  #way;
+  #base;
+  #lights;
+  #mouth;
+
+  // `isFollowed`: whether reports come now and then, so that it glides from one to the next.
+  constructor(svg, { isFollowed = true } = {}) {
+    svg.setAttribute("viewBox", `${-HALF_M} ${-HALF_M} ${2 * HALF_M} ${2 * HALF_M}`);
+    svg.innerHTML = FLOOR + treadmill() + label(`${number(0.2, 1)} m`, 0.36, 0.43);
+    this.#way = append(svg, "path");
+    for (const [name, value] of Object.entries({
+      class: "trail",
+      fill: "none",
+      stroke: "#2c7be5",
+      "stroke-width": 0.016,
+      "stroke-linecap": "round",
+      "stroke-linejoin": "round",
+      opacity: 0.75,
+    }))
+      this.#way.setAttribute(name, value);
+    this.#base = append(svg, "g");
+    this.#base.setAttribute("class", "robot-base");
+    this.#base.innerHTML = BASE;
+    this.#lights = this.#base.querySelectorAll(".light");
+    this.#mouth = this.#base.querySelector(".mood");
+    const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.#base.style.transition = isCalm || !isFollowed ? "none" : `transform ${MOVE_MS}ms linear`;
+    this.draw({ poses: [] });
+  }
+
+  // `poses`: those that it had, oldest first; `lights`: two colors; `mood`: calm, glad or sad.
+  draw({ poses, lights, mood }) {
+    const { x_m = 0, y_m = 0, heading_rad = 0 } = poses.at(-1) ?? {};
+    this.#base.style.opacity = poses.length ? 1 : 0.35;
+    // In units of the drawing, which CSS calls pixels.
+    this.#base.style.transform = `translate(${-y_m}px, ${-x_m}px) rotate(${-heading_rad}rad)`;
+    this.#base.dataset.pose = `${x_m.toFixed(3)} ${y_m.toFixed(3)} ${heading_rad.toFixed(3)}`;
+    this.#way.setAttribute("d", poses.length > 1 ? `M${poses.map(point).join("L")}` : "");
+    for (const [index, light] of this.#lights.entries()) {
+      light.dataset.color = lights?.[index] ?? "off";
+      light.setAttribute("fill", COLORS[light.dataset.color] ?? "none");
+    }
+    this.#mouth.dataset.mood = mood ?? "calm";
+    this.#mouth.setAttribute("d", MOUTHS[mood] ?? MOUTHS.calm);
+  }
+}

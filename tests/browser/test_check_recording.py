@@ -1,0 +1,121 @@
+"""A lab's C3D file: uploaded, checked, confirmed, and walked with, all in a browser."""
+
+from __future__ import annotations
+
+import json
+import re
+import sqlite3
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.gait.c3d import write_c3d
+from tests.gait.walks import make_walk
+from tests.support.browsers import SIZES
+from tests.support.servers import Server
+from tests.support.walk_seed import make_walks
+
+pytestmark = pytest.mark.browser
+
+MASS_KG = 75.0
+CHECKED_MS = 90_000  # numpy is loaded and a file measured, however busy the machine
+
+
+@pytest.fixture(scope="module")
+def walk():
+    return make_walk(rate_hz=200, jitter_s=0.0, strides=25, mass_kg=MASS_KG)[0]
+
+
+@pytest.fixture
+def page(server: Server, browser: Browser):
+    (ready,) = make_walks(server, {})
+    with sqlite3.connect(server.folder / "garry.sqlite3") as database:
+        database.execute("UPDATE rehab_patient SET body_mass_kg = ?", (MASS_KG,))
+        database.execute("UPDATE rehab_trainingsession SET state = 'finished'")
+    width, height = SIZES["laptop"]
+    context = browser.new_context(
+        base_url=server.url, viewport={"width": width, "height": height}, has_touch=True
+    )
+    context.set_default_timeout(60_000)
+    context.add_cookies([{"name": "sessionid", "value": ready.cookie, "url": server.url}])
+    page = context.new_page()
+    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
+    yield page
+    context.close()
+
+
+def upload(page: Page, path) -> None:
+    page.goto("/recordings/check/")
+    page.set_input_files("#file", path)
+    page.fill("#mass", str(MASS_KG))
+    page.click("text=Check the file")
+
+
+def test_a_c3d_file_is_checked_and_then_walked_with(page, server, walk, tmp_path):
+    path = tmp_path / "Lab walk 7.c3d"
+    write_c3d(path, walk)
+    upload(page, path)
+
+    # Proposed: columns, units, signs and legs; a person looks at them.
+    force = page.locator("select[name='left.force.column']")
+    expect(force).to_have_value("Fz1", timeout=CHECKED_MS)
+    expect(page.locator("input[name='left.force.factor']")).to_have_value("-1")
+    expect(page.locator("input[name='right.moment.factor']")).to_have_value("0.001")
+    expect(page.locator("input[name='right.angle.factor']")).to_have_value("0.0174532925")
+    expect(page.locator("main")).to_contain_text("strides are valid, 75.0 kg, 200 samples a second")
+
+    # What is wrong is refused, with what was seen, and nothing is stored.
+    page.fill("input[name='left.force.factor']", "1")
+    page.select_option("select[name='left.angle.column']", "LAnkleMoment.X")
+    page.click("text=That is right")
+    refused = page.get_by_role("alert").first
+    words = "left.force=Fz1: its sign is turned. Give a factor of -1."
+    expect(refused).to_contain_text(words, timeout=CHECKED_MS)
+    expect(refused).to_contain_text("LAnkleAngles.X looks like it, LAnkleMoment.X does not.")
+    assert not list(server.folder.glob("recordings/*"))
+
+    # Confirmed, it is a source of steps.
+    page.fill("input[name='left.force.factor']", "-1")
+    page.select_option("select[name='left.angle.column']", "LAnkleAngles.X")
+    page.click("text=That is right")
+    stored = page.get_by_role("status")
+    expect(stored).to_contain_text("lab-walk-7.csv is ready to walk with", timeout=CHECKED_MS)
+    assert [file.name for file in server.folder.glob("recordings/*")] == ["lab-walk-7.csv"]
+    assert not list(server.folder.glob("uploads/*"))  # what was uploaded is gone
+
+    page.click("text=Choose a patient")
+    page.goto("/patients/1/new/")
+    page.check("input[name=source][value='recording lab-walk-7.csv']", force=True)
+    page.check("input[name=station] >> nth=0", force=True)
+    page.click("button[name=then][value=walk]")
+    page.wait_for_url("**/sessions/*/")
+    session = int(page.url.rstrip("/").split("/")[-1])
+    page.tap("[data-change=start]")
+    page.wait_for_function("() => document.body.dataset.step >= 4")
+
+    measured = {round(s.a2_w_kg, 3) for s in walk.both_legs(look_ahead_s=0.05) if s.a2_w_kg}
+    with sqlite3.connect(server.folder / "garry.sqlite3") as database:
+        rows = database.execute(
+            "SELECT value, reasons FROM rehab_step WHERE session_id = ? ORDER BY number", (session,)
+        ).fetchall()
+    valid = [value for value, reasons in rows if not json.loads(reasons)]
+    assert len(valid) >= 3
+    for value in valid:  # half of its channels came at half of the rate
+        assert min(abs(value / one - 1) for one in measured) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "said"),
+    [
+        ("walk.exe", b"MZ", "Choose a file of .c3d"),
+        ("walk.c3d", b"\x02\x50" + bytes(2000), "This file cannot be read|is no C3D file"),
+        ("walk.csv", b"a,b\n1,2\n", "No column is a time"),
+    ],
+)
+def test_files_that_nothing_can_be_measured_from(page, tmp_path, name, data, said):
+    path = tmp_path / name
+    path.write_bytes(data)
+    upload(page, path)
+    expect(page.get_by_role("alert").filter(visible=True)).to_contain_text(
+        re.compile(said), timeout=CHECKED_MS
+    )

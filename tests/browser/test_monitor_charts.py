@@ -1,0 +1,110 @@
+"""What the therapist's page draws: a baseline in its unit, minutes, what is beyond, phases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.support.layout import boxes
+from tests.support.servers import Server
+from tests.support.walk_seed import Feet, feet_of, make_walks
+
+pytestmark = pytest.mark.browser
+
+PHASES = [
+    {"kind": "baseline", "name": "Baseline", "strides": 50},
+    {"kind": "training", "name": "Training", "seconds": 110},
+    {"kind": "washout", "name": "Washout", "seconds": 55},
+]
+OVERLAP = """(selector) => {
+  const boxes = [...document.querySelectorAll(selector)].map((one) => one.getBoundingClientRect());
+  return boxes.some((a, i) => boxes.slice(0, i).some((b) =>
+    a.left < b.right && b.left < a.right && a.top < b.bottom - 2 && b.top < a.bottom - 2));
+}"""
+MEANS = """async () =>
+  (await import("garry/monitor/strip")).runningMeans([2, 4, null, 6]).map((one) => one &&
+    [one.mean, one.sd])"""
+
+
+@pytest.fixture
+def walking(server: Server, browser: Browser) -> Iterator[tuple[Page, Feet]]:
+    (walk,) = make_walks(server, {"phases": PHASES, "goal_percent": 100})
+    context = browser.new_context(
+        base_url=server.url, reduced_motion="reduce", viewport={"width": 1440, "height": 900}
+    )
+    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
+    page = context.new_page()
+    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
+    page.goto(f"/sessions/{walk.session}/monitor/")
+    with feet_of(server, walk) as feet:
+        page.click("[data-main]")
+        feet.hear("start")
+        yield page, feet
+    context.close()
+
+
+def at_stride(page: Page, number: int) -> None:
+    expect(page.locator("[data-show=number]")).to_have_text(f"no. {number}")
+
+
+def test_the_charts_tell_unit_mean_minutes_and_what_is_out_of_range(
+    walking: tuple[Page, Feet],
+) -> None:
+    page, feet = walking
+    strip = page.locator("#strip")
+    feet.walk(0.9, 1.0, None, 1.1, 1.0)
+    at_stride(page, 5)
+    expect(page.locator("[data-show=strip]")).to_have_text("Strides in W/kg, mean ± SD")
+    expect(strip.locator("circle.calm")).to_have_count(4)
+    expect(strip.locator(".mean, .spread")).to_have_count(2)
+    expect(strip).to_contain_text("W/kg")
+    page.reload()  # what was walked before is plotted as well
+    expect(strip.locator("circle.calm")).to_have_count(4)
+    assert page.evaluate(MEANS) == [
+        None,
+        [3, pytest.approx(2**0.5)],
+        [3, pytest.approx(2**0.5)],
+        [4, 2],
+    ]
+
+    feet.walk(*[1.0] * 47, 1.9, 0.2, *[1.1] * 10)
+    at_stride(page, 64)
+    expect(page.locator("[data-show=strip]")).to_have_text("Strides against the goal")
+    expect(strip.locator("path.hit")).to_have_count(1)
+    expect(strip.locator("path.miss")).to_have_count(1)
+    expect(strip.locator(".minute")).to_have_text(["now", "−1 min"])
+    for remark in ("pain", "dizziness", "handrail"):
+        page.click(f"[data-remark={remark}]")
+    expect(strip.locator(".remark-words")).to_have_count(3)
+    assert page.evaluate(OVERLAP, "#strip text:not(.part)") is False
+
+
+def test_a_phase_is_as_wide_as_it_is_long_and_filled_as_far_as_it_is_walked(
+    walking: tuple[Page, Feet],
+) -> None:
+    page, feet = walking
+    feet.walk(*[1.0] * 50, *[1.0] * 50)
+    at_stride(page, 100)
+    _, training, washout = boxes(page, ".phases li")
+    assert training["width"] == pytest.approx(2 * washout["width"], rel=0.05)
+    done = page.locator(".phases .is").evaluate("(one) => +one.style.getPropertyValue('--done')")
+    assert done == pytest.approx(50 * 1.07 / 110, abs=0.03)
+    expect(page.locator(".phases .is")).to_contain_text("left")
+
+
+def test_what_to_do_about_signals_that_are_late_lost_or_drifting(
+    walking: tuple[Page, Feet],
+) -> None:
+    page, feet = walking
+    step = {"side": "left", "value": 4.0}
+    told = {
+        1: (step | {"reasons": ["late"], "value": None}, "Late: close other programs"),
+        2: (step | {"extra": {"flag_lost": 1.0}}, "Lost: look at the network"),
+        3: (step | {"reasons": ["angle_out_of_step"]}, "drifting: let one clock stamp"),
+    }
+    for number, (row, words) in told.items():
+        feet.say({"type": "steps", "steps": [row | {"number": number, "time_s": 1.07 * number}]})
+        at_stride(page, number)
+        expect(page.locator("[data-show=extras]")).to_contain_text(words)

@@ -1,0 +1,121 @@
+"""The therapist's page at every size, in every language: safety within reach, and nothing cut."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+from websockets.sync.client import connect
+
+from tests.support.layout import CORNERS, SCREENS, boxes, complaints, cut, set_screen, too_small
+from tests.support.servers import Server
+from tests.support.walk_seed import feet_of, make_walks
+
+pytestmark = pytest.mark.browser
+
+SAFETY = ".safety button"
+LAPTOPS = ("tablet-landscape", "low-laptop", "laptop", "wall")  # everything at once
+PHASES = [
+    {"kind": "baseline", "name": "Baseline", "strides": 5},
+    {"kind": "training", "name": "Training", "seconds": 300},
+    {"kind": "catch", "name": "Catch", "strides": 10},
+    {"kind": "washout", "name": "Washout"},
+]
+
+
+@pytest.fixture(scope="module", params=["en", "es"])
+def monitor(request: pytest.FixtureRequest, server: Server, browser: Browser) -> Iterator[Page]:
+    """The page of a session that runs, with a robot, a goal that was changed and a note."""
+    (walk,) = make_walks(server, {"name": "Rosalinda", "phases": PHASES})
+    context = browser.new_context(base_url=server.url, reduced_motion="reduce")
+    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
+    page = context.new_page()
+    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
+    page.goto("/account/")
+    page.select_option("#language", request.param)
+    page.click("form[action*=language] button")
+    page.goto(f"/sessions/{walk.session}/monitor/")
+    url, header = f"ws://127.0.0.1:{server.port}/ws/robot/", f"Bearer {walk.robot}"
+    with (
+        feet_of(server, walk) as feet,
+        connect(url, additional_headers={"Authorization": header}) as robot,
+    ):
+        robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
+        page.click("[data-main]")
+        feet.hear("start")
+        feet.walk(0.9, 1.1, 1.0, 0.8, 1.2, 1.0, None, 1.3)
+        page.click("[data-goal='1']")
+        page.click("[data-remark=pain]")
+        feet.walk(1.1)
+        expect(page.locator("[data-show=number]")).to_contain_text("9")
+        yield page
+    context.close()
+
+
+def safety_is_within_reach(page: Page) -> None:
+    assert complaints(page, SAFETY, 44) == []
+
+
+@pytest.mark.parametrize("screen", CORNERS)
+def test_pause_stop_and_fall_keep_their_places_whatever_happens(monitor: Page, screen: str) -> None:
+    set_screen(monitor, screen)
+    if monitor.locator("[data-main]").get_attribute("value") == "resume":
+        monitor.click("[data-main]")
+    expect(monitor.locator("[data-main]")).to_have_attribute("value", "pause")
+    places = boxes(monitor, SAFETY)
+    assert len(places) == 3
+    safety_is_within_reach(monitor)
+
+    monitor.locator(".panels").evaluate("(panels) => panels.scrollTo(0, 9999)")
+    safety_is_within_reach(monitor)
+    monitor.wait_for_selector("[data-alarm=source]")  # the sensor is silent
+    monitor.click("[data-main]")
+    expect(monitor.locator("[data-main]")).to_have_attribute("value", "resume")
+    monitor.click("[data-robot=stop]")
+    monitor.wait_for_selector("[data-alarm=robot]")
+    monitor.evaluate("document.querySelector('.said').textContent = 'x '.repeat(80)")
+    safety_is_within_reach(monitor)
+    for question in ("[data-end]", "[data-remark=borg]"):
+        monitor.click(question)
+        expect(monitor.locator("dialog[open]")).to_be_visible()
+        safety_is_within_reach(monitor)
+        assert complaints(monitor, "dialog[open] button", 44) == []
+        monitor.keyboard.press("Escape")
+        expect(monitor.locator("dialog[open]")).to_have_count(0)
+    assert boxes(monitor, SAFETY) == places
+
+    monitor.locator("[data-robot=arm]").click()
+    monitor.evaluate("document.querySelector('.said').textContent = ''")
+    expect(monitor.locator("[data-alarm]")).to_have_count(0)
+
+
+@pytest.mark.parametrize("screen", CORNERS)
+def test_nothing_is_cut_or_too_small(monitor: Page, screen: str) -> None:
+    set_screen(monitor, screen)
+    assert monitor.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert cut(monitor, ".card:not(.strip), .bar-top, .whom, .phases li, .seg, .notices *") == []
+    assert cut(monitor, ".panels button, .panels select, .bar-top .btn, .panels h2") == []
+    assert too_small(monitor, ".panels button, .panels select, .bar-top .btn", 44) == []
+    if screen in LAPTOPS:
+        assert cut(monitor, ".panels, .controls, .side") == []
+        assert complaints(monitor, ".panels .card", 44) == []
+    if screen != "phone":
+        (robot,) = boxes(monitor, ".robot.card")
+        assert min(robot["width"], robot["height"]) >= 280
+    if screen == "wall":  # as large, in its share of the screen, as on a laptop
+        (pause, *_others) = boxes(monitor, SAFETY)
+        assert pause["height"] >= 0.08 * SCREENS["wall"][1]
+
+
+def test_a_phone_has_what_matters_first(monitor: Page) -> None:
+    set_screen(monitor, "phone")
+    parts = (".last", ".goal.card", ".presence", ".strip", ".robot.card")
+    tops = [boxes(monitor, part)[0]["y"] for part in parts]
+    assert tops == sorted(tops)
+    monitor.locator(".panels").evaluate("(panels) => panels.scrollTo(0, 0)")
+    (bar,) = boxes(monitor, ".safety")
+    for part in (".last", ".goal.card"):
+        (box,) = boxes(monitor, part)
+        assert box["y"] + box["height"] <= bar["y"]

@@ -1,0 +1,120 @@
+"""The patient's page at every size, in every language and size of words: Pause and Stop robot stay
+in their places, and nothing is cut.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import pytest
+from playwright.sync_api import Browser, Page
+from websockets.sync.client import connect
+
+from tests.support.extent import EVERYTHING
+from tests.support.layout import TOO_WIDE, boxes, complaints, set_screen
+from tests.support.servers import Server
+from tests.support.walk_seed import Walk, feet_of, make_walks
+
+pytestmark = pytest.mark.browser
+
+SCREENS = ("phone", "tablet-portrait", "tablet-landscape", "laptop", "wall")
+CORNERS = SCREENS if EVERYTHING else ("phone", "tablet-portrait", "tablet-landscape")
+TEXTS = ("normal", "large", "largest") if EVERYTHING else ("normal", "largest")
+BUTTONS = "header button, .actions button"
+WORDS = ".words, .phrase, .sub, header .who, header button, .actions button, .key, .label"
+# What people read and tap; the horizon, which no words cross where nothing is measured.
+CROSSING = """() => {
+  const words = [...document.querySelectorAll(".words, .sub")]
+    .filter((one) => one.checkVisibility()).map((one) => one.getBoundingClientRect().bottom);
+  const bottom = Math.max(...words);
+  const floor = document.querySelector(".horizon").getBoundingClientRect().top;
+  const slots = [".phrase", ".count", ".actions", ".part", "header .who", ".pause", ".robot"]
+    .map((name) => document.querySelector(name))
+    .filter((one) => one.checkVisibility({ visibilityProperty: true }))
+    .map((one) => [one.className, one.getBoundingClientRect()]);
+  const said = bottom > floor + 1 ? [`the words end at ${bottom}, the floor is at ${floor}`] : [];
+  slots.forEach(([name, a], i) => slots.slice(0, i).forEach(([other, b]) => {
+    const beside = a.left >= b.right - 1 || b.left >= a.right - 1;
+    if (!beside && a.top < b.bottom - 1 && b.top < a.bottom - 1)
+      said.push(`${name} overlaps ${other}`);
+  }));
+  return said;
+}"""
+
+
+@contextmanager
+def page_of(browser: Browser, server: Server, walk: Walk, *, alone: bool) -> Iterator[Page]:
+    """Open the page on a paired tablet, or where a therapist is signed in."""
+    context = browser.new_context(base_url=server.url, reduced_motion="reduce")
+    name, value = ("garry_tablet", walk.tablet) if alone else ("sessionid", walk.cookie)
+    context.add_cookies([{"name": name, "value": value, "url": server.url}])
+    context.set_default_timeout(40_000)
+    page = context.new_page()
+    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
+    page.goto(walk.path)
+    yield page
+    context.close()
+
+
+def look_everywhere(page: Page, before: Callable[[], None] = lambda: None) -> None:
+    """Check the page as it is now at every size, with all sizes of words."""
+    look = page.get_attribute("body", "data-look")
+    for screen in CORNERS:
+        set_screen(page, screen)
+        places = []
+        for text in TEXTS:
+            before()
+            page.evaluate("(text) => (document.body.dataset.text = text)", text)
+            page.evaluate(
+                "async () => { await document.fonts.ready; dispatchEvent(new Event('resize'));"
+                " await new Promise((drawn) => "
+                "requestAnimationFrame(() => requestAnimationFrame(drawn))); }"
+            )
+            where = (look, screen, text)
+            assert (where, complaints(page, BUTTONS, 60)) == (where, [])
+            assert (where, page.evaluate(TOO_WIDE, WORDS)) == (where, [])
+            assert (where, page.evaluate(CROSSING)) == (where, [])
+            places.append(boxes(page, "header .robot, header .pause"))
+        assert (screen, places) == (screen, [places[0]] * len(places))
+        width = page.viewport_size["width"] if page.viewport_size else 0
+        assert places[0][1]["x"] + places[0][1]["width"] >= 0.94 * width
+
+
+@pytest.mark.parametrize("language", ["en", "es"])
+def test_pause_and_stop_robot_keep_their_places_and_no_word_is_cut(
+    server: Server, browser: Browser, language: str
+) -> None:
+    (walk,) = make_walks(server, {"name": "Rosalinda", "screen": {"language": language}})
+    url, header = f"ws://127.0.0.1:{server.port}/ws/robot/", f"Bearer {walk.robot}"
+    with (
+        page_of(browser, server, walk, alone=False) as page,
+        page_of(browser, server, walk, alone=True) as tablet,
+        feet_of(server, walk) as feet,
+        connect(url, additional_headers={"Authorization": header}) as robot,
+    ):
+        robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
+        page.wait_for_selector(".robot:not([hidden])")
+        look_everywhere(page)
+        page.click("[data-change=start]")
+        feet.hear("start")
+        page.wait_for_selector("body[data-look=begin]")
+        look_everywhere(page)
+
+        def step() -> None:
+            feet.walk(1.2)
+            page.wait_for_function("n => document.body.dataset.step == n", arg=feet.number)
+
+        step()
+        look_everywhere(page, step)
+        page.wait_for_selector("body[data-look=still]")
+        look_everywhere(page)
+        page.click(".pause")
+        page.wait_for_selector("body[data-look=paused]")
+        look_everywhere(page)
+        tablet.wait_for_selector("body[data-look=paused]")
+        look_everywhere(tablet)
+        assert tablet.locator(".actions button:visible").count() == 0
+        page.click("[data-ask=end]")
+        look_everywhere(page)

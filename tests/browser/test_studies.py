@@ -1,0 +1,201 @@
+"""A study in a real browser: planned without code, walked blind, an arm revealed on the record."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.support.browsers import SIZES
+from tests.support.servers import ROOT, Server, clean_environment
+
+pytestmark = pytest.mark.browser
+
+PEOPLE = """
+import json
+from importlib import import_module
+from django.conf import settings
+from django.contrib.auth import BACKEND_SESSION_KEY, HASH_SESSION_KEY, SESSION_KEY
+from django.utils import timezone
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import record_consent
+from rehab.people.models import Patient, User
+from rehab.people.sign_in.first_start import first_clinic
+from rehab.people.sign_in.flow import BACKEND
+clinic = first_clinic()
+found = {}
+for name, role in (("lena", "lead"), ("theo", "pt"), ("asha", "pt")):
+    user = User.everywhere.create_user(name, role=role, clinic=clinic)
+    cookies = import_module(settings.SESSION_ENGINE).SessionStore()
+    cookies[SESSION_KEY] = str(user.pk)
+    cookies[BACKEND_SESSION_KEY] = BACKEND
+    cookies[HASH_SESSION_KEY] = user.get_session_auth_hash()
+    cookies.save()
+    found[name] = cookies.session_key
+rosa = Patient.everywhere.create(clinic=clinic, code="R1", nickname="Rosa", paretic_side="left")
+record_consent(rosa, Purpose.RESEARCH, None, timezone.now())
+found["patient"] = rosa.pk
+print(json.dumps(found))
+"""
+# What would tell the assessor the condition: the arms' names and types, as people and as programs
+# call them. The type that a set-up offers to everybody by default is in no arm.
+TELLING = re.compile("sunny side|stern side|negative|explicit", re.IGNORECASE)
+
+
+@contextmanager
+def page_of(browser: Browser, server: Server, cookie: str) -> Iterator[Page]:
+    width, height = SIZES["laptop"]
+    context = browser.new_context(base_url=server.url, viewport={"width": width, "height": height})
+    context.add_cookies([{"name": "sessionid", "value": cookie, "url": server.url}])
+    context.set_default_timeout(40_000)
+    page = context.new_page()
+    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
+    yield page
+    context.close()
+
+
+@pytest.fixture
+def people(server: Server) -> dict[str, Any]:
+    done = subprocess.run(
+        [sys.executable, "manage.py", "shell", "-v0", "-c", PEOPLE],
+        cwd=ROOT,
+        env=clean_environment(server.folder, server.port),
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    made: dict[str, Any] = json.loads(done.stdout)
+    return made
+
+
+def plan_by_clicks(page: Page) -> None:
+    page.goto("/studies/")
+    page.click("text=Plan a study")
+    page.fill("#id_code", "VAL")
+    page.fill("#id_title", "Two ways to answer a step")
+    page.fill("#id_question", "Which way keeps more of the push-off?")
+    page.fill("#id_participants", "12")
+    page.fill("#id_block_sizes", "2, 4")
+    page.select_option("#id_primary_outcome", "retention_in_washout")
+    for row, (code, name, valence) in enumerate(
+        (("A", "Sunny side", "explicit"), ("B", "Stern side", "negative"))
+    ):
+        page.fill(f"#id_arm-{row}-code", code)
+        page.fill(f"#id_arm-{row}-name", name)
+        page.select_option(f"#id_arm-{row}-valence", valence)
+        page.select_option(f"#id_arm-{row}-protocol", label="Baseline, training, washout")
+    page.click("button:has-text('Keep')")
+    expect(page.locator("h1")).to_have_text("VAL Draft")
+    expect(page.locator(".risk")).to_contain_text("punishment has worked worse")
+    page.click("button:has-text('Register')")
+    page.select_option("#mark-assessor", label="asha")
+    page.click("form:has(#mark-assessor) button")
+    page.click("button:has-text('Start enrolling')")
+    expect(page.locator("h1")).to_have_text("VAL Running")
+
+
+def enroll_and_start(page: Page, study: str) -> str:
+    """Take the patient in, start the first visit; return the address of the session."""
+    page.goto(study)
+    page.click("text=Enroll a patient")
+    page.select_option("#id_patient", label="Rosa (R1)")
+    page.check("[name=keep_data][value=yes]")
+    page.click("button:has-text('Enroll')")
+    expect(page.locator("h1")).to_have_text("VAL-001 Rosa")
+    page.click("button:has-text('Start visit 1')")
+    page.wait_for_url("**/monitor/")
+    return page.url
+
+
+def look_everywhere(page: Page, addresses: list[str]) -> None:
+    """Open what an assessor may open; every title, address and answer is searched."""
+    heard: list[tuple[str, str]] = []
+    page.on("response", lambda answer: heard.append((answer.url, read(answer))))
+    page.on(
+        "websocket",
+        lambda socket: socket.on(
+            "framereceived", lambda frame: heard.append((socket.url, str(frame)))
+        ),
+    )
+    for address in addresses:
+        answer = page.goto(address)
+        assert answer is not None
+        assert answer.status == 200, address
+        heard.append((page.url, page.title()))
+    found = [
+        (url, text[m.start() - 80 : m.end() + 20])
+        for url, text in heard
+        if (m := TELLING.search(text))
+    ]
+    assert not [url for url, _ in heard if TELLING.search(url)]
+    assert len(heard) > len(addresses)
+    assert found == []
+
+
+def read(answer: Any) -> str:
+    """Return an answer's text without the links that pick a type, which everybody's pages list.
+
+    Scripts and pictures are the same for everybody.
+    """
+    kind = answer.headers.get("content-type", "")
+    text = answer.text() if "html" in kind or "json" in kind else ""
+    return re.sub(r"(?s)<a\s[^>]*\?type=.*?</a>", "", text)
+
+
+def test_a_study_is_planned_walked_blind_and_an_arm_is_revealed(server, browser, people):
+    with page_of(browser, server, people["lena"]) as lead:
+        plan_by_clicks(lead)
+        study = lead.url
+    with page_of(browser, server, people["theo"]) as pt:
+        monitor = enroll_and_start(pt, study)
+        participant = f"{server.url}/participants/1/"
+        session = re.search(r"/sessions/(\d+)/", monitor).group(1)
+
+        with page_of(browser, server, people["asha"]) as assessor:
+            patient = f"/patients/{people['patient']}/"
+            own = ["/start/", patient, f"{patient}sessions/", f"{patient}records/"]
+            look_everywhere(assessor, [*own, "/studies/", study, participant, "/api/v1/sessions"])
+            for part in ("", "monitor/", "details/", "report/", "scores/"):
+                answer = assessor.goto(f"/sessions/{session}/{part}")
+                assert answer is not None
+                assert answer.status == 404, part
+            for kind in ("patient", "monitor"):
+                frames = assessor.evaluate(LISTEN, f"/ws/session/{session}/{kind}/")
+                assert [json.loads(frame)["code"] for frame in frames] == ["no_session"]
+            assessor.goto(participant)
+            assessor.click("text=Reveal the arm")
+            assessor.fill("#why-reveal", "curious")
+            assessor.click("button:has-text('Reveal')")
+            expect(assessor.locator(".errorlist")).to_contain_text("Ask a lead")
+            assert not TELLING.search(assessor.locator("main").inner_text())
+
+        pt.goto(participant)
+        pt.click("text=Reveal the arm")
+        pt.fill("#why-reveal", "dizzy after the third block")
+        pt.check("[name=emergency]")
+        pt.click("button:has-text('Reveal')")
+        expect(pt.locator(".revealed")).to_contain_text("side")
+    with page_of(browser, server, people["lena"]) as lead:
+        lead.goto(study)
+        told = lead.locator("main")
+        expect(told).to_contain_text("dizzy after the third block")
+        expect(told).to_contain_text("Arm revealed in an emergency (theo)")
+        expect(told).to_contain_text("Revealing the arm was refused (asha)")
+        lead.goto("/admin/rehab/auditentry/")
+        expect(lead.locator("main, #content").last).to_contain_text("Revealed a study's arm")
+
+
+LISTEN = """path => new Promise(done => {
+  const frames = [];
+  const socket = new WebSocket(path.startsWith("/") ? `ws://${location.host}${path}` : path);
+  socket.onmessage = (message) => frames.push(message.data);
+  socket.onclose = () => done(frames);
+  setTimeout(() => done(['{"code": "still open"}']), 10000);
+})"""

@@ -1,0 +1,78 @@
+"""What stands in deploy/ names commands, settings and figures that exist."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from configparser import RawConfigParser
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from django.conf import settings
+from django.core.management import get_commands, load_command_class
+from prometheus_client import generate_latest
+
+from rehab.sessions.live import instruments, runtime
+from rehab.sessions.live.process import STOP_S
+from rehab.sessions.live.trouble import Trouble
+from robot.__main__ import make_parser
+from tests.support.servers import ROOT
+
+DEPLOY = ROOT / "deploy"
+UNITS = sorted((DEPLOY / "systemd").glob("*.service"))
+
+
+class Unit(RawConfigParser):
+    """A unit of systemd: keys have capitals, and may stand more than once."""
+
+    optionxform = staticmethod(str)  # type: ignore[assignment]
+
+
+@pytest.mark.parametrize("unit", UNITS, ids=lambda unit: unit.stem)
+def test_a_unit_starts_a_command_that_exists(unit: Path) -> None:
+    read = Unit(strict=False)
+    read.read(unit)
+    program, *arguments = shlex.split(read["Service"]["ExecStart"])
+    assert program == "/opt/garry/.venv/bin/python"
+    if arguments[0] == "manage.py":
+        command = load_command_class(get_commands()[arguments[1]], arguments[1])
+        command.create_parser("manage.py", arguments[1]).parse_args(arguments[2:])
+    elif arguments[:2] == ["-m", "robot"]:
+        make_parser().parse_args(arguments[2:])
+    else:
+        assert arguments[:2] == ["-m", "rehab.sources"]
+
+
+def test_the_server_has_longer_to_stop_than_it_takes() -> None:
+    read = Unit(strict=False)
+    read.read(DEPLOY / "systemd" / "garry-server.service")
+    assert float(read["Service"]["TimeoutStopSec"]) > STOP_S
+    grace = re.search(r"stop_grace_period: (\d+)s", (DEPLOY / "compose.yaml").read_text())
+    assert float(grace[1]) > STOP_S
+
+
+def test_settings_that_are_named_exist() -> None:
+    named = set()
+    for file in (*DEPLOY.rglob("*"), ROOT / "docs" / "hosting.md"):
+        if file.is_file() and file.suffix != ".pyc":
+            named |= set(re.findall(r"\bGARRY_[A-Z_]+\b", file.read_text()))
+    clients = {"GARRY_SERVER", "GARRY_ROBOT_TOKEN", "GARRY_SOURCE_TOKEN", "GARRY_TEST_ALL"}
+    assert named - clients <= set(settings.VARIABLES)
+
+
+def test_alarms_and_the_board_ask_for_figures_that_exist(monkeypatch) -> None:
+    idle = SimpleNamespace(
+        sessions={}, is_ready=True, writer=SimpleNamespace(backlog=0, trouble=Trouble.NONE)
+    )
+    monkeypatch.setattr(runtime, "peek", lambda: idle)
+    shown = generate_latest(instruments.REGISTRY).decode()
+    there = set(re.findall(r"^# TYPE (\w+)", shown, re.MULTILINE))
+    board = json.loads((DEPLOY / "grafana" / "garry.json").read_text())
+    asked = [target["expr"] for panel in board["panels"] for target in panel["targets"]]
+    asked += re.findall(r"expr: (.*)", (DEPLOY / "prometheus" / "alerts.yml").read_text())
+    assert len(asked) > 15
+    for expression in asked:
+        for name in re.findall(r"\b(?:garry|process)_\w+", expression):
+            assert {name, name.removesuffix("_bucket")} & there, expression

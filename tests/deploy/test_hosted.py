@@ -1,0 +1,163 @@
+"""The hosted set as deploy/ and docs/hosting.md say: PostgreSQL, one server, nginx with TLS."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import ssl
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from email.message import Message
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.hosted import find_missing, run_nginx, run_postgres
+from tests.support.servers import ROOT
+from tests.support.torture import Entrance, Torture
+
+pytestmark = [
+    pytest.mark.server,
+    pytest.mark.long,
+    pytest.mark.skipif(bool(find_missing()), reason=find_missing()),
+]
+
+TOKEN = "only who watches the server has this"
+
+
+@dataclass
+class Hosted:
+    """A hosted set that waits for its server."""
+
+    torture: Torture
+    plain: str
+    secure: str
+    tls: ssl.SSLContext
+
+    def get(self, url: str, **headers: str) -> tuple[int, Message, str]:
+        """Return what a GET answers: status, headers, text. Redirects are not followed."""
+        opener = urllib.request.build_opener(
+            NoRedirect, urllib.request.HTTPSHandler(context=self.tls)
+        )
+        try:
+            request = urllib.request.Request(url, headers=headers)  # noqa: S310 (our own address)
+            with opener.open(request, timeout=20) as answer:
+                return answer.status, answer.headers, answer.read().decode(errors="replace")
+        except urllib.error.HTTPError as answer:
+            return answer.code, answer.headers, answer.read().decode(errors="replace")
+
+    @contextmanager
+    def serve(self) -> Iterator[subprocess.Popen[str]]:
+        """Run the server until the block ends."""
+        with subprocess.Popen(
+            [sys.executable, "manage.py", "serve", *self.torture.serve],
+            cwd=ROOT,
+            env=self.torture.environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        ) as process:
+            try:
+                for line in process.stdout:
+                    if line.startswith("Ready"):
+                        break
+                yield process
+            finally:
+                process.terminate()
+                process.communicate(timeout=40)
+
+
+class NoRedirect(urllib.request.HTTPRedirectHandler):
+    """Leaves a redirect as it is."""
+
+    def redirect_request(self, *_: Any, **__: Any) -> None:
+        """Follow nothing."""
+
+
+@pytest.fixture(params=["uvicorn", "daphne"])
+def server_name(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def hosted(tmp_path: Path, server_name: str) -> Iterator[Hosted]:
+    """Return a set after the commands of docs/hosting.md: tables made, static files collected."""
+    with run_postgres() as database:
+        torture = Torture(
+            tmp_path / "garry", seed=17, rate=20, database=database, serve=["--server", server_name]
+        )
+        torture.folder.mkdir()
+        torture.environment |= {
+            "GARRY_HOSTED": "1",
+            "GARRY_SECRET_KEY": "0123456789" * 6,
+            "GARRY_ALLOWED_HOSTS": "localhost",
+            "GARRY_METRICS_TOKEN": TOKEN,
+            "GARRY_LOG_FORMAT": "json",
+        }
+        torture.run_python("manage.py", "migrate", "--verbosity", "0")
+        torture.run_python("manage.py", "collectstatic", "--no-input", "--verbosity", "0")
+        with run_nginx(tmp_path / "nginx", torture.port) as (plain, secure, tls):
+            torture.entrance = Entrance(secure, tls)
+            yield Hosted(torture, plain, secure, tls)
+
+
+@pytest.mark.timeout(300)
+def test_a_walk_through_the_proxy_outlives_restarts_and_a_kill(hosted: Hosted) -> None:
+    ended = asyncio.run(hosted.torture.run(sessions=4, rounds=4, orderly=0.7))
+    assert hosted.torture.find_faults(ended) == []
+    assert 0 < ended["kills"] < 4
+    assert sum(walk.acknowledged for walk in hosted.torture.walks) > 100
+
+
+@pytest.mark.parametrize("server_name", ["uvicorn"], indirect=True)
+def test_what_the_proxy_lets_through(hosted: Hosted) -> None:
+    assert hosted.get(f"{hosted.secure}/readyz")[0] == 502  # no server yet
+    with hosted.serve():
+        assert hosted.get(f"{hosted.secure}/readyz")[::2] == (200, "ok\n")
+        status, headers, _ = hosted.get(f"{hosted.plain}/start/?a=b")
+        assert (status, headers["Location"]) == (308, "https://localhost/start/?a=b")
+        status, headers, page = hosted.get(f"{hosted.secure}/sign-in/")
+        assert status == 200
+        assert headers["Strict-Transport-Security"].startswith("max-age=31536000")
+        assert len(headers["X-Request-ID"]) == 32  # nginx's
+        style = page.split('rel="stylesheet" href="')[1].split('"')[0]
+        status, headers, _ = hosted.get(f"{hosted.secure}{style}", **{"Accept-Encoding": "gzip"})
+        assert (status, headers.get("Content-Encoding")) == (200, "gzip")
+        assert "immutable" in headers["Cache-Control"]
+
+        own = f"http://127.0.0.1:{hosted.torture.port}/metrics"
+        https = {"X-Forwarded-Proto": "https", "Host": "localhost"}
+        assert hosted.get(own, **https)[0] == 404
+        allowed = https | {"Authorization": f"Bearer {TOKEN}"}
+        status, _, figures = hosted.get(own, **allowed)
+        assert status == 200
+        assert "garry_ready 1.0" in figures
+        assert hosted.get(f"{hosted.secure}/metrics", **allowed)[0] == 404
+
+
+@pytest.mark.parametrize("server_name", ["uvicorn"], indirect=True)
+def test_a_second_server_on_the_database_waits_until_the_first_has_ended(hosted: Hosted) -> None:
+    with hosted.serve() as first:
+        second = subprocess.Popen(
+            [sys.executable, "manage.py", "serve", "--port", "0"],
+            cwd=ROOT,
+            env=hosted.torture.environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            warning = json.loads(second.stderr.readline())
+            assert warning["message"].startswith("Another server runs on this database")
+            assert first.poll() is None
+            first.kill()  # its lock goes with its connection
+            assert any(line.startswith("Ready") for line in second.stdout)
+        finally:
+            second.terminate()
+            second.communicate(timeout=40)

@@ -1,0 +1,57 @@
+"""What a fault did to the strides of a walk: how many A2 are wrong, how many strides are lost."""
+
+from dataclasses import dataclass
+
+from tests.gait.walks import pair_up
+
+WRONG = 0.1  # of A2
+NEAR_S = 0.1
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Counts of the left leg's strides.
+
+    ``strides`` are valid without the fault; ``lost`` of them are not valid with it, and ``wrong``
+    are shown with an A2 that is off by more than a tenth. ``worst`` is the largest error shown,
+    ``contact_s`` the largest of a valid stride's contacts.
+    """
+
+    strides: int
+    lost: int
+    wrong: int
+    worst: float
+    contact_s: float
+
+
+def count(found, clean) -> Tally:
+    """Return the tally of the left strides that were found against those of the same walk."""
+    own = [s for s in clean if s.side in (None, "left") and s.valid]
+    shown = [s for s in found if s.side in (None, "left") and s.valid]
+    pairs = pair_up(shown, [s.initial_contact_s for s in own])
+    errors = [
+        abs(one.a2_w_kg / other.a2_w_kg - 1)
+        for one, other in zip(pairs, own, strict=True)
+        if one is not None
+    ]
+    known = {id(one) for one in pairs if one is not None}
+    others = [s.initial_contact_s for s in clean if s.side in (None, "left")]
+    strangers = sum(
+        id(one) not in known and min(abs(one.initial_contact_s - o) for o in others) > NEAR_S
+        for one in shown
+    )
+    contacts = [
+        max(
+            abs(one.initial_contact_s - other.initial_contact_s),
+            abs(one.terminal_contact_s - other.terminal_contact_s),
+        )
+        for one, other in zip(pairs, own, strict=True)
+        if one is not None
+    ]
+    return Tally(
+        strides=len(own),
+        lost=sum(one is None for one in pairs),
+        wrong=sum(error > WRONG for error in errors) + strangers,
+        worst=max(errors, default=0.0),
+        contact_s=max(contacts, default=0.0),
+    )

@@ -1,0 +1,141 @@
+"""The corners of the fault bench, whose whole table `make bench` prints."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rehab.gait import Flag
+from tests.gait.faults.bench import FAULTS, RECORDINGS, SLOW_STRIDES_S, open_walk, try_fault
+from tests.gait.faults.spoil import lose, shake, stall
+from tests.gait.faults.tally import count
+from tests.gait.walks import make_walk, pair_up
+
+SYNTHETIC = [name for name in RECORDINGS if name != "moore"]
+
+
+@pytest.mark.parametrize("name", RECORDINGS)
+@pytest.mark.parametrize("width_ms", [15, 50, 150])
+def test_samples_that_come_late_are_put_back(name, width_ms):
+    tally = try_fault(name, f"stall {width_ms} ms")
+
+    assert tally.wrong == 0
+    assert tally.lost <= 0.05 * tally.strides
+
+
+@pytest.mark.parametrize("name", RECORDINGS)
+@pytest.mark.parametrize("width_s", [0.03, 0.082, 0.15])
+def test_stalls_of_inverse_dynamics_by_stamp(name, width_s):
+    """Those before 55 % of stance do no harm and stay; the others are not shown."""
+    walk, clean = open_walk(name)
+    stance_s = np.median([s.stance_s for s in clean])
+    before = (0.0, max(0.02, 0.5 - 1.6 * width_s / stance_s))
+    kept = count(stall(walk, clean, width_s, by_stamp=True, share=before).both_legs(), clean)
+    shown = count(stall(walk, clean, width_s, by_stamp=True, share=(0.6, 0.9)).both_legs(), clean)
+
+    assert kept.wrong == shown.wrong == 0
+    assert kept.lost <= 0.05 * kept.strides
+    assert shown.lost >= 0.9 * shown.strides
+
+
+@pytest.mark.parametrize("name", RECORDINGS)
+@pytest.mark.parametrize("width_s", [0.03, 0.12])
+def test_lost_samples(name, width_s):
+    walk, clean = open_walk(name)
+    early = lose(walk, clean, width_s, share=(0.05, 0.3)).both_legs()
+    tally, late = count(early, clean), count(lose(walk, clean, width_s).both_legs(), clean)
+
+    assert tally.wrong == late.wrong == 0
+    assert tally.lost <= 0.05 * tally.strides
+    assert (width_s < 0.05) == (not any(Flag.LOST in s.flags for s in early))
+
+
+@pytest.mark.parametrize("name", ["100 Hz", "1 kHz"])
+def test_times_by_frame_number_tell_a_loss_exactly(name):
+    walk, clean = open_walk(name)
+    by_frame = replace(walk, t_s=np.arange(len(walk.t_s)) / walk.rate_hz)
+    broken = lose(by_frame, clean, 0.12, share=(0.05, 0.3))
+    lost_s = np.diff(broken.t_s) - 1 / walk.rate_hz
+    told = [s for s in broken.both_legs() if s.side == "left" and Flag.LOST in s.flags]
+
+    assert len(told) >= 0.9 * len([s for s in clean if s.side == "left"])
+    assert all(np.abs(lost_s - s.lost_s).min() < 1e-9 for s in told)
+    assert all(s.late_s < 1e-9 for s in told)
+
+
+@pytest.mark.parametrize("name", RECORDINGS)
+@pytest.mark.parametrize("fault", [name for name in FAULTS if name.startswith("drag")])
+def test_a_foot_that_drags(name, fault):
+    tally = try_fault(name, fault)
+
+    assert tally.wrong == 0
+    # moore2013 unloads so slowly that 60 N hide its last 45 ms.
+    assert tally.lost <= (0.3 if name == "moore" else 0.1) * tally.strides
+
+
+@pytest.mark.parametrize("name", ["100 Hz", "1 kHz", "fast 100 Hz"])
+@pytest.mark.parametrize("force", [40, 50, 60])
+@pytest.mark.parametrize("part", ["", ", first half", ", second half", ", whole swing"])
+def test_contacts_of_a_foot_that_drags(name, force, part):
+    assert try_fault(name, f"drag {force} N{part}").contact_s < 0.02
+
+
+@pytest.mark.parametrize("name", RECORDINGS)
+def test_clonus_is_kept_and_flagged(name):
+    walk, clean = open_walk(name)
+    found = [s for s in shake(walk, clean, 1.0).both_legs() if s.side == "left"]
+
+    assert count(found, clean).lost == count(found, clean).wrong == 0
+    assert np.mean([Flag.CLONUS in s.flags for s in found]) > 0.9
+    assert not any(Flag.CLONUS in s.flags for s in clean)
+
+
+@pytest.mark.parametrize("stride_s", SLOW_STRIDES_S)
+@pytest.mark.parametrize("rate_hz", [100, 1000])
+def test_slow_gait(stride_s, rate_hz):
+    walk, truth = make_walk(
+        rate_hz=rate_hz, stride_s=stride_s, a2_w_kg=0.5, mass_kg=70.0, strides=15
+    )
+    found = [s for s in walk.both_legs() if s.side == "left"]
+    pairs = pair_up(found, [stride.initial_contact_s for stride in truth])
+
+    assert all(stride is not None and stride.valid for stride in pairs)
+
+
+@pytest.mark.parametrize("fault", [name for name in FAULTS if name.startswith("swap")])
+@pytest.mark.parametrize("name", RECORDINGS)
+def test_swapped_channels_make_no_valid_stride(name, fault):
+    assert try_fault(name, fault).lost == try_fault(name, "none").strides
+
+
+@pytest.mark.parametrize(
+    "fault", [f"{c} {ms:+d} ms" for c in ("angle", "moment") for ms in (-100, -50, 50, 100)]
+)
+@pytest.mark.parametrize("name", RECORDINGS)
+def test_channels_out_of_time(name, fault):
+    """The first stride cannot know; moore2013's braking is sure to 10 ms a stride."""
+    tally = try_fault(name, fault)
+
+    assert tally.wrong <= (2 if name == "moore" else 1)
+    assert tally.lost >= tally.strides - 2
+
+
+@pytest.mark.parametrize(
+    "fault", [f"drift of {c} to {ms:+d} ms" for c in ("angle", "moment") for ms in (-100, 100)]
+)
+@pytest.mark.parametrize("name", RECORDINGS)
+def test_channels_that_drift(name, fault):
+    """By 3 ms a stride: told once the slope is sure, later where strides scatter (moore2013)."""
+    tally = try_fault(name, fault)
+
+    assert tally.wrong <= (14 if name == "moore" else 8)
+    assert tally.lost >= 0.5 * tally.strides
+
+
+@pytest.mark.parametrize("fault", ["scuff 60 N", "straddle"])
+@pytest.mark.parametrize("name", RECORDINGS)
+def test_steps_that_go_wrong(name, fault):
+    tally = try_fault(name, fault)
+
+    assert tally.wrong == 0
+    assert tally.lost <= 0.6 * tally.strides

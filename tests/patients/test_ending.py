@@ -1,0 +1,96 @@
+"""The end of a session in the patient's words: true, of its feedback type, and blaming nobody."""
+
+from __future__ import annotations
+
+import html
+import re
+from datetime import time, timedelta
+
+import pytest
+from django.urls import reverse
+
+from rehab.patients.ending import Walked, describe_change
+from rehab.patients.visits import plan_visit
+from rehab.people.models import Patient
+from rehab.sessions.models import TrainingSession
+from tests.support.walks import HIT, MISS, walk
+from tests.support.world import NOW, World, client_of
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def patient(world: World) -> Patient:
+    return Patient.everywhere.create(
+        clinic=world.clinic, code="B-1", nickname="Rosa", paretic_side="left"
+    )
+
+
+def read(world: World, session: TrainingSession) -> str:
+    """Return the page's words."""
+    page = client_of(world).get(reverse("ending", args=[session.pk])).content.decode()
+    words = html.unescape(re.sub(r"<[^>]+>", " ", page.split("<main")[1]))
+    return " ".join(words.replace("\N{NO-BREAK SPACE}", " ").split())
+
+
+@pytest.mark.parametrize(
+    ("rate", "goal", "said"),
+    [
+        (0.7, 2.0, "More steps at the goal than last time."),
+        (0.62, 2.0, "As many steps at the goal as last time."),
+        (0.4, 2.0, "Fewer steps at the goal than last time. Days differ."),
+        (0.6, 2.2, "The goal was higher than last time, and you reached it as often."),
+        (0.3, 2.2, "The goal was higher than last time."),
+        (0.9, 1.8, "The goal was lower than last time."),
+    ],
+)
+def test_the_sentence_is_true_of_both_days(rate: float, goal: float, said: str) -> None:
+    assert describe_change(Walked(rate, 2.0, goal), Walked(0.6, 2.0, 2.0)) == said
+
+
+def test_today_stands_beside_last_time(world, patient):
+    walk(patient, "binary", [HIT] * 9 + [MISS], days_ago=9)
+    walk(patient, "binary", [HIT] * 4 + [MISS] * 6, days_ago=7)
+    walk(patient, "positive", [HIT] * 10, days_ago=2, simulated=True)  # nobody walked that
+    session = walk(patient, "positive", [HIT] * 5 + [MISS] * 3 + [HIT] * 2)
+    day = (NOW + timedelta(days=7)).date()
+    plan_visit(patient, NOW.date(), time(9, 30))
+    plan_visit(patient, day, time(14, 15))
+    words = read(world, session)
+    assert "You walked" in words
+    assert "Today 7 of 10 Last time 4 of 10" in words
+    assert "Most in a row 5" in words
+    assert f"{day:%A} {day.day} {day:%B}, 2:15 p.m." in words
+    assert "More steps at the goal than last time." in words
+
+
+def test_a_type_that_only_takes_points_praises_no_row(world, patient):
+    words = read(world, walk(patient, "negative", [HIT] * 9 + [MISS]))
+    assert "Today 9 of 10" in words
+    assert "Next time you can compare with today." in words
+    assert "in a row" not in words
+
+
+def test_the_explicit_type_shows_values_and_no_verdict(world, patient):
+    walk(patient, "explicit", [MISS] * 4, days_ago=7)
+    words = read(world, walk(patient, "explicit", [HIT] * 4))
+    assert "Your push, on average Today 2.50 W/kg Last time 1.50 W/kg" in words
+    assert "goal" not in words
+    assert "of 10" not in words
+
+
+def test_a_blinded_study_tells_no_figure(world, patient):
+    session = walk(patient, "positive", [HIT] * 10)
+    patient.blinded = True
+    patient.save()
+    words = read(world, session)
+    assert "You walked" in words
+    assert "of 10" not in words
+    assert "in a row" not in words
+    assert reverse("scores", args=[session.pk]) not in words
+
+
+def test_an_open_session_goes_on(world, patient):
+    session = walk(patient, "positive", [HIT], end=None)
+    answer = client_of(world).get(reverse("ending", args=[session.pk]))
+    assert answer.headers["Location"] == reverse("walk", args=[session.pk])

@@ -1,0 +1,66 @@
+"""An incident's orders on a simulated base: it comes to where it was recorded, unless pushed."""
+
+import pytest
+
+from robot.bases.kinematic import IDEAL, KinematicBase
+from robot.behavior.performer import Performer
+from robot.black_box.recorder import BlackBox
+from robot.black_box.witness import Witness
+from robot.motion.gestures import GESTURES
+from robot.motion.limits import TICK_S
+from robot.play_gesture import VirtualClock
+from robot.replay import main, read_ticks, replay
+from robot.wire.incident import read_lines, to_lines
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    """A gesture in the middle of which somebody stopped the robot, as its black box has it."""
+    clock = VirtualClock()
+    base = KinematicBase(clock.monotonic)
+    box = BlackBox(tmp_path / "box", clock.monotonic)
+    box.begin()
+    performer = Performer(base)
+    witness = Witness(box, performer, base)
+    assert not performer.play_alone(GESTURES["celebrate"], clock.now_s)
+    for tick in range(400):
+        performer.tick(clock.now_s)
+        witness.see(clock.now_s)
+        if tick == 90:
+            performer.handle({"type": "stop"}, clock.now_s)
+            witness.hear({"type": "stop"})
+        clock.sleep(TICK_S)
+    box.write()
+    (file,) = (tmp_path / "box").glob("incident-*-stopped.jsonl")
+    return file
+
+
+def test_orders_explain_where_it_was(recorded, capsys):
+    assert main([str(recorded), "--base", "kinematic"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) > 3
+    apart_mm = [float(line.rsplit(maxsplit=2)[1]) for line in lines]
+    assert max(apart_mm) <= 10
+    moved = [one for one in read_ticks(recorded.read_text()) if not one[1].is_still]
+    assert len(moved) > 20
+
+
+def test_what_orders_do_not_explain_shows(recorded):
+    records = read_lines(recorded.read_text())
+    for one in records:
+        if "tick" in one and one["at_s"] > 1.0:
+            one["tick"][3] += 0.1  # somebody pushed it aside
+    ticks = read_ticks(to_lines(records))
+    clock = VirtualClock()
+    with KinematicBase(clock.monotonic, IDEAL) as base:
+        *_, last = replay(ticks, base, clock.monotonic, clock.sleep)
+    assert last.recorded.distance_m(last.replayed) == pytest.approx(0.1, abs=0.02)
+
+
+@pytest.mark.parametrize("text", [None, "", "nonsense\n{}\n", '{"at_s":1,"tick":[1]}\n'])
+def test_a_file_that_is_none_is_refused_with_the_cure(tmp_path, text, capsys):
+    path = tmp_path / "one.jsonl"
+    if text is not None:
+        path.write_text(text)
+    assert main([str(path), "--base", "kinematic"]) == 2
+    assert str(path) in capsys.readouterr().err

@@ -1,0 +1,170 @@
+"""What a plan does by itself while somebody walks, as pages, source, robot and log hear of it."""
+
+from __future__ import annotations
+
+from rehab.sessions.log import SessionEvent, Step
+from rehab.training.adaptation import AdaptationMode, GoalAdaptation
+from rehab.training.cueing import CueRule, CueTiming
+from rehab.training.goals import GoalRule, Target
+from rehab.training.phases import make_phase
+from rehab.training.schedules import Schedule, ScheduleKind
+from tests.support.callers import a_step, restart
+
+TRAINING = make_phase("training")
+
+
+async def events_of(session, kind):
+    rows = SessionEvent.everywhere.filter(session=session, kind=kind).order_by("pk")
+    return [row async for row in rows]
+
+
+async def test_the_robot_gets_the_whole_cue(place, begun):
+    timing = CueTiming(CueRule.STREAKS, window_s=8, count=4, rest_s=30)
+    await begun(place, TRAINING, activation_threshold=0.75, cue_timing=timing)
+    cue = (await (await place.robot().dial()).hello())["cue"]
+    assert {name: cue[name] for name in ("threshold", "rule", "window_s", "count", "rest_s")} == {
+        "threshold": 0.75,
+        "rule": "streaks",
+        "window_s": 8,
+        "count": 4,
+        "rest_s": 30,
+    }
+
+
+async def test_a_phase_without_the_robot_sends_it_no_steps(place, begun):
+    await begun(place, make_phase("training", strides=1, robot=False), TRAINING)
+    robot, source = await place.robot().dial(), await place.source().dial()
+    await robot.hello()
+    await source.hello()
+    await source.walk(4.0, 5.0)
+    assert (await robot.hear("step"))["number"] == 2
+
+
+async def test_an_automatic_goal_is_told_logged_and_found_again(place, begun):
+    session = await begun(
+        place,
+        TRAINING,
+        adaptation=GoalAdaptation(AdaptationMode.AUTOMATIC, strides=5),
+        target=Target(0.6),
+    )
+    source, monitor = await place.source().dial(), place.monitor(session)
+    await source.hello()
+    assert (await monitor.watch())["goal_adaptation"] == "automatic"
+    await source.walk(*[4.0] * 6)
+    goal = 3.0 * (1 + 0.005 * 2)
+    told = await monitor.until(lambda event: event["kind"] == "goal")
+    assert told["goal"] == goal
+    assert [message["goal"] for message in source.heard if message["type"] == "goal"] == [goal]
+    (row,) = await events_of(session, "goal_followed")
+    assert (row.after_number, row.old, row.value, row.by_id) == (5, 3.0, goal, None)
+    steps = [step.goal async for step in Step.everywhere.order_by("number")]
+    assert steps == [3.0] * 5 + [goal]
+
+    await restart()
+    again = await place.monitor(session).watch()
+    assert again["goal"] == goal
+    assert {"after": 5, "kind": "goal", "value": goal} in again["marks"]
+
+
+async def test_twenty_strides_suggest_a_goal_to_the_therapist_alone(place, begun):
+    session = await begun(place, TRAINING, target=Target(0.6))
+    source, monitor, tablet = (
+        await place.source().dial(),
+        place.monitor(session),
+        place.tablet(session),
+    )
+    await source.hello()
+    assert (await monitor.watch())["suggested_goal"] is None
+    await tablet.watch()
+    await source.walk(*[4.0] * 20)
+    assert (await monitor.until_step(19))["suggested_goal"] is None
+    assert (await monitor.until_step(20))["suggested_goal"] == 4.0
+    assert "suggested_goal" not in await tablet.until_step(20)
+
+
+async def test_a_baseline_tells_the_therapist_mean_sd_and_count(place, begun):
+    session = await begun(
+        place,
+        make_phase("baseline", strides=50),
+        TRAINING,
+        goal=GoalRule(percent_of_baseline=110, asks=True),
+    )
+    source, monitor = await place.source().dial(), place.monitor(session)
+    await source.hello()
+    assert (await monitor.watch())["baseline"]["count"] == 0
+    await source.walk(3.0, None, 5.0)
+    baseline = (await monitor.until_step(3))["baseline"]
+    assert baseline == {
+        "mean": 4.0,
+        "sd": 2.0**0.5,
+        "count": 2,
+        "needed": 50,
+        "goal": 4.4,
+        "asks": True,
+    } | {"goal": baseline["goal"]}
+    assert abs(baseline["goal"] - 4.4) < 1e-9
+    await source.walk(*[4.0] * 50)
+    waiting = await monitor.until(lambda event: "to accept its goal" in event.get("obstacle", ""))
+    assert waiting["goal"] is None
+    assert (await monitor.change("phase", 1))["type"] == "done"
+    begun_training = await monitor.until(lambda event: event.get("goal") is not None)
+    assert begun_training["baseline" if "baseline" in begun_training else "phase"]["index"] == 1
+
+
+async def test_a_planned_rest_pauses_everyone_until_the_therapist_goes_on(place, begun):
+    rested = make_phase("training", strides=2, rest_s=90)
+    session = await begun(place, rested, TRAINING)
+    source, robot = await place.source().dial(), await place.robot().dial()
+    monitor, tablet = place.monitor(session), place.tablet(session)
+    await source.hello()
+    await robot.hello()
+    await monitor.watch()
+    await tablet.watch()
+    await source.walk(4.0, 4.0)
+    paused = await monitor.until(lambda event: event.get("state") == "paused")
+    assert (paused["pause_reason"], paused["rest_s"]) == ("rest", 90)
+    await tablet.until(lambda event: event.get("state") == "paused")
+    assert (await robot.hear("state"))["state"] == "paused"
+    kinds = [message["type"] for message in source.heard]
+    assert kinds.index("pause") < len(kinds) - 1  # before the step's acknowledgment
+    assert [row.value for row in await events_of(session, "planned_rest")] == [90]
+    await source.walk(4.0)
+    await source.say(a_step(3))
+    await source.acked(3)  # sent again, it is the same step: stored as paused
+    stored = await Step.everywhere.aget(session=session, number=3)
+    assert stored.reasons == ["paused"]
+
+    await restart()
+    again = place.monitor(session)
+    assert (await again.watch())["pause_reason"] == "rest"
+    assert (await again.change("resume"))["type"] == "done"
+    assert (await again.until(lambda event: event.get("state") == "running"))["rest_s"] is None
+
+
+async def test_every_third_step_is_told_and_the_score_counts_them_all(place, begun):
+    session = await begun(place, TRAINING, schedule=Schedule(interval=3))
+    source, tablet = await place.source().dial(), place.tablet(session)
+    await source.hello()
+    await tablet.watch()
+    await source.walk(4.0, 2.0, 4.0, 2.0)
+    await tablet.until_step(4)
+    told = [event for event in tablet.events if "number" in event]
+    assert [event["kind"] for event in told] == ["calm", "calm", "step", "calm"]
+    assert (told[2]["points"], told[2]["score"]) == (1, 1)
+    again = await place.tablet(session).watch()
+    assert [step["number"] for step in again["steps"]] == [3]
+    assert again["last"]["number"] == 3
+
+
+async def test_a_summary_tells_hits_mean_and_points_of_its_block(place, begun):
+    session = await begun(place, TRAINING, schedule=Schedule(ScheduleKind.SUMMARY, 4))
+    source, tablet = await place.source().dial(), place.tablet(session)
+    await source.hello()
+    await tablet.watch()
+    await source.walk(6.0, 3.0, None, 1.5, 6.0)
+    told = await tablet.until_step(5)
+    assert told["summary"] == {"hits": 3, "steps": 4}
+    assert (told["performance"], told["hit"], told["points"], told["score"]) == (1.375, True, 2, 2)
+    assert told["words"]
+    kinds = [event["kind"] for event in tablet.events if "number" in event]
+    assert kinds == ["calm"] * 4 + ["step"]

@@ -1,0 +1,40 @@
+"""A PT's page drives the robot to its mark; no other page does."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.support.callers import Message
+
+DRIVE: Message = {"type": "robot", "order": "drive", "ahead": 1, "left": -0.5}
+
+
+async def test_what_a_held_button_orders_reaches_the_robot(place, ready):
+    session = await ready(place)
+    robot, monitor = await place.robot().dial(), place.monitor(session)
+    await robot.hello()
+    await monitor.watch()
+    await monitor.say(DRIVE)
+    told = await robot.hear("drive")
+    assert told == {"type": "drive", "ahead": 1, "left": -0.5}
+
+
+async def test_the_patient_s_page_drives_nothing(place, ready):
+    session = await ready(place)
+    robot, tablet = await place.robot().dial(), place.tablet(session)
+    await robot.hello()
+    await tablet.watch()
+    await tablet.say(DRIVE)
+    assert (await tablet.sent_away())[0] == 4400
+    assert "drive" not in [message["type"] for message in await robot.overhear()]
+
+
+@pytest.mark.parametrize(
+    "bad", [{"ahead": -1}, {"ahead": 2}, {"left": "much"}, {"ahead": None}, {"left": 1e9}]
+)
+async def test_a_drive_that_is_none_is_refused(place, ready, bad):
+    session = await ready(place)
+    monitor = place.monitor(session)
+    await monitor.watch()
+    await monitor.say(DRIVE | bad)
+    assert (await monitor.sent_away())[0] == 4400

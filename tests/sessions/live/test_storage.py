@@ -1,0 +1,176 @@
+"""A database that is stuck or full is told in words, and stops neither the process nor its end."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from asgiref.sync import sync_to_async
+from django.db import OperationalError, connection, connections, transaction
+from django.test import Client
+
+from rehab.sessions.live import process
+from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live import writer as writers
+from rehab.sessions.live.commits import Job
+from rehab.sessions.live.writer import Writer, own_connection
+from rehab.sessions.models import TrainingSession
+from tests.support.callers import a_step, numbers, turns
+
+pytestmark = pytest.mark.postgres
+only_postgres = pytest.mark.skipif(
+    "connection.vendor != 'postgresql'", reason="SQLite locks no single row"
+)
+
+
+async def health(path: str = "/healthz") -> tuple[int, str]:
+    answer = await sync_to_async(Client().get)(path)
+    return answer.status_code, answer.content.decode()
+
+
+async def test_a_writer_that_is_late_is_told_to_all(place, begun, stall, monkeypatch, caplog):
+    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.01)
+    session = await begun(place)
+    monitor, robot = place.monitor(session), await place.robot().dial()
+    assert (await monitor.watch())["presence"]["storage"] == ""
+    assert (await robot.hello())["state"] == "running"
+    source = await place.source().dial()
+    await source.hello()
+    monkeypatch.setattr(writers, "LATE_S", 0.05)
+    stall.begin()
+    await source.say(a_step(1))
+    await monitor.until(lambda e: e["kind"] == "presence" and e["presence"]["storage"] == "late")
+    assert (await robot.hear("state"))["state"] == "paused"  # it stands still
+    assert "database does not answer" in caplog.text
+    status, words = await health()
+    assert status == 503
+    assert "database does not answer" in words
+    monkeypatch.setattr(writers, "LATE_S", 1.0)
+    stall.end()
+    await source.acked(1)
+    await monitor.until(lambda e: e["kind"] == "presence" and e["presence"]["storage"] == "")
+    assert (await robot.hear("state"))["state"] == "running"
+    assert await health() == (200, "ok\n")
+    assert "Steps are stored again." in caplog.text
+
+
+async def test_a_full_disk_is_said_in_words(place, begun, stall, monkeypatch):
+    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.01)
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    stall.problem = OperationalError("database or disk is full")
+    await source.say(a_step(1))
+    code, error = await source.sent_away()
+    assert (code, error["code"]) == (4011, "not_stored")
+    assert "disk of the database is full" in error["message"]
+    assert "Make room" in (await health())[1]
+    assert (await place.monitor(session).watch())["presence"]["storage"] == "disk_full"
+    stall.problem = None
+    again = await place.source().dial()
+    await again.hello()
+    await again.walk(4.0)
+    assert await health() == (200, "ok\n")
+
+
+async def test_readiness_waits_for_the_sessions_of_the_last_run_and_ends_with_the_drain(place):
+    assert (await health("/readyz"))[0] == 503
+    runtime = runtimes.current()
+    assert (await health("/readyz"))[0] == 503
+    await runtime.recover()
+    assert await health("/readyz") == (200, "ok\n")
+    await runtime.drain()
+    assert (await health("/readyz"))[0] == 503
+
+
+async def test_a_stride_counts_as_heard_when_it_is_stored(place, begun, stall):
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    live = await runtimes.current().session(session.pk)
+    stall.begin()
+    await source.say(a_step(1))
+    await turns()
+    assert live.aggregate.fold.last_number == 1
+    assert live.stride_at is None
+    stall.end()
+    await source.acked(1)
+    assert live.stride_at is not None
+
+
+async def test_a_database_that_never_answers_holds_up_no_end(stall, live_path, monkeypatch):
+    monkeypatch.setattr(writers, "CLOSE_S", 0.05)
+    writer = Writer(lambda function: function())
+    stall.begin()
+    writer.submit(Job(threading.Event(), 0, 0, [], None, lambda _: None))
+    await asyncio.get_running_loop().run_in_executor(None, writer.close)
+    assert writer._thread.is_alive()  # nobody waited for it
+    assert writer._thread.daemon
+    stall.end()
+    writer._thread.join(5)
+
+
+def test_a_stop_that_takes_too_long_ends_the_process(monkeypatch):
+    ended = threading.Event()
+    monkeypatch.setattr(process, "STOP_S", 0.01)
+    monkeypatch.setattr(os, "_exit", lambda status: ended.set())
+    process.end_in_time()
+    assert ended.wait(5)
+
+
+@contextmanager
+def locked(session: TrainingSession) -> Iterator[None]:
+    """Hold the lock of a session's row, as a page that hangs does."""
+    has_it, done = threading.Event(), threading.Event()
+
+    def hold() -> None:
+        with transaction.atomic():
+            TrainingSession.everywhere.select_for_update().get(pk=session.pk)
+            has_it.set()
+            assert done.wait(20)
+        connection.close()
+
+    holder = threading.Thread(target=hold)
+    holder.start()
+    assert has_it.wait(5)
+    try:
+        yield
+    finally:
+        done.set()
+        holder.join()
+
+
+@only_postgres
+async def test_a_locked_session_holds_up_no_other_for_long(place, elsewhere, begun, monkeypatch):
+    monkeypatch.setattr(writers, "LOCK_TIMEOUT_MS", 200)
+    session = await begun(place)
+    other = await begun(elsewhere)
+    mine, theirs = await place.source().dial(), await elsewhere.source().dial()
+    await mine.hello()
+    await theirs.hello()
+    with locked(session):
+        await mine.say(a_step(1))
+        await theirs.say(a_step(1))
+        await theirs.acked(1)
+        assert (await mine.sent_away())[0] == 4011
+    assert (await numbers(session), await numbers(other)) == ([], [1])
+
+
+@only_postgres
+def test_the_writers_connection_is_its_own_and_gives_up(transactional_db):
+    own = own_connection()
+    try:
+        assert "pool" not in own.settings_dict["OPTIONS"]
+        assert "pool" in connections["default"].settings_dict["OPTIONS"]
+        with own.cursor() as cursor:
+            cursor.execute("SHOW lock_timeout")
+            assert cursor.fetchone() == ("3s",)
+            cursor.execute("SHOW statement_timeout")
+            assert cursor.fetchone() == ("10s",)
+            cursor.execute("SELECT 1")
+    finally:
+        own.close()

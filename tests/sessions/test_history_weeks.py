@@ -1,0 +1,65 @@
+"""Past sessions by weeks: which period, and what was noted of falls and exertion."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from rehab.people.models import Patient
+from rehab.people.roles import Role
+from rehab.sessions.log import SessionEvent
+from rehab.sessions.models import TrainingSession
+from tests.support.walks import strides, walk
+from tests.support.world import NOW, World, client_of
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def patient(world: World) -> Patient:
+    return Patient.everywhere.create(
+        clinic=world.clinic, code="B-1", nickname="Rosa", paretic_side="left"
+    )
+
+
+def words(world: World, patient: Patient, asked: str = "") -> str:
+    page = client_of(world, Role.PT).get(f"/patients/{patient.pk}/sessions/{asked}")
+    told = re.search(r"<main.*</main>", page.content.decode(), re.DOTALL)
+    assert told
+    return " ".join(re.sub("<[^>]+>", " ", told[0]).replace("\N{NO-BREAK SPACE}", " ").split())
+
+
+def note(session: TrainingSession, *kinds: tuple[str, float | None]) -> None:
+    for kind, value in kinds:
+        SessionEvent.everywhere.create(
+            session=session, kind=kind, value=value, after_number=1, at=NOW
+        )
+
+
+def test_a_period_leaves_older_sessions_out_and_keeps_the_type(world, patient):
+    for days_ago in (1, 40, 100, 400):
+        walk(patient, "positive", strides(3, 2), days_ago=days_ago)
+    walk(patient, "binary", strides(3, 2), days_ago=2)
+    for weeks, count in (("4", 2), ("12", 3), ("52", 4), ("", 5), ("3000", 5), ("-1", 5)):
+        assert f"All {count} " in words(world, patient, f"?weeks={weeks}")
+    told = words(world, patient, "?type=binary&weeks=12")
+    assert told.count("Binary · goal") == 1
+    assert "Positive · goal" not in told
+    assert "in this period" in words(world, patient, "?type=negative&weeks=4")
+
+
+def test_sessions_stand_under_their_week(world, patient):
+    for days_ago in (0, 0, 14):
+        walk(patient, "positive", strides(3, 2), days_ago=days_ago)
+    assert words(world, patient).count("Week of ") == 2
+
+
+def test_falls_and_exertion_stand_with_their_session(world, patient):
+    first = walk(patient, "positive", strides(3, 2), days_ago=2)
+    note(first, ("borg", 3), ("fall", None), ("fall", None), ("fall_withdrawn", None), ("borg", 5))
+    other = walk(patient, "positive", strides(3, 2), days_ago=1)
+    note(other, ("fall", None), ("fall_withdrawn", None))
+    told = words(world, patient)
+    assert told.count("fall") == 1
+    assert "1 fall · Borg 3–5" in told

@@ -1,0 +1,77 @@
+"""What the page that takes recordings does not take."""
+
+from __future__ import annotations
+
+import pytest
+
+from rehab.sessions.setup import recordings
+from rehab.sessions.setup.recordings import (
+    UploadRefused,
+    add_part,
+    name_recording,
+    uploaded_file,
+    write_columns,
+)
+
+
+@pytest.fixture(autouse=True)
+def folder(settings, tmp_path):
+    settings.DATA_DIR = tmp_path
+    return tmp_path
+
+
+def test_parts_follow_each_other():
+    file = uploaded_file(7, ".csv")
+    add_part(file, b"abc", 0)
+    for at in (0 + 1, 4, -1):
+        with pytest.raises(UploadRefused):
+            add_part(file, b"x", at)
+    add_part(file, b"def", 3)
+    assert file.read_bytes() == b"abcdef"
+
+
+def test_another_upload_replaces_the_one_before_of_this_person_only():
+    mine, theirs = uploaded_file(7, ".csv"), uploaded_file(8, ".csv")
+    add_part(mine, b"mine", 0)
+    add_part(theirs, b"theirs", 0)
+    other = uploaded_file(7, ".c3d")
+    add_part(other, b"new", 0)
+    assert not mine.exists()
+    assert (other.read_bytes(), theirs.read_bytes()) == (b"new", b"theirs")
+
+
+def test_sizes_are_bounded(monkeypatch):
+    monkeypatch.setattr(recordings, "BYTES_MAX", 10)
+    file = uploaded_file(7, ".csv")
+    add_part(file, b"12345678", 0)
+    with pytest.raises(UploadRefused):
+        add_part(file, b"345", 8)
+    with pytest.raises(UploadRefused):
+        add_part(file, bytes(recordings.PART_BYTES + 1), 0)
+
+
+@pytest.mark.parametrize("ending", ["", ".py", "/../../x.csv", ".csv/..", ".gz"])
+def test_other_kinds_of_files(ending):
+    with pytest.raises(UploadRefused):
+        uploaded_file(7, ending)
+
+
+def test_names_lead_nowhere_else():
+    assert name_recording("../../etc/Passwd") == "etcpasswd.csv"
+    assert name_recording("Walk 7, left!") == "walk-7-left.csv"
+    assert name_recording("…/..") == ""
+
+
+def test_columns_as_they_are_chosen():
+    chosen = {
+        "left.force": {"column": "F z", "factor": "-1", "delay_ms": ""},
+        "left.angle": {"column": "", "factor": "2", "delay_ms": ""},
+        "left.moment": {"column": "M", "factor": "0,001", "delay_ms": "12"},
+    }
+    assert write_columns(chosen, {"column": "t", "factor": ""}) == [
+        "time=t*1",
+        "left.force=F z*-1@0",
+        "left.moment=M*0.001@0.012",
+    ]
+    with pytest.raises(ValueError, match="one"):
+        write_columns(chosen, {"column": "t", "factor": "one"})

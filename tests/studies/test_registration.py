@@ -1,0 +1,189 @@
+"""A study is fixed before its first patient, and every later change is a version of its own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from rehab.people.roles import Role
+from rehab.sessions.setup.protocols import Protocol, ProtocolPhase
+from rehab.studies.allocation.scheme import Secret
+from rehab.studies.append_only import AppendOnlyRow
+from rehab.studies.models import StudyState
+from rehab.studies.participants import StudyEvent
+from rehab.studies.registration import close, current_version, digest_of, register, revise, start
+from rehab.studies.sealing import seal, unseal
+from rehab.studies.visits import Place, start_session
+from rehab.training.measures import InvalidSetting
+from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
+from tests.support.world import NOW, World
+
+pytestmark = pytest.mark.django_db
+
+
+def kinds(study) -> list[str]:
+    return list(study.events.values_list("kind", flat=True))
+
+
+def test_registering_fixes_the_plan_and_publishes_a_commitment_alone(world):
+    study = draft_study(world)
+    version = register(study, world.people[Role.LEAD], NOW)
+    study.refresh_from_db()
+    assert study.state == StudyState.REGISTERED
+    assert version.document["allocation"]["commitment_sha256"] == study.commitment
+    assert unseal(study.sealed).commitment == study.commitment
+    assert version.digest == digest_of(version.document)
+    assert [arm["feedback_type"] for arm in version.document["arms"]] == ["positive", "negative"]
+    assert version.document["arms"][0]["phases"][0]["kind"] == "baseline"
+    assert SEED not in str(version.document) + study.sealed
+    with pytest.raises(InvalidSetting, match="is registered"):
+        register(study, None, NOW)
+    with pytest.raises(AppendOnlyRow):
+        version.save()
+
+
+@pytest.mark.parametrize(
+    ("change", "cure"),
+    [
+        ({"sealed": Secret(SEED, (3,))}, "Use multiples of 2"),
+        ({"sealed": Secret("short", (2,))}, "at least 8"),
+        ({"method": "list"}, "Paste the list"),
+        ({"method": "minimization"}, "at least one"),
+        ({"visits": 0}, "1 to 60"),
+    ],
+)
+def test_a_study_that_could_not_be_run_is_not_registered(world, change, cure):
+    change = {k: seal(v) if isinstance(v, Secret) else v for k, v in change.items()}
+    study = draft_study(world, **change)
+    with pytest.raises(InvalidSetting, match=cure):
+        register(study, None, NOW)
+    study.refresh_from_db()
+    assert study.is_draft
+    assert kinds(study) == []
+
+
+def test_arms_that_could_not_be_walked_are_refused(world):
+    study = draft_study(world)
+    without = Protocol.everywhere.get(clinic=None, name="Training only")
+    study.arms.filter(code="B").update(protocol=without)
+    with pytest.raises(InvalidSetting, match="needs a baseline phase"):
+        register(study, None, NOW)
+    study.arms.all().update(protocol=study.arms.first().protocol, valence="positive")
+    with pytest.raises(InvalidSetting, match="Arms A and B do the same"):
+        register(study, None, NOW)
+
+
+def test_a_seal_opens_with_the_servers_own_key_only(world, settings):
+    sealed = seal(Secret(SEED, (2,)))
+    settings.SECRET_KEY = "another key than that of before, long enough"
+    with pytest.raises(InvalidSetting, match="GARRY_SECRET_KEY"):
+        unseal(sealed)
+
+
+def test_an_arm_whose_protocol_was_deleted_says_so(world):
+    study = draft_study(world)
+    own_protocol(world, study)
+    register(study, None, NOW)
+    Protocol.everywhere.get(name="Of the study").delete()
+    with pytest.raises(InvalidSetting, match="protocol of arm A was deleted"):
+        current_version(study)
+
+
+def own_protocol(world: World, study) -> ProtocolPhase:
+    protocol = Protocol.everywhere.create(clinic=world.clinic, name="Of the study")
+    for position, kind in enumerate(("baseline", "training", "washout")):
+        ProtocolPhase.everywhere.create(
+            protocol=protocol,
+            position=position,
+            kind=kind,
+            name=kind,
+            feedback=kind == "training",
+            strides=60,
+        )
+    study.arms.all().update(protocol=protocol)
+    return protocol.phases.get(kind="training")
+
+
+def test_a_protocol_that_is_changed_after_the_start_needs_a_new_version(world):
+    study = draft_study(world)
+    training = own_protocol(world, study)
+    register(study, None, NOW)
+    start(study, None, NOW)
+    first = enrolled(study, new_patient(world, 1))
+    before = start_session(first, Place(), None, NOW)
+    training.strides = 90
+    training.save()
+    newcomer = new_patient(world, 2)
+    with pytest.raises(InvalidSetting, match="new version"):
+        enrolled(study, newcomer)
+    with pytest.raises(InvalidSetting, match="Say why"):
+        revise(study, " ", None, NOW)
+    revise(study, "Ninety strides are needed to learn.", None, NOW)
+    second = enrolled(study, newcomer)
+    after = start_session(second, Place(), None, NOW)
+    numbers = [visit.version.number for visit in (before.study_visit, after.study_visit)]
+    assert numbers == [1, 2]
+    phases = [
+        version.document["arms"][0]["phases"][1]["strides"] for version in study.versions.all()
+    ]
+    assert phases == [60, 90]
+    with pytest.raises(InvalidSetting, match="Nothing is different"):
+        revise(study, "again", None, NOW)
+
+
+def test_what_was_allocated_cannot_be_allocated_otherwise(world):
+    study = running_study(world)
+    study.arms.filter(code="A").update(weight=2)
+    with pytest.raises(InvalidSetting, match="plan a new one"):
+        revise(study, "more of A", None, NOW)
+    study.arms.filter(code="A").update(weight=1)
+    study.method, study.factors = "minimization", [["severity", ["mild", "severe"]]]
+    with pytest.raises(InvalidSetting, match="plan a new one"):
+        revise(study, "balance", None, NOW)
+    study.refresh_from_db()
+    assert current_version(study).number == 1
+
+
+def test_closing_waits_for_open_sessions_and_ends_what_was_hidden(world):
+    study = running_study(world)
+    patient = new_patient(world)
+    session = start_session(enrolled(study, patient), Place(), None, NOW)
+    with pytest.raises(InvalidSetting, match="End it first"):
+        close(study, None, NOW)
+    session.state = "finished"
+    session.save()
+    close(study, world.people[Role.LEAD], NOW)
+    patient.refresh_from_db()
+    assert not patient.blinded
+    assert kinds(study) == ["registered", "started", "enrolled", "closed"]
+    with pytest.raises(InvalidSetting, match="Only a running study"):
+        enrolled(study, new_patient(world, 2))
+
+
+def test_events_are_only_added(world):
+    study = running_study(world)
+    event = study.events.first()
+    event.reason = "otherwise"
+    with pytest.raises(AppendOnlyRow):
+        event.save()
+    assert StudyEvent.everywhere.get(pk=event.pk).reason == ""
+    with pytest.raises(AppendOnlyRow):
+        event.delete()
+
+
+def test_a_study_warns_of_negative_feedback_early_after_a_stroke(world):
+    study = draft_study(world, months_since_stroke=None)
+    assert study.risks_early_punishment
+    study.months_since_stroke = 5
+    assert study.risks_early_punishment
+    study.months_since_stroke = 6
+    assert not study.risks_early_punishment
+    study.months_since_stroke = None
+    study.arms.all().update(valence="positive")
+    assert not study.risks_early_punishment
+
+
+def test_a_commitment_depends_on_every_part_of_the_secret():
+    secret = Secret(SEED, (2, 4))
+    assert secret.commitment != replace(secret, block_sizes=(2,)).commitment

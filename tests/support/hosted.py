@@ -1,0 +1,217 @@
+"""A hosted set of its own on loopback, in a folder: PostgreSQL, and nginx with TLS before GARRY.
+
+Services that run on the machine already are not touched.
+"""
+
+from __future__ import annotations
+
+import os
+import pwd
+import shutil
+import signal
+import socket
+import ssl
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
+from ipaddress import IPv4Address
+from pathlib import Path
+from typing import Any
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import NameOID
+
+from tests.support.servers import ROOT, free_port
+
+NAME = "localhost"
+DEPLOY = ROOT / "deploy"
+PASSWORD = "only on loopback, for a minute"
+
+
+def find_missing() -> str:
+    """Return what the set needs and this machine lacks, with the cure; empty where it is there."""
+    programs = {"nginx-light": find_nginx(), "postgresql": find_initdb()}
+    lacking = [package for package, program in programs.items() if program is None]
+    return f"apt-get install {' '.join(lacking)}" if lacking else ""
+
+
+def find_nginx() -> str | None:
+    """Return nginx, which Debian keeps where only root looks."""
+    return shutil.which("nginx", path=f"{os.environ['PATH']}:/usr/sbin")
+
+
+def find_initdb() -> Path | None:
+    """Return the newest PostgreSQL's initdb."""
+    found = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"))
+    return found[-1] if found else None
+
+
+@contextmanager
+def run_postgres() -> Iterator[str]:
+    """Run a PostgreSQL of our own until the block ends; yield the address of its database.
+
+    It refuses to run as root, so then it runs as somebody else, in a folder that is theirs.
+    """
+    with tempfile.TemporaryDirectory(prefix="garry-postgres-") as name:
+        yield from _run_postgres(Path(name))
+
+
+def _run_postgres(folder: Path) -> Iterator[str]:
+    bin_folder = find_initdb().parent
+    port = free_port()
+    data, sockets = folder / "data", folder / "sockets"
+    sockets.mkdir()
+    secret = folder / "password"
+    secret.write_text(PASSWORD)
+    account: dict[str, Any] = {}
+    if os.geteuid() == 0:
+        other = pwd.getpwnam("postgres")
+        account = {"user": other.pw_uid, "group": other.pw_gid, "extra_groups": []}
+        for path in (folder, sockets, secret):
+            os.chown(path, other.pw_uid, other.pw_gid)
+    made = subprocess.run(
+        [
+            *(bin_folder / "initdb", "--pgdata", data, "--username=garry", f"--pwfile={secret}"),
+            *("--auth=scram-sha-256", "--encoding=UTF8", "--locale=C", "--no-sync"),
+        ],
+        capture_output=True,
+        text=True,
+        cwd="/",
+        **account,
+    )
+    assert made.returncode == 0, made.stderr
+    options = f"-p {port} -c listen_addresses=127.0.0.1 -c unix_socket_directories={sockets}"
+    server = subprocess.Popen(
+        [bin_folder / "postgres", "-D", data, *options.split()],
+        cwd="/",
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        **account,
+    )
+    try:
+        _wait_for_postgres(bin_folder, port)
+        _make_database(port)
+        yield _address(port, "garry")
+    finally:
+        server.send_signal(signal.SIGINT)  # it waits for no client
+        server.wait(30)
+
+
+def _wait_for_postgres(bin_folder: Path, port: int) -> None:
+    ready = [str(bin_folder / "pg_isready"), "-q", "-h", "127.0.0.1", "-p", str(port), "-t", "1"]
+    for _ in range(60):
+        if subprocess.run(ready).returncode == 0:
+            return
+    raise RuntimeError("PostgreSQL does not answer")
+
+
+def _wait_for_port(port: int) -> None:
+    for _ in range(200):
+        try:
+            socket.create_connection(("127.0.0.1", port), 1).close()
+        except ConnectionRefusedError:
+            time.sleep(0.05)
+        else:
+            return
+    raise RuntimeError(f"Nobody listens at port {port}")
+
+
+def _make_database(port: int) -> None:
+    import psycopg
+
+    with psycopg.connect(_address(port, "postgres"), autocommit=True) as connection:
+        connection.execute("CREATE DATABASE garry")
+
+
+def _address(port: int, database: str) -> str:
+    return f"postgres://garry:{PASSWORD.replace(' ', '%20')}@127.0.0.1:{port}/{database}"
+
+
+def make_certificate(folder: Path) -> ssl.SSLContext:
+    """Write a certificate for this machine and its key; return a context that trusts it."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, NAME)])
+    now = datetime.now(UTC)
+    certificate = (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(name)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - timedelta(days=1))
+        .not_valid_after(now + timedelta(days=1))
+        .add_extension(
+            x509.SubjectAlternativeName(
+                [x509.DNSName(NAME), x509.IPAddress(IPv4Address("127.0.0.1"))]
+            ),
+            critical=False,
+        )
+        .sign(key, hashes.SHA256())
+    )
+    pem = certificate.public_bytes(serialization.Encoding.PEM)
+    (folder / "fullchain.pem").write_bytes(pem)
+    (folder / "privkey.pem").write_bytes(
+        key.private_bytes(
+            serialization.Encoding.PEM,
+            serialization.PrivateFormat.PKCS8,
+            serialization.NoEncryption(),
+        )
+    )
+    return ssl.create_default_context(cadata=pem.decode())
+
+
+def adapt(text: str, changes: dict[str, str]) -> str:
+    """Return a file of deploy/ with what docs/hosting.md says to change. Each is in it."""
+    for old, new in changes.items():
+        assert old in text, f"deploy/ has no {old!r} any more"
+        text = text.replace(old, new)
+    return text
+
+
+@contextmanager
+def run_nginx(folder: Path, server_port: int) -> Iterator[tuple[str, str, ssl.SSLContext]]:
+    """Run nginx before a server until the block ends, by the configuration that we ship.
+
+    Yields its addresses with and without TLS, and a context that trusts it.
+    """
+    folder.mkdir()
+    plain, secure = free_port(), free_port()
+    tls = make_certificate(folder)
+    site = adapt(
+        (DEPLOY / "nginx" / "garry.conf").read_text(),
+        {
+            "garry.example.org": NAME,
+            "/etc/ssl/garry": str(folder),
+            "server 127.0.0.1:8000;": f"server 127.0.0.1:{server_port};",
+            "listen 80;": f"listen 127.0.0.1:{plain};",
+            "listen 443 ssl http2;": f"listen 127.0.0.1:{secure} ssl http2;",
+            "    listen [::]:80;\n": "",
+            "    listen [::]:443 ssl http2;\n": "",
+        },
+    )
+    (folder / "garry.conf").write_text(site)
+    temporary = "".join(
+        f"{kind}_temp_path {folder}/{kind};\n"
+        for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+    )
+    main = folder / "nginx.conf"
+    main.write_text(
+        f"daemon off;\n{'user root;' if os.geteuid() == 0 else ''}\npid {folder}/pid;\n"
+        f"error_log {folder}/error.log;\nevents {{ worker_connections 1024; }}\n"
+        f"http {{ access_log off;\n{temporary}include {folder}/garry.conf; }}\n"
+    )
+    command = [find_nginx(), "-p", str(folder), "-c", str(main)]
+    tried = subprocess.run([*command, "-t"], capture_output=True, text=True)
+    assert tried.returncode == 0, tried.stderr
+    server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    try:
+        _wait_for_port(secure)
+        yield f"http://{NAME}:{plain}", f"https://{NAME}:{secure}", tls
+    finally:
+        server.terminate()
+        server.wait(10)
