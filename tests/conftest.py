@@ -217,19 +217,22 @@ def world(_amber: Callable[[], World], db: None) -> World:
 
 
 @pytest.fixture(scope="session")
-def _chromium() -> Any:
+def shared_chromium() -> Any:
     from tests.support.browsers import SharedChromium
 
     return SharedChromium()
 
 
 @pytest.fixture(scope="module")
-def browser(_chromium: Any) -> Iterator[Any]:
+def browser(shared_chromium: Any) -> Iterator[Any]:
     """Chromium: one process for all tests in a row that need it. Its driver leaves no room for an
     event loop of a test, so it ends before a test of another kind.
     """
-    SHARED["chromium"] = (lambda item: bool(item.get_closest_marker("browser"))), _chromium.close
-    running = _chromium.browser()
+    SHARED["chromium"] = (
+        (lambda item: bool(item.get_closest_marker("browser"))),
+        shared_chromium.close,
+    )
+    running = shared_chromium.browser()
     yield running
     for context in running.contexts:
         context.close()

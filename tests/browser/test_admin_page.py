@@ -50,7 +50,6 @@ def page(browser: Browser, server: Server, protocol: str) -> Iterator[Page]:
     context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
     made = context.new_page()
     complaints: list[str] = []
-    made.on("pageerror", lambda error: complaints.append(str(error)))
     made.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
     yield made
     context.close()

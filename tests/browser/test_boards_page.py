@@ -63,7 +63,6 @@ def test_a_board_is_built_with_its_preview_and_seen_on_a_tablet(tmp_path, browse
             )
             context.set_default_timeout(PATIENCE_MS)
             page = context.new_page()
-            page.on("pageerror", lambda error: complaints.append(str(error)))
             page.on(
                 "console",
                 lambda said: complaints.append(said.text) if said.type == "error" else None,

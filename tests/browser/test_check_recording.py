@@ -39,7 +39,6 @@ def page(server: Server, browser: Browser):
     context.set_default_timeout(60_000)
     context.add_cookies([{"name": "sessionid", "value": ready.cookie, "url": server.url}])
     page = context.new_page()
-    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
     yield page
     context.close()
 

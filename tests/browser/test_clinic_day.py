@@ -46,7 +46,6 @@ def page_with(
     )
     context.set_default_timeout(40_000)
     page = context.new_page()
-    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
     yield page
     context.close()
 

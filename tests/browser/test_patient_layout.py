@@ -52,7 +52,6 @@ def page_of(browser: Browser, server: Server, walk: Walk, *, alone: bool) -> Ite
     context.add_cookies([{"name": name, "value": value, "url": server.url}])
     context.set_default_timeout(40_000)
     page = context.new_page()
-    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
     page.goto(walk.path)
     yield page
     context.close()

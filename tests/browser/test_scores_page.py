@@ -64,7 +64,6 @@ def tablet(browser: Browser, server: Server, size: str, *, still: bool = False) 
     page.fill("#id_password", server.password)
     page.click("[type=submit]")
     complaints: list[str] = []
-    page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
     yield page
     context.close()

@@ -31,9 +31,12 @@ def page(browser: Browser, server: Server) -> Iterator[Page]:
         has_touch=True,
     ) as context:
         made = context.new_page()
-        made.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
-        made.on("console", lambda said: pytest.fail(said.text) if said.type == "error" else None)
+        complaints: list[str] = []
+        made.on(
+            "console", lambda said: complaints.append(said.text) if said.type == "error" else None
+        )
         yield made
+    assert complaints == []
 
 
 def sign_in(page: Page, server: Server) -> None:

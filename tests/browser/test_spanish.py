@@ -98,8 +98,6 @@ def test_a_session_is_told_in_the_languages_of_who_reads_it(
 ) -> None:
     pt: Callable[[Page], None] = {"es": is_spanish, "en": is_english}[language]
     desk, tablet = therapist.new_page(), therapist.new_page()
-    for page in (desk, tablet):
-        page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
     patient = 0
     for path in ("/account/", "/start/", "/tablets/pair/", "/account/second-factor/app/", "/"):
         desk.goto(path)

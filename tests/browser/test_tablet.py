@@ -25,9 +25,7 @@ def test_a_paired_tablet_follows_its_station(tmp_path, browser: Browser):
                 base_url=server.url, viewport={"width": width, "height": height}
             )
             context.set_default_timeout(PATIENCE_MS)
-            page = context.new_page()
-            page.on("pageerror", lambda error: pytest.fail(f"the page failed: {error}"))
-            return page
+            return context.new_page()
 
         pt, tablet = open_page("laptop"), open_page("tablet-portrait")
         tablet.goto("/tablet/")

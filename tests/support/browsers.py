@@ -6,7 +6,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
 SIZES = {
     "phone": (390, 844),
@@ -36,9 +36,17 @@ def go_on_to_scores(page: Page) -> None:
 
 
 class SharedChromium:
-    """Chromium that stays until it is closed, and is started again when asked for."""
+    """Chromium that stays until it is closed, and is started again when asked for.
+
+    Attributes
+    ----------
+    page_errors
+        Errors in scripts that no page has caught, of all pages. They are kept and not raised:
+        an exception in a listener ends Playwright's event loop, and all tests after it fail.
+    """
 
     def __init__(self) -> None:
+        self.page_errors: list[str] = []
         self._running: AbstractContextManager[Browser] | None = None
         self._browser: Browser | None = None
 
@@ -47,8 +55,17 @@ class SharedChromium:
         if self._running is None:
             self._running = chromium()
             self._browser = self._running.__enter__()
+            self._browser.on("context", self._listen)
         assert self._browser is not None
         return self._browser
+
+    def _listen(self, context: BrowserContext) -> None:
+        context.on(
+            "weberror",
+            lambda error: self.page_errors.append(
+                f"{error.page and error.page.url}: {error.error}"
+            ),
+        )
 
     def close(self) -> None:
         """Close the browser, if it runs."""
