@@ -29,9 +29,10 @@ quiet = out=$$($(1) 2>&1) || { printf '%s\n' "$$out" >&2; exit 1; }
 
 # Tests share the cores: a worker that has none left takes half of what another still has. Those of
 # real time (a robot's 20 ms) then run alone, also after a failure. With ARGS there may be none (5).
-# Without GARRY_TEST_ALL long ones are left out, and properties are tried with fewer examples.
-some = $(1) -m pytest $(2) -m 'not (bench or screenshots$(if $(GARRY_TEST_ALL),, or long)) $(3)' \
-	$(ARGS) || [ $$? = 5 ]
+# Without GARRY_TEST_ALL long ones are left out, of browsers and real time all but the essential ones,
+# and properties are tried with fewer examples.
+left_out = $(if $(GARRY_TEST_ALL),,or long or ((browser or realtime) and not essential))
+some = $(1) -m pytest $(2) -m 'not (bench or screenshots $(left_out)) $(3)' $(ARGS) || [ $$? = 5 ]
 shared = { $(call some,$(1),$(2) -n auto --maxprocesses 4 --dist worksteal,and not realtime $(3)); }
 alone = { $(call some,$(1),$(2),and realtime $(3)); }
 run_tests = status=0; $(call shared,$(1),$(2),$(3)) || status=1; \

@@ -113,6 +113,7 @@ def test_no_program_reads_or_changes_anything_of_another_clinic(capsys):
 # --- the matrix can fail: seeded leaks ------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_person_whom_a_researchers_program_is_told_is_caught(monkeypatch):
     monkeypatch.setattr(people_api, "may_see_names", lambda context: True)
     leaks, _ = find_leaks((build_world("amber"), build_world("birch")))

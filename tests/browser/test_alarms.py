@@ -88,6 +88,7 @@ def hear_stop(robot: ClientConnection) -> None:
         pass
 
 
+@pytest.mark.essential
 def test_a_fall_stops_the_robot_pauses_and_is_noted_before_anything_is_asked(
     server: Server, monitor: Page, walk: Walk
 ) -> None:
@@ -105,6 +106,7 @@ def test_a_fall_stops_the_robot_pauses_and_is_noted_before_anything_is_asked(
         assert monitor.evaluate("heard") == []  # whoever tapped knows it
 
 
+@pytest.mark.essential
 @pytest.mark.realtime
 def test_a_fall_is_at_the_robot_within_a_tenth_of_a_second(
     server: Server, monitor: Page, walk: Walk
@@ -150,6 +152,7 @@ def test_undo_withdraws_the_note_alone(server: Server, monitor: Page, walk: Walk
         expect(monitor.get_by_role("button", name="Not hurt")).to_be_visible()
 
 
+@pytest.mark.essential
 @pytest.mark.realtime
 def test_a_silent_sensor_is_seen_heard_and_felt(
     server: Server, browser: Browser, monitor: Page, walk: Walk

@@ -41,6 +41,7 @@ def choose(page: Page, words: str) -> None:
     page.click(f".radiolist label:has-text('{words}')")
 
 
+@pytest.mark.essential
 def test_a_board_is_built_with_its_preview_and_seen_on_a_tablet(tmp_path, browser: Browser):
     with serve(tmp_path) as server:
         seeded = subprocess.run(

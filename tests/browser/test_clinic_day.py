@@ -71,6 +71,7 @@ print(TrainingSession.everywhere.filter(patient__nickname="Amara").count())
 """
 
 
+@pytest.mark.essential
 def test_from_today_to_walking_in_three_taps(server: Server, browser: Browser) -> None:
     (walk,) = make_walks(server, {})
     run(server, EXPECTED)

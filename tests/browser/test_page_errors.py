@@ -12,6 +12,7 @@ pytestmark = pytest.mark.browser
 RAISES = "data:text/html,<script>setTimeout(() => { throw Error('not caught') })</script>"
 
 
+@pytest.mark.essential
 def test_an_error_that_no_page_caught_is_kept_for_the_end_of_its_test(
     browser: Browser, shared_chromium: SharedChromium
 ) -> None:

@@ -77,6 +77,7 @@ def synthetic(server: Server, walk: Walk, seed: int) -> subprocess.Popen[bytes]:
     )
 
 
+@pytest.mark.essential
 def test_numbers_on_the_page_equal_the_database(server, browser):
     walks = make_walks(server, *({"valence": valence} for valence in VALENCES))
     with ExitStack() as stack:
@@ -147,6 +148,7 @@ def test_what_a_step_shows_is_there_after_a_reload_and_on_a_second_tablet(server
         assert page.evaluate(DIGEST) == shown
 
 
+@pytest.mark.essential
 def test_a_session_from_start_to_scores(server, browser):
     phases = [{"kind": "training", "strides": 3}, {"kind": "catch", "strides": 10}]
     (walk,) = make_walks(server, {"phases": phases})
@@ -266,6 +268,7 @@ def test_a_page_that_is_signed_out_says_so_and_stops(server, browser):
         assert page.locator("text=Load again").is_visible()
 
 
+@pytest.mark.essential
 def test_the_robot_can_be_stopped_from_the_page(server, browser):
     (walk,) = make_walks(server, {})
     header = {"Authorization": f"Bearer {walk.robot}"}

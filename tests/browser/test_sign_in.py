@@ -72,6 +72,7 @@ def set_up_app(page: Page) -> tuple[str, str, list[str]]:
     return secret, code, kept
 
 
+@pytest.mark.essential
 def test_an_app_and_its_recovery_codes(page: Page, server: Server) -> None:
     page.goto("/account/")
     sign_in(page, server)

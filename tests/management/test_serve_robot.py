@@ -123,6 +123,7 @@ async def perform(url: str, cookie: str, token: str) -> list[dict[str, Any]]:
     return reports
 
 
+@pytest.mark.essential
 @pytest.mark.realtime
 def test_the_robot_answers_stops_and_leaves_with_the_server(tmp_path):
     cookie, source = python(tmp_path, 'KINDS = ["source"]\n' + PREPARE).split()

@@ -86,6 +86,7 @@ async def walk_until_closed(
     return codes, acknowledged
 
 
+@pytest.mark.essential
 @pytest.mark.realtime
 @pytest.mark.parametrize("by", ["daphne", "uvicorn"])
 def test_sigterm_with_fifty_viewers(tmp_path, by):

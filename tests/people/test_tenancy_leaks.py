@@ -82,6 +82,7 @@ def test_a_forgotten_scope_is_caught_wherever_it_shows(worlds, monkeypatch):
     assert set(counts) == {actor.label for actor in eyes}
 
 
+@pytest.mark.long
 def test_a_picker_of_every_row_is_caught(worlds, monkeypatch):
     def offer_all(self: Any, db: Any, db_field: Any, request: HttpRequest) -> Any:
         return db_field.remote_field.model.everywhere.all()
@@ -95,6 +96,7 @@ def test_a_picker_of_every_row_is_caught(worlds, monkeypatch):
     assert "pt of amber: /admin/rehab/leaderboard/add/ shows Patient of birch" in leaks
 
 
+@pytest.mark.long
 def test_a_chooser_of_whose_eyes_a_board_is_seen_with_is_caught(worlds, monkeypatch):
     everybody = Patient.everywhere.annotate(alone=Q(boards="own")).order_by("pk")
     monkeypatch.setattr(LeaderboardAdmin, "_patients_who_walked", lambda self, request: everybody)
@@ -104,6 +106,7 @@ def test_a_chooser_of_whose_eyes_a_board_is_seen_with_is_caught(worlds, monkeypa
     assert "pt of amber: /admin/rehab/leaderboard/add/ shows Patient of birch" in leaks
 
 
+@pytest.mark.long
 def test_an_autocomplete_of_every_row_is_caught(worlds, monkeypatch):
     monkeypatch.setattr(
         AutocompleteJsonView, "get_queryset", lambda self: Patient.everywhere.order_by("pk")
@@ -163,6 +166,7 @@ def test_a_board_of_another_clinic_is_caught(worlds, monkeypatch):
     assert f"pt of amber: {url} shows Leaderboard of birch" in leaks
 
 
+@pytest.mark.long
 def test_unscoped_calls_of_the_api_are_caught(worlds, monkeypatch):
     monkeypatch.setattr(people_api, "patients_of", lambda user: Patient.everywhere.order_by("pk"))
     leaks, _ = find_leaks(
@@ -183,6 +187,7 @@ def test_a_name_that_the_api_tells_researchers_is_caught(worlds, monkeypatch):
     assert "researcher of amber: /api/v1/sessions names a patient by nickname" in leaks
 
 
+@pytest.mark.long
 def test_persons_beside_a_row_that_a_researcher_reads_are_caught(worlds, monkeypatch):
     monkeypatch.setattr(admin_base, "hidden_fields", lambda request, model: set())
     leaks, _ = find_leaks(worlds, researchers(worlds), under="/admin/rehab/")
@@ -192,6 +197,7 @@ def test_persons_beside_a_row_that_a_researcher_reads_are_caught(worlds, monkeyp
     assert f"{told}sessionevent/ names a pt" in leaks
 
 
+@pytest.mark.long
 def test_numbers_of_patients_in_a_history_are_caught(worlds, monkeypatch):
     monkeypatch.setattr(history_text, "rights_of", lambda role, model_name: Right.VIEW)
     leaks, _ = find_leaks(worlds, researchers(worlds), under="/admin/rehab/leaderboard/")
@@ -199,6 +205,7 @@ def test_numbers_of_patients_in_a_history_are_caught(worlds, monkeypatch):
     assert f"researcher of amber: {url} names a patient by number" in leaks
 
 
+@pytest.mark.long
 def test_staff_in_a_history_and_beside_a_session_is_caught(worlds, monkeypatch):
     board = worlds[0].more[0]
     who = {"by": worlds[0].people[Role.PT], "clinic": worlds[0].clinic, "object_id": board.pk}

@@ -54,6 +54,7 @@ def test_a_wrong_command_line(words):
     assert ended.value.code == 2
 
 
+@pytest.mark.essential
 @pytest.mark.realtime
 def test_the_twin_comes_home_in_truth():
     done = subprocess.run(
@@ -123,6 +124,7 @@ def start(*words):
 
 @pytest.mark.realtime
 @POSIX
+@pytest.mark.essential
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_a_signal_stops_a_kobuki(name):
     with FakeKobuki() as kobuki:

@@ -74,6 +74,7 @@ async def test_it_says_hello_decides_performs_and_reports(garry):
         await garry.until(is_kind("gesture", phase="ended", outcome="done"))
 
 
+@pytest.mark.essential
 @pytest.mark.realtime
 async def test_a_stop_is_at_the_base_within_a_tenth_of_a_second(garry):
     base = IdealBase(time.monotonic)
@@ -88,6 +89,7 @@ async def test_a_stop_is_at_the_base_within_a_tenth_of_a_second(garry):
         await garry.until(is_kind("gesture", phase="ended", outcome="stopped"))
 
 
+@pytest.mark.essential
 @pytest.mark.realtime
 async def test_silence_stops_it_and_what_was_on_its_way_counts_no_more(garry):
     base = IdealBase(time.monotonic)

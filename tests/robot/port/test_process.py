@@ -41,6 +41,7 @@ def test_it_begins_with_stops_and_pumps_at_50_hz(kobuki):
         assert kobuki.bad == 0
 
 
+@pytest.mark.essential
 @pytest.mark.realtime
 def test_stale_orders_stop_it(kobuki):
     with owning(kobuki) as owner:
@@ -50,6 +51,7 @@ def test_stale_orders_stop_it(kobuki):
         assert 0.15 < kobuki.moved_after(since_s) <= 0.35
 
 
+@pytest.mark.essential
 @pytest.mark.realtime
 @pytest.mark.parametrize("how", ["pipe closes", "SIGTERM", "SIGHUP"])
 def test_its_end_stops_it_three_times(kobuki, how):
@@ -295,6 +297,7 @@ def test_an_exception_of_its_own_stops_the_base():
     assert not bench.ports[0].is_open
 
 
+@pytest.mark.essential
 @pytest.mark.realtime
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no guard")
 def test_killed_together_with_its_parent_its_guard_stops_the_base(kobuki):

@@ -225,6 +225,7 @@ def test_a_thread_that_ended_is_a_base_that_is_lost(ros, monkeypatch):
         base.stop()  # never raises
 
 
+@pytest.mark.essential
 @pytest.mark.realtime
 def test_it_stands_still_by_itself_when_whoever_orders_hangs(ros):
     with open_base(ros.url) as base:

@@ -174,6 +174,7 @@ async def test_a_leak_is_caught(everyone, monkeypatch):
     assert not any("researcher" in leak or "stranger" in leak for leak in leaks)
 
 
+@pytest.mark.long
 async def test_a_patient_whom_a_researcher_hears_of_is_caught(everyone, monkeypatch):
     everybody = frozenset(Role)
     monkeypatch.setattr(screens.ScreenConsumer, "people", everybody)
@@ -182,6 +183,7 @@ async def test_a_patient_whom_a_researcher_hears_of_is_caught(everyone, monkeypa
     assert f"researcher of amber: {route} names a patient by nickname" in leaks
 
 
+@pytest.mark.long
 async def test_a_device_at_another_clinics_station_is_caught(everyone, monkeypatch):
     async def find_open_session(device: Device, session_id: int | None) -> int | None:
         return session_id or everyone.sessions["amber"].pk
@@ -193,6 +195,7 @@ async def test_a_device_at_another_clinics_station_is_caught(everyone, monkeypat
     assert not any("researcher" in leak or "pt" in leak.split()[0] for leak in leaks)
 
 
+@pytest.mark.long
 async def test_words_of_another_clinic_are_caught(everyone, monkeypatch):
     """Who may come in hears a name of another clinic beside the own session."""
     told = screens.ScreenConsumer.send_message

@@ -73,6 +73,7 @@ def test_it_begins_at_home_still_and_knows_its_battery(base):
     assert base.problem == ""
 
 
+@pytest.mark.essential
 @pytest.mark.realtime
 @pytest.mark.parametrize(
     "twist",
@@ -227,6 +228,7 @@ def test_a_base_that_is_switched_off_and_on_jumps_nowhere(kobuki, base):
     assert abs(base.read().pose.heading_rad - there.heading_rad) < 0.05
 
 
+@pytest.mark.essential
 @pytest.mark.realtime
 def test_a_port_that_vanishes_and_comes_back(tmp_path):
     """It comes back stopped, from where it was, and goes on only after an order to stand."""
@@ -308,6 +310,7 @@ def test_a_lost_base_is_stopped_although_the_port_process_hung_at_the_end(tmp_pa
         assert not any(speed for _, speed, _ in again.orders)
 
 
+@pytest.mark.essential
 @pytest.mark.realtime
 def test_leaving_it_stops_it(kobuki):
     with driving(kobuki.url) as base:
