@@ -280,6 +280,9 @@ def _decimate(window: Floats, factor: int) -> Floats | None:
     count = window.shape[1] // factor
     if count < 2:
         return None
-    groups = np.ascontiguousarray(window[:, window.shape[1] - count * factor :])
-    means: Floats = groups.reshape(-1, factor) @ np.ones(factor) / factor
-    return means.reshape(len(window), count)
+    first = window.shape[1] - count * factor
+    decimated = window[:, first::factor].copy()
+    for neighbor in range(1, factor):
+        decimated += window[:, first + neighbor :: factor]
+    decimated /= factor
+    return decimated
