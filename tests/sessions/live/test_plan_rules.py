@@ -194,7 +194,7 @@ async def test_a_summary_tells_hits_mean_and_points_of_its_block(place, begun):
     await tablet.watch()
     await source.walk(6.0, 3.0, None, 1.5, 6.0)
     told = await tablet.until_step(5)
-    assert told["summary"] == {"hits": 3, "steps": 4}
+    assert told["summary"] == {"hits": 3, "steps": 4, "close": 0}
     assert (told["performance"], told["hit"], told["points"], told["score"]) == (1.375, True, 2, 2)
     assert told["words"]
     kinds = [event["kind"] for event in tablet.events if "number" in event]
