@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rehab.gait.contacts.gyroscope_strides import measure_gyroscope
 from rehab.gait.offline import measure_both_legs, measure_strides
 from rehab.gait.recordings.columns import CHANNELS, read_column, read_column_map
 from rehab.gait.recordings.csv_files import apply_columns, read_mass, save_signals
@@ -25,7 +26,6 @@ from rehab.gait.recordings.plot import load_pyplot, plot_strides
 from rehab.gait.recordings.tables import read_any_table, read_signals
 from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.setup.check import check_setup, compare_with_setup
-from rehab.gait.setup.gyroscope import measure_gyroscope
 from rehab.gait.setup.report import describe_setup, setup_to_json
 from rehab.gait.signals.clock import estimate_rate
 from rehab.gait.strides import GaitInputError, Stride
