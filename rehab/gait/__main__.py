@@ -76,6 +76,9 @@ def _read_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--rate", type=float, help="samples per second; else the median of times")
     parser.add_argument("--look-ahead", type=float, default=LOOK_AHEAD_S, metavar="S")
     parser.add_argument(
+        "--overground", action="store_true", help="over plates in a floor, a step or two at a time"
+    )
+    parser.add_argument(
         "--columns",
         nargs="+",
         metavar="CHANNEL=COLUMN",
@@ -98,6 +101,7 @@ def _measure_file(path: Path, options: argparse.Namespace) -> None:
             rate_hz=rate_hz,
             mass_kg=mass_kg,
             look_ahead_s=options.look_ahead,
+            is_overground=options.overground,
         )
     else:
         ((side, leg),) = legs.items()
@@ -107,6 +111,7 @@ def _measure_file(path: Path, options: argparse.Namespace) -> None:
             rate_hz=rate_hz,
             mass_kg=mass_kg,
             look_ahead_s=options.look_ahead,
+            is_overground=options.overground,
             side=side,
         )
     check = check_signals(

@@ -281,8 +281,13 @@ class Intake:
                 )
                 self._failed.set()
                 return
-            look_ahead_s = self._settings.look_ahead_s
-            self._pipeline = SignalPipeline(mass_kg, self._rate_hz, look_ahead_s, self._notify)
+            self._pipeline = SignalPipeline(
+                mass_kg,
+                self._rate_hz,
+                self._settings.look_ahead_s,
+                self._notify,
+                is_overground=self._settings.is_overground,
+            )
         self._put_strides(self._pipeline.add(t_s, values))
         for finding in self._pipeline.check():
             where = f" ({finding.side} leg)" if finding.side else ""

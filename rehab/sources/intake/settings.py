@@ -50,6 +50,8 @@ class IntakeSettings:
         The leg of rows that name none; None for the session's trained one.
     keep
         Where the raw signals are written to, if anywhere.
+    is_overground
+        Whether people walk over plates in a floor, and not on a treadmill.
     gyroscopes
         Instead of legs' signals: which column is the rate of rotation of which foot or shank.
     """
@@ -60,6 +62,7 @@ class IntakeSettings:
     columns: ColumnMap = SIGNAL_LAYOUTS["garry"]
     side: Side | None = None
     keep: Path | None = None
+    is_overground: bool = False
     gyroscopes: tuple[Gyroscope, ...] = ()
 
     @classmethod
@@ -89,6 +92,7 @@ class IntakeSettings:
             columns=read_column_map(columns) if columns else cls().columns,
             side=Side(options.side) if options.side else None,
             keep=options.keep,
+            is_overground=getattr(options, "overground", False),
             gyroscopes=tuple(
                 _read_gyroscope(text) for text in getattr(options, "gyroscope", None) or ()
             ),
@@ -125,6 +129,9 @@ def add_signal_arguments(parser: ArgumentParser) -> None:
         metavar="CHANNEL=COLUMN",
         help="time=… and {left,right}.{" + ",".join(CHANNELS) + "}=…; COLUMN*FACTOR changes unit "
         "or sign (default: time_s, left_force_n, left_moment_nm, left_angle_rad, right_…)",
+    )
+    signals.add_argument(
+        "--overground", action="store_true", help="over plates in a floor, a step or two at a time"
     )
     signals.add_argument(
         "--gyroscope",
