@@ -29,7 +29,7 @@ PAGE_ROWS = 2_000  # rows held in memory
 SESSIONS_PAGE = 200
 STEP_FIELDS = (
     *("number", "time_s", "received_at", "side", "value", "gain", "shown", "goal", "performance"),
-    *("hit", "points", "valid", "reasons", "phase", "rules_version", "extra"),
+    *("hit", "close", "points", "valid", "reasons", "phase", "rules_version", "extra"),
 )
 NUMBER, SIDE, REASONS, PHASE = (
     STEP_FIELDS.index(name) for name in ("number", "side", "reasons", "phase")
@@ -183,4 +183,5 @@ def _read_answers(plan: SessionPlan) -> tuple[Any, ...]:
         *(timing.rule.value, timing.window_s, timing.count, timing.rest_s),
         *(schedule.kind.value, schedule.interval, schedule.band),
         plan.adaptation.mode.value,
+        plan.close_steps.part,
     )

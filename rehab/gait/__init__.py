@@ -6,6 +6,7 @@ sources.
 """
 
 from rehab.gait.contacts.gyroscope import ContactKind, GyroscopeContact, GyroscopeDetector
+from rehab.gait.contacts.gyroscope_strides import GyroscopeStride, GyroscopeStrideDetector
 from rehab.gait.offline import measure_both_legs, measure_strides
 from rehab.gait.online import StrideDetector
 from rehab.gait.selfcheck.checks import Finding, SignalCheck, check_signals
@@ -21,6 +22,8 @@ __all__ = [
     "GaitInputError",
     "GyroscopeContact",
     "GyroscopeDetector",
+    "GyroscopeStride",
+    "GyroscopeStrideDetector",
     "LegSamples",
     "RejectionReason",
     "SignalCheck",

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rehab.gait.contacts.gyroscope_strides import measure_gyroscope
 from rehab.gait.offline import measure_both_legs, measure_strides
 from rehab.gait.recordings.columns import CHANNELS, read_column, read_column_map
 from rehab.gait.recordings.csv_files import apply_columns, read_mass, save_signals
@@ -25,7 +26,6 @@ from rehab.gait.recordings.plot import load_pyplot, plot_strides
 from rehab.gait.recordings.tables import read_any_table, read_signals
 from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.setup.check import check_setup, compare_with_setup
-from rehab.gait.setup.gyroscope import measure_gyroscope
 from rehab.gait.setup.report import describe_setup, setup_to_json
 from rehab.gait.signals.clock import estimate_rate
 from rehab.gait.strides import GaitInputError, Stride
@@ -76,6 +76,9 @@ def _read_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--rate", type=float, help="samples per second; else the median of times")
     parser.add_argument("--look-ahead", type=float, default=LOOK_AHEAD_S, metavar="S")
     parser.add_argument(
+        "--overground", action="store_true", help="over plates in a floor, a step or two at a time"
+    )
+    parser.add_argument(
         "--columns",
         nargs="+",
         metavar="CHANNEL=COLUMN",
@@ -98,6 +101,7 @@ def _measure_file(path: Path, options: argparse.Namespace) -> None:
             rate_hz=rate_hz,
             mass_kg=mass_kg,
             look_ahead_s=options.look_ahead,
+            is_overground=options.overground,
         )
     else:
         ((side, leg),) = legs.items()
@@ -107,6 +111,7 @@ def _measure_file(path: Path, options: argparse.Namespace) -> None:
             rate_hz=rate_hz,
             mass_kg=mass_kg,
             look_ahead_s=options.look_ahead,
+            is_overground=options.overground,
             side=side,
         )
     check = check_signals(

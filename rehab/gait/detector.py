@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from rehab.gait.contacts.force_plate import CONTACT_N, RELEASE_N
 from rehab.gait.one_leg import KEEP_S, LegDetector
 from rehab.gait.settings import DetectorSettings
 from rehab.gait.signals.buffer import SampleBuffer
-from rehab.gait.signals.clock import Columns, SampleClock
+from rehab.gait.signals.clock import SampleClock
 from rehab.gait.signals.filters import Floats
-from rehab.gait.signals.samples import read_chunk, split_chunk
 from rehab.gait.stances.kinetics import CUTOFF_HZ
 from rehab.gait.strides import Stride
 
@@ -80,6 +80,8 @@ class Detector:
         self._is_overground = is_overground
         self._clock = SampleClock()
         self._samples = SampleBuffer(int(KEEP_S * rate_hz), legs=len(sides))
+        self._layout = self._samples.layout
+        self._rows = 0  # of the last table
         self._legs = [
             LegDetector(buffer, settings, side)
             for buffer, side in zip(self._samples.legs, sides, strict=True)
@@ -96,17 +98,25 @@ class Detector:
 
     def _feed(self, names: Sequence[str], channels: Sequence[ArrayLike | None]) -> list[Stride]:
         """Add samples of the named channels, the first of which is the time."""
-        chunk, late_s = self._clock.add(read_chunk(names, channels))
-        return self._advance(chunk, late_s)
+        layout, clock = self._layout, self._clock
+        table = layout.read(names, channels)
+        if len(table) != self._rows:  # other channels are sent than were before
+            self._rows, held = len(table), clock.finish()
+            if held is not None:
+                table = np.concatenate((layout.widen(held), layout.widen(table)), axis=1)
+        return self._advance(*clock.add(table, layout.time_rows[len(table)]))
 
-    def _advance(self, chunk: Columns, late_s: Floats | None) -> list[Stride]:
+    def _advance(self, table: Floats, late_s: Floats | None) -> list[Stride]:
+        samples, longest = self._samples, self._legs[0].longest_chunk
+        first, count = samples.end, table.shape[1]
+        if count <= longest:
+            samples.append(table, late_s)
+            return self._detect(first, first + count)
         strides: list[Stride] = []
-        samples, done = self._samples, 0
-        for piece, count in split_chunk(chunk, self._legs[0].longest_chunk):
-            first = samples.end
-            samples.append(piece, count, None if late_s is None else late_s[done : done + count])
-            done += count
-            strides += self._detect(first, samples.end)
+        for done in range(0, count, longest):
+            part = slice(done, done + longest)
+            samples.append(table[:, part], None if late_s is None else late_s[part])
+            strides += self._detect(first + done, samples.end)
         return strides
 
     def _detect(self, start: int, stop: int) -> list[Stride]:

@@ -22,6 +22,7 @@ def measure_strides(
     mass_kg: float,
     look_ahead_s: float = 0.05,
     is_velocity: bool = False,
+    is_overground: bool = False,
     side: str | None = None,
 ) -> list[Stride]:
     """Return the strides of one leg of a recording.
@@ -30,7 +31,7 @@ def measure_strides(
     ----------
     t_s, force_n, moment_nm, angle_rad, forward_n, position_m
         Channels of shape (n,), as in ``StrideDetector.feed``.
-    rate_hz, mass_kg, look_ahead_s, is_velocity, side
+    rate_hz, mass_kg, look_ahead_s, is_velocity, is_overground, side
         As in ``StrideDetector``.
 
     Returns
@@ -43,7 +44,12 @@ def measure_strides(
         For settings or channels that nothing can be measured from.
     """
     detector = StrideDetector(
-        rate_hz, mass_kg, look_ahead_s=look_ahead_s, is_velocity=is_velocity, side=side
+        rate_hz,
+        mass_kg,
+        look_ahead_s=look_ahead_s,
+        is_velocity=is_velocity,
+        is_overground=is_overground,
+        side=side,
     )
     found = detector.feed(t_s, force_n, moment_nm, angle_rad, forward_n, position_m)
     return found + detector.finish()
@@ -58,6 +64,7 @@ def measure_both_legs(
     mass_kg: float,
     look_ahead_s: float = 0.05,
     is_velocity: bool = False,
+    is_overground: bool = False,
 ) -> list[Stride]:
     """Return the strides of both legs of a recording.
 
@@ -65,7 +72,7 @@ def measure_both_legs(
     ----------
     t_s, left, right
         Times [s], shape (n,), and the channels of each leg, as in ``TwoLegDetector.feed``.
-    rate_hz, mass_kg, look_ahead_s, is_velocity
+    rate_hz, mass_kg, look_ahead_s, is_velocity, is_overground
         As in ``TwoLegDetector``.
 
     Returns
@@ -77,5 +84,11 @@ def measure_both_legs(
     GaitInputError
         For settings or channels that nothing can be measured from.
     """
-    detector = TwoLegDetector(rate_hz, mass_kg, look_ahead_s=look_ahead_s, is_velocity=is_velocity)
+    detector = TwoLegDetector(
+        rate_hz,
+        mass_kg,
+        look_ahead_s=look_ahead_s,
+        is_velocity=is_velocity,
+        is_overground=is_overground,
+    )
     return detector.feed(t_s, left, right) + detector.finish()

@@ -122,8 +122,6 @@ class LegDetector:
         """Process samples ``start:stop``, a second at most; return the strides they complete."""
         self._pending.extend(self.contacts.advance(start, stop))
         strides: list[OneLegStride] = []
-        if not self._pending:
-            return strides
         while self._pending:
             ended = self._pending[0]
             due = max((ended.end_index or 0) + self._wait, ended.known_index or 0)

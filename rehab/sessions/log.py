@@ -43,6 +43,9 @@ class Step(ScopedModel):
     goal = models.FloatField(_("goal"), null=True)
     performance = models.FloatField(_("performance"), null=True)
     hit = models.BooleanField(_("hit"), null=True)
+    close = models.BooleanField(
+        _("close"), db_default=False, help_text=_("Too uncertain to count as hit or miss.")
+    )
     points = models.SmallIntegerField(_("points"), null=True)
     valid = models.BooleanField(_("valid"))
     reasons = models.JSONField(_("reasons"), default=list)

@@ -12,6 +12,7 @@ from rehab.training.fold import SessionFold
 from rehab.training.goals import MIN_BASELINE_STRIDES
 from rehab.training.phases import find_phase_kind
 from rehab.training.plans import SessionPlan
+from rehab.training.tallies import Tally
 from rehab.training.valences import VALENCES, Valence
 
 Message = dict[str, Any]
@@ -23,6 +24,16 @@ def describe_walked(fold: SessionFold) -> Message:
         "active_s": round(fold.active_s, 2),
         "phase_s": round(fold.phase_s, 2),
         "phase_strides": fold.phase_strides,
+    }
+
+
+def describe_rates(tally: Tally) -> Message:
+    """Return the share of hits, and what it is counted from."""
+    return {
+        "hit_rate": tally.hit_rate,
+        "hits": tally.hits,
+        "judged": tally.judged,
+        "close": tally.close,
     }
 
 

@@ -189,6 +189,7 @@ class StepOut(Schema):
     goal: float | None
     performance: float | None
     hit: bool | None
+    close: bool
     points: int | None
     valid: bool
     reasons: list[str]

@@ -21,6 +21,7 @@ from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.models import Station
 from rehab.training.adaptation import GoalAdaptation
 from rehab.training.changes import OPEN_STATES, ChangeKind, ChangeValue, PauseReason
+from rehab.training.closeness import CloseSteps
 from rehab.training.cueing import DEFAULT_ACTIVATION_THRESHOLD, CueTiming
 from rehab.training.goals import GoalRule, Target
 from rehab.training.measures import A2, InvalidSetting
@@ -163,6 +164,9 @@ def _make_plan(request: SessionRequest, measure: Measure) -> SessionPlan:
         cue_timing=request.cue_timing,
         schedule=request.schedule,
         adaptation=request.adaptation,
+        close_steps=request.protocol.close_steps(patient.language)
+        if request.protocol
+        else CloseSteps(),
         gestures=tuple(gestures.values()),
         alternatives=tuple(alternatives),
         language=patient.language,

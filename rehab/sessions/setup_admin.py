@@ -187,6 +187,7 @@ class ProtocolAdmin(SharedAdmin):
             name=next(name for name in names if name not in taken),
             description=protocol.description,
             wanted_hits=protocol.wanted_hits,
+            close_percent=protocol.close_percent,
         )
         copy.save()
         for position, phase in enumerate(protocol.to_rules(), 1):

@@ -1,7 +1,8 @@
 """`python -m rehab.sources NAME …`: runs a source that dials in to the server.
 
-Exit status: 0 all strides are stored, or the session was ended; 2 the command line, the recording
-or what comes cannot be used; 3 the server refuses this source; 130 stopped by Ctrl-C.
+Exit status: 0 all strides are stored, or the session was ended; 1 a check (--check) left something
+to look at; 2 the command line, the recording or what comes cannot be used; 3 the server refuses
+this source; 130 stopped by Ctrl-C.
 """
 
 from __future__ import annotations
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 SOURCE_PATH = "/ws/source/"
 STATUS_EVERY_S = 5.0
 
+EXIT_UNSURE = 1
 EXIT_DONE, EXIT_UNUSABLE, EXIT_REFUSED, EXIT_INTERRUPTED = 0, 2, 3, 130
 
 
@@ -93,6 +95,13 @@ def make_parser(name: str, source: type[Source]) -> ArgumentParser:
     server.add_argument(
         "--log", type=Path, metavar="FILE", help="append a JSON line for every acknowledgment"
     )
+    if issubclass(source, LiveSource):
+        parser.add_argument(
+            "--check",
+            action="store_true",
+            help="listen for 30 s while somebody walks, say what the columns are, and end: nothing "
+            "is sent to a server",
+        )
     if issubclass(source, PlayedSource):
         server.add_argument(
             "--speed",
@@ -180,6 +189,36 @@ async def run_live_source(source: LiveSource, intake: Intake, client: SourceClie
     await run_client(client, describe, read(), intake.watch())
 
 
+def check_stream(name: str, options: Namespace) -> int:
+    """Print what the columns of a live source are; nothing is sent. Return the exit status.
+
+    0 where all is sure, 1 where a person has to look at something. Raises SourceError.
+    """
+    from rehab.gait import GaitInputError
+    from rehab.sources.intake.stream_check import StreamCheck
+
+    async def listen(source: LiveSource, check: StreamCheck) -> None:
+        reading = asyncio.create_task(source.read(check))
+        done = asyncio.create_task(check.is_done.wait())
+        finished, _ = await asyncio.wait({reading, done}, return_when=asyncio.FIRST_COMPLETED)
+        for task in (reading, done):
+            task.cancel()
+        await asyncio.gather(reading, done, return_exceptions=True)
+        if reading in finished:
+            reading.result()
+
+    try:
+        source = load_source(name)(options, print_status)
+        assert isinstance(source, LiveSource)  # noqa: S101 (others have no such option)
+        check = StreamCheck(source.settings, print_status)
+        asyncio.run(listen(source, check))
+        lines, is_certain = check.describe_setup()
+    except GaitInputError as problem:
+        raise SourceError(str(problem)) from None
+    print(*lines, sep="\n")
+    return EXIT_DONE if is_certain else EXIT_UNSURE
+
+
 def run(name: str, options: Namespace, stack: ExitStack) -> int:
     """Run a source until it is done and return the exit status. Raises what makes it unusable."""
     if options.stay and options.session is not None:
@@ -247,6 +286,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         make_top_parser().parse_args(words[:1])
     name = words[0]
     options = make_parser(name, load_source(name)).parse_args(words[1:])
+    if getattr(options, "check", False):
+        try:
+            return check_stream(name, options)
+        except SourceError as problem:
+            print_status(f"{problem}")
+            return EXIT_UNUSABLE
+        except KeyboardInterrupt:
+            return EXIT_INTERRUPTED
     if options.child:
         threading.Thread(target=exit_with_parent, daemon=True).start()
     try:

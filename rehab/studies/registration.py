@@ -86,6 +86,11 @@ def _describe_arm(study: Study, arm: Any) -> dict[str, Any]:
         "robot_intensity": arm.robot_intensity,
         "measure": arm.measure.slug,
         "protocol": arm.protocol.name,
+        **(
+            {}
+            if arm.protocol.close_percent is None
+            else {"close_percent": arm.protocol.close_percent}
+        ),
         "phases": [
             {
                 "kind": phase.kind,

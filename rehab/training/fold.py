@@ -232,6 +232,7 @@ class SessionFold:
             gain=self.gain,
             goal=self.goal,
             valence=self.valence if self.phase.feedback else None,
+            close_steps=self.plan.close_steps,
             rules_version=version,
         )
         self.last_number = scored.number
@@ -271,7 +272,7 @@ class SessionFold:
         """Keep whether the schedule tells the patient of a step, and of which ones with it."""
         if step.performance is None or step.hit is None or step.shown is None:
             return
-        self.untold.add(step.performance, step.shown, step.hit)
+        self.untold.add(step.performance, step.shown, step.hit, step.close)
         if self.plan.schedule.tells(self.feedback.judged, step.performance):
             self.answer, self.untold = self.untold, Untold()
             if not self.plan.schedule.tells_all:

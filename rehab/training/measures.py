@@ -11,6 +11,7 @@ GAIN_MIN = 0.5
 GAIN_MAX = 1.5
 # Beyond any unit of gait; sums over a session stay far from where floats overflow.
 BOUND_MAX = 1e9
+A2_SD = "a2_sd_w_kg"  # how sources call the standard deviation of A2
 
 
 class InvalidSetting(ValueError):
@@ -74,6 +75,11 @@ class Measure:
             raise InvalidSetting("{name}: goals need a range above 0.", name=Marked(self.name))
         if self.first_goal is not None:
             self.check_goal(self.first_goal)
+
+    @property
+    def sd_channel(self) -> str:
+        """The extra value of a step that holds its value's standard deviation; "" without one."""
+        return A2_SD if self.slug == "a2" and not self.channel else ""
 
     @property
     def goal_step(self) -> float:

@@ -7,6 +7,7 @@ from enum import StrEnum
 from typing import Any
 
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation, check_adaptation_mode
+from rehab.training.closeness import CloseSteps
 from rehab.training.cueing import (
     DEFAULT_ACTIVATION_THRESHOLD,
     CueTiming,
@@ -78,6 +79,8 @@ class SessionPlan:
         After which steps the patient is told.
     adaptation
         Whether goals follow the patient.
+    close_steps
+        Which steps are too uncertain to count as hit or miss.
     language
         Of the plan's texts.
 
@@ -102,6 +105,7 @@ class SessionPlan:
     cue_timing: CueTiming = field(default_factory=CueTiming)
     schedule: Schedule = field(default_factory=Schedule)
     adaptation: GoalAdaptation = field(default_factory=GoalAdaptation)
+    close_steps: CloseSteps = field(default_factory=CloseSteps)
     language: str = "en"
 
     def __post_init__(self) -> None:
@@ -158,6 +162,7 @@ class SessionPlan:
             cue_timing=_read_cue_timing(data.get("cue_timing", {})),
             schedule=_read_schedule(data.get("schedule", {})),
             adaptation=_read_adaptation(data.get("adaptation")),
+            close_steps=CloseSteps(**data.get("close_steps", {})),
             language=data.get("language", "en"),
         )
 

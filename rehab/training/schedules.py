@@ -108,21 +108,28 @@ class Untold:
 
     Attributes
     ----------
-    steps, hits, performance_sum, shown_sum
-        Of them, as a summary tells them.
+    steps, hits, performance_sum, shown_sum, close
+        Of them, as a summary tells them; ``hits`` has none that was close.
     """
 
     steps: int = 0
     hits: int = 0
     performance_sum: float = 0.0
     shown_sum: float = 0.0
+    close: int = 0
 
-    def add(self, performance: float, shown: float, hit: bool) -> None:
+    def add(self, performance: float, shown: float, hit: bool, close: bool = False) -> None:
         """Count one more step."""
         self.steps += 1
-        self.hits += hit
+        self.hits += hit and not close
+        self.close += close
         self.performance_sum += performance
         self.shown_sum += shown
+
+    @property
+    def misses(self) -> int:
+        """Steps below the goal that were not close."""
+        return self.steps - self.hits - self.close
 
     @property
     def mean_performance(self) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from rehab.training.closeness import CloseSteps
 from rehab.training.measures import Measure
 from rehab.training.steps import Measurement, ScoredStep, Side
 from rehab.training.valences import Valence
@@ -14,7 +15,10 @@ from robot.wire.limits import PERFORMANCE_MAX
 # folded by it again. Versions:
 # 1: a step before the last one, whichever leg, has a clock that ran backwards.
 # 2: a step before the last one of its leg (the legs' strides may overtake each other).
-RULES_VERSION = 2
+# 3: steps may be close, where the plan has it; before, none was.
+RULES_VERSION = 3
+CLOSE_SINCE = 3
+NO_CLOSE_STEPS = CloseSteps()
 
 
 class Verdict(NamedTuple):
@@ -73,6 +77,7 @@ def score_measurement(
     gain: float,
     goal: float | None,
     valence: Valence | None,
+    close_steps: CloseSteps = NO_CLOSE_STEPS,
     rules_version: int = RULES_VERSION,
 ) -> ScoredStep:
     """Return a measurement with its verdict and points.
@@ -91,18 +96,24 @@ def score_measurement(
         In the measure's unit; None while it is unknown.
     valence
         What rewards it; None in a phase without feedback.
+    close_steps
+        Which steps pay and take nothing, as their values are too uncertain.
     rules_version
         Of the rules that it is scored by.
     """
     value = measurement.value
     shown = performance = hit = points = None
+    close = False
     if reasons:
         if value is not None and not math.isfinite(value):
             value = None
     elif value is not None and goal is not None and measurement.side == trained_side:
         shown, performance, hit = judge(measure, value, gain, goal)
+        sd = measurement.extra.get(measure.sd_channel)
+        if rules_version >= CLOSE_SINCE:
+            close = close_steps.includes(shown, None if sd is None else gain * sd, goal)
         if valence is not None:
-            points = valence.points(hit)
+            points = valence.points(hit, close)
     return ScoredStep(
         number=measurement.number,
         time_s=measurement.time_s,
@@ -113,6 +124,7 @@ def score_measurement(
         goal=goal,
         performance=performance,
         hit=hit,
+        close=close,
         points=points,
         valid=not reasons,
         reasons=reasons,

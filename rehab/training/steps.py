@@ -116,6 +116,8 @@ class ScoredStep:
         In force when it was scored: ratio, in the value's unit, and the phase's index.
     shown, performance, hit
         None where nothing can be judged (invalid step, other leg, goal not known yet).
+    close
+        Whether the value is too uncertain for its verdict to count (``closeness``).
     points
         None where points do not exist (those cases, a phase without feedback, a valence without
         points); 0 where they exist but none was earned.
@@ -140,6 +142,7 @@ class ScoredStep:
     phase: int
     extra: Mapping[str, float]
     rules_version: int
+    close: bool = False
 
 
 def find_invalid_reasons(measurement: Measurement, measure: Measure) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ def summarize_tally(tally: Tally) -> dict[str, Any]:
         "invalid": tally.invalid,
         "missing": tally.missing,
         "hits": tally.hits,
+        "close": tally.close,
         "hit_rate": tally.hit_rate,
         "mean": tally.mean_value,
         "mean_performance": tally.mean_performance,
@@ -27,7 +28,8 @@ def summarize_session(fold: SessionFold) -> dict[str, Any]:
     """Return the figures of a session.
 
     ``strides``, ``valid``, ``invalid`` and ``missing`` count the trained leg in every phase;
-    ``hits``, ``hit_rate`` and ``score`` only feedback phases (docs/reference/scoring.md#totals).
+    ``hits``, ``close``, ``hit_rate`` and ``score`` only feedback phases
+    (docs/reference/scoring.md#totals).
     ``phases`` has one entry for all that are alike in name, kind, feedback, gain and valence (of
     feedback), with its single blocks: a phase in which the gain was changed has as many entries as
     it had gains.
@@ -36,6 +38,7 @@ def summarize_session(fold: SessionFold) -> dict[str, Any]:
     return {
         **{name: whole[name] for name in ("strides", "valid", "invalid", "missing")},
         "hits": feedback["hits"],
+        "close": feedback["close"],
         "hit_rate": feedback["hit_rate"],
         "score": fold.score,
         "goal": fold.goal,

@@ -14,18 +14,21 @@ class Tally:
     """Counts and sums over steps of the trained leg.
 
     ``strides = valid + invalid + missing``. A streak is a run of hits among judged steps: an
-    invalid stride neither breaks nor extends it.
+    invalid stride and a close step neither break nor extend it.
 
     Attributes
     ----------
     strides, valid, invalid, missing
         A missing stride had no value and no other fault.
     judged, hits, points
-        ``judged`` counts valid steps for which a goal was known.
+        ``judged`` counts valid steps for which a goal was known, ``hits`` those at the goal that
+        were not close.
     value_sum, performance_sum
         Of the valid and of the judged steps.
     value_squares
         Sum of the valid values' squared deviations from their mean (Welford 1962).
+    close
+        Judged steps that were close, hits or not.
     streak, best_streak
         The run of hits that is under way, and the longest one.
     """
@@ -42,6 +45,7 @@ class Tally:
     streak: int = 0
     best_streak: int = 0
     value_squares: float = 0.0
+    close: int = 0
 
     def add(self, step: ScoredStep) -> None:
         """Count one more step. An invalid one only adds to the counts of strides."""
@@ -63,7 +67,9 @@ class Tally:
             return
         self.judged += 1
         self.performance_sum += step.performance
-        if step.hit:
+        if step.close:
+            self.close += 1
+        elif step.hit:
             self.hits += 1
             self.streak += 1
             if self.streak > self.best_streak:
@@ -78,7 +84,7 @@ class Tally:
             share = self.valid * other.valid / (self.valid + other.valid)
             self.value_squares += apart * apart * share
         self.value_squares += other.value_squares
-        for name in ("strides", "valid", "invalid", "missing", "judged", "hits", "points"):
+        for name in ("strides", "valid", "invalid", "missing", "judged", "hits", "close", "points"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
         self.value_sum += other.value_sum
         self.performance_sum += other.performance_sum
@@ -102,8 +108,13 @@ class Tally:
 
     @property
     def hit_rate(self) -> float | None:
-        """Hits among the judged steps (ratio)."""
-        return self.hits / self.judged if self.judged else None
+        """Hits among the judged steps that were not close (ratio)."""
+        return self.hits / self.decided if self.decided else None
+
+    @property
+    def decided(self) -> int:
+        """Judged steps that were not close."""
+        return self.judged - self.close
 
 
 class Block(NamedTuple):

@@ -133,8 +133,10 @@ class Valence:
         """Whether a hit earns points, so that pages show the patient a row of hits."""
         return (self.hit_points or 0) > 0
 
-    def points(self, hit: bool) -> int | None:
-        """Return what a hit or a miss adds to the score."""
+    def points(self, hit: bool, close: bool = False) -> int | None:
+        """Return what a hit or a miss adds to the score; a close step adds nothing."""
+        if close:
+            return 0 if self.has_points else None
         return self.hit_points if hit else self.miss_points
 
     def band(self, performance: float) -> Band:

@@ -112,22 +112,25 @@ def test_numbers_on_the_page_equal_the_database(server, browser):
 
 @pytest.mark.parametrize("valence", VALENCES)
 def test_what_a_step_shows_is_there_after_a_reload_and_on_a_second_tablet(server, browser, valence):
-    (walk,) = make_walks(server, {"valence": valence})
+    (walk,) = make_walks(server, {"valence": valence, "close_percent": 10})
     emblems = {"positive": "gain neutral", "negative": "neutral loss", "binary": "gain loss"}
     hit, miss = emblems.get(valence, "neutral neutral").split()
     with signed_in(browser, server, walk) as context, feet_of(server, walk) as feet:
         page = open_page(context, walk)
         page.click("text=Start")
         looks(page, "begin")
-        for performance, emblem, pennant in (
-            (1.12, hit, "yes"),
-            (0.83, miss, "no"),
-            (None, "none", "no"),
-            (1.56, hit, "yes"),
+        for performance, emblem, pennant, sd in (
+            (1.12, hit, "yes", None),
+            (0.83, miss, "no", 0.01),
+            (1.01, "neutral", "no", 0.1),  # too uncertain for a verdict
+            (None, "none", "no", None),
+            (1.56, hit, "yes", 0.1),
         ):
-            feet.walk(performance)
+            feet.walk(performance, sd=sd)
             until_step(page, feet.number)
             shown = page.evaluate(DIGEST)
+            assert (shown["words"] == "About at the goal.") == (performance == 1.01)
+            assert page.locator(".dots .close:not(.gap)").count() == (feet.number > 2)
             assert (shown["look"], shown["theme"], shown["emblem"]) == ("feedback", valence, emblem)
             assert shown["key"] == expected_key(valence, stored(server, walk))
             thermometer = page.locator(".thermometer")

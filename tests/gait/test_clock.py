@@ -10,7 +10,7 @@ from tests.gait.walks import read_moore
 def run(stamps, size=10**9):
     clock, times, late = SampleClock(), [], []
     for first in range(0, len(stamps), size):
-        (part,), late_s = clock.add([stamps[first : first + size]])
+        (part,), late_s = clock.add(np.array([stamps[first : first + size]]))
         times.append(part)
         late.append(np.zeros(len(part)) if late_s is None else late_s)
     held = clock.finish()

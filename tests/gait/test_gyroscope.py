@@ -7,7 +7,7 @@ import pytest
 
 from rehab.gait import ContactKind, GaitInputError, GyroscopeDetector, compute_ankle_velocity
 from rehab.gait.__main__ import main
-from rehab.gait.setup.gyroscope import measure_gyroscope
+from rehab.gait.contacts.gyroscope_strides import measure_gyroscope
 from tests.support.data import signals
 
 RATE_HZ = 204.8

@@ -173,9 +173,18 @@ def test_a_chart_of_the_smallest_and_largest_values():
     for values in ([0.0], [1e-6, 2e-6], [15.0] * 3, [None]):
         count = len(values)
         columns = {"number": list(range(1, count + 1)), "shown": values, "goal": [None] * count}
-        chart = {"strides": columns | {"hit": [None] * count}, "phases": []}
+        verdicts = {"hit": [None] * count, "close": [False] * count}
+        chart = {"strides": columns | verdicts, "phases": []}
         drawn = draw_chart(chart)
         assert drawn["strides"] == count
         assert len(drawn["levels"]) <= 8
         for number in re.findall(r"-?[\d.]+", drawn.get("free", "")):
             assert -10 < float(number) < 1010
+
+
+def test_close_strides_have_a_mark_of_their_own():
+    columns = {"number": [1, 2, 3], "shown": [2.0, 2.0, 1.0], "goal": [2.0] * 3}
+    verdicts = {"hit": [True, True, False], "close": [False, True, True]}
+    drawn = draw_chart({"strides": columns | verdicts, "phases": []})
+    assert (drawn["hit"].count("M"), drawn["close"].count("M")) == (1, 2)
+    assert "miss" not in drawn

@@ -1,8 +1,9 @@
 """Put sessions to walk into a server's database: `python -m tests.support.walk_seed JSON`.
 
 JSON is a list of sessions: {"valence", "name", "phases": [{"kind", …}], "goal" (or
-"goal_percent", of the baseline), "minutes", "screen": {"screen_side", …}, "pin"}, where anything
-may be left out. Each gets a station of its own with tokens for its devices.
+"goal_percent", of the baseline), "minutes", "screen": {"screen_side", …}, "pin", "close_percent"
+(of the protocol)}, where anything may be left out. Each gets a station of its own with tokens for
+its devices.
 """
 
 from __future__ import annotations
@@ -58,14 +59,19 @@ class Feet:
             if message["type"] == kind:
                 return message
 
-    def walk(self, *performances: float | None) -> None:
-        """Take steps of these shares of the goal; None for one that was not measured."""
+    def walk(self, *performances: float | None, sd: float | None = None) -> None:
+        """Take steps of these shares of the goal; None for one that was not measured.
+
+        ``sd``: how uncertain the values are, if they tell.
+        """
+        extra = {} if sd is None else {"extra": {"a2_sd_w_kg": sd}}
         steps = []
         for performance in performances:
             self.number += 1
             value = None if performance is None else performance * GOAL
             time_s = self.number * 1.07
-            steps.append({"number": self.number, "time_s": time_s, "side": "left", "value": value})
+            step = {"number": self.number, "time_s": time_s, "side": "left", "value": value}
+            steps.append(step | extra)
         self.say({"type": "steps", "steps": steps})
         while self.hear("ack")["number"] < self.number:
             pass
@@ -105,6 +111,7 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
     from rehab.people.sign_in.first_start import first_clinic
     from rehab.people.sign_in.flow import BACKEND
     from rehab.sessions.services import SessionRequest, create_session
+    from rehab.sessions.setup.protocols import Protocol
     from rehab.stations.models import Device, Station
     from rehab.stations.pins import set_pin
     from rehab.training.goals import GoalRule, Target
@@ -145,6 +152,9 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
                 if "goal_percent" in wish
                 else GoalRule(value=wish.get("goal", GOAL)),
                 phases=[make_phase(**phase) for phase in phases],
+                protocol=Protocol.everywhere.create(
+                    clinic=clinic, name=name, close_percent=wish.get("close_percent")
+                ),
                 target=Target(duration_s=60 * wish.get("minutes", 10)),
                 station=station,
                 created_by=person,

@@ -195,7 +195,7 @@ def test_every_figure_follows_from_the_scored_steps(session: tuple[SessionPlan, 
     else:
         assert fold.score is None
         assert all(step.points is None for step in steps)
-    for name in ("strides", "valid", "invalid", "missing", "judged", "hits", "points"):
+    for name in ("strides", "valid", "invalid", "missing", "judged", "hits", "close", "points"):
         for index, phase in enumerate(fold.phases):
             parts = [part for block, part in fold.blocks.items() if block.phase == index]
             assert sum(getattr(part, name) for part in parts) == getattr(phase, name)

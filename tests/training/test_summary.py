@@ -40,6 +40,7 @@ def test_a_session_worked_out_by_hand() -> None:
         "invalid": 2,
         "missing": 1,
         "hits": 3,
+        "close": 0,
         "hit_rate": 0.75,
         "score": 2,
         "goal": 4.0,

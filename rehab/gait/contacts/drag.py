@@ -12,6 +12,9 @@ from rehab.gait.signals.filters import Floats, find_upper_median
 DRAG_S = 0.08
 ELBOW_S = 0.02
 ELBOW_N = 8.0  # by which less is unloaded in ``ELBOW_S``
+# A foot that is dragged once it has left bears less by so much when it leaves; how soon before, and
+# over what the plate's noise is averaged.
+DIP_N, DIP_S, QUIET_S = 12.0, 0.06, 0.005
 LOADING_S = 0.06  # before the force of a contact is certain, a drag is over
 
 
@@ -40,7 +43,30 @@ def find_elbow(force_n: Floats, rate_hz: float, release_n: float) -> tuple[int, 
     above = np.flatnonzero(force_n > level)
     if not len(above):
         return int(flat[0]), level
-    return min(int(above[-1]) + 1, len(force_n) - 1), level
+    falls = min(int(above[-1]) + 1, len(force_n) - 1)
+    dip = _find_dip(force_n[falls : falls + round(DIP_S * rate_hz)], rate_hz, level - release_n)
+    return (falls, level) if dip is None else (falls + dip, float(force_n[falls + dip]))
+
+
+def _find_dip(force_n: Floats, rate_hz: float, drag_n: float) -> int | None:
+    """Return where a foot bears least before it is dragged, None where it bears no less."""
+    least, least_n = find_least(force_n, rate_hz)
+    return least if least_n < drag_n - DIP_N else None
+
+
+def find_least(force_n: Floats, rate_hz: float) -> tuple[int, float]:
+    """Return where a falling force is least before it rises again, and what it is there [N].
+
+    The plate's noise is averaged.
+    """
+    width = max(1, round(QUIET_S * rate_hz))
+    if len(force_n) < width:
+        return 0, math.inf
+    mean = np.convolve(force_n, np.full(width, 1 / width), "valid")
+    risen = mean > np.minimum.accumulate(mean) + ELBOW_N
+    again = int(risen.argmax())
+    least = int(mean[: again if risen[again] else None].argmin())
+    return least + width // 2, float(mean[least])
 
 
 def find_drag(before_n: Floats, rate_hz: float, offset_n: float) -> float | None:

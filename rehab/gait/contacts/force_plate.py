@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehab.gait.contacts.drag import DRAG_S, ELBOW_S, find_drag, find_elbow
+from rehab.gait.contacts.drag import DIP_S, DRAG_S, ELBOW_S, find_drag, find_elbow, find_least
 from rehab.gait.contacts.zero import PlateZero, find_finite_median
 from rehab.gait.signals.buffer import LegBuffer
 from rehab.gait.signals.filters import Floats, find_maximum
@@ -27,6 +27,7 @@ CERTAIN = 0.15  # of body weight
 LOOK_BACK_S = 0.25  # from there to the release threshold, for a foot that is loaded slowly
 STUCK_S = 4.5  # in contact for longer: standing, or the plate's zero has moved above the threshold
 BLOCK_S = 0.1
+BEFORE_END_S = 0.03  # where a plate is looked at that bears least when a foot leaves
 
 
 @dataclass(slots=True, eq=False)
@@ -275,7 +276,13 @@ class ContactFinder:
         begin = self._zero_index if last is None or last.end_index is None else last.end_index
         begin = max(begin, self._zero_index, index - self._buffer.samples.keep // 2)
         margin = (index - begin) // 5
-        self._zero.learn(self._buffer.channel(FORCE, begin + margin, index - margin))
+        swing = self._buffer.channel(FORCE, begin + margin, index - margin)
+        least_n = math.inf
+        if last is not None and last.end_index == begin:
+            first = max(begin - round(BEFORE_END_S * self._rate_hz), self._buffer.samples.first)
+            stop = min(begin + round(DIP_S * self._rate_hz) + 1, index)
+            least_n = find_least(self._buffer.channel(FORCE, first, stop), self._rate_hz)[1]
+        self._zero.learn(swing, least_n)
 
     def _recover_from_drift(self, index: int) -> None:
         """Reset the plate's zero where it has drifted so far that a contact does not end.

@@ -7,6 +7,7 @@ from collections import deque
 
 import numpy as np
 
+from rehab.gait.contacts.drag import DIP_N
 from rehab.gait.signals.filters import Floats, find_upper_median
 
 OFFSET_MAX = 0.15  # of body weight; a plate that reads more in swing needs its own zero button
@@ -38,11 +39,22 @@ class PlateZero:
         self._offsets: deque[float] = deque(maxlen=OFFSET_SWINGS)
         self._zeros: deque[float] = deque(maxlen=ZERO_SWINGS)
 
-    def learn(self, swing: Floats) -> None:
-        """Learn from the middle of a swing, shape (n,)."""
+    def learn(self, swing: Floats, least_n: float = math.inf) -> None:
+        """Learn from a swing.
+
+        Parameters
+        ----------
+        swing
+            Its middle, shape (n,).
+        least_n
+            The least force around the end of the stance before: a plate reads no less than its zero
+            there, so that a swing that reads more is one of a foot that is dragged all through it.
+        """
         if len(swing) < self._least:
             return
         zero = _find_zero(swing)
+        if zero - max(least_n, self.offset_n) > DIP_N:
+            return
         self._zeros.append(zero)
         is_near = abs(zero - self.offset_n) <= ZERO_STEP_N
         is_steady = (

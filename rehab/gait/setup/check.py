@@ -98,9 +98,9 @@ def check_setup(columns: Mapping[str, Floats], mass_kg: float | None = None) -> 
         for side, leg in legs.items()
         for channel in ("moment", "angle")
     }
-    (times, *_), late_s = SampleClock().add([time_s])
+    (times,), late_s = SampleClock().add(np.array([time_s]))
     late = 0 if late_s is None else int((late_s > LATE_S).sum())
-    lost = 0 if times is None else int((np.diff(times) > 2.5 / proposal.rate_hz).sum())
+    lost = int((np.diff(times) > 2.5 / proposal.rate_hz).sum())
     check = check_signals(
         time_s,
         legs.get("left"),

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from rehab.gait.signals.filters import Floats
-from rehab.gait.signals.samples import CHANNEL_NAMES, FORCE, TIME
+from rehab.gait.signals.samples import Layout
 
 
 class SampleBuffer:
@@ -25,25 +23,24 @@ class SampleBuffer:
         self.keep = keep
         self.end = 0
         self.first = 0  # the oldest sample that is still there
-        # Time lies between the legs, so that each has its six channels side by side.
-        table = np.full((1 + legs * len(CHANNEL_NAMES), 3 * keep), np.nan)
-        tables = (
-            [table] if legs == 1 else [table[len(CHANNEL_NAMES) :: -1], table[len(CHANNEL_NAMES) :]]
-        )
+        self.layout = Layout(legs)
+        wide = len(self.layout.order)
+        table = np.full((wide, 3 * keep), np.nan)
+        middle = self.layout.time_rows[wide]
+        tables = [table] if legs == 1 else [table[middle::-1], table[middle:]]
         self.legs = [LegBuffer(self, leg) for leg in tables]
         self._table = table
-        self._rows = [tables[0][TIME], *(row for leg in tables for row in leg[FORCE:])]
-        self._sent = [False] * len(self._rows)  # rows that were never sent stay NaN
+        self._parts = {rows: table[place] for rows, place in self.layout.rows.items()}
+        self._has_seldom = False  # rows that were never sent stay NaN
         self._late = np.zeros(3 * keep)
         self._late_end = 0  # behind the newest sample that was late
 
-    def append(
-        self, chunk: Sequence[Floats | None], count: int, late_s: Floats | None = None
-    ) -> None:
-        """Append ``count`` samples of each channel: times, then those of each leg; None for NaN.
+    def append(self, table: Floats, late_s: Floats | None = None) -> None:
+        """Append samples as ``Layout.read`` returns them, shape (rows, samples).
 
         ``late_s`` is by how much each came late, None where none did.
         """
+        rows, count = table.shape
         begin = self.end - self.first
         end = begin + count
         if end > self._table.shape[1]:
@@ -52,12 +49,11 @@ class SampleBuffer:
             self._late[self.keep :] = 0
             self.first = self.end - self.keep
             begin, end = self.keep, self.keep + count
-        for place, (row, values) in enumerate(zip(self._rows, chunk, strict=True)):
-            if values is not None:
-                row[begin:end] = values
-                self._sent[place] = True
-            elif self._sent[place]:
-                row[begin:end] = np.nan
+        if rows == len(self._table):
+            self._has_seldom = True
+        elif self._has_seldom:
+            self._table[:, begin:end] = np.nan
+        self._parts[rows][:, begin:end] = table
         self.end += count
         if late_s is not None:
             self._late[begin:end] = late_s

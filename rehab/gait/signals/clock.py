@@ -27,8 +27,6 @@ EVEN_S, EVEN_SAMPLES = 0.02, 3
 UNDECIDED_S = 1.0
 SLOWEST_S = 2.0  # between samples; what lies further apart is in milliseconds
 
-Columns = list[Floats | None]
-
 
 class SampleClock:
     """Puts late samples back to when they were taken; the rest keep the times that they have.
@@ -39,52 +37,56 @@ class SampleClock:
 
     def __init__(self) -> None:
         self._period_s: float | None = None
+        self._usual_s = math.nan  # at most between two samples, once the period is known
         self._newest: deque[Floats] = deque()  # times without a gap
         self._count = 0  # of them
         self._stamp_s = math.nan  # of the newest sample
-        self._held: Columns | None = None
+        self._held: Floats | None = None
 
-    def add(self, chunk: Columns) -> tuple[Columns, Floats | None]:
+    def add(self, table: Floats, row: int = 0) -> tuple[Floats, Floats | None]:
         """Return the samples whose times are known now, and by how much each was late.
 
         Parameters
         ----------
-        chunk
-            Stamps [s], then any channels, shape (n,) each; None for a channel that is not sent.
+        table
+            Stamps [s] and any channels, shape (rows, n); it is kept, and changed where samples are
+            late.
+        row
+            Where the stamps are.
 
         Returns
         -------
-        As many columns as were given, with times in place of stamps, and the stamps' lateness [s],
+        As many rows as were given, with times in place of stamps, and the stamps' lateness [s],
         shape (n,), or None where none is late.
         """
         if self._held is not None:
-            chunk, self._held = _join(self._held, chunk), None
-        stamps = chunk[0]
-        assert stamps is not None  # noqa: S101 (times are always sent)
-        times, late = stamps, None
-        done = self._pass_even(stamps) if len(stamps) else 0
-        if done == len(stamps):
-            return chunk, None
-        while done < len(stamps):
+            table, self._held = np.concatenate((self._held, table), axis=1), None
+        stamps = table[row]
+        count = len(stamps)
+        done = self._pass_even(stamps) if count else 0
+        if done == count:
+            return table, None
+        late = None
+        while done < count:
             if even := self._pass_even(stamps[done:]):
                 done += even
                 continue
             settled = self._settle(stamps[done:])
             if settled is None:
-                self._held = [None if one is None else one[done:] for one in chunk]
-                chunk = [None if one is None else one[:done] for one in chunk]
+                self._held, table = table[:, done:], table[:, :done]
                 break
             if late is None:
-                times, late = stamps.copy(), np.zeros(len(stamps))
+                late = np.zeros(count)
             part = slice(done, done + len(settled))
-            times[part], late[part] = settled, np.maximum(stamps[part] - settled, 0)
-            self._extend(settled, stamps[part])
+            late[part] = np.maximum(stamps[part] - settled, 0)
+            self._extend(settled, float(stamps[part.stop - 1]))
+            stamps[part] = settled
             done = part.stop
             if self._period_s is None:
                 self._begin_line(self._line[-1:])
-        return [times[:done], *chunk[1:]], None if late is None else late[:done]
+        return table, None if late is None else late[:done]
 
-    def finish(self) -> Columns | None:
+    def finish(self) -> Floats | None:
         """Return the samples that are still held back, with the times that they have."""
         held, self._held = self._held, None
         return held
@@ -94,22 +96,27 @@ class SampleClock:
         count = len(stamps)
         if self._period_s is None:
             count = min(count, FIRST_SAMPLES - self._count)
-        else:
-            limit = self._period_s + _find_tolerance(self._period_s)
-            if not stamps[0] - self._stamp_s <= limit:
-                return 0
+            self._extend(stamps[:count], float(stamps[count - 1]))
+            if self._count >= FIRST_SAMPLES:
+                self._period_s = find_period(self._line)
+                if self._period_s is None:
+                    self._begin_line(np.empty(0))
+                else:
+                    self._usual_s = self._period_s + _find_tolerance(self._period_s)
+            return count
+        usual_s = self._usual_s
+        if not stamps.item(0) - self._stamp_s <= usual_s:
+            return 0
+        if count > 1:
             steps = stamps[1:] - stamps[:-1]
-            if count > 1 and not steps[steps.argmax()] <= limit:
-                count = int(np.flatnonzero(~(steps <= limit))[0]) + 1
-        self._extend(stamps[:count], stamps[:count])
-        if self._period_s is None and self._count >= FIRST_SAMPLES:
-            self._period_s = find_period(self._line)
-            if self._period_s is None:
-                self._begin_line(np.empty(0))
+            if not steps.item(steps.argmax()) <= usual_s:
+                count = int(np.flatnonzero(~(steps <= usual_s))[0]) + 1
+                stamps = stamps[:count]
+        self._extend(stamps, stamps.item(-1))
         return count
 
-    def _extend(self, times: Floats, stamps: Floats) -> None:
-        self._stamp_s = float(stamps[-1])
+    def _extend(self, times: Floats, stamp_s: float) -> None:
+        self._stamp_s = stamp_s
         self._newest.append(times)
         self._count += len(times)
         while self._count - len(self._newest[0]) >= LINE_SAMPLES:
@@ -214,18 +221,3 @@ def _first_even(
     gaps = np.cumsum(steps > period_s + tolerance_s)
     at = _first((pace >= BURST_PACE * period_s) & (gaps[even:] == gaps[:-even]))
     return at + even if at < len(pace) else len(stamps)
-
-
-def _join(first: Columns, second: Columns) -> Columns:
-    lengths = [len(columns[0]) for columns in (first, second) if columns[0] is not None]
-    return [
-        None
-        if one is None and other is None
-        else np.concatenate(
-            [
-                np.full(length, np.nan) if part is None else part
-                for part, length in zip((one, other), lengths, strict=True)
-            ]
-        )
-        for one, other in zip(first, second, strict=True)
-    ]

@@ -26,6 +26,79 @@ class LegSamples(NamedTuple):
     position_m: ArrayLike | None = None
 
 
+class Layout:
+    """Where each channel of one or two legs lies in a table of samples, shape (rows, samples).
+
+    Time lies between two legs, so that each has its six rows side by side; rows that are seldom
+    sent lie outside. A narrow table is one without them.
+
+    Parameters
+    ----------
+    legs
+        How many, one or two.
+    """
+
+    def __init__(self, legs: int) -> None:
+        one = range(1, 1 + len(CHANNEL_NAMES))
+        # Of what is fed, a time and then each leg's channels, in the order of the rows.
+        self.order = (0, *one) if legs == 1 else (*reversed(one), 0, *(len(one) + n for n in one))
+        self._narrow = tuple(
+            n for n in self.order if n == 0 or (n - 1) % len(CHANNEL_NAMES) < ANGLE
+        )
+        self._seldom = tuple(n for n in self.order if n not in self._narrow)
+        first = self.order.index(self._narrow[0])
+        self.rows = {
+            len(self.order): slice(0, len(self.order)),
+            len(self._narrow): slice(first, first + len(self._narrow)),
+        }
+        self.time_rows = {rows: rows // 2 if legs == 2 else 0 for rows in self.rows}
+
+    def read(self, names: Sequence[str], channels: Sequence[ArrayLike | None]) -> Floats:
+        """Return a chunk's channels as a table; a single number is one sample.
+
+        Parameters
+        ----------
+        names
+            What each channel is called in messages.
+        channels
+            A time, then each leg's channels, shape (n,) or numbers; None for one that is not sent.
+
+        Returns
+        -------
+        A new array, narrow where nothing is sent that is seldom; else NaN where nothing is.
+
+        Raises
+        ------
+        GaitInputError
+            For channels of different lengths or with more than one dimension.
+        """
+        for place in self._seldom:
+            if channels[place] is not None:
+                break
+        else:
+            try:
+                table: Floats = np.array([channels[place] for place in self._narrow], np.float64)
+            except (TypeError, ValueError):  # of different lengths, as a rule
+                pass
+            else:
+                if table.ndim == 2:
+                    return table
+        chunk = read_chunk(names, channels)
+        length = next(len(values) for values in chunk if values is not None)
+        return np.array(
+            [
+                np.full(length, np.nan) if values is None else values
+                for values in (chunk[place] for place in self.order)
+            ]
+        )
+
+    def widen(self, table: Floats) -> Floats:
+        """Return a table with all rows, NaN where it had none."""
+        wide = np.full((len(self.order), table.shape[1]), np.nan)
+        wide[self.rows[len(table)]] = table
+        return wide
+
+
 def read_chunk(names: Sequence[str], channels: Sequence[ArrayLike | None]) -> list[Floats | None]:
     """Return the channels as float arrays of one length; a single number is one sample.
 
@@ -66,21 +139,3 @@ def read_chunk(names: Sequence[str], channels: Sequence[ArrayLike | None]) -> li
         f"The channels have different numbers of samples: {lengths}. Feed as many of each; put NaN "
         "where a channel has none."
     )
-
-
-def split_chunk(chunk: list[Floats | None], longest: int) -> list[tuple[list[Floats | None], int]]:
-    """Return a chunk in pieces of at most ``longest`` samples, each with its number of samples.
-
-    The first channel must be there.
-    """
-    length = 0 if chunk[0] is None else len(chunk[0])
-    if length <= longest:
-        return [(chunk, length)]
-    parts = [slice(start, start + longest) for start in range(0, length, longest)]
-    return [
-        (
-            [None if values is None else values[part] for values in chunk],
-            min(longest, length - part.start),
-        )
-        for part in parts
-    ]

@@ -62,9 +62,8 @@ def check_samples(
     is_velocity
         Whether the angle is a velocity [rad/s].
     """
-    rows = slice(TIME, ANGLE + 1)
-    steps = window[rows, stance + 1 :] - window[rows, stance:-1]
-    low, high = steps.min(axis=1).tolist(), steps.max(axis=1).tolist()
+    part = window[MOMENT : ANGLE + 1, stance:]
+    steps = part[:, 1:] - part[:, :-1]
     reasons = []
     if clock.lost_s <= GAP_S:
         taken_s = float(window[TIME, -1] - window[TIME, stance])
@@ -75,9 +74,9 @@ def check_samples(
         (MOMENT, mass_kg, MOMENT_JUMP, RejectionReason.MOMENT_LOST),
         (ANGLE, 1.0, VELOCITY_JUMP if is_velocity else ANGLE_JUMP, RejectionReason.ANGLE_LOST),
     ):
-        jump = max(high[row], -low[row])
+        values, moved, steps_s = part[row - MOMENT], steps[row - MOMENT], None
+        jump = max(find_maximum(moved), -find_minimum(moved))
         if not math.isfinite(jump):  # some are missing
-            values = window[row, stance:]
             known = np.flatnonzero(np.isfinite(values))
             if _has_gap(time, known):
                 reasons.append(reason)
@@ -86,11 +85,10 @@ def check_samples(
             values = values[known]
             moved = np.diff(values)
             jump = find_maximum(np.abs(moved))
-        else:
-            values, moved, steps_s = window[row, stance:], steps[row], np.diff(time)
-        is_jumping = jump > scale * (at_once + by_time / rate_hz) and bool(
-            (np.abs(moved) > scale * (at_once + by_time * np.maximum(steps_s, 1 / rate_hz))).any()
-        )
+        is_jumping = jump > scale * (at_once + by_time / rate_hz)
+        if is_jumping:
+            taken = np.maximum(np.diff(time) if steps_s is None else steps_s, 1 / rate_hz)
+            is_jumping = bool((np.abs(moved) > scale * (at_once + by_time * taken)).any())
         if is_jumping or _is_frozen(values, moved, FROZEN_S[row] * rate_hz):
             reasons.append(reason)
     return reasons
@@ -156,7 +154,7 @@ def _has_gap(time_s: Floats, known: NDArray[np.intp]) -> bool:
 def _is_frozen(values: Floats, steps: Floats, longest: float) -> bool:
     """Return whether a channel repeats one value, not zero, for more than ``longest`` samples."""
     still = steps == 0
-    if not still.any():
+    if not still[still.argmax()]:
         return False
     still &= values[1:] != 0
     edges = np.concatenate(([-1], np.flatnonzero(~still), [len(still)]))

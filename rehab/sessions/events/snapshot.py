@@ -12,6 +12,7 @@ from rehab.sessions.payloads import (
     describe_coaching,
     describe_now,
     describe_phase,
+    describe_rates,
     describe_state,
     describe_types,
 )
@@ -40,6 +41,7 @@ def history_entry(
         "number": step.number,
         "performance": step.performance,
         "hit": step.hit,
+        "close": step.close,
         "points": step.points,
         "valid": step.valid,
         "phase": step.phase,
@@ -92,9 +94,7 @@ def snapshot(
             **describe_coaching(fold),
             "trained_side": plan.trained_side,
             "marks": list(marks),
-            "hit_rate": fold.feedback.hit_rate,
-            "hits": fold.feedback.hits,
-            "judged": fold.feedback.judged,
+            **describe_rates(fold.feedback),
             "obstacle": fold.obstacle,
             "robot": dict(robot),
             "phases": [

@@ -10,6 +10,7 @@ from rehab.sessions.events.event import LiveEvent
 from rehab.sessions.payloads import (
     Message,
     describe_coaching,
+    describe_rates,
     describe_walked,
 )
 from rehab.training.controls import Audience
@@ -18,7 +19,7 @@ from rehab.training.phases import Phase
 from rehab.training.plans import SessionPlan
 from rehab.training.schedules import ScheduleKind, Untold
 from rehab.training.steps import ScoredStep
-from rehab.training.valences import Valence
+from rehab.training.valences import Band, Emblem, Valence
 
 
 class StoredStep(Protocol):
@@ -34,6 +35,8 @@ class StoredStep(Protocol):
     def performance(self) -> float | None: ...
     @property
     def hit(self) -> bool | None: ...
+    @property
+    def close(self) -> bool: ...
     @property
     def points(self) -> int | None: ...
     @property
@@ -71,7 +74,7 @@ def step_event(
     ``live`` is False for a step that came too late to be shown as one.
     """
     tally, score, plan, walked = fold.feedback, fold.score, fold.plan, describe_walked(fold)
-    streak, hits, judged = tally.streak, tally.hits, tally.judged
+    streak, rates = tally.streak, describe_rates(tally)
     answer, coaching = fold.answer, describe_coaching(fold)
 
     def build(audience: Audience) -> Message | None:
@@ -80,12 +83,7 @@ def step_event(
                 shown = patient_step(plan, context, step, score, streak, live=live, answer=answer)
                 return None if shown is None else shown | walked
             case Audience.MONITOR:
-                rate = {
-                    "hit_rate": hits / judged if judged else None,
-                    "hits": hits,
-                    "judged": judged,
-                }
-                totals = {"score": score, "streak": streak, **rate, **walked}
+                totals = {"score": score, "streak": streak, **rates, **walked}
                 return _monitor_step(step, live=live) | totals | coaching
             case Audience.ROBOT:
                 return _robot_step(context.phase, step, live=live)
@@ -118,15 +116,18 @@ def patient_step(
     if plan.schedule.kind is ScheduleKind.SUMMARY:
         return _summary(context, step, answer, score, streak, live=live)
     valence, band = context.valence, context.valence.band(step.performance)
+    if step.close:
+        band = Band(0, plan.close_steps.words)
     return {
         "kind": "step",
         "number": step.number,
         "live": live,
         "performance": round(step.performance, 4),
         "hit": step.hit,
+        "close": step.close,
         "words": band.words if context.words_shown else "",
         "chart": context.chart_style,
-        "emblem": valence.emblem(step.hit),
+        "emblem": Emblem.NEUTRAL if step.close else valence.emblem(step.hit),
         "confetti": band.confetti,
         "points": step.points,
         "score": score,
@@ -147,10 +148,12 @@ def _summary(
 ) -> Message:
     """Return what the patient is told of a block of steps: their hits, their mean, their points."""
     valence, mean = context.valence, answer.mean_performance
-    band, misses = valence.band(mean), answer.steps - answer.hits
+    band = valence.band(mean)
     points = None
     if valence.has_points:
-        points = answer.hits * (valence.hit_points or 0) + misses * (valence.miss_points or 0)
+        points = answer.hits * (valence.hit_points or 0) + answer.misses * (
+            valence.miss_points or 0
+        )
     return {
         "kind": "step",
         "number": step.number,
@@ -165,7 +168,7 @@ def _summary(
         "score": score,
         "streak": streak if valence.rewards else None,
         "shown": None if valence.has_points else round(answer.mean_shown, 2),
-        "summary": {"hits": answer.hits, "steps": answer.steps},
+        "summary": {"hits": answer.hits, "steps": answer.steps, "close": answer.close},
     }
 
 
@@ -182,6 +185,7 @@ def _monitor_step(step: ScoredStep, *, live: bool) -> Message:
         "goal": step.goal,
         "performance": step.performance,
         "hit": step.hit,
+        "close": step.close,
         "points": step.points,
         "valid": step.valid,
         "reasons": step.reasons,
@@ -193,6 +197,8 @@ def _monitor_step(step: ScoredStep, *, live: bool) -> Message:
 def _robot_step(phase: Phase, step: ScoredStep, *, live: bool) -> Message | None:
     if not live or not phase.feedback or not phase.robot or step.performance is None:
         return None
+    if step.close:
+        return None  # a gesture would be a verdict
     return {
         "type": "step",
         "number": step.number,

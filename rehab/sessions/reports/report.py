@@ -49,6 +49,7 @@ def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
         "extras": mean_extras(user, session),
         "robot": _describe_robot(review.rows),
         "chart": draw_chart(review.chart),
+        "has_close": bool(review.figures["close"]),
         "unit": plan.measure.unit,
     }
 

@@ -15,8 +15,8 @@ RING = 2.6
 def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
     """Return all strides of the trained leg against the goal, as paths that print in gray.
 
-    At or above the goal is a disc, below a ring, without a goal a cross; an invalid stride is a
-    mark below the axis. The goal is a line, phases without feedback are shaded.
+    At or above the goal is a disc, below a ring, without a goal a cross, close to it a dash; an
+    invalid stride is a mark below the axis. The goal is a line, phases without feedback are shaded.
     ``chart`` is the result of ``review.stride_chart``. Returns {} without strides.
     """
     strides = chart["strides"]
@@ -36,12 +36,15 @@ def draw_chart(chart: dict[str, Any]) -> dict[str, Any]:
         return HEIGHT - HEIGHT * max(value, 0.0) / top
 
     paths: defaultdict[str, list[str]] = defaultdict(list)
-    for number, value, hit in zip(numbers, shown, strides["hit"], strict=True):
+    verdicts = zip(numbers, shown, strides["hit"], strides["close"], strict=True)
+    for number, value, hit, close in verdicts:
         at = x(number)
         if value is None:
             paths["lost"].append(f"M{at:.1f} {HEIGHT:.0f}v6")
         elif hit is None:
             paths["free"].append(f"M{at - 2.4:.1f} {y(value):.1f}h4.8m-2.4 -2.4v4.8")
+        elif close:
+            paths["close"].append(f"M{at - 2.4:.1f} {y(value):.1f}h4.8")
         elif hit:
             paths["hit"].append(f"M{at:.1f} {y(value):.1f}h0")
         else:

@@ -124,14 +124,16 @@ def stride_chart(
         Step.objects.visible_to(user)
         .filter(session=session, side=session.trained_side)
         .order_by("number")
-        .values_list("number", "valid", "value", "gain", "shown", "goal", "hit", "phase", "reasons")
+        .values_list(
+            "number", "valid", "value", "gain", "shown", "goal", "hit", "close", "phase", "reasons"
+        )
     )
     columns: dict[str, list[Any]] = {
-        name: [] for name in ("number", "shown", "goal", "hit", "phase", "why")
+        name: [] for name in ("number", "shown", "goal", "hit", "close", "phase", "why")
     }
-    for number, valid, value, gain, shown, goal, hit, phase, reasons in steps.iterator():
+    for number, valid, value, gain, shown, goal, hit, close, phase, reasons in steps.iterator():
         seen = shown if shown is not None else value * gain if valid and value is not None else None
-        row = (number, _round(seen), _round(goal), hit, phase, ", ".join(reasons))
+        row = (number, _round(seen), _round(goal), hit, close, phase, ", ".join(reasons))
         for column, entry in zip(columns.values(), row, strict=True):
             column.append(entry)
     runs = groupby(zip(columns.pop("phase"), columns["number"], strict=True), lambda pair: pair[0])

@@ -45,9 +45,7 @@ def format_summary(plan: SessionPlan, review: SessionReview) -> SessionSummary:
         hit_rate=Figure(
             _("Hit rate"),
             format_rate(figures["hit_rate"]),
-            _("wanted %(rate)s") % {"rate": format_rate(target.hit_rate)}
-            if target.hit_rate
-            else "",
+            ", ".join(_describe_rate(target.hit_rate, figures["close"])),
         ),
         score=Figure(
             _("Score"),
@@ -76,6 +74,15 @@ def format_summary(plan: SessionPlan, review: SessionReview) -> SessionSummary:
             else "",
         ),
     )
+
+
+def _describe_rate(wanted: float | None, close: int) -> list[str]:
+    """Return what stands beside a hit rate: the wanted one, and how many steps are not in it."""
+    notes = [_("wanted %(rate)s") % {"rate": format_rate(wanted)}] if wanted else []
+    if close:
+        about = ngettext("%(count)s step was close", "%(count)s steps were close", close)
+        notes.append(about % {"count": format_number(close, 0)})
+    return notes
 
 
 def format_phases(review: SessionReview) -> list[dict[str, Any]]:

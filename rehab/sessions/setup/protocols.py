@@ -11,10 +11,12 @@ from django.db.models import F, Q
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
+from rehab.feedback.translation import translate
 from rehab.people.models import Clinic
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.web.refusals import format_refusal
 from rehab.training import measures as rules
+from rehab.training.closeness import CLOSE_WORDS, CloseSteps
 from rehab.training.phases import PHASE_KINDS, Phase
 from robot.wire.frames import NAME
 
@@ -136,6 +138,16 @@ class Protocol(ClinicModel):
         validators=[MinValueValidator(1), MaxValueValidator(100)],
         help_text=_("Filled in where a session is set up with it; left empty, it stays."),
     )
+    close_percent = models.PositiveSmallIntegerField(
+        _("close steps, % beyond the goal"),
+        null=True,
+        blank=True,
+        validators=[MaxValueValidator(49)],
+        help_text=_(
+            "A step pays and takes nothing where more than this part of its 95 % interval lies "
+            "beyond the goal. Left empty, each step is a hit or a miss."
+        ),
+    )
 
     class Meta(ClinicModel.Meta):
         verbose_name = _("protocol")
@@ -157,6 +169,11 @@ class Protocol(ClinicModel):
         """Return the phases in the form that the rules use."""
         phases = sorted(self.phases.all(), key=lambda phase: phase.position)  # also if prefetched
         return tuple(phase.to_rule() for phase in phases)
+
+    def close_steps(self, language: str) -> CloseSteps:
+        """Return which steps are told as close, with words in a language."""
+        part = None if self.close_percent is None else self.close_percent / 100
+        return CloseSteps(part, translate(CLOSE_WORDS, language))
 
 
 class ProtocolPhase(ScopedModel):

@@ -8,12 +8,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
-from rehab.gait import Stride
+from rehab.gait import GyroscopeStride, Stride
 from rehab.gait.recordings.columns import Column
 from rehab.gait.selfcheck.cures import CURES
 from rehab.sources.client import LiveFeed
 from rehab.sources.intake.alignment import Alignment, Channel, Floats, Samples
-from rehab.sources.intake.measurements import to_measurement
+from rehab.sources.intake.gyroscopes import GyroscopePipeline
+from rehab.sources.intake.measurements import to_measurement, to_timed_measurement
 from rehab.sources.intake.pipeline import SignalPipeline
 from rehab.sources.intake.quality import SignalQuality
 from rehab.sources.intake.recorder import SignalRecorder
@@ -73,6 +74,9 @@ class Intake:
             for channel, column in leg.items()
         }
         self._rate_hz = settings.rate_hz
+        self._gyroscopes = GyroscopePipeline(settings.gyroscopes, settings.rate_hz, notify)
+        if settings.gyroscopes:
+            self._columns = {}
         self._problem: SourceError | None = None
         self._failed = asyncio.Event()
         self._number = 0
@@ -105,14 +109,14 @@ class Intake:
         for row in rows:
             if VALUE in row:
                 self._add_stride(row)
-            elif self._columns.keys() & row.keys():
+            elif self._columns.keys() & row.keys() or self._gyroscopes.names & row.keys():
                 if samples and row.keys() != samples[0].keys():
                     self._add_samples(samples)
                     samples = []
                 samples.append(row)
             else:
                 names = ", ".join(list(row)[:4])
-                known = ", ".join(list(self._columns)[:3])
+                known = ", ".join([*self._columns, *self._gyroscopes.names][:3])
                 self.reject_row(
                     f"A row with {names} is neither a stride nor a sample: a stride has a value, a "
                     f"sample {known} or more. Rename them, or map them with --columns."
@@ -133,6 +137,7 @@ class Intake:
         """End the feed: nothing more will come."""
         if self._pipeline is not None:
             self._put_strides(self._pipeline.finish())
+        self._put_steps(self._gyroscopes.finish())
         self._feed.finish()
 
     def close(self) -> None:
@@ -172,11 +177,15 @@ class Intake:
             if named is not None:
                 self._put(named, is_timed=False)
 
+    def _put_steps(self, strides: Iterable[tuple[Side, GyroscopeStride]]) -> None:
+        for side, stride in strides:
+            self._put(to_timed_measurement(stride, self._number + 1, side), is_timed=False)
+
     # --- Samples ---
 
     def _add_samples(self, rows: list[Mapping[str, Cell]]) -> None:
         """Add rows that have the same cells."""
-        names = [name for name in rows[0] if name in self._columns]
+        names = [n for n in rows[0] if n in self._columns or n in self._gyroscopes.names]
         time = self._settings.columns.time
         times, cells = [], []
         for row in rows:
@@ -222,6 +231,10 @@ class Intake:
         if not len(t_s):
             return
         self.quality.count_samples(stream, t_s)
+        if self._settings.gyroscopes:
+            rates = {n: table[:, p] for p, n in enumerate(names) if n in self._gyroscopes.names}
+            self._put_steps(self._gyroscopes.add(t_s, rates))
+            return
         known = [place for place, name in enumerate(names) if name in self._columns]
         values: dict[Channel, Floats] = {}
         for place in known:
@@ -253,7 +266,8 @@ class Intake:
     def accepts(self, names: Iterable[str]) -> bool:
         """Return whether rows with these cells are strides or samples."""
         there = set(names)
-        return VALUE in there or bool(self._columns.keys() & there)
+        known = self._columns.keys() | self._gyroscopes.names
+        return VALUE in there or bool(known & there)
 
     def _measure(self, t_s: Floats, values: dict[Channel, Floats]) -> None:
         if self._recorder is not None:
@@ -267,8 +281,13 @@ class Intake:
                 )
                 self._failed.set()
                 return
-            look_ahead_s = self._settings.look_ahead_s
-            self._pipeline = SignalPipeline(mass_kg, self._rate_hz, look_ahead_s, self._notify)
+            self._pipeline = SignalPipeline(
+                mass_kg,
+                self._rate_hz,
+                self._settings.look_ahead_s,
+                self._notify,
+                is_overground=self._settings.is_overground,
+            )
         self._put_strides(self._pipeline.add(t_s, values))
         for finding in self._pipeline.check():
             where = f" ({finding.side} leg)" if finding.side else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rehab.gait import Stride
+from rehab.gait import GyroscopeStride, Stride
 from rehab.training.steps import Measurement, Side
 from robot.wire.limits import MAX_REASONS
 
@@ -17,6 +17,22 @@ EXTRA = (
     "a2_sd_w_kg",
     *("weight_ratio", "offset_n"),
 )
+
+
+def to_timed_measurement(stride: GyroscopeStride, number: int, side: Side) -> Measurement:
+    """Return a stride by a gyroscope as a measurement: figures without an A2.
+
+    A measure with a channel (``stride_s``, ``stance_s``, ``cadence_min``) trains one of them. It
+    ends with the initial contact after it.
+    """
+    extra = ("initial_contact_s", "terminal_contact_s", "stride_s", "stance_s", "cadence_min")
+    return Measurement(
+        number=number,
+        time_s=stride.initial_contact_s + stride.stride_s,
+        side=side,
+        value=None,
+        extra={name: getattr(stride, name) for name in extra},
+    )
 
 
 def to_measurement(stride: Stride, number: int, side: Side) -> Measurement | None:

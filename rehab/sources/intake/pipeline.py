@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from rehab.gait import (
@@ -32,18 +34,27 @@ class SignalPipeline:
         Body mass of the walker [kg].
     rate_hz
         Samples per second; None to estimate it.
-    look_ahead_s
-        How long strides wait after terminal contact [s].
+    look_ahead_s, is_overground
+        As in ``rehab.gait.StrideDetector``.
     notify
         Called with lines for the person who runs the source.
     """
 
     def __init__(
-        self, mass_kg: float, rate_hz: float | None, look_ahead_s: float, notify: Notify
+        self,
+        mass_kg: float,
+        rate_hz: float | None,
+        look_ahead_s: float,
+        notify: Notify,
+        *,
+        is_overground: bool = False,
     ) -> None:
         self.mass_kg = mass_kg
         self.rate_hz = rate_hz
-        self._look_ahead_s = look_ahead_s
+        self._how: dict[str, Any] = {
+            "look_ahead_s": look_ahead_s,
+            "is_overground": is_overground,
+        }
         self._notify = notify
         self._held: list[Samples] = []
         self._detector: TwoLegDetector | StrideDetector | None = None
@@ -109,13 +120,9 @@ class SignalPipeline:
             check_rate(rate_hz)
             self._sides, self.rate_hz = sides, rate_hz
             if len(sides) == 2:
-                self._detector = TwoLegDetector(
-                    rate_hz, self.mass_kg, look_ahead_s=self._look_ahead_s
-                )
+                self._detector = TwoLegDetector(rate_hz, self.mass_kg, **self._how)
             else:
-                self._detector = StrideDetector(
-                    rate_hz, self.mass_kg, look_ahead_s=self._look_ahead_s, side=sides[0]
-                )
+                self._detector = StrideDetector(rate_hz, self.mass_kg, side=sides[0], **self._how)
         except GaitInputError as problem:
             self._notify(f"{problem} Times have to be the device's own, in seconds.")
             return []

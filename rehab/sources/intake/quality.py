@@ -55,8 +55,9 @@ class SignalQuality:
 
     def _judge(self, stream: str, t_s: Floats) -> None:
         """Count what comes late and what is lost."""
-        (times, *_), late_s = self._clocks.setdefault(stream, SampleClock()).add([t_s])
-        if times is None or not len(times):
+        clock = self._clocks.setdefault(stream, SampleClock())
+        (times,), late_s = clock.add(np.array([t_s]))
+        if not len(times):
             return
         if late_s is not None:
             self.late += int((late_s > LATE_S).sum())

@@ -7,12 +7,29 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-from rehab.gait.recordings.columns import CHANNELS, SIGNAL_LAYOUTS, ColumnMap, read_column_map
+from rehab.gait.recordings.columns import (
+    CHANNELS,
+    SIDES,
+    SIGNAL_LAYOUTS,
+    Column,
+    ColumnMap,
+    read_column,
+    read_column_map,
+)
 from rehab.gait.settings import LOOK_AHEAD_MAX_S, MASS_MAX_KG, MASS_MIN_KG
 from rehab.sources.reporting import SourceError
 from rehab.training.steps import Side
 
 LOOK_AHEAD_S = 0.05  # reduces the error of A2 from 1.0 to 0.14 % (moore2013)
+
+
+@dataclass(frozen=True, slots=True)
+class Gyroscope:
+    """A gyroscope on a walker: its leg, "foot" or "shank", and the column of its sagittal rate."""
+
+    side: Side
+    segment: str
+    column: Column
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +50,10 @@ class IntakeSettings:
         The leg of rows that name none; None for the session's trained one.
     keep
         Where the raw signals are written to, if anywhere.
+    is_overground
+        Whether people walk over plates in a floor, and not on a treadmill.
+    gyroscopes
+        Instead of legs' signals: which column is the rate of rotation of which foot or shank.
     """
 
     mass_kg: float | None = None
@@ -41,6 +62,8 @@ class IntakeSettings:
     columns: ColumnMap = SIGNAL_LAYOUTS["garry"]
     side: Side | None = None
     keep: Path | None = None
+    is_overground: bool = False
+    gyroscopes: tuple[Gyroscope, ...] = ()
 
     @classmethod
     def read(cls, options: Namespace) -> Self:
@@ -69,7 +92,23 @@ class IntakeSettings:
             columns=read_column_map(columns) if columns else cls().columns,
             side=Side(options.side) if options.side else None,
             keep=options.keep,
+            is_overground=getattr(options, "overground", False),
+            gyroscopes=tuple(
+                _read_gyroscope(text) for text in getattr(options, "gyroscope", None) or ()
+            ),
         )
+
+
+def _read_gyroscope(text: str) -> Gyroscope:
+    """Return what a text such as ``left.foot=gyro_z*0.01745`` says. Raises SourceError."""
+    place, _, column = text.partition("=")
+    side, _, segment = place.partition(".")
+    if side not in SIDES or segment not in ("foot", "shank") or not column:
+        raise SourceError(
+            f"'{text}' maps no gyroscope. Write SIDE.SEGMENT=COLUMN with SIDE left or right and "
+            "SEGMENT foot or shank: left.foot=gyro_z*0.01745"
+        )
+    return Gyroscope(Side(side), segment, read_column(column))
 
 
 def add_signal_arguments(parser: ArgumentParser) -> None:
@@ -90,6 +129,16 @@ def add_signal_arguments(parser: ArgumentParser) -> None:
         metavar="CHANNEL=COLUMN",
         help="time=… and {left,right}.{" + ",".join(CHANNELS) + "}=…; COLUMN*FACTOR changes unit "
         "or sign (default: time_s, left_force_n, left_moment_nm, left_angle_rad, right_…)",
+    )
+    signals.add_argument(
+        "--overground", action="store_true", help="over plates in a floor, a step or two at a time"
+    )
+    signals.add_argument(
+        "--gyroscope",
+        nargs="+",
+        metavar="SIDE.SEGMENT=COLUMN",
+        help="instead of forces: contacts, stride time and cadence by the sagittal rate of a foot "
+        "or shank in rad/s (left.foot=gyro_z*0.01745 for degrees); its sign is found",
     )
     signals.add_argument(
         "--keep", type=Path, metavar="FILE", help="write the raw signals to a new file, here only"

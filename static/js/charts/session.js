@@ -7,8 +7,10 @@ const data = document.getElementById("session");
 const { strides, phases, marks: changes, unit } = data ? JSON.parse(data.textContent) : {};
 const DENSE_PX = 2; // a stride; with less they are drawn smaller
 
-function valuesOf(wanted) {
-  return strides.shown.map((shown, i) => (shown !== null && wanted(strides.hit[i]) ? shown : null));
+// Values of the strides with a verdict: true for hits, false for misses, null without one. Those that
+// were close are drawn by themselves.
+function valuesOf(verdict) {
+  return strides.shown.map((shown, i) => (strides.hit[i] === verdict && !strides.close[i] ? shown : null));
 }
 
 function describeVerdict(index) {
@@ -17,7 +19,8 @@ function describeVerdict(index) {
       why: strides.why[index] ? strides.why[index].split(", ").map(reasonName).join(", ") : _("no value"),
     });
   if (strides.hit[index] === null) return _("no goal yet");
-  return strides.hit[index] ? _("hit") : _("below the goal");
+  const side = strides.hit[index] ? _("hit") : _("below the goal");
+  return strides.close[index] ? fill(_("close: %(side)s"), { side }) : side;
 }
 
 function formatValue(value) {
@@ -105,15 +108,17 @@ function drawStrides(element) {
   draw(element, {
     data: [
       strides.number,
-      valuesOf((hit) => hit === null),
-      valuesOf((hit) => hit === false),
-      valuesOf((hit) => hit === true),
+      valuesOf(null),
+      valuesOf(false),
+      valuesOf(true),
+      strides.shown.map((shown, i) => (strides.close[i] ? shown : null)),
       strides.goal,
     ],
     series: [
       { paths: () => null, points: { show: false } },
       pointSeries(size, width, "c-miss", "card"),
       pointSeries(size, width, "c-hit", "c-hit"),
+      pointSeries(size, width, "c-third", "card"),
       { stroke: () => color("c-goal"), width: 2.5, paths: paths.stepped({ align: 1 }), points: { show: false } },
     ],
     scales: { x: { time: false }, y: { range: () => [0, top] } },

@@ -21,6 +21,7 @@ export function createLastStride({ state, show }) {
 
   function describeVerdict(stride, phase) {
     if (stride.performance != null) {
+      if (stride.close) return fill(_("close: %(side)s"), { side: stride.hit ? _("hit") : _("below") });
       return (stride.hit ? _("hit") : _("below")) + (stride.points ? `, ${signed(stride.points)}` : "");
     }
     if (stride.valid) return fill(_("%(phase)s: no goal yet"), { phase: phaseName(phase.name) });
@@ -50,7 +51,8 @@ export function createLastStride({ state, show }) {
       );
       show("verdict", describeVerdict(stride, session.phase));
       dot.hidden = !isJudged;
-      dot.classList.toggle("miss", !stride.hit);
+      dot.classList.toggle("miss", !stride.hit && !stride.close);
+      dot.classList.toggle("close", Boolean(stride.close));
     },
   };
 }

@@ -16,7 +16,7 @@ export function drawLastStrides(svg, strides, count) {
   const dx = fullWidth / count;
   const width = dx * 0.68;
 
-  function drawStride({ performance, hit, valid }, index) {
+  function drawStride({ performance, hit, close, valid }, index) {
     const x = (count - strides.length + index) * dx + dx * 0.16;
     if (performance == null) {
       return valid
@@ -26,8 +26,8 @@ export function drawLastStrides(svg, strides, count) {
     const size = Math.min(Math.max(4, Math.abs(performance - 1) * scale), goal - 22);
     const below = { x: x + 1.5, y: goal, width: width - 3, height: Math.min(size, fullHeight - goal - 4) };
     const bar = hit
-      ? shape("rect", { class: "hit", x, y: goal - size, width, height: size, rx: 4 })
-      : shape("rect", { class: "miss", ...below, rx: 4 });
+      ? shape("rect", { class: close ? "close" : "hit", x, y: goal - size, width, height: size, rx: 4 })
+      : shape("rect", { class: close ? "close" : "miss", ...below, rx: 4 });
     if (index < strides.length - 1) return bar;
     const y = hit ? goal - size - 8 : Math.min(goal + size + 17, fullHeight - 4);
     return bar + text(number(100 * performance), { class: "newest", x: x + width, y });

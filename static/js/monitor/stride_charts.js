@@ -1,6 +1,6 @@
 // The strides in drawings: the strip of all recent ones with its legend, the last twenty, and the share of hits.
 
-import { _, fill } from "garry/shared/language";
+import { _, fill, n_ } from "garry/shared/language";
 import { percent } from "garry/shared/format";
 import { legendOf } from "garry/monitor/annotations";
 import { drawHitRing } from "garry/monitor/hit_ring";
@@ -30,13 +30,20 @@ export function createStrideCharts({ state, show }) {
 
   function describeLast() {
     const judged = state.strides.filter(({ performance }) => performance !== null).slice(-LAST);
-    const hits = judged.filter(({ hit }) => hit).length;
-    return judged.length ? fill(_("%(hits)s of %(count)s hit"), { hits, count: judged.length }) : "";
+    const decided = judged.filter(({ close }) => !close);
+    const hits = decided.filter(({ hit }) => hit).length;
+    if (!judged.length) return "";
+    return withClose(fill(_("%(hits)s of %(count)s hit"), { hits, count: decided.length }), judged.length - decided.length);
   }
 
-  function describeRate({ hits, judged, target }) {
+  // Steps that were close are counted apart.
+  function withClose(words, close) {
+    return close ? `${words}, ${n_("%(count)s close", "%(count)s close", close)}` : words;
+  }
+
+  function describeRate({ hits, judged, close = 0, target }) {
     show("wanted", target.hit_rate ? fill(_("Wanted %(rate)s"), { rate: percent(target.hit_rate) }) : _("No rate set"));
-    show("judged", judged === undefined ? "" : fill(_("%(hits)s of %(count)s strides"), { hits, count: judged }));
+    show("judged", judged === undefined ? "" : withClose(fill(_("%(hits)s of %(count)s strides"), { hits, count: judged - close }), close));
   }
 
   return {

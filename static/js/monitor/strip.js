@@ -88,7 +88,7 @@ export function drawStrip(svg, strides, annotations, session) {
         ? shape("circle", { class: "calm", cx: x(index), cy: floor - 8, r: 3.2 })
         : path("gap", `M${x(index)} ${floor - 4}v-10`);
     }
-    const kind = !isJudged ? "calm" : stride.hit ? "hit" : "miss";
+    const kind = !isJudged ? "calm" : stride.close ? "close" : stride.hit ? "hit" : "miss";
     if (value > range[1]) return path(kind, `M${x(index)} ${y(range[1]) - 5}l5 9h-10z`);
     if (value < range[0]) return path(kind, `M${x(index)} ${y(range[0]) + 5}l5 -9h-10z`);
     return shape("circle", { class: kind, cx: x(index), cy: y(value), r: index === shown.length - 1 ? 6 : 3.2 });

@@ -3,7 +3,7 @@
 import { signed } from "garry/shared/format";
 import { _, fill, n_, number as format } from "garry/shared/language";
 import { isStill } from "garry/walk/reduced_motion";
-import { describeStep, messageFor, phaseLeft, timeLeft } from "garry/walk/text";
+import { describeStep, describeSummary, messageFor, phaseLeft, timeLeft } from "garry/walk/text";
 
 const ROLL = { duration: 300, easing: "cubic-bezier(.2, .8, .2, 1)" };
 const SWAP = { duration: 200, easing: "cubic-bezier(.2, .8, .2, 1)" };
@@ -85,7 +85,7 @@ export function createFeedback(body) {
     set(
       runWords,
       last?.summary
-        ? fill(_("%(hits)s of %(steps)s steps"), last.summary)
+        ? describeSummary(last.summary)
         : streak === null
           ? fill(_("Step %(number)s"), { number })
           : n_("%(count)s in a row", "%(count)s in a row", streak),

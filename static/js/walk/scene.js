@@ -61,15 +61,15 @@ export function createScene(svg) {
   }
 
   // Show the last step's performance (null: not measured; undefined: none yet) and the strides.
-  function show({ performance, hit, strides: entries }) {
-    shown = { performance, hit, strides: entries };
+  function show({ performance, hit, close, strides: entries }) {
+    shown = { performance, hit, close, strides: entries };
     const level = y(performance ?? 0);
     const height = performance === null ? layout.y0 + 60 : level;
     for (const liquid of liquids) liquid.style.transform = `translateY(${height}px)`;
     ticks.forEach((tick, i) => tick.classList.toggle("wet", performance !== null && y(TICKS[i]) > level));
-    const goesOn = performance > 0 && !hit && level - 20 > y(1) + 14;
+    const goesOn = performance > 0 && !hit && !close && level - 20 > y(1) + 14;
     arrow.setAttribute("d", goesOn ? `M0 ${level - 20}V${y(1) + 14}` : "");
-    thermometer.dataset.hit = hit ? "yes" : "no";
+    thermometer.dataset.hit = hit && !close ? "yes" : "no";
     thermometer.toggleAttribute("data-missing", performance === null);
     thermometer.toggleAttribute("data-over", performance > TOP);
     dots.draw(entries);

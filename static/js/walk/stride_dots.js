@@ -1,5 +1,5 @@
-// The latest strides on the thermometer's own scale: a disc at or above the goal, a ring below, a gap
-// where nothing was measured. The newest is larger and points to the level.
+// The latest strides on the thermometer's own scale: a disc at or above the goal, a ring below, a small
+// disc where it was close, a gap where nothing was measured. The newest is larger and points to the level.
 import { append } from "garry/shared/svg";
 import { isStill } from "garry/walk/reduced_motion";
 
@@ -22,20 +22,21 @@ export function createDots(svg) {
     dots.forEach((dot, i) => dot.setAttribute("cx", left + i * layout.step));
   }
 
-  // Draw strides { number, performance, hit }, oldest first.
+  // Draw strides { number, performance, hit, close }, oldest first.
   function draw(entries) {
     const recent = entries.slice(-SHOWN);
     const first = SHOWN - recent.length;
     let line = "";
     let joined = false;
     dots.forEach((dot, i) => {
-      const { performance = null, hit } = recent[i - first] ?? {};
+      const { performance = null, hit, close = false } = recent[i - first] ?? {};
       const gap = performance === null;
       dot.classList.toggle("gap", gap);
       if (!gap) {
         const y = layout.y(Math.max(performance, LOWEST)).toFixed(1);
         dot.setAttribute("cy", y);
-        dot.classList.toggle("hit", hit);
+        dot.classList.toggle("hit", hit && !close);
+        dot.classList.toggle("close", close);
         line += `${joined ? "L" : "M"}${layout.left + i * layout.step} ${y}`;
         if (i === SHOWN - 1) lead.setAttribute("d", `M${layout.right + 20} ${y}H${layout.end}`);
       }

@@ -85,3 +85,10 @@ export function describeStep(step, session) {
     .filter(Boolean)
     .join(" ");
 }
+
+// Return what a block of steps came to.
+export function describeSummary({ hits, steps, close }) {
+  return close
+    ? fill(_("%(hits)s of %(steps)s steps, %(close)s close"), { hits, steps, close })
+    : fill(_("%(hits)s of %(steps)s steps"), { hits, steps });
+}

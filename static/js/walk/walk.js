@@ -89,6 +89,7 @@ function draw() {
     scene.show({
       performance: last?.kind === "missing" ? null : last?.performance,
       hit: last?.hit ?? false,
+      close: last?.close ?? false,
       strides: steps,
     });
     celebrate(confetti);

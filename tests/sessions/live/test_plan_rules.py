@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rehab.sessions.log import SessionEvent, Step
+from rehab.sessions.setup.protocols import Protocol
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation
 from rehab.training.cueing import CueRule, CueTiming
 from rehab.training.goals import GoalRule, Target
@@ -29,6 +30,36 @@ async def test_the_robot_gets_the_whole_cue(place, begun):
         "count": 4,
         "rest_s": 30,
     }
+
+
+async def test_a_close_step_is_told_to_people_and_not_to_the_robot(place, begun):
+    protocol = await Protocol.everywhere.acreate(
+        clinic=place.patient.clinic, name="close", close_percent=10
+    )
+    session = await begun(place, TRAINING, protocol=protocol)
+    robot, source = await place.robot().dial(), await place.source().dial()
+    monitor, tablet = place.monitor(session), place.tablet(session)
+    for page in (monitor, tablet):
+        await page.watch()
+    await robot.hello()
+    await source.hello()
+    await source.walk(3.01, extra={"a2_sd_w_kg": 0.1})
+    told, seen = await tablet.until_step(1), await monitor.until_step(1)
+    assert (told["words"], told["emblem"], told["confetti"]) == (
+        *("About at the goal.", "neutral", "none"),
+    )
+    assert (told["close"], told["hit"], told["points"], told["score"]) == (True, True, 0, 0)
+    assert (seen["close"], seen["hit"], seen["value"], seen["points"]) == (True, True, 3.01, 0)
+    assert (seen["hits"], seen["judged"], seen["hit_rate"]) == (0, 1, None)
+    await source.walk(5.0, extra={"a2_sd_w_kg": 0.1})
+    assert (await robot.hear("step"))["number"] == 2
+    stored = Step.everywhere.order_by("number").values_list("close", "hit", "points")
+    assert [row async for row in stored] == [(True, True, 0), (False, True, 1)]
+
+    await restart()
+    again = await place.monitor(session).watch()
+    assert (again["close"], again["hits"], again["judged"]) == (1, 1, 2)
+    assert [step["close"] for step in again["steps"]] == [True, False]
 
 
 async def test_a_phase_without_the_robot_sends_it_no_steps(place, begun):
@@ -163,7 +194,7 @@ async def test_a_summary_tells_hits_mean_and_points_of_its_block(place, begun):
     await tablet.watch()
     await source.walk(6.0, 3.0, None, 1.5, 6.0)
     told = await tablet.until_step(5)
-    assert told["summary"] == {"hits": 3, "steps": 4}
+    assert told["summary"] == {"hits": 3, "steps": 4, "close": 0}
     assert (told["performance"], told["hit"], told["points"], told["score"]) == (1.375, True, 2, 2)
     assert told["words"]
     kinds = [event["kind"] for event in tablet.events if "number" in event]
