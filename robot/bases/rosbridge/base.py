@@ -109,7 +109,7 @@ class RosbridgeBase(MobileBase):
             self._bridge.wake()
 
     def answer(self, answer: Answer) -> None:
-        """Say its words, and raise or lower head or arms, where it has any."""
+        """Send its words, and raise or lower head or arms, where it has any."""
         with self._lock:
             self._client.answer(answer)
         if self._bridge is not None:
