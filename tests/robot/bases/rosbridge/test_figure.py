@@ -3,6 +3,7 @@
 from argparse import ArgumentParser
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import pytest
 
@@ -25,7 +26,7 @@ class Figured(Stage):
 
     def __init__(self, voice=VOICE, joints=JOINTS):
         super().__init__(replace(CLOSED, voice=voice, joints=joints))
-        self.said, self.sent = list[str](), list[dict]()
+        self.said, self.sent = list[str](), list[dict[str, Any]]()
         graph = self.bridge.graph
         graph.subscribe(SPEECH.name, SPEECH.kind, lambda one: self.said.append(one["data"]))
         graph.subscribe(HEAD.name, HEAD.kind, self.sent.append)
