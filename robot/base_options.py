@@ -25,6 +25,13 @@ def add_base_arguments(parser: ArgumentParser, names: Collection[str] = BASES) -
         metavar="URL",
         help="where a rosbridge is (default: GARRY_ROS_URL, or ws://127.0.0.1:9090)",
     )
+    for feeling, window in (("glad", "strong"), ("sad", "weak")):
+        parser.add_argument(
+            f"--say-{feeling}",
+            default="",
+            metavar="WORDS",
+            help=f"what a base that talks says to a {window} window",
+        )
     for name in names:
         BASES[name].add_arguments(parser.add_argument_group(f"--base {name}"))
 

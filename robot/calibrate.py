@@ -87,13 +87,15 @@ def measure(
         refused = performer.play_alone(MEASURED, monotonic())
         if refused:
             raise NotMeasured(f"The base may not move: {refused}.")
-        for pause_s in control_loop(performer, monotonic, lambda: not performer.player.is_busy):
-            there = performer.senses.state
+        for pause_s in control_loop(
+            performer, monotonic, lambda: not performer.body.player.is_busy
+        ):
+            there = performer.body.senses.state
             turns.add(there.pose.heading_rad, there.sensors.slip_rad)
             sleep(pause_s)
-        if performer.player.outcome != DONE:
-            raise NotMeasured(f"It did not get there: {performer.player.outcome}.")
-    delay_s = performer.player.measured_delay_s
+        if performer.body.player.outcome != DONE:
+            raise NotMeasured(f"It did not get there: {performer.body.player.outcome}.")
+    delay_s = performer.body.player.measured_delay_s
     if delay_s is None:
         raise NotMeasured("It moves, and not as it is ordered. Look at its wheels and the floor.")
     lag_s = min(Response().lag_s, delay_s)  # the rest is dead time: only their sum is seen

@@ -17,7 +17,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
-from types import TracebackType
 from typing import Any, Self
 
 from robot.ros.bridge import Bridge
@@ -199,12 +198,7 @@ class OriginalTopics:
         self._bridge = Bridge(self._url, self._client, self._lock, self._monotonic)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        problem: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close the connection."""
         if self._bridge is not None:
             self._bridge.close()

@@ -121,11 +121,11 @@ def play_gesture(
     farthest_m = 0.0
     if not refused:
         performer.tick(began_s)
-    for pause_s in control_loop(performer, monotonic, lambda: not performer.player.is_busy):
-        farthest_m = max(farthest_m, performer.senses.state.pose.distance_m(HOME))
+    for pause_s in control_loop(performer, monotonic, lambda: not performer.body.player.is_busy):
+        farthest_m = max(farthest_m, performer.body.senses.state.pose.distance_m(HOME))
         sleep(pause_s)
     took_s = monotonic() - began_s
-    outcome = refused or performer.player.outcome
+    outcome = refused or performer.body.player.outcome
     for _ in range(round(REST_S / TICK_S)):
         base.stop()
         sleep(TICK_S)

@@ -70,7 +70,7 @@ class Simulation:
             self._source_s = time_s
             self._handle({"type": "step", "time_s": time_s, "performance": performance})
             self._collect()
-        while self._performer.player.is_busy:
+        while self._performer.body.player.is_busy:
             self._advance(TICK_S)
 
     def _handle(self, message: Mapping[str, Any]) -> None:
@@ -79,7 +79,7 @@ class Simulation:
     def _advance(self, span_s: float) -> None:
         """Advance the clock by a span [s]; in one step while nothing moves."""
         until_s = self._now_s + span_s
-        player = self._performer.player
+        player = self._performer.body.player
         for pause_s in control_loop(
             self._performer,
             lambda: self._now_s,

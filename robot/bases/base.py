@@ -7,7 +7,6 @@ from argparse import ArgumentParser, Namespace, _ArgumentGroup
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from types import TracebackType
 from typing import ClassVar, Self
 
 from robot.motion.pose import Pose
@@ -182,17 +181,22 @@ class MobileBase(ABC):
         self.response = response
 
     def __enter__(self) -> Self:
-        """Open it."""
+        """Open it. Raises BaseLost where it cannot be opened at all."""
+        self.open()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        problem: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Leave it standing still."""
-        self.stop()
+        try:
+            self.stop()
+        finally:
+            self.close()
+
+    def open(self) -> None:  # noqa: B027 (not every base has what could be opened)
+        """Open its port, bridge or page. Raises BaseLost."""
+
+    def close(self) -> None:  # noqa: B027
+        """Close what ``open`` has opened; it stands still by now."""
 
     @property
     def counters(self) -> Mapping[str, int]:

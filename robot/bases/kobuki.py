@@ -6,8 +6,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
-from types import TracebackType
-from typing import ClassVar, Self
+from typing import ClassVar
 
 from robot.bases.base import Abilities, BaseLost, BaseState, Indication, MobileBase, SensorState
 from robot.bases.hazards import UNORDERED, StillWatch, UnreadHazards
@@ -79,7 +78,7 @@ class KobukiBase(MobileBase):
         self._lights, self._sound = LIGHTS[Indication.WAITING], b""
         self._requested_s = self._lit_s = monotonic() - LIGHT_EVERY_S
 
-    def __enter__(self) -> Self:
+    def open(self) -> None:
         """Open the port, stop the base, and wait a moment for its firmware version."""
         self._client = PortClient(self.port, BAUD, STOP_FRAME, self._receive, self._monotonic)
         until_s = self._monotonic() + GREETING_S
@@ -89,17 +88,10 @@ class KobukiBase(MobileBase):
                 if self._estimate is not None and self._filter.firmware is not None:
                     break
             time.sleep(0.02)
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        problem: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Leave it standing still, its lights off."""
+    def close(self) -> None:
+        """Put its lights off, and close the port."""
         self.show(Indication.WAITING, aloud=False)
-        self.stop()
         if self._client is not None:
             self._client.close()
 

@@ -7,8 +7,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Mapping
-from types import TracebackType
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 from robot.bases.base import Abilities, BaseLost, GroundTruth
 from robot.bases.kobuki import KobukiBase
@@ -31,7 +30,7 @@ class TwinBase(KobukiBase):
         self._twin: subprocess.Popen[str] | None = None
         self._order_lock = threading.Lock()
 
-    def __enter__(self) -> Self:
+    def open(self) -> None:
         """Start the twin, and open its port. Raises BaseLost where it does not start."""
         self._twin = subprocess.Popen(
             [sys.executable, "-m", "robot.bases.twin", "--child", *self._options],
@@ -45,21 +44,15 @@ class TwinBase(KobukiBase):
             self._end()
             raise BaseLost("The twin does not start: see its messages above.")
         try:
-            super().__enter__()
+            super().open()
         except BaseException:
             self._end()
             raise
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        problem: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Leave it standing still, and end it."""
+    def close(self) -> None:
+        """Close its port, and end it."""
         try:
-            super().__exit__(kind, problem, trace)
+            super().close()
         finally:
             self._end()
 

@@ -14,7 +14,6 @@ from collections import deque
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from robot.black_box.ring import Ring
@@ -92,12 +91,7 @@ class BlackBox:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        problem: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Write the rest, for a second at most, where the disk answers."""
         self.note(kept=CLOSED)
         self._is_closing.set()

@@ -33,7 +33,7 @@ class Witness:
         self._awake_s = self._seen_s = -math.inf
         self._is_awake = False
         if box is not None:
-            performer.status.on_report = self._record_report
+            performer.body.status.on_report = self._record_report
             base.on_bytes = self._record_bytes
 
     def hear(self, message: Message) -> None:
@@ -46,11 +46,11 @@ class Witness:
         """Record a tick: what was ordered, and what the base reports."""
         if self._box is None:
             return
-        ordered, state = self._performer.ordered, self._performer.senses.state
+        ordered, state = self._performer.body.ordered, self._performer.body.senses.state
         hazards = sorted(state.sensors.hazards)
         if not ordered.is_still or not state.twist.is_still or hazards:
             self._awake_s = now_s
-        self._is_awake = self._performer.player.is_busy or now_s - self._awake_s < AWAKE_S
+        self._is_awake = self._performer.body.player.is_busy or now_s - self._awake_s < AWAKE_S
         if self._is_awake or now_s - self._seen_s >= AT_EASE_S:
             self._seen_s = now_s
             pose, twist = state.pose, state.twist
@@ -65,7 +65,7 @@ class Witness:
             self._box.keep(reason, self._performer.session)
 
     def _look_for_stop(self) -> None:
-        latch = self._performer.safety.latch
+        latch = self._performer.body.safety.latch
         if self._box is not None and latch and latch != self._latch:
             self._box.keep(latch, self._performer.session)
         self._latch = latch

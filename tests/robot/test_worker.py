@@ -150,7 +150,7 @@ async def test_however_the_server_hangs_up_it_stands_still_until_somebody_orders
         else:
             await socket.close(code)
         await until_still(base, 0.1)
-        assert not worker.performer.safety.is_armed or code in ENDING
+        assert not worker.performer.body.safety.is_armed or code in ENDING
         if code not in ENDING:
             await garry.until_hello(2)
             assert "dialing in again" in " ".join(said)

@@ -86,7 +86,7 @@ class Stage:
         self.hear(type="step", time_s=self.source_s, performance=1.0)
         self.wait(0.5)
         self.source_s += 0.5
-        assert self.robot.player.is_busy
+        assert self.robot.body.player.is_busy
         assert not self.base.read().twist.is_still
         return self
 

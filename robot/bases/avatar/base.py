@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace, _ArgumentGroup
 from collections.abc import Callable
-from types import TracebackType
-from typing import ClassVar, Self
+from typing import ClassVar
 
 from robot.bases.avatar.page_server import PageServer
 from robot.bases.base import Abilities, Answer, BadOption, BaseLost, BaseState, Indication
@@ -44,12 +43,6 @@ class AvatarBase(KinematicBase):
             default=DEFAULT_PORT,
             help=f"the page is http://HOST:PORT/ (default: {DEFAULT_PORT})",
         )
-        group.add_argument(
-            "--say-glad", default="", metavar="WORDS", help="what it says to a strong window"
-        )
-        group.add_argument(
-            "--say-sad", default="", metavar="WORDS", help="what it says to a weak one"
-        )
 
     def configure(self, options: Namespace) -> None:
         """Apply the page's address. Raises BadOption."""
@@ -59,7 +52,7 @@ class AvatarBase(KinematicBase):
         self.host, self.page_port = options.avatar_host, options.avatar_port
         self.words = {True: options.say_glad, False: options.say_sad}
 
-    def __enter__(self) -> Self:
+    def open(self) -> None:
         """Serve the page. Raises BaseLost where its address is taken."""
         try:
             self._pages = PageServer(self.host, self.page_port)
@@ -68,16 +61,9 @@ class AvatarBase(KinematicBase):
                 f"The avatar's page cannot be served at {self.host}:{self.page_port} "
                 f"({problem.strerror}). Choose another --avatar-port."
             ) from None
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        problem: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Let it stand, and close its pages."""
-        self.stop()
+    def close(self) -> None:
+        """Close its pages."""
         if self._pages is not None:
             self._pages.close()
 

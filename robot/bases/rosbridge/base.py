@@ -8,10 +8,8 @@ import time
 from argparse import ArgumentParser, Namespace, _ArgumentGroup
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from types import TracebackType
-from typing import Self
 
-from robot.bases.base import BaseLost, BaseState, Indication, MobileBase
+from robot.bases.base import Answer, BaseLost, BaseState, Indication, MobileBase
 from robot.bases.rosbridge.client import BaseClient
 from robot.bases.rosbridge.options import add_topic_arguments, read_topics
 from robot.bases.rosbridge.topics import DEFAULT_PROFILE, PROFILES, Topics
@@ -49,22 +47,15 @@ class RosbridgeBase(MobileBase):
         self.port = options.ros_url
         self._set_topics(read_topics(options))
 
-    def __enter__(self) -> Self:
+    def open(self) -> None:
         """Connect, and wait a moment for the base's odometry."""
         self._bridge = Bridge(self.port or find_bridge(), self._client, self._lock, self._monotonic)
         until_s = self._monotonic() + GREETING_S
         while self._monotonic() < until_s and self.read().sensors.silent_s == math.inf:
             time.sleep(0.02)
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        problem: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Leave it standing still."""
-        self.stop()
+    def close(self) -> None:
+        """Send the last frames, which are stops, and close the connection."""
         if self._bridge is not None:
             self._bridge.close()
 
@@ -114,6 +105,13 @@ class RosbridgeBase(MobileBase):
         """Show its state by its light, and by a short sound."""
         with self._lock:
             self._client.show(str(indication), aloud=aloud)
+        if self._bridge is not None:
+            self._bridge.wake()
+
+    def answer(self, answer: Answer) -> None:
+        """Send its words, and raise or lower head or arms, where it has any."""
+        with self._lock:
+            self._client.answer(answer)
         if self._bridge is not None:
             self._bridge.wake()
 

@@ -6,8 +6,9 @@ import math
 from collections import Counter
 from collections.abc import Iterator
 
-from robot.bases.base import BaseState, SensorState
+from robot.bases.base import Answer, BaseState, SensorState
 from robot.bases.hazards import UNORDERED, StillWatch, rim_speed_m_s
+from robot.bases.rosbridge.figure import Figure
 from robot.bases.rosbridge.orders import Orders
 from robot.bases.rosbridge.perception import DeadReckoning, HazardSensors, ReportedOdometry
 from robot.bases.rosbridge.topics import ALL_HAZARDS, RELAY_ALIVE, Topics
@@ -64,6 +65,7 @@ class BaseClient:
             DeadReckoning() if topics.odometry is None else ReportedOdometry()
         )
         self.sensors = HazardSensors()
+        self._figure = Figure(topics.voice, topics.joints)
         self._still_watch = StillWatch()
         self._is_open = False
         self._opened_s = now_s
@@ -99,6 +101,13 @@ class BaseClient:
             sound = write_sound(topics.sound.kind, state)
             if sound is not None:
                 self._signals.append(publish(topics.sound, sound))
+        if self._is_open:
+            self._signals += self._figure.show(state)
+
+    def answer(self, answer: Answer) -> None:
+        """Begin to answer; one that finds no connection is left out."""
+        if self._is_open:
+            self._signals += self._figure.answer(answer)
 
     def due(self, now_s: float) -> Iterator[Frame]:
         """Yield the frames to send now."""
@@ -149,16 +158,19 @@ class BaseClient:
         self.orders.reset()
         self.odometry.order(STILL, now_s)
         self.sensors.reset()
+        self._figure.disconnect()
         self._missing.clear()
         self._signals.clear()
         self._relay_s = -math.inf
 
     def end(self, now_s: float) -> Iterator[Frame]:
         """Yield the last frames: stand still, unsubscribe, unadvertise."""
+        last_pose = list(self._figure.show("stopped"))
         self.disconnect(now_s)
         topics = self.topics
         for _ in range(LAST_STOPS):
             yield from self._order(STILL)
+        yield from last_pose
         for topic in topics.subscribed:
             yield unsubscribe(topic)
         for topic in topics.published:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
 import re
 from argparse import ArgumentParser, Namespace, _ArgumentGroup
 from collections.abc import Collection
 from dataclasses import replace
 
 from robot.bases.base import BadOption
+from robot.bases.rosbridge.figure import LONGEST_S, Joints, Voice
 from robot.bases.rosbridge.topics import BUMP, DEFAULT_PROFILE, PROFILES, RELAY_INPUT, Topics
 from robot.ros.frames import Topic
-from robot.ros.messages import BOOL, ODOMETRY, SENSOR_TYPES, TWISTS, without_msg
+from robot.ros.messages import BOOL, ODOMETRY, SENSOR_TYPES, STRING, TWISTS, without_msg
 from robot.ros.signals import LIGHT_TYPES, SOUND_TYPES
 
 NAME = re.compile(r"/?[A-Za-z]\w*(/\w+)*", re.ASCII)
 NONE = "none"
+TRAJECTORY = "trajectory_msgs/JointTrajectory"
+POSES = {"rest": "at rest", "glad": "after a strong window", "sad": "after a weak one"}
 SENSOR_OPTIONS = {BUMP: "bumper", "cliff": "cliff", "wheel_drop": "wheel_drop"}
 
 # A base that goes on for longer than this [s] without orders is not watched by its own timeout.
@@ -47,6 +51,24 @@ def add_topic_arguments(group: ArgumentParser | _ArgumentGroup) -> None:
             f"--{name}-topic",
             metavar="TOPIC:TYPE",
             help=f"of its {name}, which announces that it moves; {NONE}: has none",
+        )
+    group.add_argument(
+        "--speech-topic",
+        metavar="TOPIC",
+        help=f"that says its words aloud ({STRING}), see --say-glad and --say-sad",
+    )
+    group.add_argument(
+        "--joints-topic",
+        metavar="TOPIC",
+        help=f"that moves its head or arms ({TRAJECTORY})",
+    )
+    group.add_argument("--joints", default="", metavar="NAME,…", help="the names of these joints")
+    for pose, when in POSES.items():
+        group.add_argument(
+            f"--pose-{pose}",
+            default="",
+            metavar="RAD,…",
+            help=f"their angles {when}, as in --pose-{pose}=0,-0.3",
         )
     group.add_argument(
         "--own-timeout-s",
@@ -97,6 +119,8 @@ def read_topics(options: Namespace) -> Topics:
         sensors=sensors,
         light=light,
         sound=sound,
+        voice=_read_voice(options),
+        joints=_read_joints(options),
         own_timeout_s=timeout_s,
     )
 
@@ -109,6 +133,42 @@ def _read_signal(
     if text == NONE:
         return None
     return _read_topic(option, text, types, profile.kind if profile is not None else "")
+
+
+def _read_voice(options: Namespace) -> Voice | None:
+    text = options.speech_topic
+    if not text:
+        return None
+    topic = _read_topic("--speech-topic", text, (STRING,), STRING)
+    return Voice(topic, options.say_glad, options.say_sad)
+
+
+def _read_joints(options: Namespace) -> Joints | None:
+    if not options.joints_topic:
+        return None
+    topic = _read_topic("--joints-topic", options.joints_topic, (TRAJECTORY,), TRAJECTORY)
+    names = tuple(options.joints.split(","))
+    if not all(NAME.fullmatch(name) for name in names):
+        raise BadOption("--joints: name the joints, like --joints head_pan,head_tilt.")
+    rest, glad, sad = (_read_pose(f"--pose-{one}", options, len(names)) for one in POSES)
+    joints = Joints(topic, names, rest, glad, sad)
+    if joints.takes_s > LONGEST_S:
+        raise BadOption(
+            f"--pose-glad, --pose-sad: from one pose to another it takes {joints.takes_s:.1f} s, "
+            f"and no stop may reach it; up to {LONGEST_S:g} s is allowed. Choose smaller angles."
+        )
+    return joints
+
+
+def _read_pose(option: str, options: Namespace, count: int) -> tuple[float, ...]:
+    text = getattr(options, option.removeprefix("--").replace("-", "_"))
+    try:
+        angles_rad = tuple(map(float, text.split(",")))
+    except ValueError:
+        angles_rad = ()
+    if len(angles_rad) != count or not all(abs(angle) <= math.pi for angle in angles_rad):
+        raise BadOption(f"{option}: write an angle within ±3.14 rad for each of --joints.")
+    return angles_rad
 
 
 def _read_topic(option: str, text: str, types: Collection[str], kind: str) -> Topic:

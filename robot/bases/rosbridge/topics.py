@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from robot.bases.base import Abilities
+from robot.bases.rosbridge.figure import Joints, Voice
 from robot.ros.frames import Topic
 from robot.ros.messages import DOCK, HAZARDS, ODOMETRY, STRING, TWIST, TWIST_STAMPED
 
@@ -34,6 +35,8 @@ class Topics:
         Show and sound its state.
     dock
         Says whether it stands at its charger.
+    voice, joints
+        By which it answers beside its motion.
     own_timeout_s
         After this long without an order the base stops by itself, as a person has tried; None where
         that is unknown, and the relay has to watch.
@@ -45,6 +48,8 @@ class Topics:
     light: Topic | None = None
     sound: Topic | None = None
     dock: Topic | None = None
+    voice: Voice | None = None
+    joints: Joints | None = None
     own_timeout_s: float | None = None
 
     @property
@@ -60,7 +65,8 @@ class Topics:
     @property
     def published(self) -> list[Topic]:
         """All that we publish on."""
-        topics = (self.order, self.relay, self.light, self.sound)
+        topics = [self.order, self.relay, self.light, self.sound]
+        topics += [one.topic for one in (self.voice, self.joints) if one is not None]
         return [topic for topic in topics if topic is not None]
 
     @property
@@ -77,6 +83,7 @@ class Topics:
             simulated=False,
             moves=True,
             announces=self.light is not None or self.sound is not None,
+            answers=self.voice is not None or self.joints is not None,
             real_time=True,
             closed_loop=self.odometry is not None,
             bumpers=BUMP in self.sensors or ALL_HAZARDS in self.sensors,

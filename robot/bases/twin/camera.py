@@ -16,7 +16,6 @@ import threading
 from collections.abc import Callable
 from importlib.resources import as_file, files
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -57,12 +56,7 @@ class Camera:
         self._sender.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        problem: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Stop. The last picture stays."""
         self._over.set()
         self._sender.join(END_S)

@@ -3,19 +3,17 @@
 import math
 import time
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from robot.bases import BASES, Answer, Indication
 from robot.bases.kinematic import KinematicBase
-from robot.bases.rosbridge import RosbridgeBase
-from robot.bases.rosbridge.topics import PROFILES
 from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, ORDER_HOLDS_S
 from robot.motion.pose import HOME, Pose, advance
 from robot.motion.twist import STILL, Twist
 from robot.simulation import SIMULATED_BASES
+from tests.support.driven_ros import open_base
 from tests.support.fake_kobuki import FakeKobuki
 from tests.support.fake_ros import FakeBase, FakeRosbridge, ServedRos, Ticking, release
 from tests.support.robot_stage import IdealBase
@@ -100,9 +98,7 @@ def rosbridge():
     bridge = FakeRosbridge()
     robot = FakeBase(bridge.graph, time.monotonic)
     with ServedRos(bridge) as served, Ticking(robot):
-        base = RosbridgeBase(clock, replace(PROFILES["plain"], own_timeout_s=0.6))
-        base.port = served.url
-        yield Stage(base, clock)
+        yield Stage(open_base(served.url), clock)
 
 
 def is_still(there):

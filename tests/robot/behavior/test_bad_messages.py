@@ -99,5 +99,7 @@ def test_any_json_moves_a_base_only_by_gestures_that_were_told(told):
             stage.now_s += TICK_S
             stage.robot.tick(stage.now_s)
             moving = not stage.base.read().twist.is_still
-            assert not moving or (armed and stage.robot.player.is_busy and stage.robot.is_linked)
+            assert not moving or (
+                armed and stage.robot.body.player.is_busy and stage.robot.is_linked
+            )
         stage.collect()

@@ -57,7 +57,7 @@ def test_status_comes_every_second_and_four_times_while_it_moves(stage):
 def test_a_session_that_does_not_run_eases_the_robot_to_a_stop(stage, state):
     stage.perform()
     stage.hear(type="state", state=state)
-    assert stage.robot.player.is_busy  # it slows down, it does not jerk
+    assert stage.robot.body.player.is_busy  # it slows down, it does not jerk
     stage.wait(0.5)
     assert stage.base.read().twist == STILL
     assert stage.ended == [state]
@@ -80,7 +80,7 @@ def test_silence_halts_it_within_three_quarters_of_a_second(stage):
     stage.perform()
     stage.heartbeats = False
     silent_s = stage.now_s
-    while stage.robot.player.is_busy:
+    while stage.robot.body.player.is_busy:
         stage.wait(TICK_S)
     assert stage.now_s - silent_s <= SILENCE_S + 2 * TICK_S <= 0.75
     assert stage.base.read().twist == STILL
@@ -250,7 +250,7 @@ def test_a_quiet_robot_goes_half_as_far_at_half_the_speed_in_the_same_time():
         stage.walk(*[1.2] * 5)
         stage.hear(type="step", time_s=stage.source_s, performance=1.2)
         speeds = []
-        while stage.robot.player.is_busy:
+        while stage.robot.body.player.is_busy:
             stage.wait(TICK_S)
             speeds.append(abs(stage.base.read().twist.v_m_s))
         return max(speeds), len(speeds) * TICK_S
@@ -263,7 +263,7 @@ def test_a_quiet_robot_goes_half_as_far_at_half_the_speed_in_the_same_time():
 def test_a_robot_that_is_off_decides_and_stands_still(stage):
     stage.perform()
     stage.hear(type="cue", cue=CUE | {"intensity": 0})
-    assert stage.robot.player.is_busy  # what has begun comes home
+    assert stage.robot.body.player.is_busy  # what has begun comes home
     stage.walk(*[1.0] * 12)
     assert stage.ended == ["done"]
     last = stage.of("decision")[-1]

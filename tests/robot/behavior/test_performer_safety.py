@@ -19,7 +19,7 @@ def test_a_gesture_is_announced_half_a_second_before_it_moves(felt):
     felt.wait(TICK_S)
     assert felt.base.shown[-1] == (Indication.MOVING, False)
     assert len(felt.base.played) == len(felt.base.lit) == 1  # its score has begun
-    assert felt.robot.player.is_busy
+    assert felt.robot.body.player.is_busy
     while felt.base.read().twist.is_still:
         felt.wait(TICK_S)
     assert 0.5 <= felt.now_s - begun_s <= 0.5 + 3 * TICK_S
@@ -192,14 +192,14 @@ def test_a_bump_of_50_ms_in_a_hang_of_0_2_s_is_never_lost(reader):
         stage.hear(type="arm")
         stage.robot.play_alone(GESTURES["sway"], stage.now_s)
         stage.wait(0.6 + number * 0.01)
-        assert stage.robot.player.is_busy
+        assert stage.robot.body.player.is_busy
         stage.base.bumped = True  # and over, before anyone looks
         stage.now_s += 0.2
         stage.hear(type="heartbeat")
         if reader == "a step":
-            stage.robot.senses.read()
+            stage.robot.body.senses.read()
         elif reader == "an arming":
             stage.hear(type="arm")
         stage.robot.tick(stage.now_s)
-        assert stage.robot.safety.latch == "bump"
-        assert not stage.robot.player.is_busy
+        assert stage.robot.body.safety.latch == "bump"
+        assert not stage.robot.body.player.is_busy

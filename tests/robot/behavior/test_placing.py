@@ -69,7 +69,7 @@ def test_nothing_moves_it_where_it_may_not(why):
     elif why == "stopped":
         stage.hear(type="stop")
     elif why == "disarmed":
-        stage.robot.safety.is_armed = False
+        stage.robot.body.safety.is_armed = False
     elif why == "unwatched":
         stage.hear(type="heartbeat", watched=False)
     else:

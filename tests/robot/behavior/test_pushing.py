@@ -37,7 +37,7 @@ def push(gesture, intensity, dead_time_s, after_s):
     stage.walk(*[1.2] * 5)
     stage.hear(type="step", time_s=5.0, performance=1.2)
     began_s = stage.now_s
-    while stage.robot.player.is_busy:
+    while stage.robot.body.player.is_busy:
         stage.wait(TICK_S)
         stage.base.held = float(stage.now_s - began_s >= after_s)
     return stage

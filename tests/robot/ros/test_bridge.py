@@ -7,7 +7,7 @@ import socket
 import sys
 import threading
 import time
-from contextlib import ExitStack, asynccontextmanager
+from contextlib import asynccontextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,15 +15,21 @@ from typing import Any
 import pytest
 
 from robot.bases import BaseLost
-from robot.bases.rosbridge import RosbridgeBase
 from robot.bases.rosbridge.orders import IN_FLIGHT
-from robot.bases.rosbridge.topics import PROFILES, Topics
+from robot.bases.rosbridge.topics import PROFILES
 from robot.behavior.safety import BASE_SILENT_S
 from robot.motion.gestures import GESTURES
 from robot.motion.twist import STILL, Twist
 from robot.original_topics import OriginalTopics
 from robot.play_gesture import main, play_gesture
 from robot.ros.bridge import RETRY_LONGEST_S, Bridge
+from tests.support.driven_ros import (
+    PLAIN,
+    come_back,
+    lose_while_moving,
+    open_base,
+    wired_base,
+)
 from tests.support.fake_robot_server import CUE, TOKEN, FakeGarry, serve_garry
 from tests.support.fake_ros import (
     FakeBase,
@@ -34,9 +40,7 @@ from tests.support.fake_ros import (
     release,
     wait_until,
 )
-from tests.support.wire import Wire
 
-PLAIN = replace(PROFILES["plain"], own_timeout_s=0.6)
 PLAIN_WORDS = ["--ros-robot", "plain", "--own-timeout-s", "0.6"]
 ROOT = Path(__file__).parents[3]
 
@@ -49,12 +53,6 @@ def ros():
     with ServedRos(bridge) as served, Ticking(robot):
         served.robot = robot
         yield served
-
-
-def open_base(url, topics=PLAIN):
-    base = RosbridgeBase(time.monotonic, topics)
-    base.port = url
-    return base
 
 
 @pytest.mark.realtime
@@ -110,29 +108,19 @@ def test_nobody_there_is_told_with_the_cure(capsys, monkeypatch):
 
 @pytest.mark.realtime
 def test_a_bridge_that_comes_back_hears_a_stop_first_and_nothing_old(ros):
-    with ExitStack() as stack:
-        wire = stack.enter_context(Wire(ros.port))
-        base = stack.enter_context(open_base(f"ws://127.0.0.1:{wire.port}"))
-        release(base)
-        drive(base, Twist(0.2, 0), lambda: ros.robot.is_moving)
-        wire.go_down()
-        drive(base, Twist(0.2, 0), lambda: "No rosbridge" in base.problem)
+    with wired_base(ros) as (wire, base):
+        lose_while_moving(ros, wire, base)
         assert base.read().sensors.silent_s > BASE_SILENT_S
         for _ in range(10):
             base.drive(Twist(0.2, 0))
-        before = len(ros.robot.orders)
-        wire.come_up()
-        drive(base, Twist(0.2, 0), lambda: len(ros.robot.orders) > before + 3)
-        assert {order[1:] for order in ros.robot.orders[before:]} == {(0.0, 0.0)}
+        assert come_back(ros, wire, base) == {(0.0, 0.0)}
         assert base.counters["bridge_openings"] == 2
         assert base.counters["refused"] > 0
 
 
 @pytest.mark.realtime
 def test_a_black_hole_is_told_and_stops_it(ros):
-    with ExitStack() as stack:
-        wire = stack.enter_context(Wire(ros.port))
-        base = stack.enter_context(open_base(f"ws://127.0.0.1:{wire.port}"))
+    with wired_base(ros) as (wire, base):
         threading.Timer(0.6, wire.freeze).start()
         played = play_gesture(GESTURES["celebrate"], base, time.monotonic, time.sleep)
         assert played["outcome"] == "base_silent"
@@ -237,7 +225,7 @@ def test_it_stands_still_by_itself_when_whoever_orders_hangs(ros):
 
 
 def test_a_bumper_that_nobody_publishes_keeps_it_from_moving(ros):
-    topics = Topics(PLAIN.order, PLAIN.odometry, PROFILES["kobuki"].sensors, own_timeout_s=0.6)
+    topics = replace(PLAIN, sensors=PROFILES["kobuki"].sensors)
     with open_base(ros.url, topics) as base:
         wait_until(lambda: base.read().sensors.refusal == "feeler_missing")
 

@@ -3,19 +3,15 @@
 import json
 import math
 import time
-from contextlib import ExitStack
-from dataclasses import replace
 
 import pytest
 from websockets.sync.client import connect
 
-from robot.bases.rosbridge import RosbridgeBase
-from robot.bases.rosbridge.topics import PROFILES, Topics
 from robot.motion.gestures import GESTURES
 from robot.motion.twist import STILL, Twist
 from robot.original_topics import OriginalTopics
 from robot.play_gesture import play_gesture
-from robot.ros.frames import Topic
+from tests.support.driven_ros import come_back, lose_while_moving, open_base, wired_base
 from tests.support.fake_ros import (
     FakeBase,
     FakeRosbridge,
@@ -26,12 +22,9 @@ from tests.support.fake_ros import (
     wait_until,
 )
 from tests.support.real_ros import RosMaster, why_missing
-from tests.support.wire import Wire
+from tests.support.rosbridge_stage import BUMPER, CLOSED
 
 pytestmark = [pytest.mark.ros, pytest.mark.realtime]
-
-PLAIN = replace(PROFILES["plain"], own_timeout_s=0.6)
-BUMPER = Topic("/bumper", "std_msgs/Bool")
 
 
 @pytest.fixture(scope="module")
@@ -54,17 +47,9 @@ def ros(master):
         yield served
 
 
-def open_base(url):
-    base = RosbridgeBase(
-        time.monotonic, Topics(PLAIN.order, PLAIN.odometry, {"bump": BUMPER}, own_timeout_s=0.6)
-    )
-    base.port = url
-    return base
-
-
 def test_a_node_of_rospy_receives_twists_and_its_odometry_closes_the_loop(ros):
     start = ros.robot.x_m, ros.robot.y_m
-    with open_base(ros.url) as base:
+    with open_base(ros.url, CLOSED) as base:
         release(base)
         played = play_gesture(GESTURES["celebrate"], base, time.monotonic, time.sleep)
     assert played["outcome"] == "done"
@@ -76,7 +61,7 @@ def test_a_node_of_rospy_receives_twists_and_its_odometry_closes_the_loop(ros):
 
 
 def test_a_bumper_of_a_node_stops_it(ros):
-    with open_base(ros.url) as base:
+    with open_base(ros.url, CLOSED) as base:
         release(base)
         drive(base, Twist(0.1, 0), lambda: ros.robot.is_moving)
         ros.node.publish(BUMPER.name, {"data": True})
@@ -86,18 +71,10 @@ def test_a_bumper_of_a_node_stops_it(ros):
 
 
 def test_a_reconnection_replays_nothing(ros):
-    with ExitStack() as stack:
-        wire = stack.enter_context(Wire(ros.port))
-        base = stack.enter_context(open_base(f"ws://127.0.0.1:{wire.port}"))
-        release(base)
-        drive(base, Twist(0.2, 0), lambda: ros.robot.is_moving)
-        wire.go_down()
-        drive(base, Twist(0.2, 0), lambda: "No rosbridge" in base.problem)
+    with wired_base(ros, CLOSED) as (wire, base):
+        lose_while_moving(ros, wire, base)
         wait_until(lambda: not ros.robot.is_moving)  # by its own timeout: nobody else can
-        before = len(ros.robot.orders)
-        wire.come_up()
-        drive(base, Twist(0.2, 0), lambda: len(ros.robot.orders) > before + 3)
-        assert {order[1:] for order in ros.robot.orders[before:]} == {(0.0, 0.0)}
+        assert come_back(ros, wire, base) == {(0.0, 0.0)}
 
 
 def test_the_original_s_nodes_hear_what_they_expect(ros, master):

@@ -135,7 +135,7 @@ def test_where_the_relay_dies_we_stop_the_base_past_it(watched):
     while watched.robot.is_moving:
         watched.wait(0.02)
         assert watched.now_s - since_s < 0.35
-    assert watched.performer.safety.latch in ("base_silent", "nobody_watches")
+    assert watched.performer.body.safety.latch in ("base_silent", "nobody_watches")
 
 
 def test_who_says_that_the_base_stops_by_itself_needs_no_relay():

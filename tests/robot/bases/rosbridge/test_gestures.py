@@ -74,4 +74,4 @@ def test_an_open_loop_has_to_be_looked_at_after_so_many_gestures():
     assert stage.of("decision")[-1]["reason"] == "place_unknown"
     assert stage.of("decision")[-2]["reason"] == ""
     stage.performer.handle({"type": "arm"}, stage.now_s)
-    assert stage.performer.safety.blocking_reason(stage.base.read()) == ""
+    assert stage.performer.body.safety.blocking_reason(stage.base.read()) == ""

@@ -56,11 +56,11 @@ def test_a_bump_stops_it_in_place_and_holds(stage):
     assert stage.of("stop")[0]["reason"] == "bump"
     stage.wait(1.0)
     stage.performer.handle({"type": "arm"}, stage.now_s)
-    assert stage.performer.safety.latch == "bump"  # it is pressed still
+    assert stage.performer.body.safety.latch == "bump"  # it is pressed still
     stage.tell(BUMPER.name, {"data": False})
     stage.wait(0.2)
     stage.performer.handle({"type": "arm"}, stage.now_s)
-    assert stage.performer.safety.latch == ""
+    assert stage.performer.body.safety.latch == ""
 
 
 def test_a_kobuki_s_own_feelers():

@@ -1,0 +1,159 @@
+"""A robot's body: its base, what it feels, and the gesture that it plays until something stops it.
+
+It knows no server and no session. Time is a parameter.
+"""
+
+from __future__ import annotations
+
+from robot.bases import Answer, BaseState, MobileBase
+from robot.behavior.expression import Expression
+from robot.behavior.placing import Placing
+from robot.behavior.reports import stop_report
+from robot.behavior.safety import ANNOUNCE_S, AWAY, STALLED, Safety
+from robot.behavior.senses import Senses
+from robot.behavior.status import StatusReporter
+from robot.motion.gesture import Gesture
+from robot.motion.limits import Limits
+from robot.motion.player import BAD_ODOMETRY, OUT_OF_TIME, Player
+from robot.motion.response import AT_ONCE
+from robot.motion.twist import STILL
+
+CANNOT_MOVE = "base_cannot_move"
+SAD = ("droop", "original_negative")  # of the gestures that are played alone
+
+
+class Body:
+    """One base: starts and stops gestures on it, and is ticked 50 times a second.
+
+    Parameters
+    ----------
+    base
+        An open base; nothing else may order it.
+    limits
+        Speeds and accelerations of every gesture.
+
+    Attributes
+    ----------
+    ordered
+        The base's present order.
+    """
+
+    def __init__(self, base: MobileBase, limits: Limits) -> None:
+        self.base, self.senses = base, Senses(base)
+        # Without odometry its pose is what was ordered, which is never late.
+        self.player = Player(limits, base.response if base.abilities.closed_loop else AT_ONCE)
+        self.status = StatusReporter(base)
+        self.expression = Expression(base)
+        self.safety = Safety(base.abilities)
+        self.placing = Placing()
+        self.ordered = STILL
+
+    @property
+    def is_away(self) -> bool:
+        """Whether it has to be put back by a person; a simulated one is carried back at once."""
+        return not self.base.abilities.simulated and not self.safety.is_at_home(self.senses.state)
+
+    def refusal_reason(self, gesture: Gesture, state: BaseState) -> str:
+        """Return what keeps it from performing a gesture; empty where it may."""
+        if not self.base.abilities.moves:
+            return CANNOT_MOVE
+        if reason := self.safety.rejection_reason(gesture):
+            return reason
+        if reason := self.safety.blocking_reason(state):
+            return reason
+        if not self.safety.is_at_home(state):
+            if not self.base.abilities.simulated:
+                return AWAY
+            self.base.set_home()  # as a person would carry it back
+        return ""
+
+    def start(
+        self, gesture: Gesture, now_s: float, state: BaseState, answer: Answer, pace: float = 1.0
+    ) -> None:
+        """Start a gesture that nothing refuses, and answer by it."""
+        after_s = ANNOUNCE_S if self.base.abilities.announces else 0.0
+        pose = self.senses.read().pose  # a simulated base may have been put back
+        self.player.start(gesture, now_s, pose, after_s, pace)
+        self.expression.start(gesture.score.quiet if answer.is_quiet else gesture.score, now_s)
+        self.safety.start_gesture(now_s, state)
+        self.status.report_gesture(gesture, "started", "")
+        self.base.answer(answer)
+
+    def start_alone(self, gesture: Gesture, now_s: float) -> str:
+        """Arm it and start a gesture where it stands, or return why not, as a code.
+
+        The caller vouches for a person who watches. No base is carried home first.
+        """
+        safety, state = self.safety, self.senses.read()
+        safety.is_watched = True
+        reason = (
+            safety.rejection_reason(gesture)
+            or safety.arm(now_s, state)
+            or safety.blocking_reason(state)
+        )
+        if not reason and not safety.is_at_home(state):
+            reason = AWAY
+        if not reason:
+            answer = Answer(gesture.name, gesture.name not in SAD)
+            self.start(gesture.scaled(safety.share), now_s, state, answer)
+        return reason
+
+    def tick(self, now_s: float, *, may_be_placed: bool) -> BaseState:
+        """Order the base's next twist, and return what it reports. Raises BaseLost.
+
+        ``may_be_placed``: whether nobody walks, so that a person may drive it to its mark.
+        """
+        state, player = self.senses.judge(), self.player
+        ordered = player.answered(now_s)
+        self.expression.tick(now_s)
+        found = self.safety.check(now_s, state, ordered, performing=player.is_busy)
+        if found:
+            self.stop_for(found)
+        was, placed = player.gesture, self.placing.twist(now_s)
+        if placed.is_still or not (may_be_placed and self._can_be_placed(state)):
+            self.ordered = self.base.drive(player.step(now_s, state.pose))
+        else:
+            self.ordered = self.base.drive(placed)
+            self.base.set_home()  # where it stands is home when the button is let go
+        if was is not None and not player.is_busy:
+            self.expression.stop()
+            self.status.report_gesture(was, "ended", player.outcome)
+            if player.outcome in (OUT_OF_TIME, BAD_ODOMETRY):
+                # A base that did not get there is held or blocked, and would be again at once.
+                self.safety.latch_fault(STALLED, now_s)
+                self.stop_for(STALLED)
+        return state
+
+    def arm(self, now_s: float) -> None:
+        """Let it move again, for a person; where it stands is home now."""
+        problem = self.safety.arm(now_s, self.senses.read())
+        if problem:
+            self.stop_for(problem)
+        elif not self.player.is_busy:
+            self.base.set_home()
+
+    def halt(self, reason: str) -> None:
+        """Stand still at once."""
+        self.placing.end()
+        gesture = self.player.gesture
+        self.player.halt(reason)
+        self.expression.stop()
+        self.base.stop()
+        self.ordered = STILL
+        if gesture is not None:
+            self.status.report_gesture(gesture, "ended", self.player.outcome)
+
+    def stop_for(self, reason: str) -> None:
+        """Stand still for a fault that is latched, and report it."""
+        self.halt(reason)
+        self.status.report(stop_report(reason))
+
+    def _can_be_placed(self, state: BaseState) -> bool:
+        """Whether it is armed, real and unhindered."""
+        return (
+            not self.player.is_busy
+            and self.base.abilities.moves
+            and not self.base.abilities.simulated  # that is put back by itself
+            and self.safety.is_watched
+            and not self.safety.blocking_reason(state)
+        )
