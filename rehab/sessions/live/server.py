@@ -98,10 +98,10 @@ class LiveServer(Server):  # type: ignore[misc]
         self._starting = task  # tasks without a reference may be collected
 
     async def _start(self) -> None:
+        process.tune_interpreter()
         paused = await runtimes.current().recover()
         if paused:
             log.warning("%s session(s) were left running; they are paused now.", paused)
-        process.tune_interpreter()
         if self._on_ready is not None:
             self._on_ready()
 

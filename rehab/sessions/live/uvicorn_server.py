@@ -135,10 +135,10 @@ class UvicornLiveServer(Server):
 
     async def startup(self, *args: Any, **options: Any) -> None:
         """Recover the sessions of dead processes, then listen."""
+        process.tune_interpreter()
         paused = await runtimes.current().recover()
         if paused:
             log.warning("%s session(s) were left running; they are paused now.", paused)
-        process.tune_interpreter()
         await super().startup(*args, **options)
         if self._on_ready is not None:
             self._on_ready()
