@@ -70,7 +70,8 @@ class Caller:
         self.wire = WebsocketCommunicator(application, path, headers=lines)
         # As our servers do: what can be handled at once is, unless something waits before it.
         self._take: Callable[[str], bool] | None = None
-        self.wire.scope["extensions"] = {READ_NOW: partial(setattr, self, "_take")}
+        ours: Any = {READ_NOW: partial(setattr, self, "_take")}
+        self.wire.scope["extensions"] = ours
         self.heard: list[Message] = []
         self.code: int | None = None
 

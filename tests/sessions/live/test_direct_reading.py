@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 from typing import Any
 
 import pytest
@@ -42,6 +43,21 @@ def stream() -> bytes:
     return b"".join(frame.serialize(mask=True) for frame in frames)
 
 
+async def shake_hands(application: Any) -> DirectProtocol:
+    """Return the server's side of a connection to an application."""
+    config = Config(application, lifespan="off", log_config=None)
+    protocol = DirectProtocol(config, ServerState(), {}, asyncio.get_running_loop())
+    protocol.connection_made(Transport())  # type: ignore[arg-type]
+    protocol.data_received(HANDSHAKE)
+    await turns()
+    return protocol
+
+
+def keep(taken: list[str], text: str) -> bool:
+    taken.append(text)
+    return True
+
+
 @pytest.mark.parametrize("taken_chars", [[], [1, 3, 5, 100], [3, 5]], ids=["none", "all", "some"])
 @pytest.mark.parametrize("patient", [True, False])
 async def test_texts_come_once_and_in_order(taken_chars, patient):
@@ -63,11 +79,7 @@ async def test_texts_come_once_and_in_order(taken_chars, patient):
                 else:
                     got.append(message["text"])
 
-        config = Config(application, lifespan="off", log_config=None)
-        protocol = DirectProtocol(config, ServerState(), {}, asyncio.get_running_loop())
-        protocol.connection_made(Transport())  # type: ignore[arg-type]
-        protocol.data_received(HANDSHAKE)
-        await turns()
+        protocol = await shake_hands(application)
         data = stream()
         for begin in range(0, len(data), size):
             protocol.data_received(data[begin : begin + size])
@@ -79,20 +91,40 @@ async def test_texts_come_once_and_in_order(taken_chars, patient):
         await turns()
 
 
+async def test_a_frame_inside_a_texts_bytes_is_no_message():
+    """Whoever chooses the mask chooses the bytes: here a part of a text looks like a whole one."""
+    mask = b"\x80" * 4
+    inner = bytes((0x81, 0x85)) + mask + bytes(0x80 | byte for byte in b"inner")
+    text = bytes(byte ^ 0x80 for byte in b"\xe1" + inner + b"\xe2")
+    pieces = [bytes((0x81, 0x80 | len(text))) + mask + b"\xe1", inner, b"\xe2"]
+    got: list[str] = []
+
+    async def application(scope: Any, receive: Any, send: Any) -> None:
+        scope["extensions"][READ_NOW](partial(keep, got))
+        await receive()
+        await send({"type": "websocket.accept"})
+        got.append((await receive())["text"])
+        await receive()
+
+    protocol = await shake_hands(application)
+    for piece in pieces:
+        protocol.data_received(piece)
+        await turns(3)
+    assert got == [text.decode()]
+    protocol.connection_lost(None)
+    await turns()
+
+
 async def test_whole_texts_are_taken_past_the_queue():
     taken: list[str] = []
 
     async def application(scope: Any, receive: Any, send: Any) -> None:
-        scope["extensions"][READ_NOW](lambda text: not taken.append(text))
+        scope["extensions"][READ_NOW](partial(keep, taken))
         await receive()
         await send({"type": "websocket.accept"})
         assert (await receive())["type"] == "websocket.disconnect"
 
-    config = Config(application, lifespan="off", log_config=None)
-    protocol = DirectProtocol(config, ServerState(), {}, asyncio.get_running_loop())
-    protocol.connection_made(Transport())  # type: ignore[arg-type]
-    protocol.data_received(HANDSHAKE)
-    await turns()
+    protocol = await shake_hands(application)
     for text in TEXTS:
         protocol.data_received(Frame(Opcode.TEXT, text.encode()).serialize(mask=True))
     assert taken == TEXTS
