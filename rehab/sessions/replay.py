@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
+from typing import NamedTuple
 
 from django.db.models import Count, Max
 
@@ -23,7 +24,14 @@ class DamagedLog(RuntimeError):
 
 
 def fold_log(fold: SessionFold, session: TrainingSession) -> SessionFold:
-    """Fold a session's log, from the fold's last step on, and return the fold.
+    """Fold a session's log, from the fold's last step on, and return the fold."""
+    return fold_entries(fold, session.pk, log_entries(session, fold.last_number))
+
+
+def fold_entries(
+    fold: SessionFold, session_id: int, entries: Iterable[Measurement | Change]
+) -> SessionFold:
+    """Fold entries of a log and return the fold.
 
     Impossible entries (such as a second pause) are skipped with a warning: they had no effect when
     they were stored, and refusing the log would make the rest of the session unreadable. What comes
@@ -31,7 +39,7 @@ def fold_log(fold: SessionFold, session: TrainingSession) -> SessionFold:
     """
     skipped: list[str] = []
     try:
-        for entry in log_entries(session, fold.last_number):
+        for entry in entries:
             try:
                 if isinstance(entry, Change):
                     fold.change(entry)
@@ -40,12 +48,12 @@ def fold_log(fold: SessionFold, session: TrainingSession) -> SessionFold:
             except (InvalidSetting, InvalidMeasurement) as problem:
                 skipped.append(f"{entry}: {problem}")
     except DamagedLog as problem:
-        log.error("%s", problem)
+        log.error("%s", str(problem))  # not the error, which holds the query that was under way
     if skipped:
         log.warning(
             "Skipped %d impossible entries in the log of session %s; the first: %s",
             len(skipped),
-            session.pk,
+            session_id,
             skipped[0],
         )
     return fold
@@ -57,17 +65,28 @@ def log_entries(session: TrainingSession, after: int = 0) -> Iterator[Measuremen
     ``after``: those after this step, which was the last thing that happened. Raises DamagedLog
     where a step is missing.
     """
-    changes = SessionEvent.everywhere.filter(session=session, kind__in=list(CONTROLS))
-    events = list(changes.filter(after_number__gte=after).order_by("pk"))
-    events.reverse()
-    number = after
+    changes = SessionEvent.everywhere.filter(
+        session=session, kind__in=list(CONTROLS), after_number__gte=after
+    ).order_by("pk")
     steps = Step.everywhere.filter(session=session, number__gt=after).order_by("number")
-    for stored in steps.values_list(*MEASURED).iterator():
+    stored = steps.values_list(*MEASURED).iterator()
+    return merge_entries(session.pk, after, stored, list(changes))
+
+
+def merge_entries(
+    session_id: int, after: int, steps: Iterable[StoredMeasurement], changes: list[SessionEvent]
+) -> Iterator[Measurement | Change]:
+    """Return steps (their columns ``MEASURED``) and changes in the order in which they took effect.
+
+    Both in the order of the log, behind step ``after``. Raises DamagedLog where a step is missing.
+    """
+    events, number = changes[::-1], after
+    for stored in steps:
         while events and events[-1].after_number <= number:
             yield _to_change(events.pop())
         step = _to_measurement(*stored)
         if step.number != number + 1:
-            raise DamagedLog(describe_hole(session.pk, number, step.number))
+            raise DamagedLog(describe_hole(session_id, number, step.number))
         yield step
         number = step.number
     while events:
@@ -76,11 +95,28 @@ def log_entries(session: TrainingSession, after: int = 0) -> Iterator[Measuremen
 
 def check_log(session: TrainingSession) -> int:
     """Return the last number of a log that has every step. Raises DamagedLog for any other."""
-    steps = Step.everywhere.filter(session=session)
-    found = steps.aggregate(count=Count("pk"), last=Max("number"))
-    last = max(found["last"] or 0, session.last_number)
-    if found["count"] != last:
-        raise DamagedLog(describe_hole(session.pk, found["count"], last))
+    return check_end(session, count_steps([session.pk])[session.pk])
+
+
+class StoredSteps(NamedTuple):
+    """How many steps are stored of a session, and the number of the last one."""
+
+    steps: int
+    last: int
+
+
+def count_steps(session_ids: Collection[int]) -> dict[int, StoredSteps]:
+    """Return what is stored of each session."""
+    steps = Step.everywhere.filter(session__in=session_ids).order_by().values_list("session")
+    found = {key: StoredSteps(*ends) for key, *ends in steps.annotate(Count("pk"), Max("number"))}
+    return {key: found.get(key, StoredSteps(0, 0)) for key in session_ids}
+
+
+def check_end(session: TrainingSession, stored: StoredSteps) -> int:
+    """Return the last number of a log, given what is stored. Raises DamagedLog if steps lack."""
+    last = max(stored.last, session.last_number)
+    if stored.steps != last:
+        raise DamagedLog(describe_hole(session.pk, stored.steps, last))
     return last
 
 
@@ -98,6 +134,7 @@ def _to_change(event: SessionEvent) -> Change:
 
 # What a source sent of a step. Plain rows: a model's object for each would take most of the time.
 MEASURED = ("number", "time_s", "side", "value", "reasons", "extra", "rules_version")
+StoredMeasurement = tuple[int, float, str, float | None, list[str], dict[str, float], int]
 
 
 def _to_measurement(

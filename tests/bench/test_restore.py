@@ -23,8 +23,11 @@ def test_sessions_are_back_soon(tmp_path):
     )
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout.splitlines()[-1])
-    each_ms = 1000 * told["seconds"] / told["sessions"]
-    print(f"\nrestored: {told['sessions']} in {told['seconds']:.1f} s, {each_ms:.1f} ms each")
+    each_ms = 1000 * told["cpu_s"] / told["sessions"]
+    print(
+        f"\nrestored: {told['sessions']} in {told['seconds']:.1f} s, "
+        f"{each_ms:.1f} ms of processor time each"
+    )
     assert told["sessions"] == COUNT
     if COUNT >= 1000:
         assert told["seconds"] <= AIM_S

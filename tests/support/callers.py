@@ -6,6 +6,7 @@ import asyncio
 import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Self
 
 from channels.testing import WebsocketCommunicator
@@ -13,6 +14,7 @@ from channels.testing import WebsocketCommunicator
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.frames import READ_NOW
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
@@ -66,6 +68,10 @@ class Caller:
         if origin is not None:
             lines.append((b"origin", origin.encode()))
         self.wire = WebsocketCommunicator(application, path, headers=lines)
+        # As our servers do: what can be handled at once is, unless something waits before it.
+        self._take: Callable[[str], bool] | None = None
+        ours: Any = {READ_NOW: partial(setattr, self, "_take")}
+        self.wire.scope["extensions"] = ours
         self.heard: list[Message] = []
         self.code: int | None = None
 
@@ -82,6 +88,8 @@ class Caller:
             await self.wire.send_input({"type": "websocket.receive", "bytes": message})
         else:
             text = message if isinstance(message, str) else json.dumps(message)
+            if self._take is not None and self.wire.input_queue.empty() and self._take(text):
+                return
             await self.wire.send_input({"type": "websocket.receive", "text": text})
 
     async def hear(self, kind: str | None = None) -> Message:

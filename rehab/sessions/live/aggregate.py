@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
+from collections.abc import Iterable
 from datetime import datetime
 from typing import Any, NamedTuple
 
@@ -31,8 +32,9 @@ class StepRow(NamedTuple):
 
 
 Row = StepRow | SessionEvent | SessionMetric
-CHECKPOINT_STEPS = 200
+CHECKPOINT_STEPS = 100
 MARKS = 100  # the newest; more would hide the strides
+MARKED = (*marked_kinds(), *Remark, RuleEntry.GOAL_FOLLOWED)  # kinds of events that leave one
 Summary = dict[str, Any]
 
 
@@ -53,13 +55,17 @@ class SessionAggregate:
     @classmethod
     def load(cls, session: TrainingSession) -> SessionAggregate:
         """Return the aggregate of a session, rebuilt from its log."""
+        aggregate = cls.from_checkpoint(session)
+        aggregate.fold = fold_log(aggregate.fold, session)
+        marked = SessionEvent.everywhere.filter(session=session, kind__in=MARKED).order_by("-pk")
+        aggregate.keep_marks(reversed(marked[:MARKS]))
+        return aggregate
+
+    @classmethod
+    def from_checkpoint(cls, session: TrainingSession) -> SessionAggregate:
+        """Return the aggregate of the first steps of a session, or before them."""
         aggregate = cls(session)
-        aggregate.fold = fold_log(aggregate.restore_checkpoint() or aggregate.fold, session)
-        marked = SessionEvent.everywhere.filter(
-            session=session, kind__in=[*marked_kinds(), *Remark, RuleEntry.GOAL_FOLLOWED]
-        ).order_by("-pk")
-        for event in reversed(marked[:MARKS]):
-            aggregate._keep_mark(event)
+        aggregate.fold = aggregate.restore_checkpoint() or aggregate.fold
         return aggregate
 
     def restore_checkpoint(self) -> SessionFold | None:
@@ -73,6 +79,11 @@ class SessionAggregate:
     def is_checkpoint_due(self) -> bool:
         """Whether a checkpoint is worth its place after the last step."""
         return self.fold.last_number % CHECKPOINT_STEPS == 0
+
+    def keep_marks(self, events: Iterable[SessionEvent]) -> None:
+        """Keep the marks among a log's events, in their order."""
+        for event in events:
+            self._keep_mark(event)
 
     def _keep_mark(self, event: SessionEvent) -> None:
         """Keep an event for the snapshots of later subscribers, if charts point it out."""

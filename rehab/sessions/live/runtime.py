@@ -24,7 +24,7 @@ from rehab.sessions.live import owners, sources
 from rehab.sessions.live.audit_queue import AuditQueue
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
 from rehab.sessions.live.instruments import LATE_S
-from rehab.sessions.live.loading import find_newest_open, load
+from rehab.sessions.live.loading import Loader, find_newest_open
 from rehab.sessions.live.process import move_database_log
 from rehab.sessions.live.session import LiveSession, NotStored, RobotStop
 from rehab.sessions.live.supervisor import Supervisor
@@ -52,7 +52,6 @@ SWEEP = round(PAGE_HEARTBEAT_S / ROBOT_HEARTBEAT_S)
 CHECKPOINT = 8  # heartbeats
 SEAL = round(600 / ROBOT_HEARTBEAT_S)
 HEARTBEAT = to_text({"type": "heartbeat"})
-RECOVERED_TOGETHER = 50  # sessions whose commits are awaited while others are read
 
 
 class Draining(NotStored):
@@ -79,6 +78,7 @@ class Runtime:
         self.address = sources.local_address(
             settings.HOST, settings.PORT
         )  # where child processes connect
+        self._loader = Loader()
         self._opening: dict[int, asyncio.Task[None]] = {}
         self._held: set[int] = set()  # sessions that this process may be the owner of
         self._orphaned: set[int] = set()  # sessions of dead processes: paused if they run
@@ -138,7 +138,7 @@ class Runtime:
 
     async def _open(self, session_id: int) -> None:
         self._held.add(session_id)
-        loaded = await sync_to_async(load)(session_id)
+        loaded = await self._loader.load(session_id)
         aggregate, stopped = loaded.aggregate, loaded.robot_stopped
         live = LiveSession(aggregate, self.writer, loaded.recent, self._drop, robot_stopped=stopped)
         if loaded.was_orphaned:
@@ -240,10 +240,7 @@ class Runtime:
         """
         orphaned, handed_on = await sync_to_async(owners.find_ownerless)()
         self._orphaned.update(orphaned)
-        left = (*orphaned, *handed_on)
-        for first in range(0, len(left), RECOVERED_TOGETHER):
-            some = left[first : first + RECOVERED_TOGETHER]
-            await asyncio.gather(*(self._recover(session_id) for session_id in some))
+        await asyncio.gather(*map(self._recover, (*orphaned, *handed_on)))
         self.is_ready = True
         return len(orphaned)
 

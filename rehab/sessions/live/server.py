@@ -17,7 +17,7 @@ from twisted.internet import defer, reactor
 
 from rehab.sessions.live import process
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.frames import WRITE_NOW
+from rehab.sessions.live.frames import READ_NOW, WRITE_NOW
 from rehab.sessions.live.websockets import DirectProtocol, InboundQueue, sender
 from robot.wire.limits import MAX_FRAME_BYTES
 
@@ -79,7 +79,7 @@ class LiveServer(Server):  # type: ignore[misc]
             return super().create_application(protocol, scope)
         queue = InboundQueue(protocol.transport)
         scope.setdefault("asgi", {"version": "3.0"})
-        scope["extensions"] = {WRITE_NOW: protocol.send_text}
+        scope["extensions"] = {WRITE_NOW: protocol.send_text, READ_NOW: protocol.read_now}
         application = self.application(
             scope=scope, receive=queue.get, send=sender(protocol, self.handle_reply)
         )
@@ -98,10 +98,10 @@ class LiveServer(Server):  # type: ignore[misc]
         self._starting = task  # tasks without a reference may be collected
 
     async def _start(self) -> None:
+        process.tune_interpreter()
         paused = await runtimes.current().recover()
         if paused:
             log.warning("%s session(s) were left running; they are paused now.", paused)
-        process.tune_interpreter()
         if self._on_ready is not None:
             self._on_ready()
 

@@ -364,12 +364,17 @@ class LiveSession:
         switches = [type_mark(after, slug) for after, slug in self.aggregate.fold.switches]
         return sorted([*self.aggregate.marks, *switches], key=lambda mark: mark["after"])
 
+    @property
+    def is_free(self) -> bool:
+        """Whether nobody subscribes, and nobody waits for that."""
+        return not (self._subscribing or self._in_turn)
+
     async def wait_for_subscriptions(self) -> None:
         """Wait while somebody subscribes; to be called before recording steps or changes.
 
         Waiting callers continue in the order in which they came.
         """
-        if not (self._subscribing or self._in_turn):
+        if self.is_free:
             return
         self._in_turn += 1
         try:

@@ -14,13 +14,17 @@ from uvicorn import Config, Server
 from uvicorn._types import ASGIReceiveEvent
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from uvicorn.server import HANDLED_SIGNALS
+from websockets.protocol import OPEN
 
 from rehab.sessions.live import process
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.frames import (
     MAX_WAITING_BYTES,
     MESSAGE_BYTES,
+    READ_NOW,
     WRITE_NOW,
+    FrameEdges,
+    read_text_frame,
     text_frame,
 )
 from robot.wire.limits import MAX_FRAME_BYTES
@@ -60,13 +64,39 @@ class BoundedBody:
 
 
 class DirectProtocol(WebSocketsSansIOProtocol):
-    """Writes text frames past the layers between the transport and the application.
+    """Reads and writes text frames past the layers between the transport and the application.
 
     Reading pauses once much waits for the application, not with each message: that takes two calls
     of the system.
     """
 
-    waiting_bytes = 0
+    _take: Callable[[str], bool] | None = None
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.waiting_bytes = 0
+        self._edges = FrameEdges()
+
+    def read_now(self, take: Callable[[str], bool]) -> None:
+        """Let a function handle texts at once; what it does not is queued for the application."""
+        self._take = take
+
+    def data_received(self, data: bytes) -> None:
+        """Take bytes from the transport: a whole text message at once, all else as usual."""
+        if self.conn.state is not OPEN or not self._take_text(data):
+            if self.conn.state is OPEN:
+                self._edges.pass_by(data)
+            super().data_received(data)
+
+    def _take_text(self, data: bytes) -> bool:
+        between = self._edges.is_between_frames and self.conn.current_size is None
+        if self._take is None or self.close_sent or not (between and self.queue.empty()):
+            return False
+        text = read_text_frame(data)
+        try:
+            return text is not None and self._take(text.decode())
+        except UnicodeDecodeError:  # websockets closes the socket for that
+            return False
 
     def write_now(self, text: str) -> bool:
         """Send a text message; return False where the client is behind and it has to wait."""
@@ -93,7 +123,8 @@ class DirectProtocol(WebSocketsSansIOProtocol):
 
     async def run_asgi(self) -> None:
         """Run the application, which may write text frames at once."""
-        self.scope["extensions"][WRITE_NOW] = self.write_now  # type: ignore[assignment]
+        ours: dict[str, Any] = {WRITE_NOW: self.write_now, READ_NOW: self.read_now}
+        self.scope["extensions"].update(ours)
         await super().run_asgi()
 
 
@@ -135,10 +166,10 @@ class UvicornLiveServer(Server):
 
     async def startup(self, *args: Any, **options: Any) -> None:
         """Recover the sessions of dead processes, then listen."""
+        process.tune_interpreter()
         paused = await runtimes.current().recover()
         if paused:
             log.warning("%s session(s) were left running; they are paused now.", paused)
-        process.tune_interpreter()
         await super().startup(*args, **options)
         if self._on_ready is not None:
             self._on_ready()

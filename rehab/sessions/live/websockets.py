@@ -7,6 +7,7 @@ Each override has a test that fails when a new version below changes what it res
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -71,6 +72,12 @@ class DirectProtocol(WebSocketProtocol):  # type: ignore[misc]
     Twisted would also write on the next turn of its loop only.
     """
 
+    _take: Callable[[str], bool] | None = None
+
+    def read_now(self, take: Callable[[str], bool]) -> None:
+        """Let a function handle texts at once; what it does not is queued for the application."""
+        self._take = take
+
     def send_text(self, text: str) -> bool:
         """Send a text message, unless the socket is not open. Return True: nothing waits."""
         if self.state == self.STATE_OPEN and not self.muted:
@@ -82,12 +89,17 @@ class DirectProtocol(WebSocketProtocol):  # type: ignore[misc]
         text = None
         if self.state == self.STATE_OPEN and not self.data and self._is_between_messages:
             text = read_text_frame(data)
-        if text is None or not _is_utf8(text):  # autobahn closes the socket for that
+        decoded = None if text is None else _decode(text)
+        if text is None or decoded is None:
             super()._dataReceived(data)
             return
         if self.autoPingTimeoutCall and self.autoPingRestartOnAnyTraffic:
             self._cancelAutoPingTimeoutCall()
-        self.onMessage(text, False)
+        free = self._take is not None and not self.muted and self.application_queue.empty()
+        if free and self._take is not None and self._take(decoded):
+            self.last_ping = time.time()  # as ``onMessage`` notes that the client is there
+        else:
+            self.onMessage(text, False)
 
     @property
     def _is_between_messages(self) -> bool:
@@ -105,12 +117,12 @@ class DirectProtocol(WebSocketProtocol):  # type: ignore[misc]
             super().sendData(data, sync, chopsize)
 
 
-def _is_utf8(data: bytes) -> bool:
+def _decode(data: bytes) -> str | None:
+    """Return a text, or None for what is none: autobahn closes the socket for that."""
     try:
-        data.decode()
+        return data.decode()
     except UnicodeDecodeError:
-        return False
-    return True
+        return None
 
 
 WebSocketFactory.protocol = DirectProtocol

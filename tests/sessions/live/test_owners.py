@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import threading
+from collections.abc import Collection
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -290,15 +291,15 @@ async def test_a_session_that_opens_during_the_drain_is_released(place, begun, m
     await runtimes.current().drain()
     runtimes._current = None
     reading, may_read = threading.Event(), threading.Event()
-    load = loading.load
+    load = loading.load_together
 
-    def load_late(session_id: int) -> Any:
-        loaded = load(session_id)
+    def load_late(session_ids: Collection[int]) -> Any:
+        loaded = load(session_ids)
         reading.set()
         assert may_read.wait(10)
         return loaded
 
-    monkeypatch.setattr(runtimes, "load", load_late)
+    monkeypatch.setattr(loading, "load_together", load_late)
     source = await place.source().dial()
     await source.say({"type": "hello", "version": 1, "run": "r1", "last": 0})
     await asyncio.get_running_loop().run_in_executor(None, reading.wait)

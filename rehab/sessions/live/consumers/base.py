@@ -15,12 +15,13 @@ from django.db import DatabaseError
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.auth import Actor
-from rehab.sessions.live.frames import WRITE_NOW
+from rehab.sessions.live.frames import READ_NOW, WRITE_NOW
+from rehab.sessions.live.messages import read_frame
 from rehab.sessions.live.session import LiveSession, NotStored
 from rehab.sessions.live.trouble import describe_failure
 from rehab.sessions.payloads import Message
 from robot.wire.close_codes import CloseCode
-from robot.wire.frames import BadFrame, read_object
+from robot.wire.frames import BadFrame
 
 log = logging.getLogger(__name__)
 
@@ -125,7 +126,10 @@ class Socket(AsyncWebsocketConsumer):
         self.base_send: Any = send
         self.runtime = runtimes.current()
         self.is_closed = False
+        self._is_receiving = False  # nothing is being handled
         self._write_now = scope.get("extensions", {}).get(WRITE_NOW, _cannot_write)
+        if (read_now := scope.get("extensions", {}).get(READ_NOW)) is not None:
+            read_now(self._take)
         self.outbox = Outbox(self.send, self.write)
         self._tasks: set[asyncio.Task[None]] = set()
         self._context = contextvars.copy_context()
@@ -144,7 +148,11 @@ class Socket(AsyncWebsocketConsumer):
 
     async def _serve(self, receive: Any) -> None:
         while True:
-            message = await receive()
+            self._is_receiving = True
+            try:
+                message = await receive()
+            finally:
+                self._is_receiving = False
             match message["type"]:
                 case "websocket.connect":
                     await self.accept()
@@ -158,6 +166,22 @@ class Socket(AsyncWebsocketConsumer):
                         await self._guard(self._on_frame(message))
                 case "websocket.disconnect":
                     raise StopConsumer
+
+    def _take(self, text: str) -> bool:
+        """Handle a text at once, where it is its turn and nothing has to be waited for."""
+        if not self._is_receiving or self.is_closed or self._budget < 1:
+            return False
+        try:
+            taken = self.handle_now(text)
+        except Exception:  # whatever it was, the usual way meets it too, and tells the client
+            return False
+        if taken:
+            self._spend_budget()
+        return taken
+
+    def handle_now(self, text: str) -> bool:
+        """Handle a frame that needs no waiting; return False for any other."""
+        return False
 
     async def _on_frame(self, message: dict[str, Any]) -> None:
         self._spend_budget()
@@ -272,7 +296,7 @@ class Socket(AsyncWebsocketConsumer):
 
     async def on_frame(self, text: str | None) -> None:
         """Handle a frame."""
-        read_object(text)
+        read_frame(text)
 
     def on_disconnect(self) -> None:
         """Release what the socket holds."""

@@ -15,6 +15,7 @@ from rehab.sessions.live.auth import (
     may_open,
 )
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
+from rehab.sessions.live.messages import read_frame
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import LiveSession, Peer
 from rehab.sessions.payloads import Message
@@ -22,7 +23,7 @@ from rehab.sessions.replay import DamagedLog
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED_STATES
 from robot.wire.close_codes import CloseCode
-from robot.wire.frames import BadFrame, read_object
+from robot.wire.frames import BadFrame
 
 
 class DeviceSocket(Socket):
@@ -49,7 +50,7 @@ class DeviceSocket(Socket):
 
     async def on_frame(self, text: str | None) -> None:
         """Handle a frame; without a token in the header the first one brings it."""
-        message = read_object(text)
+        message = read_frame(text)
         if self.device is None:
             token = message.get("token")
             self._authorize(await authenticate_token(token) if isinstance(token, str) else None)

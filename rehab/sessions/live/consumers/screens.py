@@ -26,6 +26,7 @@ from rehab.sessions.live.consumers.base import CloseSocket, Socket
 from rehab.sessions.live.hub import Lagged, Stalled, Subscriber
 from rehab.sessions.live.messages import (
     read_change,
+    read_frame,
     read_order,
     read_remark,
 )
@@ -38,7 +39,7 @@ from rehab.training.changes import ChangeKind, PauseReason
 from rehab.training.controls import CONTROLS, Audience, Requester
 from rehab.training.measures import InvalidSetting
 from robot.wire.close_codes import CloseCode
-from robot.wire.frames import BadFrame, read_name, read_number, read_object, read_whole
+from robot.wire.frames import BadFrame, read_name, read_number, read_whole
 
 
 class ScreenConsumer(Socket):
@@ -135,7 +136,7 @@ class ScreenConsumer(Socket):
 
     async def on_frame(self, text: str | None) -> None:
         """Handle a frame of a page."""
-        await self.on_message(read_object(text))
+        await self.on_message(read_frame(text))
 
     async def on_message(self, message: Message) -> None:
         """Handle a message of a page."""

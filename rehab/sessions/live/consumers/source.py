@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from datetime import datetime
 
 from django.utils import timezone
 
@@ -13,8 +14,10 @@ from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.lateness import Lateness
 from rehab.sessions.live.messages import (
     Hello,
+    read_frame,
     read_hello,
     read_plain,
+    read_step,
     read_steps,
 )
 from rehab.sessions.live.session import LiveSession
@@ -26,6 +29,7 @@ from robot.wire.close_codes import CloseCode
 from robot.wire.frames import BadFrame
 from robot.wire.limits import MAX_STEPS
 
+STEPPING = {State.RUNNING, State.PAUSED}  # states that take steps
 PLAIN_HELLO = Hello(run="text", last=0, session=None, clock_s=None, speed=1.0)
 
 
@@ -43,6 +47,25 @@ class SourceConsumer(DeviceSocket):
             await self._handle_plain(*plain)
         else:
             await super().on_frame(text)
+
+    def handle_now(self, text: str) -> bool:
+        """Record the next step, as most frames bring it; all else takes its turn."""
+        live = self.live
+        if live is None or not self.hello_received or not live.is_free:
+            return False
+        message = read_frame(text)
+        if message.get("type") != "step":
+            return False
+        step = read_step(message)
+        if step.number != live.next_number or live.aggregate.fold.state not in STEPPING:
+            return False
+        self._record(live, step, timezone.now())
+        return True
+
+    def _record(self, live: LiveSession, step: Measurement, received_at: datetime) -> None:
+        _check_open_steps(live)
+        late = self.lateness.is_late(step.time_s, time.monotonic())
+        live.record_step(step, received_at, late=late)
 
     async def on_message(self, message: Message, text: str) -> None:
         """Handle hello and steps."""
@@ -97,7 +120,7 @@ class SourceConsumer(DeviceSocket):
             )
             return
         await live.wait_for_subscriptions()
-        now, received_at = time.monotonic(), timezone.now()
+        received_at = timezone.now()
         for measurement in measurements:
             if measurement.number < live.next_number:
                 await self._check_same(live, measurement)
@@ -115,9 +138,7 @@ class SourceConsumer(DeviceSocket):
                 )
                 return
             else:
-                _check_open_steps(live)
-                late = self.lateness.is_late(measurement.time_s, now)
-                live.record_step(measurement, received_at, late=late)
+                self._record(live, measurement, received_at)
 
     async def _check_same(self, live: LiveSession, measurement: Measurement) -> None:
         """Acknowledge a step that is stored already; refuse other content under its number."""

@@ -1,0 +1,112 @@
+"""Frames of JSON are read by msgspec as by Python, and steps at once as in their turn."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from rehab.sessions.events.event import to_text
+from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.consumers.source import SourceConsumer
+from rehab.sessions.live.messages import read_frame
+from rehab.sessions.log import Step
+from robot.wire.frames import BadFrame, read_object
+from tests.support.callers import turns
+from tests.support.json_values import ANYTHING
+
+VALUES = st.dictionaries(st.sampled_from(["type", "a", "b"]), ANYTHING)
+
+
+def outcome(read: Any, text: str) -> str:
+    """Return what was read, to the last digit, or why not."""
+    try:
+        return repr(read(text))
+    except BadFrame as problem:
+        return f"refused: {problem}"
+
+
+@given(VALUES.map(json.dumps) | st.text(max_size=40))
+@example('{"a":18446744073709551616}')
+@example('{"a":-9223372036854775809}')
+@example('{"a":1760000000123456789}')
+@example('{"a":NaN}')
+@example('{"a":-Infinity}')
+@example('{"a":1e400}')
+@example('{"a":1,"a":2}')
+@example('{"a":"\\ud800"}')
+@example('{"type":1}')
+@example("[1]")
+@example("{}{}")
+@example("[" * 3000)
+@example('{"a":1.7976931348623157e308,"b":5e-324}')
+@example(" " * 65_537)
+def test_msgspec_reads_what_python_reads(text):
+    assert outcome(read_frame, text) == outcome(read_object, text)
+
+
+def test_binary_frames_are_refused():
+    with pytest.raises(BadFrame, match="text frames"):
+        read_frame(None)
+
+
+def is_finite(value: Any) -> bool:
+    text = json.dumps(value)
+    return not any(word in text for word in ("NaN", "Infinity"))
+
+
+@given(VALUES.filter(is_finite))
+@example({"a": 2**70})
+@example({"a": "\ud800"})
+@example({"a": 1e16, "b": -0.0})
+@example({"a": 2**63 - 1, "b": (1, 2)})
+def test_what_is_written_is_read_again_as_it_was(message):
+    def without_tuples(value: Any) -> Any:
+        return json.loads(json.dumps(value))
+
+    assert json.loads(to_text(message)) == without_tuples(message)
+
+
+def test_no_browser_is_sent_what_is_no_json():
+    assert to_text({"value": math.nan}) == '{"value":null}'
+
+
+async def test_a_step_is_recorded_at_once_only_in_its_turn(place, begun, monkeypatch):
+    """In its turn: the next number, nothing before it in the queue, nobody who subscribes."""
+    taken: list[tuple[str, bool]] = []
+    handle_now = SourceConsumer.handle_now
+
+    def note(self: SourceConsumer, text: str) -> bool:
+        taken.append((json.loads(text)["type"], handle_now(self, text)))
+        return taken[-1][1]
+
+    monkeypatch.setattr(SourceConsumer, "handle_now", note)
+    session = await begun(place)
+    source = await place.source().dial()
+    await source.hello()
+    await source.walk(4.0)
+    assert taken[-1] == ("step", True)
+    live = await runtimes.current().session(session.pk)
+    step = {"type": "step", "time_s": 9.0, "side": "left", "value": 4.0}
+    await source.say({**step, "number": 1})  # stored with another time: a conflict, as ever
+    assert taken[-1] == ("step", False)
+    assert (await source.sent_away())[1]["code"] == "conflict"
+    source = await place.source().dial()
+    await source.hello(last=1)
+    live._subscribing += 1
+    live._nobody_subscribes.clear()
+    await source.say({**step, "number": 2})
+    await source.say({**step, "number": 3})
+    await turns()
+    assert (live.next_number, taken[-1]) == (2, ("step", False))
+    live._subscribing -= 1
+    live._nobody_subscribes.set()
+    await source.acked(3)
+    await source.say({**step, "number": 4})
+    assert (live.next_number, taken[-1]) == (5, ("step", True))
+    await source.acked(4)
+    assert [one.number async for one in Step.everywhere.filter(session=session)] == [1, 2, 3, 4]
