@@ -64,14 +64,14 @@ def log_entries(session: TrainingSession, after: int = 0) -> Iterator[Measuremen
     steps = Step.everywhere.filter(session=session, number__gt=after).order_by("number")
     for stored in steps.values_list(*MEASURED).iterator():
         while events and events[-1].after_number <= number:
-            yield _to_change(events.pop())
-        step = _to_measurement(*stored)
+            yield to_change(events.pop())
+        step = to_measurement(*stored)
         if step.number != number + 1:
             raise DamagedLog(describe_hole(session.pk, number, step.number))
         yield step
         number = step.number
     while events:
-        yield _to_change(events.pop())
+        yield to_change(events.pop())
 
 
 def check_log(session: TrainingSession) -> int:
@@ -92,7 +92,8 @@ def describe_hole(session_id: int, before: int, after: int) -> str:
     )
 
 
-def _to_change(event: SessionEvent) -> Change:
+def to_change(event: SessionEvent) -> Change:
+    """Return a stored change as it was made."""
     return Change(event.kind, event.data.get("value", event.value))
 
 
@@ -100,7 +101,7 @@ def _to_change(event: SessionEvent) -> Change:
 MEASURED = ("number", "time_s", "side", "value", "reasons", "extra", "rules_version")
 
 
-def _to_measurement(
+def to_measurement(
     number: int,
     time_s: float,
     side: str,

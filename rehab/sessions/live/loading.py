@@ -38,12 +38,12 @@ def load(session_id: int) -> LoadedSession:
     return LoadedSession(
         aggregate=SessionAggregate.load(session),
         recent=list(reversed(latest)),
-        robot_stopped=_is_robot_stopped(session),
+        robot_stopped=is_robot_stopped(session),
         was_orphaned=before not in ("", owners.HANDED_ON, session.owner),
     )
 
 
-def _is_robot_stopped(session: TrainingSession) -> bool:
+def is_robot_stopped(session: TrainingSession) -> bool:
     """Return whether the latest order to the station's robot, in any session, was stop."""
     if session.station is not None:
         return session.station.robot_stopped
