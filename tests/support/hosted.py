@@ -35,7 +35,11 @@ PASSWORD = "only on loopback, for a minute"
 
 def find_missing() -> str:
     """Return what the set needs and this machine lacks, with the cure; empty where it is there."""
-    programs = {"nginx-light": find_nginx(), "postgresql": find_initdb()}
+    programs = {
+        "nginx-light": find_nginx(),
+        "postgresql": find_initdb(),
+        "redis-server": shutil.which("redis-server"),
+    }
     lacking = [package for package, program in programs.items() if program is None]
     return f"apt-get install {' '.join(lacking)}" if lacking else ""
 
@@ -100,6 +104,23 @@ def _run_postgres(folder: Path) -> Iterator[str]:
     finally:
         server.send_signal(signal.SIGINT)  # it waits for no client
         server.wait(30)
+
+
+@contextmanager
+def run_redis(port: int = 0) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """Run a Redis of our own until the block ends; yield its address and its process."""
+    port = port or free_port()
+    at = ["--bind", "127.0.0.1", "--port", str(port), "--save", "", "--appendonly", "no"]
+    with tempfile.TemporaryDirectory(prefix="garry-redis-") as folder:
+        server = subprocess.Popen(
+            ["redis-server", *at, "--dir", folder], stdout=subprocess.DEVNULL, cwd=folder
+        )
+        try:
+            _wait_for_port(port)
+            yield f"redis://127.0.0.1:{port}/0", server
+        finally:
+            server.kill()
+            server.wait(10)
 
 
 def _wait_for_postgres(bin_folder: Path, port: int) -> None:

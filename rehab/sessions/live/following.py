@@ -149,7 +149,7 @@ class Follower(Subscriber):
 
     EXPIRES_S = 3.5  # a follower speaks each second
 
-    def __init__(self, live: LiveSession, server: str, tell: Callable[[Data], None]) -> None:
+    def __init__(self, live: LiveSession, server: str, tell: Callable[[Data], object]) -> None:
         async def send(_: str) -> None:
             """Send nothing: a follower reads the log."""
 

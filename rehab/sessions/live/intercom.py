@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import contextvars
 import itertools
 import logging
 import time
@@ -95,7 +96,8 @@ class Intercom:
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     def _start(self, work: Any) -> None:
-        task = asyncio.get_running_loop().create_task(work)
+        loop, context = asyncio.get_running_loop(), contextvars.Context()  # not a request's
+        task = loop.create_task(work, context=context)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 

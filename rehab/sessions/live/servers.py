@@ -10,10 +10,9 @@ import asyncio
 import contextvars
 import logging
 from collections.abc import Awaitable, Callable, Mapping
+from functools import partial
 from typing import Any, Protocol
 
-from asgiref.sync import sync_to_async
-from channels.db import database_sync_to_async
 from django.utils import timezone
 
 from rehab.people.models import User
@@ -26,6 +25,7 @@ from rehab.sessions.live.following import (
     read_new_rows,
 )
 from rehab.sessions.live.intercom import Data, Intercom, Unheard
+from rehab.sessions.live.own_connection import DatabaseThread
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import LiveSession, NotStored
 from rehab.sessions.log import Remark
@@ -36,6 +36,7 @@ log = logging.getLogger(__name__)
 
 BEAT_S = 1.0  # the log is read so often where no hint comes
 UNUSED_BEATS = 3  # after so many without a page a session is not followed any more
+READ_TIMEOUT_MS = 5_000
 READ_PAUSE_S = 0.005  # between two reads: hints that come meanwhile are read together
 
 
@@ -86,9 +87,10 @@ class Servers:
                 "give_up": self._on_give_up,
             },
         )
-        loop, context = asyncio.get_running_loop(), contextvars.Context()
+        self._database = DatabaseThread("garry-follower", READ_TIMEOUT_MS)
+        loop = asyncio.get_running_loop()
         self._tasks = [
-            loop.create_task(work, context=context)
+            loop.create_task(work, context=contextvars.Context())
             for work in (self._repeat(self._beat), self._repeat(self._read))
         ]
 
@@ -98,6 +100,7 @@ class Servers:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         await self.intercom.close()
+        self._database.close()
 
     def address_of(self, owner: str) -> str:
         """Return how a proxy reaches a server; empty where that is not known."""
@@ -174,7 +177,7 @@ class Servers:
         return live
 
     async def _open(self, session_id: int) -> None:
-        live = await sync_to_async(load_followed)(session_id)
+        live = await self._database.run(load_followed, session_id)
         self.followed[session_id] = live
         self._unused[session_id] = 0
         self.intercom.tell(live.owner, "follow", live.viewers)
@@ -204,7 +207,7 @@ class Servers:
         if not wanted:
             return
         ends = [(live.id, live.aggregate.fold.last_number, live.last_event) for live in wanted]
-        found = await database_sync_to_async(read_new_rows)(ends)
+        found = await self._database.run(read_new_rows, ends)
         for live in wanted:
             new = found.get(live.id)
             if self.followed.get(live.id) is not live:
@@ -222,7 +225,7 @@ class Servers:
     async def _beat(self) -> None:
         """Each second: who is there, which pages are here, and the log where no hint came."""
         self.intercom.echo()
-        servers = await database_sync_to_async(lease.valid_servers)()
+        servers = await self._database.run(lease.valid_servers)
         self._addresses = dict(servers)
         for live in list(self.followed.values()):
             gone = live.owner not in self._addresses and self._own.may_judge
@@ -258,9 +261,7 @@ class Servers:
             return
         follower = next((one for one in _followers(live) if one.server == server), None)
         if follower is None:
-            follower = Follower(
-                live, server, lambda hint: self.intercom.tell(server, "hint", hint) and None
-            )
+            follower = Follower(live, server, partial(self.intercom.tell, server, "hint"))
             live.feed.subscribers.add(follower)
         before = (follower.tablets, live.is_watched)
         follower.hear(viewers, asyncio.get_running_loop().time())
