@@ -64,7 +64,10 @@ def test_settings_that_are_named_exist() -> None:
 
 def test_alarms_and_the_board_ask_for_figures_that_exist(monkeypatch) -> None:
     idle = SimpleNamespace(
-        sessions={}, is_ready=True, writer=SimpleNamespace(backlog=0, trouble=Trouble.NONE)
+        sessions={},
+        is_ready=True,
+        servers=None,
+        writer=SimpleNamespace(backlog=0, trouble=Trouble.NONE),
     )
     monkeypatch.setattr(runtime, "peek", lambda: idle)
     shown = generate_latest(instruments.REGISTRY).decode()

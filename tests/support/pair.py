@@ -88,7 +88,8 @@ class Dialed:
         """Return the numbers of the steps that were told, in their order."""
         kinds = ("step", "missing", "calm")
         told = [one["number"] for one in self.heard if one.get("kind") in kinds]
-        missed = [step["number"] for one in self.heard for step in one.get("steps", [])]
+        frames = [one for one in self.heard if one.get("type") == "steps"]
+        missed = [step["number"] for one in frames for step in one["steps"]]
         return [*missed, *told] if missed else told
 
     async def hang_up(self) -> None:
@@ -127,10 +128,14 @@ class Pair:
         await asyncio.gather(*(self.until_ready(place) for place in range(len(self.ports))))
         return self
 
+    async def hang_up_all(self) -> None:
+        """Close all connections that were dialed."""
+        dialed, self._open = self._open, []
+        await asyncio.gather(*(one.hang_up() for one in dialed))
+
     async def __aexit__(self, *_: object) -> None:
         """Stop both."""
-        for dialed in self._open:
-            await dialed.hang_up()
+        await self.hang_up_all()
         for process in self.processes:
             if process is not None and process.poll() is None:
                 process.send_signal(signal.SIGCONT)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextvars
 import logging
+import time
 from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
 from typing import Any, Protocol
@@ -101,6 +102,12 @@ class Servers:
         await asyncio.gather(*self._tasks, return_exceptions=True)
         await self.intercom.close()
         self._database.close()
+
+    @property
+    def deaf_s(self) -> float:
+        """Seconds since a message to ourselves came back; 0 where they come."""
+        silent_s = time.monotonic() - self.intercom.echoed_s
+        return silent_s if silent_s > 3 * BEAT_S else 0.0
 
     def address_of(self, owner: str) -> str:
         """Return how a proxy reaches a server; empty where that is not known."""
