@@ -51,6 +51,11 @@ class Dialed:
         self.code = self.socket.close_code
         self._news.set()
 
+    def forget(self) -> None:
+        """Forget what was heard."""
+        self.heard.clear()
+        self.times.clear()
+
     async def say(self, message: Message) -> float:
         """Send a message; return when."""
         with suppress(ConnectionClosed):

@@ -35,6 +35,7 @@ from rehab.training.steps import InvalidMeasurement
 
 READ_TOGETHER = 100  # sessions of one query
 LATE = timedelta(seconds=2)  # a step that was read so long after it came is not shown as live
+WHO = ("source", "robot", "tablets", "storage")  # of the presence
 NOBODY: Message = {
     "source": False,
     "robot": False,
@@ -99,8 +100,8 @@ class FollowedSession(LiveSession):
     def take_hint(self, hint: Data) -> None:
         """Publish what the owner tells and no log has."""
         self._late = set(hint["late"])
-        if hint["presence"] != self._presence:
-            self._presence = hint["presence"]
+        before, self._presence = self._presence, hint["presence"]
+        if any(before[name] != self._presence[name] for name in WHO):  # ages go with heartbeats
             self.feed.publish(presence_event(self.aggregate.fold, self._presence))
         for kind, report in hint["robot"].items():
             if report is not None and report != self.robot_reports.get(kind):

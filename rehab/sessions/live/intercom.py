@@ -24,6 +24,7 @@ Data = dict[str, Any]
 HEARD_S = 0.3  # within which the other server says that it has a question
 ANSWER_S = 5.0  # within which it answers one that waits for its disk
 WAITING = 10_000  # messages; older ones are dropped while Redis does not answer
+DEAF_S = 5.0  # our own echo comes each second: else the subscription is lost
 PAUSE_S = 0.5  # after a failure of the layer
 HEARD = "heard"
 ANSWER = "answer"
@@ -120,9 +121,12 @@ class Intercom:
     async def _receive(self) -> None:
         while True:
             try:
-                message = await self._layer.receive(_channel(self.own))
+                async with asyncio.timeout(DEAF_S):
+                    message = await self._layer.receive(_channel(self.own))
             except Exception as problem:
                 log.error("Nothing is heard of other servers: %r", problem)
+                with contextlib.suppress(Exception):
+                    await self._layer.flush()  # it would not subscribe again by itself
                 await asyncio.sleep(PAUSE_S)
                 continue
             kind, sender = message.pop("type", ""), message.pop("from", "")

@@ -102,6 +102,7 @@ class Lease:
         self.id = uuid.uuid4().hex
         self.address = address
         self.shares = shares
+        self.entered = 0  # how often: more than once where it expired meanwhile
         self._on_excluded = on_excluded
         self._connection: BaseDatabaseWrapper | None = None
         self._renewed_s = 0.0  # by the monotonic clock
@@ -189,6 +190,7 @@ class Lease:
             finally:
                 cursor.execute("SELECT pg_advisory_unlock(%s)", [KEY])
         self._renewed_s = self._unbroken_since_s = time.monotonic()
+        self.entered += 1
         return True
 
     @property

@@ -23,6 +23,7 @@ from rehab.sessions.events.event import to_text
 from rehab.sessions.live import lease, owners, sources
 from rehab.sessions.live.audit_queue import AuditQueue
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
+from rehab.sessions.live.commits import Fenced
 from rehab.sessions.live.instruments import LATE_S
 from rehab.sessions.live.loading import find_newest_open, load
 from rehab.sessions.live.owners import OwnedElsewhere
@@ -33,6 +34,7 @@ from rehab.sessions.live.supervisor import Supervisor
 from rehab.sessions.live.trouble import WORDS, Trouble, describe_failure
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Remark
+from rehab.sessions.models import TrainingSession
 from rehab.training.changes import (
     ENDED_STATES,
     OPEN_STATES,
@@ -187,13 +189,24 @@ class Runtime:
         if sources.child_name(session_id) in self.supervisor.children:
             return False  # its source dials in here
         del self.sessions[session_id]  # from here on nobody gets it
-        await live.wait_until_committed()
-        given = await sync_to_async(owners.hand_on)(session_id, live.aggregate.session.epoch)
-        self._held.discard(session_id)
-        if live.robot is not None:
-            live.robot.evict(CloseCode.ELSEWHERE, "elsewhere", "The session moved. Connect again.")
-        self.close_pages(live)
-        return given
+        try:
+            await live.wait_until_committed()
+            epoch = live.aggregate.session.epoch
+            return await sync_to_async(owners.hand_on)(session_id, epoch)
+        finally:
+            if live.robot is not None:
+                moved = "The session moved. Connect again."
+                live.robot.evict(CloseCode.ELSEWHERE, "elsewhere", moved)
+            self.close_pages(live)
+
+    async def drop_taken(self) -> None:
+        """Drop the sessions that another server has claimed while this one's lease had expired."""
+        there = TrainingSession.everywhere.filter(pk__in=list(self.sessions))
+        epochs = dict([row async for row in there.values_list("pk", "epoch")])
+        for live in list(self.sessions.values()):
+            if epochs.get(live.id, live.aggregate.session.epoch) != live.aggregate.session.epoch:
+                self._drop(live, Fenced("Another server has taken the session over."))
+                await self.supervisor.stop(sources.child_name(live.id))
 
     async def _open(self, session_id: int) -> None:
         self._held.add(session_id)

@@ -60,6 +60,7 @@ class Owning(Protocol):
     def announce_here(self, session_id: int, station_id: int) -> None: ...
     async def give_up(self, session_id: int, slot: str) -> bool: ...
     async def take_over_left(self) -> None: ...
+    async def drop_taken(self) -> None: ...
     def close_pages(self, live: LiveSession) -> None: ...
 
 
@@ -69,6 +70,7 @@ class Servers:
     def __init__(self, owning: Owning, own: lease.Lease) -> None:
         self._owning = owning
         self._own = own
+        self._entered = own.entered
         self.followed: dict[int, FollowedSession] = {}
         self._opening: dict[int, asyncio.Task[None]] = {}
         self._unused: dict[int, int] = {}  # beats
@@ -248,6 +250,9 @@ class Servers:
             own.feed.subscribers.difference_update(gone_ones)
             if gone_ones:
                 own.announce_presence(timezone.now())
+        if self._entered != self._own.entered:  # others may have taken sessions meanwhile
+            await self._owning.drop_taken()
+            self._entered = self._own.entered
         if self._own.may_judge:
             await self._owning.take_over_left()
         await asyncio.sleep(BEAT_S)
