@@ -89,6 +89,7 @@ class Faults:
             while not all(map(has_more, self.walks, marks)):  # noqa: ASYNC110
                 await asyncio.sleep(0.02)
         self.recovered_s.setdefault(name, []).append(time.monotonic() - began_s)
+        print(f"{name}: {self.recovered_s[name][-1]:.1f} s", flush=True)
         if name == "rolling restart":
             self.paused_by_order += self.count_pauses() - before
         for place in range(2):
@@ -105,7 +106,9 @@ class Faults:
 
     async def resume(self, row: Message) -> None:
         """Let a session go on that a fault has paused, as a therapist does."""
+        said = ""
         for _ in range(100):
+            monitor = None
             try:
                 monitor = await self.pair.monitor(self.random.randrange(2), row)
                 shown = await monitor.until(of_type("snapshot"))
@@ -113,11 +116,13 @@ class Faults:
                     return
                 await monitor.say({"type": "change", "kind": "resume", "id": "r"})
                 await monitor.until(lambda one: one.get("id") == "r")
-            except (AssertionError, *GONE):
+            except (AssertionError, *GONE) as problem:
+                said = repr(problem)
                 await asyncio.sleep(0.2)
             finally:
-                await self.pair.hang_up_all()
-        raise AssertionError("never resumed")
+                if monitor is not None:
+                    await monitor.hang_up()
+        raise AssertionError(f"never resumed: {said}")
 
     async def stop_from_the_other_server(self, row: Message) -> None:
         """Measure how soon a stop reaches the robot from a page at the other server."""
@@ -187,7 +192,9 @@ def test_each_part_fails_under_load_and_nothing_is_lost(tmp_path: Path) -> None:
     with run_postgres(restarts) as database, run_redis(restarts) as redis:
         pair = Pair(tmp_path / "garry", database, redis)
         with run_nginx(tmp_path / "nginx", *pair.ports, restarts=restarts) as (_, secure, tls):
-            print(f"\nseed {seed}, each fault {times} times, {SESSIONS} sessions × {RATE:g}/s")
+            print(
+                f"\nlog: {pair.log}; seed {seed}, each fault {times} times, {SESSIONS} sessions × {RATE:g}/s"
+            )
             faults = asyncio.run(story(pair, Entrance(secure, tls)))
             problems: list[str] = []
             for walk in faults.walks:

@@ -35,6 +35,7 @@ from rehab.sessions.live.trouble import WORDS, Trouble, describe_failure
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Remark
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.payloads import Message
 from rehab.training.changes import (
     ENDED_STATES,
     OPEN_STATES,
@@ -319,11 +320,21 @@ class Runtime:
             raise NotAllowed("The session has ended.")
         await live.remark(what, value, by, timezone.now())
 
-    def stop_robots(self, live: LiveSession, by: User | None, device_id: int | None) -> None:
-        """Stop the robot of a session of this process, and with it of the others there."""
-        told = {} if device_id is None else {"device": device_id}
+    def stop_robots(self, live: LiveSession, by: User | None, told: Message) -> None:
+        """Stop the robot of a session of this process, and of the others there, on any server.
+
+        ``told``: which device stopped it, if it was no person.
+        """
         for session in self.sessions_at_station_of(live):
             session.stop_robot(by, timezone.now(), told)
+        if self.servers is not None and live.station_id is not None:
+            self.servers.tell_of_stop(live.station_id, by, told)
+
+    def stop_at(self, station_id: int, by: User | None, told: Message) -> None:
+        """Stop the robot of a station, as another server says."""
+        for session in list(self.sessions.values()):
+            if session.station_id == station_id:
+                session.stop_robot(by, timezone.now(), told)
 
     async def arm_robots(self, live: LiveSession, by: User) -> None:
         """Let the robot of a session of this process move again, once that is committed."""
@@ -336,7 +347,7 @@ class Runtime:
         """Do what a page at another server orders. Raises what ``session`` raises."""
         live = self.sessions.get(session_id) or await self.session(session_id)
         if order == "stop":
-            self.stop_robots(live, by, device_id)
+            self.stop_robots(live, by, {} if device_id is None else {"device": device_id})
         elif by is not None:
             await self.arm_robots(live, by)
 

@@ -30,6 +30,7 @@ from rehab.sessions.live.own_connection import DatabaseThread
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import LiveSession, NotStored
 from rehab.sessions.log import Remark
+from rehab.sessions.payloads import Message
 from rehab.training.changes import ChangeValue
 from rehab.training.measures import InvalidSetting
 
@@ -58,6 +59,7 @@ class Owning(Protocol):
     ) -> None: ...
     def drive_own_robot(self, session_id: int, drive: Mapping[str, float]) -> None: ...
     def announce_here(self, session_id: int, station_id: int) -> None: ...
+    def stop_at(self, station_id: int, by: User | None, told: Message) -> None: ...
     async def give_up(self, session_id: int, slot: str) -> bool: ...
     async def take_over_left(self) -> None: ...
     async def drop_taken(self) -> None: ...
@@ -87,6 +89,7 @@ class Servers:
                 "order": self._on_order,
                 "drive": self._on_drive,
                 "opened": self._on_opened,
+                "stop_at": self._on_stop_at,
                 "give_up": self._on_give_up,
             },
         )
@@ -144,9 +147,16 @@ class Servers:
 
     def announce(self, session_id: int, station_id: int) -> None:
         """Tell devices that wait at other servers of a session."""
+        self._tell_all("opened", {"session": session_id, "station": station_id})
+
+    def tell_of_stop(self, station_id: int, by: User | None, told: Message) -> None:
+        """Tell other servers of a stop: sessions of one station share its robot."""
+        self._tell_all("stop_at", {"station": station_id, "by": by and by.pk, "told": told})
+
+    def _tell_all(self, kind: str, data: Data) -> None:
         for server in self._addresses:
             if server != self._own.id:
-                self.intercom.tell(server, "opened", {"session": session_id, "station": station_id})
+                self.intercom.tell(server, kind, data)
 
     async def ask_for(self, owner: str, session_id: int, slot: str) -> bool:
         """Return whether the owner gave a session up to the device that waits here."""
@@ -308,6 +318,9 @@ class Servers:
 
     async def _on_opened(self, server: str, told: Data) -> None:
         self._owning.announce_here(told["session"], told["station"])
+
+    async def _on_stop_at(self, server: str, stop: Data) -> None:
+        self._owning.stop_at(stop["station"], _account(stop["by"]), stop["told"])
 
     async def _on_give_up(self, server: str, asked: Data) -> Data:
         return {"given": await self._owning.give_up(asked["session"], asked["slot"])}

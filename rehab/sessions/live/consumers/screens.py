@@ -224,7 +224,8 @@ class ScreenConsumer(Socket):
         if isinstance(live, FollowedSession):
             self.run_to_end(self._ask_owner(live, order, by, device_id))
         elif order == "stop":
-            self.runtime.stop_robots(live, by, device_id)
+            told = {} if device_id is None else {"device": device_id}
+            self.runtime.stop_robots(live, by, told)
         elif by is not None:  # in a task, so that a stop meanwhile does not wait
             self.start(self.runtime.arm_robots(live, by))
         if by is not None or order == "stop":  # queued: no robot waits for the audit log
