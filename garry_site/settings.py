@@ -208,7 +208,10 @@ else:
     }
 DEFAULT_AUTO_FIELD = "django.db.models.BigAutoField"
 
-REDIS_URL = text("GARRY_REDIS_URL", "", "channel layer between several server processes")
+REDIS_URL = text("GARRY_REDIS_URL", "", "Redis, by which several servers hear each other")
+ADDRESS = text(
+    "GARRY_ADDRESS", "", "host:port by which the proxy reaches this one of several servers"
+)
 CHANNEL_LAYERS = {
     "default": {
         # Pub/sub, not the core layer: docs/reference/stack.md#several-processes.

@@ -15,6 +15,7 @@ from __future__ import annotations
 import asyncio
 import json
 import random
+import re
 import ssl
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
@@ -53,6 +54,10 @@ REFUSALS: dict[int, str] = {
 # After these the pause is not reset to the shortest: the server, or what we send, is at fault, and
 # a quick reconnection would make it worse.
 _TROUBLE = frozenset({CloseCode.NOT_STORED, CloseCode.TOO_MANY, 1002, 1003, 1007, 1009})
+
+# Tells a proxy before several servers which of them to choose: what the error `elsewhere` named.
+SERVER_HEADER = "GARRY-Server"
+ADDRESS = re.compile(r"[A-Za-z0-9.:\[\]_-]{1,100}")
 
 # Handshakes that are refused by a status instead of a close code.
 _STATUS_CODES = {
@@ -164,6 +169,8 @@ class Link:
         self._was_welcome = False  # ever: then a failure is likely to pass
         self._was_heard = False  # on this connection
         self._error = ""  # the last one that the server sent on this connection
+        # Of several servers the one that has the session, as another one said: for the proxy.
+        self._server = ""
 
     @property
     def is_open(self) -> bool:
@@ -255,9 +262,12 @@ class Link:
     async def _connect(self) -> None:
         timing = self._timing
         loopback = urlsplit(self.url).hostname in {"localhost", "127.0.0.1", "::1"}
+        headers = {"Authorization": f"Bearer {self._token}"}
+        if self._server:
+            headers[SERVER_HEADER] = self._server
         socket = await connect(
             self.url,
-            additional_headers={"Authorization": f"Bearer {self._token}"},
+            additional_headers=headers,
             user_agent_header="GARRY",
             compression=None,  # frames are small; compression would only cost time
             proxy=None if loopback else True,
@@ -288,6 +298,10 @@ class Link:
             ) from None
         if kind == "error":
             self._error = str(message.get("message", ""))
+            server = str(message.get("server", ""))
+            if server != self._server and ADDRESS.fullmatch(server):
+                self._server = server
+                self._back_off.reset()
         else:
             self._was_welcome = self._was_heard = True
             self._error = ""
@@ -308,6 +322,7 @@ class Link:
 
     def _explain_failure(self, problem: OSError | WebSocketException) -> str:
         """Return why there is no connection. Raises LinkRefused where trying again is useless."""
+        self._server = ""  # it may be gone
         if isinstance(problem, ssl.SSLCertVerificationError):
             raise LinkRefused(
                 CloseCode.NOT_PROTOCOL,

@@ -83,14 +83,14 @@ def merge_entries(
     events, number = changes[::-1], after
     for stored in steps:
         while events and events[-1].after_number <= number:
-            yield _to_change(events.pop())
-        step = _to_measurement(*stored)
+            yield to_change(events.pop())
+        step = to_measurement(*stored)
         if step.number != number + 1:
             raise DamagedLog(describe_hole(session_id, number, step.number))
         yield step
         number = step.number
     while events:
-        yield _to_change(events.pop())
+        yield to_change(events.pop())
 
 
 def check_log(session: TrainingSession) -> int:
@@ -128,7 +128,8 @@ def describe_hole(session_id: int, before: int, after: int) -> str:
     )
 
 
-def _to_change(event: SessionEvent) -> Change:
+def to_change(event: SessionEvent) -> Change:
+    """Return a stored change as it was made."""
     return Change(event.kind, event.data.get("value", event.value))
 
 
@@ -137,7 +138,7 @@ MEASURED = ("number", "time_s", "side", "value", "reasons", "extra", "rules_vers
 StoredMeasurement = tuple[int, float, str, float | None, list[str], dict[str, float], int]
 
 
-def _to_measurement(
+def to_measurement(
     number: int,
     time_s: float,
     side: str,

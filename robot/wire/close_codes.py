@@ -18,10 +18,10 @@ class CloseCode(IntEnum):
     NOT_PROTOCOL = 4400
     BUSY = 4409
     ENDED = 4410
+    ELSEWHERE = 4421
 
 
-# After these a page does not connect again by itself. After BUSY it does: another server process
-# may give the session up.
+# After these a page does not connect again by itself.
 FINAL_FOR_PAGES = frozenset(
     {
         CloseCode.UNAUTHORIZED,

@@ -6,6 +6,7 @@ import json
 import re
 import shlex
 from configparser import RawConfigParser
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -63,8 +64,12 @@ def test_settings_that_are_named_exist() -> None:
 
 
 def test_alarms_and_the_board_ask_for_figures_that_exist(monkeypatch) -> None:
+    import_module("rehab.sessions.pages.metrics")  # registers what is counted while it is asked
     idle = SimpleNamespace(
-        sessions={}, is_ready=True, writer=SimpleNamespace(backlog=0, trouble=Trouble.NONE)
+        sessions={},
+        is_ready=True,
+        servers=None,
+        writer=SimpleNamespace(backlog=0, trouble=Trouble.NONE),
     )
     monkeypatch.setattr(runtime, "peek", lambda: idle)
     shown = generate_latest(instruments.REGISTRY).decode()

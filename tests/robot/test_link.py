@@ -155,7 +155,29 @@ async def test_the_link_greets_with_its_token_and_gives_messages():
     assert not await link.send({"type": "report"})
 
 
-@pytest.mark.parametrize("code", [1000, 1001, 4008, 4011, 4012, 4029, 4999])
+async def test_a_link_names_the_server_that_has_the_session_to_the_proxy():
+    named = []
+
+    async def handler(socket):
+        await socket.recv()
+        named.append(socket.request.headers.get("GARRY-Server"))
+        if named[-1] is None:
+            error = {"type": "error", "code": "elsewhere", "server": "127.0.0.1:8001"}
+            await socket.send(json.dumps(error | {"message": "Try again."}))
+            await socket.close(4421)
+        else:
+            await socket.send('{"type": "welcome"}')
+            await asyncio.sleep(5)
+
+    losses = Losses()
+    async with serving(handler) as url, dial(url, losses) as link:
+        assert (await anext(link))["code"] == "elsewhere"
+        assert await anext(link) == {"type": "welcome"}
+    assert named == [None, "127.0.0.1:8001"]
+    assert len(losses.pauses_s) == 1
+
+
+@pytest.mark.parametrize("code", [1000, 1001, 4008, 4011, 4012, 4029, 4421, 4999])
 async def test_a_link_that_is_closed_for_a_while_comes_back(code):
     losses = Losses()
     async with serving(closing(code)) as url, dial(url, losses) as link:

@@ -14,13 +14,14 @@ import ssl
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Any
 
+import psutil
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
@@ -35,7 +36,11 @@ PASSWORD = "only on loopback, for a minute"
 
 def find_missing() -> str:
     """Return what the set needs and this machine lacks, with the cure; empty where it is there."""
-    programs = {"nginx-light": find_nginx(), "postgresql": find_initdb()}
+    programs = {
+        "nginx-light": find_nginx(),
+        "postgresql": find_initdb(),
+        "redis-server": shutil.which("redis-server"),
+    }
     lacking = [package for package, program in programs.items() if program is None]
     return f"apt-get install {' '.join(lacking)}" if lacking else ""
 
@@ -51,17 +56,20 @@ def find_initdb() -> Path | None:
     return found[-1] if found else None
 
 
+Restarts = dict[str, Callable[[], None]]  # by program: kills it and starts it again
+
+
 @contextmanager
-def run_postgres() -> Iterator[str]:
+def run_postgres(restarts: Restarts | None = None) -> Iterator[str]:
     """Run a PostgreSQL of our own until the block ends; yield the address of its database.
 
     It refuses to run as root, so then it runs as somebody else, in a folder that is theirs.
     """
     with tempfile.TemporaryDirectory(prefix="garry-postgres-") as name:
-        yield from _run_postgres(Path(name))
+        yield from _run_postgres(Path(name), {} if restarts is None else restarts)
 
 
-def _run_postgres(folder: Path) -> Iterator[str]:
+def _run_postgres(folder: Path, restarts: Restarts) -> Iterator[str]:
     bin_folder = find_initdb().parent
     port = free_port()
     data, sockets = folder / "data", folder / "sockets"
@@ -86,13 +94,25 @@ def _run_postgres(folder: Path) -> Iterator[str]:
     )
     assert made.returncode == 0, made.stderr
     options = f"-p {port} -c listen_addresses=127.0.0.1 -c unix_socket_directories={sockets}"
-    server = subprocess.Popen(
-        [bin_folder / "postgres", "-D", data, *options.split()],
-        cwd="/",
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        **account,
-    )
+
+    def start() -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            [bin_folder / "postgres", "-D", data, *options.split()],
+            cwd="/",
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            **account,
+        )
+
+    def restart() -> None:
+        nonlocal server
+        server.send_signal(signal.SIGQUIT)  # at once, as in a crash: it recovers from its log
+        server.wait(30)
+        server = start()
+        _wait_for_postgres(bin_folder, port)
+
+    server = start()
+    restarts["postgres"] = restart
     try:
         _wait_for_postgres(bin_folder, port)
         _make_database(port)
@@ -100,6 +120,36 @@ def _run_postgres(folder: Path) -> Iterator[str]:
     finally:
         server.send_signal(signal.SIGINT)  # it waits for no client
         server.wait(30)
+
+
+@contextmanager
+def run_redis(restarts: Restarts | None = None) -> Iterator[str]:
+    """Run a Redis of our own until the block ends; yield its address."""
+    port = free_port()
+    at = ["--bind", "127.0.0.1", "--port", str(port), "--save", "", "--appendonly", "no"]
+    with tempfile.TemporaryDirectory(prefix="garry-redis-") as folder:
+
+        def start() -> subprocess.Popen[bytes]:
+            command = ["redis-server", *at, "--dir", folder]
+            return subprocess.Popen(command, stdout=subprocess.DEVNULL, cwd=folder)
+
+        def restart() -> None:
+            nonlocal server
+            server.kill()
+            server.wait(10)
+            time.sleep(1.5)
+            server = start()
+            _wait_for_port(port)
+
+        server = start()
+        if restarts is not None:
+            restarts["redis"] = restart
+        try:
+            _wait_for_port(port)
+            yield f"redis://127.0.0.1:{port}/0"
+        finally:
+            server.kill()
+            server.wait(10)
 
 
 def _wait_for_postgres(bin_folder: Path, port: int) -> None:
@@ -174,8 +224,10 @@ def adapt(text: str, changes: dict[str, str]) -> str:
 
 
 @contextmanager
-def run_nginx(folder: Path, server_port: int) -> Iterator[tuple[str, str, ssl.SSLContext]]:
-    """Run nginx before a server until the block ends, by the configuration that we ship.
+def run_nginx(
+    folder: Path, *server_ports: int, restarts: Restarts | None = None
+) -> Iterator[tuple[str, str, ssl.SSLContext]]:
+    """Run nginx before one or two servers until the block ends, by the configuration we ship.
 
     Yields its addresses with and without TLS, and a context that trusts it.
     """
@@ -187,7 +239,8 @@ def run_nginx(folder: Path, server_port: int) -> Iterator[tuple[str, str, ssl.SS
         {
             "garry.example.org": NAME,
             "/etc/ssl/garry": str(folder),
-            "server 127.0.0.1:8000;": f"server 127.0.0.1:{server_port};",
+            "127.0.0.1:8000": f"127.0.0.1:{server_ports[0]}",
+            "127.0.0.1:8001": f"127.0.0.1:{server_ports[-1] if server_ports[1:] else free_port()}",
             "listen 80;": f"listen 127.0.0.1:{plain};",
             "listen 443 ssl http2;": f"listen 127.0.0.1:{secure} ssl http2;",
             "    listen [::]:80;\n": "",
@@ -208,7 +261,19 @@ def run_nginx(folder: Path, server_port: int) -> Iterator[tuple[str, str, ssl.SS
     command = [find_nginx(), "-p", str(folder), "-c", str(main)]
     tried = subprocess.run([*command, "-t"], capture_output=True, text=True)
     assert tried.returncode == 0, tried.stderr
+
+    def restart() -> None:
+        nonlocal server
+        for worker in psutil.Process(server.pid).children():
+            worker.kill()
+        server.kill()
+        server.wait(10)
+        server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        _wait_for_port(secure)
+
     server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    if restarts is not None:
+        restarts["nginx"] = restart
     try:
         _wait_for_port(secure)
         yield f"http://{NAME}:{plain}", f"https://{NAME}:{secure}", tls

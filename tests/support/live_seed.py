@@ -63,7 +63,8 @@ def seed(count: int) -> list[dict[str, Any]]:
             )
             aggregate = SessionAggregate(session)
             store(aggregate, aggregate.change(Change(ChangeKind.START), None, timezone.now()))
-            made.append({"session": session.pk, "cookie": cookies.session_key, **tokens})
+            keys = {"session": session.pk, "place": {"patient": patient.pk, "station": station.pk}}
+            made.append({**keys, "cookie": cookies.session_key, **tokens})
     return made
 
 

@@ -1,4 +1,4 @@
-"""`manage.py serve`: the whole clinic in one process."""
+"""`manage.py serve`: the whole clinic in one process, or several for a hosted database."""
 
 from __future__ import annotations
 
@@ -14,16 +14,18 @@ from typing import Any
 from channels.routing import get_default_application
 from django.conf import settings
 from django.core.management import BaseCommand, CommandError
+from django.db import connection
 
 from rehab.boards.building.scheduler import board_builder
+from rehab.management.processes import Processes
 from rehab.people.sign_in.first_start import (
     FIRST_USERNAME,
     first_clinic,
     first_password,
     prepare_database,
 )
+from rehab.sessions.live.lease import AnotherServer, Lease
 from rehab.sessions.live.runtime import current
-from rehab.sessions.live.server_lock import AnotherServer, ServerLock
 from rehab.sessions.live.sources import local_address
 from rehab.stations.builtin import first_station, issue_builtin_token
 from rehab.stations.models import Device
@@ -33,13 +35,21 @@ from robot.bases import BASES
 class Command(BaseCommand):
     """Prepares the database, prints the address, and serves pages and sockets until Ctrl-C."""
 
-    help = "Serve GARRY: pages and sockets, one process."
+    help = "Serve GARRY: pages and sockets."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Add the options."""
         parser.add_argument("--host", default=settings.HOST)
         parser.add_argument("--port", type=int, default=settings.PORT)
         parser.add_argument("--server", choices=("daphne", "uvicorn"), default="daphne")
+        parser.add_argument(
+            "--processes",
+            type=int,
+            default=1,
+            metavar="N",
+            help="so many servers, at this port and those after it; hosted, with PostgreSQL and "
+            "Redis. SIGHUP restarts them one after the other.",
+        )
         parser.add_argument(
             "--child",
             action="append",
@@ -61,16 +71,24 @@ class Command(BaseCommand):
         host: str,
         port: int,
         server: str,
+        processes: int,
         child: list[str],
         robot: str,
         **options: Any,
     ) -> None:
         """Serve. Raises CommandError, with the cure, where the port is taken."""
+        if processes != 1:
+            check_sharing(processes)
+            if child or robot != "none":
+                raise CommandError("Several servers run no other programs. Run them beside.")
+            prepare_database()
+            Processes([serve_command(host, port + n, server) for n in range(processes)]).run()
+            return
         if robot != "none" and settings.HOSTED:
             raise CommandError("A hosted server runs no robot. Run `python -m robot` beside it.")
         check_port(host, port)
-        lock = take_lock() if settings.HOSTED else None
         prepare_database()
+        lease = take_lease(host, port) if settings.HOSTED else None
         self._print_address(local_address(host, port))
         token = robot_token() if robot != "none" else None
         SERVERS[server](
@@ -78,8 +96,8 @@ class Command(BaseCommand):
             port,
             lambda: self._start_children(child, local_address(host, port), robot, token),
         )
-        if lock is not None:
-            lock.release()
+        if lease is not None:
+            lease.release()
 
     def _start_children(
         self, commands: list[str], address: str, base: str, token: str | None
@@ -134,14 +152,36 @@ def serve_by_uvicorn(host: str, port: int, on_ready: Callable[[], None]) -> None
 SERVERS = {"daphne": serve_by_daphne, "uvicorn": serve_by_uvicorn}
 
 
-def take_lock() -> ServerLock:
-    """Return the lock of the database's only server. Raises CommandError where another runs."""
-    lock = ServerLock(on_lost=lambda: os.kill(os.getpid(), signal.SIGTERM))
+def serve_command(host: str, port: int, server: str) -> list[str]:
+    """Return the command of one of several servers."""
+    at = ["--host", host, "--port", str(port), "--server", server]
+    return [sys.executable, sys.argv[0], "serve", *at]
+
+
+def check_sharing(processes: int) -> None:
+    """Check that servers can share the database. Raises CommandError, with the cure."""
+    if processes < 1:
+        raise CommandError("Give --processes 1 or more.")
+    if not (settings.HOSTED and connection.vendor == "postgresql" and settings.REDIS_URL):
+        raise CommandError(
+            "Several servers share a PostgreSQL database and hear each other by Redis. Set "
+            "GARRY_HOSTED=1, GARRY_DATABASE_URL=postgres://… and GARRY_REDIS_URL=redis://…, or "
+            "serve by one process."
+        )
+
+
+def take_lease(host: str, port: int) -> Lease:
+    """Return the lease of a hosted server. Raises CommandError where another excludes it."""
+    lease = Lease(
+        settings.ADDRESS or f"{host}:{port}",
+        shares=bool(settings.REDIS_URL),
+        on_excluded=lambda: os.kill(os.getpid(), signal.SIGTERM),
+    )
     try:
-        lock.acquire()
+        lease.acquire()
     except AnotherServer as problem:
         raise CommandError(str(problem)) from problem
-    return lock
+    return lease
 
 
 def robot_token() -> str | None:

@@ -76,6 +76,8 @@ class Subscriber:
         Send a text once the socket takes it; send it now, or return False.
     """
 
+    tablets = 0  # that it stands for: those of another server
+
     def __init__(
         self,
         feed: EventFeed,

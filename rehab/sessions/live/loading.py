@@ -149,7 +149,7 @@ def _load(session_ids: Collection[int]) -> dict[int, Loaded]:
         found[key] = LoadedSession(
             aggregate=aggregate,
             recent=latest.get(key, []),
-            robot_stopped=_is_robot_stopped(session, events),
+            robot_stopped=is_robot_stopped(session, events),
             was_orphaned=before not in ("", owners.HANDED_ON, session.owner),
         )
     return found
@@ -193,7 +193,7 @@ def _read_events(session_ids: Collection[int]) -> dict[int, list[SessionEvent]]:
     return {key: list(some) for key, some in groupby(ordered, attrgetter("session_id"))}
 
 
-def _is_robot_stopped(session: TrainingSession, events: Sequence[SessionEvent]) -> bool:
+def is_robot_stopped(session: TrainingSession, events: Sequence[SessionEvent]) -> bool:
     """Return whether the latest order to the station's robot, in any session, was stop."""
     if session.station is not None:
         return session.station.robot_stopped

@@ -1,4 +1,8 @@
-"""Ownership of sessions: which process writes one. Each claim raises the epoch, a fencing token."""
+"""Ownership of sessions: which process writes one. Each claim raises the epoch, a fencing token.
+
+Hosted servers are named by their lease; elsewhere, and for commands, the process itself is asked
+for.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,7 @@ from pathlib import Path
 
 from django.conf import settings
 
-from rehab.sessions.live import server_lock
+from rehab.sessions.live import lease
 from rehab.sessions.log import noted_end
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
@@ -23,7 +27,16 @@ WRITTEN_BY_OWNER = ("checkpoint", "last_number", "state", "started_at", "ended_a
 
 
 class OwnedElsewhere(RuntimeError):
-    """Another process on this machine is running the session; the message says which."""
+    """Another process is running the session; the message says which. ``owner``: its name."""
+
+    def __init__(self, session_id: int, owner: str) -> None:
+        super().__init__(
+            f"Session {session_id} is run by another process ({owner.split('|')[1]}). Wait until "
+            "it has ended, or stop that process."
+            if "|" in owner
+            else f"Session {session_id} is run by another server. Try again in a moment."
+        )
+        self.owner = owner
 
 
 def _start_time(pid: int) -> str:
@@ -47,21 +60,23 @@ def _own_start_time(pid: int) -> str:
 
 def own_name() -> str:
     """Return the name that this process writes as owner."""
+    if (own := lease.held()) is not None:
+        return own.id
     return f"{socket.gethostname()}|{os.getpid()}|{_own_start_time(os.getpid())}"
 
 
 def is_alive(owner: str) -> bool:
-    """Return whether an owner's process runs.
-
-    Of other machines this is known where this process is the database's only server.
-    """
+    """Return whether an owner's process runs, or nobody can tell."""
+    own = lease.held()
+    if owner and settings.HOSTED and owner != HANDED_ON and "|" not in owner:
+        return (own is not None and not own.may_judge) or lease.is_valid(owner)
     try:
         host, pid, started = owner.split("|")
     except ValueError:
         return False
     if host != socket.gethostname():
-        # Only hosted servers share a database; else the machine was renamed.
-        return settings.HOSTED and not server_lock.is_held()
+        # A hosted server's command on another machine; else the machine was renamed.
+        return settings.HOSTED and own is None
     try:
         os.kill(int(pid), 0)
     except ProcessLookupError:
@@ -79,10 +94,7 @@ def claim(session: TrainingSession) -> str:
     while True:
         previous = session.owner
         if previous and previous != own_name() and is_alive(previous):
-            raise OwnedElsewhere(
-                f"Session {session.pk} is run by another process ({previous.split('|')[1]}). "
-                "Wait until it has ended, or stop that process."
-            )
+            raise OwnedElsewhere(session.pk, previous)
         still = TrainingSession.everywhere.filter(pk=session.pk, epoch=session.epoch)
         if still.update(epoch=session.epoch + 1, owner=own_name()):
             session.epoch, session.owner = session.epoch + 1, own_name()
@@ -97,6 +109,16 @@ def release(session_id: int, epoch: int) -> None:
     held.update(owner="", last_number=noted_end())
 
 
+def hand_on(session_id: int, epoch: int) -> bool:
+    """Release a session for another process that waits for it; False where it is not ours now."""
+    held = TrainingSession.everywhere.filter(pk=session_id, epoch=epoch, owner=own_name())
+    running = held.filter(state=State.RUNNING.value)
+    end = noted_end()
+    return bool(running.update(owner=HANDED_ON, last_number=end)) or bool(
+        held.update(owner="", last_number=end)
+    )
+
+
 def release_all(held: Collection[int]) -> None:
     """Release the sessions that this process has; hand those on that run."""
     own = TrainingSession.everywhere.filter(pk__in=held, owner=own_name())
@@ -106,7 +128,10 @@ def release_all(held: Collection[int]) -> None:
 
 def find_ownerless() -> tuple[list[int], list[int]]:
     """Return the running sessions whose process died, and those that one handed on."""
-    running = TrainingSession.everywhere.filter(owner__gt="", state=State.RUNNING.value)
+    others = TrainingSession.everywhere.exclude(owner=own_name())
+    running = others.filter(owner__gt="", state=State.RUNNING.value)
     owners = sorted(running.order_by().values_list("pk", "owner"))  # by the owners' index
-    orphaned = [key for key, owner in owners if owner != HANDED_ON and not is_alive(owner)]
+    dead = {owner for _, owner in owners if owner != HANDED_ON}
+    dead = {owner for owner in dead if not is_alive(owner)}
+    orphaned = [key for key, owner in owners if owner in dead]
     return orphaned, [key for key, owner in owners if owner == HANDED_ON]

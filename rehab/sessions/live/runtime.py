@@ -8,7 +8,7 @@ import logging
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 from asgiref.sync import sync_to_async
@@ -20,17 +20,22 @@ from django.utils import timezone
 from rehab.people.audit.seals import SEALED_AFTER, seal_logs
 from rehab.people.models import User
 from rehab.sessions.events.event import to_text
-from rehab.sessions.live import owners, sources
+from rehab.sessions.live import lease, owners, sources
 from rehab.sessions.live.audit_queue import AuditQueue
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
+from rehab.sessions.live.commits import Fenced
 from rehab.sessions.live.instruments import LATE_S
 from rehab.sessions.live.loading import Loader, find_newest_open
+from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.process import move_database_log
+from rehab.sessions.live.servers import Servers
 from rehab.sessions.live.session import LiveSession, NotStored, RobotStop
 from rehab.sessions.live.supervisor import Supervisor
 from rehab.sessions.live.trouble import WORDS, Trouble, describe_failure
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Remark
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.payloads import Message
 from rehab.training.changes import (
     ENDED_STATES,
     OPEN_STATES,
@@ -85,6 +90,10 @@ class Runtime:
         self._unlogged_stops: dict[
             str, RobotStop
         ] = {}  # at locations whose sessions were all dropped
+        own = lease.held()
+        # The other servers on the database, where there may be any.
+        self.servers = Servers(self, own) if own is not None and own.shares else None
+        self._left_before: set[int] = set()  # sessions without an owner, a beat ago
         # One task each: robots stop without heartbeats, so none may wait for the disk.
         self.background_tasks = [
             self.loop.create_task(self._repeat(beats, work), context=contextvars.Context())
@@ -136,6 +145,70 @@ class Runtime:
             if self.sessions.get(session_id) is live:
                 return live
 
+    async def viewed_session(self, session_id: int) -> LiveSession:
+        """Return a live session for a page: one that another server owns is followed.
+
+        Raises what ``session`` does.
+        """
+        if self.servers is not None and session_id in self.servers.followed:
+            return await self.servers.follow(session_id)
+        try:
+            return await self.session(session_id)
+        except OwnedElsewhere:
+            if self.servers is None:
+                raise
+        return await self.servers.follow(session_id)
+
+    def find(self, session_id: int) -> LiveSession | None:
+        """Return a session that is in memory, if it is: this process's, or one that it follows."""
+        followed = {} if self.servers is None else self.servers.followed
+        return self.sessions.get(session_id) or followed.get(session_id)
+
+    async def session_for_device(self, session_id: int, slot: str) -> LiveSession:
+        """Return a live session for a source or robot, asking another owner to give it up.
+
+        Raises what ``session`` does.
+        """
+        try:
+            return await self.settled_session(session_id)
+        except OwnedElsewhere as problem:
+            owner = problem.owner
+            if self.servers is None or not await self.servers.ask_for(owner, session_id, slot):
+                raise
+        return await self.settled_session(session_id)
+
+    async def give_up(self, session_id: int, slot: str) -> bool:
+        """Release a session for a device that waits at another server; return whether that is so.
+
+        It goes where its source is, and without one where its robot is. Nothing is lost: what
+        is queued is committed first.
+        """
+        live = self.sessions.get(session_id)
+        is_needed = live is None or live.source is not None or self.draining
+        if live is None or is_needed or (slot == "robot" and live.robot is not None):
+            return False
+        if sources.child_name(session_id) in self.supervisor.children:
+            return False  # its source dials in here
+        del self.sessions[session_id]  # from here on nobody gets it
+        try:
+            await live.wait_until_committed()
+            epoch = live.aggregate.session.epoch
+            return await sync_to_async(owners.hand_on)(session_id, epoch)
+        finally:
+            if live.robot is not None:
+                moved = "The session moved. Connect again."
+                live.robot.evict(CloseCode.ELSEWHERE, "elsewhere", moved)
+            self.close_pages(live)
+
+    async def drop_taken(self) -> None:
+        """Drop the sessions that another server has claimed while this one's lease had expired."""
+        there = TrainingSession.everywhere.filter(pk__in=list(self.sessions))
+        epochs = dict([row async for row in there.values_list("pk", "epoch")])
+        for live in list(self.sessions.values()):
+            if epochs.get(live.id, live.aggregate.session.epoch) != live.aggregate.session.epoch:
+                self._drop(live, Fenced("Another server has taken the session over."))
+                await self.supervisor.stop(sources.child_name(live.id))
+
     async def _open(self, session_id: int) -> None:
         self._held.add(session_id)
         loaded = await self._loader.load(session_id)
@@ -146,6 +219,8 @@ class Runtime:
         await self._pause_orphaned(live)
         self._inherit_stops(live)
         self.sessions[session_id] = live
+        if self.servers is not None:
+            self.servers.leave(session_id)  # it was another's
         if live.aggregate.fold.state in OPEN_STATES and not self.draining:
             await sources.run_source(self.supervisor, aggregate.session, self.address)
 
@@ -191,15 +266,30 @@ class Runtime:
         for peer in (live.source, live.robot):
             if peer is not None:
                 peer.evict(CloseCode.NOT_STORED, "not_stored", describe_failure(problem))
+        self.close_pages(live)
+
+    def close_pages(self, live: LiveSession) -> None:
+        """Close a session's sockets: their clients connect again, and find who has it now."""
         for socket in list(self.sockets):
             if getattr(socket, "live", None) is live:
                 socket.close_soon(CloseCode.RESTARTING)
 
     async def change(self, session_id: int, kind: str, value: ChangeValue, by: User | None) -> None:
-        """Apply a change; committed when this returns.
+        """Apply a change, here or where the session is; committed when this returns.
 
         Raises InvalidSetting if it is refused and NotStored if it could not be committed.
         """
+        try:
+            await self.change_own(session_id, kind, value, by)
+        except OwnedElsewhere as problem:
+            if self.servers is None:
+                raise
+            await self.servers.change(problem.owner, session_id, kind, value, by)
+
+    async def change_own(
+        self, session_id: int, kind: str, value: ChangeValue, by: User | None
+    ) -> None:
+        """Apply a change to a session of this process. Raises OwnedElsewhere, too."""
         live = await self.settled_session(session_id)
         if live.source_clock is not None and CONTROLS[kind].leads_to is State.RUNNING:
             live.source_clock.resume(time.monotonic())
@@ -214,10 +304,58 @@ class Runtime:
 
     async def remark(self, session_id: int, what: Remark, value: float | None, by: User) -> None:
         """Log a remark; committed when this returns. Raises what ``change`` raises."""
+        try:
+            await self.remark_own(session_id, what, value, by)
+        except OwnedElsewhere as problem:
+            if self.servers is None:
+                raise
+            await self.servers.remark(problem.owner, session_id, what, value, by)
+
+    async def remark_own(
+        self, session_id: int, what: Remark, value: float | None, by: User
+    ) -> None:
+        """Log a remark of a session of this process. Raises OwnedElsewhere, too."""
         live = await self.settled_session(session_id)
         if live.aggregate.fold.state in ENDED_STATES:
             raise NotAllowed("The session has ended.")
         await live.remark(what, value, by, timezone.now())
+
+    def stop_robots(self, live: LiveSession, by: User | None, told: Message) -> None:
+        """Stop the robot of a session of this process, and of the others there, on any server.
+
+        ``told``: which device stopped it, if it was no person.
+        """
+        for session in self.sessions_at_station_of(live):
+            session.stop_robot(by, timezone.now(), told)
+        if self.servers is not None and live.station_id is not None:
+            self.servers.tell_of_stop(live.station_id, by, told)
+
+    def stop_at(self, station_id: int, by: User | None, told: Message) -> None:
+        """Stop the robot of a station, as another server says."""
+        for session in list(self.sessions.values()):
+            if session.station_id == station_id:
+                session.stop_robot(by, timezone.now(), told)
+
+    async def arm_robots(self, live: LiveSession, by: User) -> None:
+        """Let the robot of a session of this process move again, once that is committed."""
+        there = self.sessions_at_station_of(live)
+        await asyncio.gather(*(session.arm_robot(by, timezone.now()) for session in there))
+
+    async def order_own_robot(
+        self, session_id: int, order: str, by: User | None, device_id: int | None
+    ) -> None:
+        """Do what a page at another server orders. Raises what ``session`` raises."""
+        live = self.sessions.get(session_id) or await self.session(session_id)
+        if order == "stop":
+            self.stop_robots(live, by, {} if device_id is None else {"device": device_id})
+        elif by is not None:
+            await self.arm_robots(live, by)
+
+    def drive_own_robot(self, session_id: int, drive: Mapping[str, float]) -> None:
+        """Pass on that a person holds a button to drive the robot to its mark."""
+        live = self.sessions.get(session_id)
+        if live is not None and live.robot is not None:
+            live.robot.tell({"type": "drive", **drive})
 
     def sessions_at_station_of(self, live: LiveSession) -> list[LiveSession]:
         """Return a session and the other live ones of its station, which share its robot."""
@@ -228,10 +366,29 @@ class Runtime:
         return [one for one in there if one.location == live.location and one is not live]
 
     def announce(self, session_id: int, station_id: int | None) -> None:
-        """Tell a station's waiting devices that a session has opened."""
-        if station_id is not None:
-            for tell in list(self.waiting_devices.get(station_id, ())):
-                tell(session_id)
+        """Tell a station's waiting devices, wherever they are, that a session has opened."""
+        if station_id is None:
+            return
+        self.announce_here(session_id, station_id)
+        if self.servers is not None:
+            self.servers.announce(session_id, station_id)
+
+    def announce_here(self, session_id: int, station_id: int) -> None:
+        """Tell a station's devices that wait at this process."""
+        for tell in list(self.waiting_devices.get(station_id, ())):
+            tell(session_id)
+
+    async def take_over_left(self) -> None:
+        """Take over sessions that run and have had no owner for a beat, or whose owner is gone.
+
+        Those that a server has just handed on are left to the device that asks for them.
+        """
+        orphaned, handed_on = await sync_to_async(owners.find_ownerless)()
+        left = {*orphaned, *handed_on}
+        again, self._left_before = left & self._left_before, left
+        self._orphaned.update(again.intersection(orphaned))
+        if not self.draining:
+            await asyncio.gather(*(self._recover(session_id) for session_id in sorted(again)))
 
     async def recover(self) -> int:
         """Pause the sessions whose process died while they ran; return how many.
@@ -247,6 +404,8 @@ class Runtime:
     async def _recover(self, session_id: int) -> None:
         try:
             await self._pause_orphaned(await self.session(session_id))
+        except OwnedElsewhere:
+            self._orphaned.discard(session_id)  # another server was faster
         except Exception:  # one broken session must not keep the server from starting
             log.exception("Session %s could not be recovered", session_id)
 
@@ -279,7 +438,8 @@ class Runtime:
     async def _send_page_heartbeats(self) -> None:
         """Send heartbeats to the pages of some sessions: of all of them within an interval."""
         self._beat = (self._beat + 1) % SWEEP
-        for live in self.sessions.values():
+        followed = self.servers.followed.values() if self.servers is not None else ()
+        for live in (*self.sessions.values(), *followed):
             if live.id % SWEEP != self._beat or not live.feed.subscribers:
                 continue
             presence = live.presence(timezone.now())
@@ -342,6 +502,8 @@ class Runtime:
             await sync_to_async(owners.release_all)(self._held)
         except DatabaseError:
             log.exception("Sessions could not be released; they come back paused")
+        if self.servers is not None:
+            await self.servers.close()
 
 
 _current: Runtime | None = None

@@ -24,14 +24,14 @@ from rehab.sessions.live.aggregate import Row, SessionAggregate, StepRow, Summar
 from rehab.sessions.live.commits import Job
 from rehab.sessions.live.hub import EventFeed, Subscriber
 from rehab.sessions.live.lateness import Lateness
-from rehab.sessions.live.trouble import WORDS, classify_failure
-from rehab.sessions.live.writer import Writer
+from rehab.sessions.live.trouble import WORDS, Trouble, classify_failure
 from rehab.sessions.log import Remark, RobotEntry, RuleEntry, Step
 from rehab.sessions.payloads import Message, type_mark
 from rehab.training.changes import Change, ChangeKind, State
 from rehab.training.controls import Audience
 from rehab.training.steps import Measurement, ScoredStep
 
+LATE_STEPS = 256
 RECENT_STEPS = 60  # strides that a page's chart may begin with
 LOGGED_REPORTS = {
     "decision": RobotEntry.DECISION,
@@ -60,6 +60,17 @@ class Peer(Protocol):
         """Close its connection with an error."""
 
 
+class Log(Protocol):
+    """Where a session's rows go: the writer of their owner."""
+
+    @property
+    def trouble(self) -> Trouble:
+        """Why nothing is stored at present, if that is so."""
+
+    def submit(self, job: Job) -> None:
+        """Queue a job without waiting."""
+
+
 class RobotStop(NamedTuple):
     """A stop of the robot: who stopped it, when, and which device if it was no person."""
 
@@ -77,7 +88,7 @@ class LiveSession:
     def __init__(
         self,
         aggregate: SessionAggregate,
-        writer: Writer,
+        writer: Log,
         recent: list[Step],
         on_failure: Callable[[LiveSession, Exception], None],
         *,
@@ -99,6 +110,7 @@ class LiveSession:
         self.unlogged_stop: RobotStop | None = None  # in force, not committed yet
         self.robot_reports: Message = {"status": None, "decision": None}  # the latest
         self.tablets = 0
+        self.late: deque[int] = deque(maxlen=LATE_STEPS)  # steps that were not shown as live
         self.tablet_heard_at: datetime | None = None
         self.stride_at: datetime | None = recent[-1].received_at if recent else None
         self.committed = aggregate.fold.last_number
@@ -148,6 +160,8 @@ class LiveSession:
         was_running = self.is_running
         row = self.aggregate.record_step(measurement, received_at)
         rows: list[Row] = [row]
+        if late:
+            self.late.append(row.step.number)
         events = [step_event(fold, context, row.step, live=not late)]
         moved = (fold.phase_index, fold.goal, fold.obstacle) != (index, goal, had_obstacle)
         if moved and not (fold.adapted and fold.phase_index == index):
@@ -191,7 +205,7 @@ class LiveSession:
         return stored
 
     def remark(
-        self, what: Remark, value: float | None, by: User, at: datetime
+        self, what: Remark, value: float | None, by: User | None, at: datetime
     ) -> asyncio.Future[None]:
         """Log a remark; the future is done when it is committed."""
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -214,7 +228,7 @@ class LiveSession:
             event = robot_stopped_event(self.aggregate.fold, True)
             self._submit([row], [event], [], stop=stop)
 
-    def arm_robot(self, by: User, at: datetime) -> asyncio.Future[None]:
+    def arm_robot(self, by: User | None, at: datetime) -> asyncio.Future[None]:
         """Let the robot move again once that is committed; then the future is done."""
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.robot_stopped = False
@@ -299,12 +313,13 @@ class LiveSession:
 
     def presence(self, now: datetime) -> Message:
         """Return who is connected, and how long ago source and tablet were last heard."""
+        tablets = self.tablets + sum(one.tablets for one in self.feed.subscribers)
         return {
             "source": self.source is not None,
             "robot": self.robot is not None,
-            "tablets": self.tablets,
+            "tablets": tablets,
             "stride_ago_s": _ago_s(self.stride_at, now),
-            "tablet_ago_s": _ago_s(self.tablet_heard_at, now) if self.tablets else None,
+            "tablet_ago_s": _ago_s(self.tablet_heard_at, now) if tablets else None,
             "storage": self._writer.trouble.value,
         }
 

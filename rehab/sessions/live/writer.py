@@ -9,7 +9,6 @@ the event loop (docs/performance.md).
 
 from __future__ import annotations
 
-import copy
 import logging
 import threading
 import time
@@ -19,10 +18,10 @@ from queue import Empty, SimpleQueue
 from weakref import WeakSet
 
 from django.db import DEFAULT_DB_ALIAS, close_old_connections, connection, connections
-from django.db.backends.base.base import BaseDatabaseWrapper
 
 from rehab.sessions.live.commits import EarlierWriteFailed, Job, commit
 from rehab.sessions.live.instruments import COMMIT_S, STEPS, WRITE_FAILURES
+from rehab.sessions.live.own_connection import own_connection
 from rehab.sessions.live.trouble import Trouble, classify_failure, concerns_all
 
 log = logging.getLogger(__name__)
@@ -34,7 +33,6 @@ CLOSE_S = 20.0  # how long a stop waits for a database that does not answer
 # Of the writer's own connection to PostgreSQL: what waits longer has failed, and is said.
 LOCK_TIMEOUT_MS = 3_000
 STATEMENT_TIMEOUT_MS = 10_000
-SQLITE_TIMEOUT_S = 10
 ALONE_LOCK_TIMEOUT_MS = 200  # of one session's rows, after a batch has failed
 
 
@@ -88,7 +86,7 @@ class Writer:
 
     def _run(self) -> None:
         try:
-            connections[DEFAULT_DB_ALIAS] = own_connection()
+            connections[DEFAULT_DB_ALIAS] = own_connection(LOCK_TIMEOUT_MS, STATEMENT_TIMEOUT_MS)
             more = True
             while more:
                 jobs, more = self._next_jobs()
@@ -177,21 +175,6 @@ class Writer:
                 job.done(problem)
             except Exception:  # the others' steps are stored, and their sources wait to hear it
                 log.exception("Session %s could not be told what was stored", job.session_id)
-
-
-def own_connection() -> BaseDatabaseWrapper:
-    """Return a connection that waits for no pool, and gives up on a database that is stuck."""
-    own = connections.create_connection(DEFAULT_DB_ALIAS)
-    # As it is now: a test has another database than the settings say.
-    own.settings_dict = copy.deepcopy(connections[DEFAULT_DB_ALIAS].settings_dict)
-    options = own.settings_dict["OPTIONS"]
-    options.pop("pool", None)
-    if own.vendor == "sqlite":
-        options["timeout"] = SQLITE_TIMEOUT_S
-    else:
-        timeouts = f"-c lock_timeout={LOCK_TIMEOUT_MS} -c statement_timeout={STATEMENT_TIMEOUT_MS}"
-        options["options"] = f"{options.get('options', '')} {timeouts}".strip()
-    return own
 
 
 def _set_lock_timeout(milliseconds: int) -> None:

@@ -6,6 +6,7 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_safe
 
 from rehab.people.access import public
+from rehab.sessions.live import lease
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.trouble import WORDS
 
@@ -31,6 +32,8 @@ def readyz(request: HttpRequest) -> HttpResponse:
     live = runtimes.peek()
     if live is None or not live.is_ready:
         return _answer("The server is starting or stopping.", 503)
+    if (own := lease.held()) is not None and not own.is_current:
+        return _answer("The server's lease has expired: the database does not answer.", 503)
     return healthz(request)
 
 

@@ -51,6 +51,12 @@ class LiveSessions(Collector):
         now = live.writer.trouble
         troubles = Counter({kind.value: int(kind is now) for kind in Trouble if kind.value})
         yield _labeled("garry_storage_trouble", "1 while steps cannot be stored.", "kind", troubles)
+        deaf_s = 0.0 if live.servers is None else live.servers.deaf_s
+        yield GaugeMetricFamily(
+            "garry_servers_deaf_seconds",
+            "Since when nothing passes between servers; 0 where there is one.",
+            deaf_s,
+        )
         yield GaugeMetricFamily(
             "garry_ready", "1 between the server's start and its end.", int(live.is_ready)
         )

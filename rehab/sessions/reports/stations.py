@@ -57,6 +57,6 @@ def connected_devices(session: TrainingSession, now: datetime) -> dict[str, bool
 
 
 def find_live_session(session: TrainingSession) -> LiveSession | None:
-    """Return the live session, where this process runs it."""
+    """Return the live session, where this process runs or follows it."""
     running = runtime.peek()
-    return running.sessions.get(session.pk) if running else None
+    return running.find(session.pk) if running else None

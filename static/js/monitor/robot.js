@@ -74,6 +74,7 @@ export class RobotPanel {
       this.#orderFailure = "";
       this.#settleOrder();
     }
+    if (event.kind === "robot_unheard") this.#reportUnanswered(event.order);
     if (event.kind === "presence") this.#isConnected = event.presence.robot;
     if (event.kind === "robot") this.#handleReport(event.report);
   }

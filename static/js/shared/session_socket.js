@@ -85,6 +85,7 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
         settle(message.id);
         break;
       case "error":
+        if (message.code === "robot_unheard") onEvent?.({ kind: message.code, order: message.order });
         closeReason = refusal(message);
         if (message.id) settle(message.id, new Error(closeReason));
     }

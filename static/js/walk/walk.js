@@ -14,7 +14,7 @@ import { createSounds } from "garry/walk/sounds";
 const PATIENCE_MS = 2_000; // a shorter break of the connection is not shown
 const STILL_MS = 4_000; // after so long without a step the last one is no longer shown as current
 const LEAVE_MS = 1_500;
-const NOT_WALKING = new Set(["presence", "robot_stopped"]); // events that are no sign of walking
+const NOT_WALKING = new Set(["presence", "robot_stopped", "robot_unheard"]); // events that are no sign of walking
 
 const { body } = document;
 const isMirror = body.classList.contains("mirrored"); // in a frame on the therapist's page
@@ -38,6 +38,7 @@ const socket = connect(body.dataset.socket, {
       confetti = event.confetti;
       sound(event);
     }
+    if (event.kind === "robot_unheard") reportUnanswered();
     if (NOT_WALKING.has(event.kind)) redraw();
     else awaitStep();
   },
@@ -52,7 +53,7 @@ const socket = connect(body.dataset.socket, {
     else note();
   },
 });
-const { showRobot, keepFocus, tellTherapist } = createControls(body, socket, (asking) => {
+const { showRobot, keepFocus, tellTherapist, reportUnanswered } = createControls(body, socket, (asking) => {
   page.asking = asking;
   redraw();
 });

@@ -14,6 +14,7 @@ def test_the_protocol_documents_each_code():
     assert sorted(map(int, documented)) == sorted(CloseCode)
 
 
-def test_a_page_waits_only_for_another_owner_of_the_session():
+def test_of_refusals_a_page_waits_only_for_another_device_to_leave():
     assert REFUSALS.keys() - FINAL_FOR_PAGES == {CloseCode.BUSY}
     assert REFUSALS.keys() >= FINAL_FOR_PAGES
+    assert CloseCode.ELSEWHERE not in REFUSALS  # never final

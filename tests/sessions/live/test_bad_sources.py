@@ -134,7 +134,7 @@ async def test_a_session_of_another_process(place, ready):
         await caller.dial()
         await caller.say({"type": "hello", "version": 1, "run": "r", "last": 0, "base": "null"})
         code, error = await caller.sent_away()
-        assert (code, error["code"]) == (4409, "busy")
+        assert (code, error["code"]) == (4421, "elsewhere")
         assert str(parent) in error["message"]
 
 

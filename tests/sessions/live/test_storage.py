@@ -17,7 +17,8 @@ from rehab.sessions.live import process
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import writer as writers
 from rehab.sessions.live.commits import Job
-from rehab.sessions.live.writer import Writer, own_connection
+from rehab.sessions.live.own_connection import own_connection
+from rehab.sessions.live.writer import LOCK_TIMEOUT_MS, STATEMENT_TIMEOUT_MS, Writer
 from rehab.sessions.models import TrainingSession
 from tests.support.callers import a_step, numbers, turns
 
@@ -162,7 +163,7 @@ async def test_a_locked_session_holds_up_no_other_for_long(place, elsewhere, beg
 
 @only_postgres
 def test_the_writers_connection_is_its_own_and_gives_up(transactional_db):
-    own = own_connection()
+    own = own_connection(LOCK_TIMEOUT_MS, STATEMENT_TIMEOUT_MS)
     try:
         assert "pool" not in own.settings_dict["OPTIONS"]
         assert "pool" in connections["default"].settings_dict["OPTIONS"]

@@ -35,12 +35,13 @@ def _cannot_write(_: str) -> bool:
 
 
 class CloseSocket(Exception):
-    """Closes a socket with a code, after an error message."""
+    """Closes a socket with a code, after an error message. ``more``: what else the error has."""
 
-    def __init__(self, code: int, error: str, message: str) -> None:
+    def __init__(self, code: int, error: str, message: str, **more: str) -> None:
         super().__init__(message)
         self.code = code
         self.error = error
+        self.more = more
 
 
 class Outbox:
@@ -204,7 +205,7 @@ class Socket(AsyncWebsocketConsumer):
         except BadFrame as problem:
             await self.close_with_error(CloseCode.NOT_PROTOCOL, problem.code, str(problem))
         except CloseSocket as problem:
-            await self.close_with_error(problem.code, problem.error, str(problem))
+            await self.close_with_error(problem.code, problem.error, str(problem), **problem.more)
         except runtimes.Draining:
             await self.close_now(CloseCode.RESTARTING)
         except NotStored as problem:
@@ -253,9 +254,9 @@ class Socket(AsyncWebsocketConsumer):
         """Send a message now."""
         await self.send(to_text(message))
 
-    async def close_with_error(self, code: int, error: str, message: str) -> None:
+    async def close_with_error(self, code: int, error: str, message: str, **more: str) -> None:
         """Send an error and close."""
-        await self.send_message({"type": "error", "code": error, "message": message})
+        await self.send_message({"type": "error", "code": error, "message": message, **more})
         await self.close_now(code)
 
     def revoke(self) -> None:

@@ -111,9 +111,12 @@ class DeviceSocket(Socket):
     async def _attach(self, session_id: int) -> None:
         try:
             # Settled: nothing may come between taking the slot and the welcome.
-            live = await self.runtime.settled_session(session_id)
+            live = await self.runtime.session_for_device(session_id, self.slot)
         except OwnedElsewhere as problem:
-            raise CloseSocket(CloseCode.BUSY, "busy", str(problem)) from None
+            servers = self.runtime.servers
+            address = servers.address_of(problem.owner) if servers is not None else ""
+            more = {"server": address} if address else {}
+            raise CloseSocket(CloseCode.ELSEWHERE, "elsewhere", str(problem), **more) from None
         except DamagedLog as problem:
             raise CloseSocket(CloseCode.NO_SESSION, "damaged_log", str(problem)) from None
         other: Peer | None = getattr(live, self.slot)

@@ -81,9 +81,8 @@ class RobotConsumer(DeviceSocket):
         if self.live is None:
             return
         if report.get("kind") == "stop":  # a sensor or its button: a person has to check it
-            for session in self.runtime.sessions_at_station_of(self.live):
-                told = {"device": self.device_id, "reason": report["reason"]}
-                session.stop_robot(None, timezone.now(), told)
+            told = {"device": self.device_id, "reason": report["reason"]}
+            self.runtime.stop_robots(self.live, None, told)
         else:
             self.live.record_robot_report(report, timezone.now())
 

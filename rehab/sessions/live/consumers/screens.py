@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
+import logging
 import re
 from collections.abc import Awaitable
 from typing import ClassVar
@@ -23,6 +23,7 @@ from rehab.sessions.events.snapshot import history_entry
 from rehab.sessions.live.auth import Actor, authenticate, may_open, may_watch
 from rehab.sessions.live.backlog import read_backlog
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
+from rehab.sessions.live.following import FollowedSession
 from rehab.sessions.live.hub import Lagged, Stalled, Subscriber
 from rehab.sessions.live.messages import (
     read_change,
@@ -40,6 +41,14 @@ from rehab.training.controls import CONTROLS, Audience, Requester
 from rehab.training.measures import InvalidSetting
 from robot.wire.close_codes import CloseCode
 from robot.wire.frames import BadFrame, read_name, read_number, read_whole
+
+log = logging.getLogger(__name__)
+
+# For programs; pages have their own words.
+_UNHEARD = {
+    "stop": "The stop was not heard. If the robot moves, use its own switch.",
+    "arm": "The order was not heard. Try again.",
+}
 
 
 class ScreenConsumer(Socket):
@@ -71,9 +80,9 @@ class ScreenConsumer(Socket):
                 CloseCode.NO_SESSION, "elsewhere", "The patient has not agreed to remote view."
             )
         try:
-            self.live = live = await self.runtime.session(session_id)
+            self.live = live = await self.runtime.viewed_session(session_id)
         except OwnedElsewhere as problem:
-            raise CloseSocket(CloseCode.BUSY, "busy", str(problem)) from None
+            raise CloseSocket(CloseCode.ELSEWHERE, "elsewhere", str(problem)) from None
         except DamagedLog as problem:
             raise CloseSocket(CloseCode.NO_SESSION, "damaged_log", str(problem)) from None
         if isinstance(self.actor, Device):
@@ -212,16 +221,31 @@ class ScreenConsumer(Socket):
             raise CloseSocket(
                 CloseCode.NO_SESSION, "not_open", "The session is not open. Connect again."
             )
-        sessions = self.runtime.sessions_at_station_of(live)
-        if order == "stop":
-            device = {"device": self.actor.pk} if isinstance(self.actor, Device) else {}
-            for session in sessions:
-                session.stop_robot(by, timezone.now(), device)
-        elif by is not None:
-            self.start(_wait_for_all([s.arm_robot(by, timezone.now()) for s in sessions]))
+        device_id = self.actor.pk if isinstance(self.actor, Device) else None
+        if isinstance(live, FollowedSession):
+            self.run_to_end(self._ask_owner(live, order, by, device_id))
+        elif order == "stop":
+            told = {} if device_id is None else {"device": device_id}
+            self.runtime.stop_robots(live, by, told)
+        elif by is not None:  # in a task, so that a stop meanwhile does not wait
+            self.start(self.runtime.arm_robots(live, by))
         if by is not None or order == "stop":  # queued: no robot waits for the audit log
             act = Act(f"robot_{order}")
             self.runtime.audit_queue.add(act, self.actor, live.id, self.scope, timezone.now())
+
+    async def _ask_owner(
+        self, live: FollowedSession, order: str, by: User | None, device_id: int | None
+    ) -> None:
+        """Have the server of the session order its robot; say so where it does not answer."""
+        servers = self.runtime.servers
+        if servers is None or (order != "stop" and by is None):
+            return
+        try:
+            await servers.order_robot(live.owner, live.id, order, by, device_id)
+        except NotStored as problem:
+            log.error("Session %s: %s was not heard: %s", live.id, order, problem)
+            unheard = {"type": "error", "code": "robot_unheard", "order": order}
+            await self.send_message(unheard | {"message": _UNHEARD[order]})
 
     def _drive_robot(self, message: Message) -> None:
         """Pass on that a person holds a button to drive the robot to its mark."""
@@ -229,8 +253,11 @@ class ScreenConsumer(Socket):
         drive = {name: read_number(message, name, *ends) for name, ends in shares.items()}
         if self.audience is not Audience.MONITOR or not isinstance(self.actor, User):
             raise BadFrame("The robot is driven on the therapist's page.")
-        if self.live is not None and self.live.robot is not None:
-            self.live.robot.tell({"type": "drive", **drive})
+        live, servers = self.live, self.runtime.servers
+        if isinstance(live, FollowedSession) and servers is not None:
+            servers.drive_robot(live.owner, live.id, drive)
+        elif live is not None:
+            self.runtime.drive_own_robot(live.id, drive)
 
     async def _refuse(self, request_id: str, code: str, message: str) -> None:
         await self.send_message(
@@ -264,11 +291,6 @@ class MonitorConsumer(ScreenConsumer):
     requester = Requester.MONITOR
     pause_reason = PauseReason.THERAPIST
     robot_orders = ("stop", "arm")
-
-
-async def _wait_for_all(futures: list[asyncio.Future[None]]) -> None:
-    """Wait for commits in a task, so that a stop meanwhile does not wait."""
-    await asyncio.gather(*futures)
 
 
 def _after(query: bytes) -> int | None:

@@ -1,0 +1,156 @@
+"""How the servers on one database talk: messages and questions over the channel layer.
+
+Each server has one channel, named by its lease. A message may be lost, and nothing depends on it
+but how soon something is known; a question waits for its answer, and says so where none comes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import contextvars
+import itertools
+import logging
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any
+
+from channels.layers import get_channel_layer
+
+log = logging.getLogger(__name__)
+
+Data = dict[str, Any]
+HEARD_S = 0.3  # within which the other server says that it has a question
+ANSWER_S = 5.0  # within which it answers one that waits for its disk
+WAITING = 10_000  # messages; older ones are dropped while Redis does not answer
+DEAF_S = 5.0  # our own echo comes each second: else the subscription is lost
+PAUSE_S = 0.5  # after a failure of the layer
+HEARD = "heard"
+ANSWER = "answer"
+Handler = Callable[[str, Data], Awaitable[Data | None]]
+
+
+class Unheard(RuntimeError):
+    """The other server did not say that it heard; what was asked may not have happened."""
+
+
+class Intercom:
+    """This server's channel.
+
+    Parameters
+    ----------
+    own
+        The id of this server's lease.
+    handlers
+        By kind of message: called with the sender's id and the data; what is returned answers a
+        question.
+    """
+
+    def __init__(self, own: str, handlers: Mapping[str, Handler]) -> None:
+        self.own = own
+        self.echoed_s = time.monotonic()  # when a message to ourselves came back last
+        self._handlers = handlers
+        self._layer: Any = get_channel_layer()
+        self._outgoing: deque[tuple[str, Data]] = deque(maxlen=WAITING)
+        self._awake = asyncio.Event()
+        self._questions: dict[int, asyncio.Queue[Data]] = {}
+        self._numbers = itertools.count(1)
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._start(self._send())
+        self._start(self._receive())
+
+    def tell(self, server: str, kind: str, data: Data) -> tuple[str, Data]:
+        """Queue a message to another server, and return what was queued."""
+        queued = (server, {"type": kind, "from": self.own, **data})
+        self._outgoing.append(queued)
+        self._awake.set()
+        return queued
+
+    async def ask(self, server: str, kind: str, data: Data, answer_s: float = ANSWER_S) -> Data:
+        """Return another server's answer. Raises Unheard where it does not hear."""
+        number = next(self._numbers)
+        answers = self._questions[number] = asyncio.Queue()
+        queued = self.tell(server, kind, {**data, "question": number})
+        try:
+            async with asyncio.timeout(HEARD_S):
+                answer = await answers.get()
+            if answer["type"] == HEARD:
+                async with asyncio.timeout(answer_s):
+                    answer = await answers.get()
+        except TimeoutError:
+            with contextlib.suppress(ValueError):
+                self._outgoing.remove(queued)  # nobody reckons with it any more
+            raise Unheard("The server of this session does not answer.") from None
+        finally:
+            del self._questions[number]
+        return answer
+
+    def echo(self) -> None:
+        """Send a message to this server itself, to know that messages pass."""
+        self.tell(self.own, "echo", {})
+
+    async def close(self) -> None:
+        """End, with what is under way."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    def _start(self, work: Any) -> None:
+        loop, context = asyncio.get_running_loop(), contextvars.Context()  # not a request's
+        task = loop.create_task(work, context=context)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _send(self) -> None:
+        failing = False
+        while True:
+            await self._awake.wait()
+            self._awake.clear()
+            while self._outgoing:
+                server, message = self._outgoing.popleft()
+                try:
+                    await self._layer.send(_channel(server), message)
+                    failing = False
+                except Exception as problem:  # whatever the layer's client raises
+                    if not failing:
+                        log.error("Other servers cannot be told anything: %r", problem)
+                    failing = True
+                    await asyncio.sleep(PAUSE_S)
+
+    async def _receive(self) -> None:
+        while True:
+            try:
+                async with asyncio.timeout(DEAF_S):
+                    message = await self._layer.receive(_channel(self.own))
+            except Exception as problem:
+                log.error("Nothing is heard of other servers: %r", problem)
+                with contextlib.suppress(Exception):
+                    await self._layer.flush()  # it would not subscribe again by itself
+                await asyncio.sleep(PAUSE_S)
+                continue
+            kind, sender = message.pop("type", ""), message.pop("from", "")
+            if kind == "echo":
+                self.echoed_s = time.monotonic()
+            elif kind in (HEARD, ANSWER):
+                waiting = self._questions.get(message.pop("to", 0))
+                if waiting is not None:
+                    waiting.put_nowait({**message, "type": kind})
+            elif kind in self._handlers:
+                self._start(self._handle(kind, sender, message))
+
+    async def _handle(self, kind: str, sender: str, data: Data) -> None:
+        question = data.pop("question", None)
+        if question is not None:
+            self.tell(sender, HEARD, {"to": question})
+        try:
+            answer = await self._handlers[kind](sender, data)
+        except Exception:
+            log.exception("A message of another server (%s) failed", kind)
+            answer = {"problem": "not_stored", "message": "The server failed. Try again."}
+        if question is not None:
+            self.tell(sender, ANSWER, {"to": question, **(answer or {})})
+
+
+def _channel(server: str) -> str:
+    return f"garry.server.{server}"

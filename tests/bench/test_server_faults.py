@@ -1,0 +1,220 @@
+"""Two servers behind nginx under load, and each part of the set fails in turn.
+
+GARRY_TEST_FAULTS times each (20), by GARRY_TEST_SEED: no acknowledged step lost or doubled, no gap
+at a viewer, orderly restarts pause nobody, a stop at the other server arrives or is refused.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import random
+import signal
+import statistics
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import psycopg
+import pytest
+
+from tests.support.hosted import Restarts, find_missing, run_nginx, run_postgres, run_redis
+from tests.support.pair import Message, Pair, of_type
+from tests.support.torture import GONE, Entrance, Walk
+
+pytestmark = pytest.mark.skipif(bool(find_missing()), reason=f"faults: {find_missing()}")
+SESSIONS, RATE = 6, 4.0
+RECOVERED_S = 90.0
+
+
+def has_more(walk: Walk, mark: int) -> bool:
+    """Return whether a step after this one was acknowledged, and one was seen."""
+    return walk.acknowledged > mark and bool(walk.seen) and walk.seen[-1] > mark
+
+
+class Faults:
+    """The set, its load, and what each fault did."""
+
+    def __init__(self, pair: Pair, restarts: Restarts, entrance: Entrance, seed: int) -> None:
+        self.pair, self.restarts, self.entrance = pair, restarts, entrance
+        self.random = random.Random(seed)
+        self.walks: list[Walk] = []
+        self.recovered_s: dict[str, list[float]] = {}
+        self.stops_s: list[float] = []
+        self.refused = 0
+        self.paused_by_order = 0
+
+    @property
+    def kinds(self) -> dict[str, Callable[[], Awaitable[None]]]:
+        """The faults, by name."""
+        return {
+            "kill -9 of a server": self.kill_server,
+            "its database connections": self.cut_connections,
+            "Redis": lambda: asyncio.to_thread(self.restarts["redis"]),
+            "PostgreSQL": lambda: asyncio.to_thread(self.restarts["postgres"]),
+            "nginx": lambda: asyncio.to_thread(self.restarts["nginx"]),
+            "rolling restart": self.restart_each,
+        }
+
+    async def kill_server(self) -> None:
+        place = self.random.randrange(2)
+        await self.pair.end(place)
+        self.pair.begin(place)
+
+    async def cut_connections(self) -> None:
+        def cut() -> None:
+            url = self.pair.environment["GARRY_DATABASE_URL"]
+            with psycopg.connect(url, autocommit=True) as connection:
+                connection.execute(
+                    "SELECT pg_terminate_backend(pid) FROM pg_stat_activity "
+                    "WHERE datname = 'garry' AND pid <> pg_backend_pid()"
+                )
+
+        await asyncio.to_thread(cut)
+
+    async def restart_each(self) -> None:
+        for place in range(2):
+            assert await self.pair.end(place, signal.SIGTERM) == 0
+            self.pair.begin(place)
+            await self.pair.until_ready(place, 120)
+
+    async def run_one(self, name: str) -> None:
+        """Let one thing fail; wait until each source is acknowledged and each viewer sees more."""
+        before = self.count_pauses() if name == "rolling restart" else 0
+        began_s = time.monotonic()
+        await self.kinds[name]()
+        marks = [walk.made for walk in self.walks]
+        async with asyncio.timeout(RECOVERED_S):
+            while not all(map(has_more, self.walks, marks)):  # noqa: ASYNC110
+                await asyncio.sleep(0.02)
+        self.recovered_s.setdefault(name, []).append(time.monotonic() - began_s)
+        print(f"{name}: {self.recovered_s[name][-1]:.1f} s", flush=True)
+        if name == "rolling restart":
+            self.paused_by_order += self.count_pauses() - before
+        for place in range(2):
+            await self.pair.until_ready(place, 120)
+        await asyncio.gather(*(self.resume(walk.row) for walk in self.walks))
+        await self.stop_from_the_other_server(self.random.choice(self.walks).row)
+
+    def count_pauses(self) -> int:
+        with psycopg.connect(self.pair.environment["GARRY_DATABASE_URL"]) as connection:
+            found = connection.execute(
+                "SELECT count(*) FROM rehab_sessionevent WHERE kind = 'pause'"
+            )
+            return int(found.fetchone()[0])
+
+    async def resume(self, row: Message) -> None:
+        """Let a session go on that a fault has paused, as a therapist does."""
+        said = ""
+        for _ in range(100):
+            monitor = None
+            try:
+                monitor = await self.pair.monitor(self.random.randrange(2), row)
+                shown = await monitor.until(of_type("snapshot"))
+                if shown["state"] == "running":
+                    return
+                await monitor.say({"type": "change", "kind": "resume", "id": "r"})
+                await monitor.until(lambda one: one.get("id") == "r")
+            except (AssertionError, *GONE) as problem:
+                said = repr(problem)
+                await asyncio.sleep(0.2)
+            finally:
+                if monitor is not None:
+                    await monitor.hang_up()
+        raise AssertionError(f"never resumed: {said}")
+
+    async def stop_from_the_other_server(self, row: Message) -> None:
+        """Measure how soon a stop reaches the robot from a page at the other server."""
+        try:
+            place, robot = await self.find_robots_place(row)
+            monitor = await self.pair.monitor(1 - place, row)
+            await monitor.until(of_type("snapshot"))
+            for _ in range(5):
+                robot.forget()
+                monitor.forget()
+                said_s = await monitor.say({"type": "robot", "order": "stop"})
+                try:
+                    self.stops_s.append(robot.times[await robot.find(of_type("stop"), 2)] - said_s)
+                except AssertionError:
+                    await monitor.until(of_type("error", code="robot_unheard"))
+                    self.refused += 1
+                await monitor.say({"type": "robot", "order": "arm"})
+                await robot.until(of_type("arm"))
+        finally:
+            await self.pair.hang_up_all()
+
+    async def find_robots_place(self, row: Message) -> tuple[int, Any]:
+        for attempt in range(100):
+            robot = await self.pair.robot(attempt % 2, row)
+            first = await robot.until(lambda one: one["type"] in ("welcome", "error"))
+            if first["type"] == "welcome":
+                return attempt % 2, robot
+            await asyncio.sleep(0.2)
+        raise AssertionError("no server has the session")
+
+    async def run(self, times: int) -> None:
+        """Let everything fail so many times, in a random order."""
+        rows = self.pair.seed(SESSIONS)
+        self.walks = [Walk(row, self.entrance, RATE) for row in rows]
+        senders = [asyncio.create_task(walk.send()) for walk in self.walks]
+        watchers = [asyncio.create_task(walk.watch()) for walk in self.walks]
+        async with asyncio.timeout(RECOVERED_S):
+            while not all(walk.acknowledged for walk in self.walks):  # noqa: ASYNC110
+                await asyncio.sleep(0.05)
+        wanted = [*self.kinds] * times
+        self.random.shuffle(wanted)
+        for name in wanted:
+            await self.run_one(name)
+        for walk in self.walks:
+            walk.stopping = True
+        await asyncio.wait_for(asyncio.gather(*senders), 60)
+        await asyncio.sleep(3)
+        for watcher in watchers:
+            watcher.cancel()
+
+
+@pytest.mark.timeout(0)
+def test_each_part_fails_under_load_and_nothing_is_lost(tmp_path: Path) -> None:
+    seed = int(os.environ.get("GARRY_TEST_SEED", "20261122"))
+    times = int(os.environ.get("GARRY_TEST_FAULTS", "20"))
+    restarts: Restarts = {}
+    (tmp_path / "garry").mkdir()
+
+    async def story(pair: Pair, entrance: Entrance) -> Faults:
+        faults = Faults(pair, restarts, entrance, seed)
+        async with pair:
+            await faults.run(times)
+            for place in range(2):
+                assert await pair.end(place, signal.SIGTERM) == 0
+        return faults
+
+    with run_postgres(restarts) as database, run_redis(restarts) as redis:
+        pair = Pair(tmp_path / "garry", database, redis)
+        with run_nginx(tmp_path / "nginx", *pair.ports, restarts=restarts) as (_, secure, tls):
+            print(
+                f"\nlog: {pair.log}; seed {seed}, each fault {times} times, {SESSIONS} sessions × {RATE:g}/s"
+            )
+            faults = asyncio.run(story(pair, Entrance(secure, tls)))
+            problems: list[str] = []
+            for walk in faults.walks:
+                log = pair.read_log(walk.row)
+                if log["numbers"] != list(range(1, walk.made + 1)) or not log["refolds"]:
+                    problems.append(f"session {walk.row['session']}: {walk.made}, {log}")
+                if walk.seen != list(range(1, walk.made + 1)):
+                    problems.append(f"session {walk.row['session']}: a viewer's gap or double")
+    for name, took_s in sorted(faults.recovered_s.items()):
+        print(
+            f"{name:26} n {len(took_s):2}  recovered: median {statistics.median(took_s):5.1f} s, "
+            f"last {max(took_s):5.1f} s"
+        )
+    stops = sorted(faults.stops_s)
+    print(
+        f"stop at the other server: n {len(stops)}, median "
+        f"{1000 * statistics.median(stops):.0f} ms, last {1000 * stops[-1]:.0f} ms"
+    )
+    steps = sum(walk.made for walk in faults.walks)
+    print(f"refused loudly: {faults.refused}; paused by orderly restarts: {faults.paused_by_order}")
+    print(f"steps: {steps}; problems: {len(problems)}")
+    assert problems == []
+    assert faults.paused_by_order == 0

@@ -1,0 +1,110 @@
+"""Leases of hosted servers: judged by the database's clock, renewed, excluded, taken over."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from django.db import connection
+
+from rehab.sessions.live import lease, owners
+from rehab.sessions.live.lease import AnotherServer, Lease
+
+pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.postgres]
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch, settings: Any) -> Iterator[None]:
+    if connection.vendor != "postgresql":
+        pytest.skip("only hosted servers have leases")
+    settings.HOSTED = True
+    monkeypatch.setattr(lease, "RENEW_S", 0.05)
+    monkeypatch.setattr(lease, "RETRY_S", 0.02)
+    monkeypatch.setattr(lease, "LEASE_S", 0.6)
+    sql("DELETE FROM rehab_server")
+    yield
+    sql("DELETE FROM rehab_server")
+
+
+def sql(statement: str, *values: object) -> list[Any]:
+    with connection.cursor() as cursor:
+        cursor.execute(statement, values)
+        return cursor.fetchall() if cursor.description else []
+
+
+def enter(*, shares: bool, lost: threading.Event | None = None) -> Lease:
+    one = Lease("127.0.0.1:1", shares=shares, on_excluded=(lost or threading.Event()).set)
+    one.acquire(wait_s=0.3)
+    return one
+
+
+@pytest.mark.parametrize(("first", "second"), [(False, False), (True, False), (False, True)])
+def test_servers_that_cannot_hear_each_other_do_not_share_a_database(first, second):
+    one = enter(shares=first)
+    with pytest.raises(AnotherServer, match="GARRY_REDIS_URL"):
+        enter(shares=second)
+    threading.Timer(0.1, one.release).start()
+    two = Lease("127.0.0.1:2", shares=second, on_excluded=lambda: None)
+    two.acquire(wait_s=10)
+    two.release()
+
+
+def test_servers_with_redis_share_a_database():
+    one, two = enter(shares=True), enter(shares=True)
+    assert {server.id for server in lease.valid_servers()} == {one.id, two.id}
+    one.release()
+    assert not lease.is_valid(one.id)
+    assert lease.is_valid(two.id)
+    two.release()
+    assert lease.held() is None
+
+
+def test_a_lease_is_renewed_and_outlives_its_connection():
+    one = enter(shares=True)
+    time.sleep(0.8)
+    assert lease.is_valid(one.id)
+    assert one._connection is not None
+    pid = one._connection.connection.info.backend_pid
+    sql("SELECT pg_terminate_backend(%s, 5000)", pid)
+    time.sleep(0.4)
+    assert lease.is_valid(one.id)
+    one.release()
+
+
+def test_an_owner_lives_as_long_as_its_lease_whatever_its_host_is_called():
+    other, own = enter(shares=True), enter(shares=True)
+    time.sleep(0.2)  # from then on it judges
+    assert own.may_judge
+    assert owners.is_alive(other.id)
+    other._closing.set()  # it hangs
+    other._thread.join()
+    assert owners.is_alive(other.id)
+    time.sleep(0.7)
+    assert not owners.is_alive(other.id)
+    other.release()
+    assert not owners.is_alive(owners.HANDED_ON)
+    own.release()
+
+
+def test_after_an_outage_of_the_database_nobody_is_taken_for_dead_at_once(monkeypatch):
+    own = enter(shares=True)
+    monkeypatch.setattr(lease, "RENEW_S", 5.0)
+    own._unbroken_since_s = time.monotonic()  # it has just come back
+    assert not own.may_judge
+    monkeypatch.setattr(lease, "_held", own)
+    assert owners.is_alive("f" * 32)
+    own.release()
+
+
+def test_a_server_without_redis_whose_database_another_has_taken_ends(monkeypatch):
+    lost = threading.Event()
+    one = enter(shares=False, lost=lost)
+    monkeypatch.setattr(one, "_execute", lambda _: 0)  # it hangs: its row expires
+    sql("UPDATE rehab_server SET expires_at = now() - interval '1 s', id = 'x'")
+    sql("INSERT INTO rehab_server VALUES ('y', '127.0.0.1:2', false, now() + interval '60 s')")
+    assert lost.wait(10)
+    monkeypatch.undo()
+    one.release()
