@@ -57,7 +57,7 @@ def _phases(results: Results) -> list[PhaseLabel]:
     for one in results.participants:
         for visit in one.visits:
             for phase in visit.phases:
-                label = PhaseLabel(gettext(phase["name"]), phase["judged"] > 0)
+                label = PhaseLabel(gettext(phase["name"]), phase["feedback"])
                 found.setdefault(phase["phase"], label)
     return [found.get(index, PhaseLabel("", True)) for index in range(max(found, default=-1) + 1)]
 

@@ -89,9 +89,16 @@ class Results:
         rest = [slug for slug in OUTCOMES if slug in found and slug not in self.registered]
         return (*rest, *sorted(slug for slug in found if slug.startswith(CHANNEL)))
 
+    @cached_property
+    def _findings(self) -> dict[str, Finding]:
+        return {}
+
     def find(self, slug: str) -> Finding:
         """Return what was found of an outcome."""
-        return find(self.participants, list(self.arms), slug, crossover=self.study.crossover)
+        if slug not in self._findings:
+            arms, crossed = list(self.arms), self.study.crossover
+            self._findings[slug] = find(self.participants, arms, slug, crossover=crossed)
+        return self._findings[slug]
 
     @cached_property
     def curves(self) -> dict[str, list[Point]]:

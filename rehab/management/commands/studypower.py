@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 from argparse import ArgumentParser, ArgumentTypeError
 from typing import Any
@@ -41,6 +40,7 @@ class Command(BaseCommand):
         parser.add_argument("--effects", type=parse_effects, default={}, metavar="A=0,B=8")
         parser.add_argument("--participants", type=int, help="default: as planned")
         parser.add_argument("--simulations", type=int, default=200)
+        parser.add_argument("--gently", action="store_true", help="let live sessions go first")
         parser.add_argument("--sd", type=float, default=10.0, help="between people, %% of baseline")
         parser.add_argument("--kept", type=float, default=25.0, help="%% that washout keeps")
         parser.add_argument("--dropout", type=float, default=0.0, help="%% before each visit")
@@ -48,8 +48,8 @@ class Command(BaseCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Simulate. Raises CommandError, with the cure."""
         prepare_database()
-        with contextlib.suppress(OSError, AttributeError):  # Windows has no niceness
-            os.nice(10)  # live sessions go first
+        if options["gently"] and hasattr(os, "nice"):  # Windows has none
+            os.nice(10)
         try:
             run = find_run(options)
             for stored in work(run):

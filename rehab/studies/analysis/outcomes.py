@@ -217,7 +217,13 @@ def describe_phases(walk: Walk) -> list[dict[str, Any]]:
     SD about the trend [%], lag-1 autocorrelation.
     """
     return [
-        {"phase": index, "kind": phase.kind, "name": phase.name, **_describe(walk, where)}
+        {
+            "phase": index,
+            "kind": phase.kind,
+            "name": phase.name,
+            "feedback": phase.feedback,
+            **_describe(walk, where),
+        }
         for index, phase in enumerate(walk.phases)
         if (where := walk.phase == index).any()
     ]

@@ -12,7 +12,7 @@ INK, MUTED, GRID, QUIET = "#1c1c1a", "#595955", "#dededa", "#f1f1ed"
 # and a dash of its own.
 COLORS = ("#0068a3", "#b84c00", "#00705a", "#98437e", "#4d4d4d", "#7a6000", "#16324f", "#8c1d1d")
 DASHES = ("", "9 4", "2.5 3.5", "12 4 2.5 4", "5 2.5", "1.5 2.5", "16 5", "7 3 2 3 2 3")
-LETTER = 0.56  # mean width of a letter by the type's size
+LETTER = 0.5  # mean width of a letter by the type's size
 
 
 class Canvas:
@@ -90,7 +90,7 @@ class Canvas:
         """Write the arms' names with their shapes, in rows; return the foot of the last one."""
         left = x
         for arm, label in enumerate(labels):
-            wide = 46 + LETTER * 15 * len(label) + 22
+            wide = 44 + LETTER * 15 * len(label) + 20
             if left > x and left + wide > self.width - 12:
                 left, y = x, y + 24
             if dashed:

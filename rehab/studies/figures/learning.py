@@ -9,8 +9,8 @@ from itertools import groupby
 from rehab.studies.analysis.curves import Point
 from rehab.studies.figures.canvas import COLORS, GRID, INK, MUTED, QUIET, Canvas, number, ticks
 
-WIDTH, HEIGHT = 1000.0, 430.0
-LEFT, RIGHT, BOTTOM, BETWEEN = 62.0, 16.0, 40.0, 18.0
+WIDTH, HEIGHT = 1000.0, 450.0
+LEFT, RIGHT, BOTTOM, BETWEEN = 62.0, 16.0, 54.0, 18.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -108,13 +108,12 @@ def show_power(request: HttpRequest, study_id: int) -> HttpResponse:
 
 @for_roles(Role.LEAD, Role.RESEARCHER, patients=False)
 @require_POST
-def go_on(request: HttpRequest, study_id: int, run_id: int) -> HttpResponse:
+def go_on(request: HttpRequest, run_id: int) -> HttpResponse:
     """Go on with a run that was broken off."""
     user = user_of(request)
-    study = _get(user, study_id)
-    run = get_object_or_404(PowerRun.objects.visible_to(user), study=study, pk=run_id)
+    run = get_object_or_404(PowerRun.objects.visible_to(user), pk=run_id)
     begin(run)
-    return redirect("study-power", study_id=study.pk)
+    return redirect("study-power", study_id=_get(user, run.study_id).pk)
 
 
 def begin(run: PowerRun) -> None:
@@ -130,4 +129,4 @@ def begin(run: PowerRun) -> None:
 def _start(live: runtime.Runtime, run_id: int, command: list[str]) -> None:
     name = f"power of run {run_id}"
     if name not in live.supervisor.children:
-        live.supervisor.start(name, [*command, "--run", str(run_id)], once=True)
+        live.supervisor.start(name, [*command, "--run", str(run_id), "--gently"], once=True)

@@ -103,9 +103,10 @@ def _told(interval: Interval | None, unit: str) -> dict[str, str] | None:
 
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
 @require_safe
-def download_results(request: HttpRequest, study_id: int, name: str, kind: str) -> HttpResponse:
-    """Return a figure as SVG, or the data behind the figures as CSV."""
+def download_results(request: HttpRequest, study_id: int) -> HttpResponse:
+    """Return a figure as SVG, or the data behind the figures as CSV: the ``file`` of that name."""
     study, user = _open(request, study_id)
+    name, _point, kind = request.GET.get("file", "outcomes.csv").partition(".")
     if name not in {"svg": FIGURES, "csv": TABLES}.get(kind, {}):
         raise Http404
     now = timezone.now()

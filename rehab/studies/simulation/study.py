@@ -74,7 +74,7 @@ def _plan(clinic: Clinic, code: str, trial: Trial, seed: int, now: datetime) -> 
             study=study,
             position=position,
             code=arm,
-            name=f"{valence}, truly {effect:+g} %",
+            name=f"{valence}, truly {effect:+g} %".replace("-", "\N{MINUS SIGN}"),
             valence=valence,
             measure=measure,
             protocol=protocol,
