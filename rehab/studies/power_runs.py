@@ -58,9 +58,16 @@ class PowerRun(ScopedModel):
         return len(self.found)
 
     @property
-    def last_seed(self) -> int:
-        """The seed of the last study."""
-        return self.simulations - 1
+    def assumptions(self) -> str:
+        """From which seeds it simulates, and what it assumes, in words."""
+        names = ("sd_percent", "kept_percent", "dropout_percent")
+        told = {name: f"{self.settings[name]:g}" for name in names}
+        words = gettext(
+            "Seeds 0 to %(last)d; people differ by %(sd_percent)s %%, washout keeps "
+            "%(kept_percent)s %%, %(dropout_percent)s %% leave before each visit. Pairs are not "
+            "corrected for their number."
+        )
+        return words % (told | {"last": self.simulations - 1})
 
     @property
     def is_done(self) -> bool:
