@@ -25,7 +25,7 @@ class Canvas:
             f'<rect width="{width:g}" height="{height:g}" fill="#fff"/>',
         ]
 
-    def add(self, tag: str, inner: str = "", **attributes: float | str) -> None:
+    def add(self, tag: str, inner: str = "", /, **attributes: float | str) -> None:
         """Add an element; `_` in an attribute's name stands for `-`."""
         written = "".join(
             f" {name.rstrip('_').replace('_', '-')}={quoteattr(_text(value))}"
