@@ -87,7 +87,7 @@ def make_participant(
     walks: dict[str, list[Walk | None]] = {}
     before: Walk | None = None
     for visit, walked in planned:
-        walks.setdefault(visit.arm, []).append(walked and walked.walk)
+        walks.setdefault(visit.arm, []).append(None if walked is None else walked.walk)
         if walked is None:
             visits.append(visit)
             continue
