@@ -23,6 +23,7 @@ from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Pairing, PinAttempts, Station
 from rehab.studies.models import Arm, Study, StudyMark, StudyVersion
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
+from rehab.studies.power_runs import PowerRun
 
 # People and settings. Sessions, consents and studies are logs themselves.
 TRACKED = (
@@ -69,6 +70,7 @@ __all__ = [
     "Pairing",
     "Patient",
     "PinAttempts",
+    "PowerRun",
     "Preset",
     "Protocol",
     "ProtocolPhase",

@@ -98,6 +98,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Allocation": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "StudyVisit": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "StudyEvent": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
+    "PowerRun": {Role.LEAD: Right.VIEW, Role.RESEARCHER: Right.VIEW},
     "Leaderboard": {
         Role.HOST: Right.ALL,
         Role.LEAD: Right.ALL,

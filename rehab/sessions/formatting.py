@@ -13,6 +13,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
 from rehab.training.changes import State
+from rehab.training.schedules import Schedule, ScheduleKind
 
 MISSING = "–"
 NBSP = "\N{NO-BREAK SPACE}"
@@ -92,6 +93,22 @@ STATE_LABELS: dict[State, Any] = {
     State.FINISHED: "",
     State.ABORTED: _("ended early"),
 }
+
+
+def format_schedule(schedule: Schedule) -> str:
+    """Return when feedback comes, in a few words."""
+    values = {"steps": schedule.interval, "band": round(100 * schedule.band)}
+    match schedule.kind:
+        case ScheduleKind.EVERY if schedule.tells_all:
+            return gettext("every step")
+        case ScheduleKind.EVERY:
+            return gettext("every %(steps)d steps") % values
+        case ScheduleKind.BANDWIDTH:
+            return gettext("beyond ± %(band)d %%") % values
+        case ScheduleKind.FADED:
+            return gettext("fading to every %(steps)d steps") % values
+        case ScheduleKind.SUMMARY:
+            return gettext("summary of %(steps)d steps") % values
 
 
 def format_state(state: str) -> str:

@@ -15,6 +15,7 @@ from rehab.sessions.pages import (
     tablet,
     takehome,
     walk,
+    words,
 )
 
 urlpatterns = [
@@ -31,6 +32,7 @@ urlpatterns = [
     path("tablet/state/", tablet.tablet_state, name="tablet-state"),
     path("sessions/<int:session_id>/", walk.show_walk, name="walk"),
     path("sessions/<int:session_id>/monitor/", monitor.show_monitor, name="monitor"),
+    path("sessions/<int:session_id>/words/", words.edit_words, name="words"),
     path("sessions/<int:session_id>/report/", report.show_report, name="report"),
     path("sessions/<int:session_id>/details/", session.show_session, name="session"),
     path("incidents/<int:incident_id>/", incident.show_incident, name="incident"),

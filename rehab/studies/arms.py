@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from rehab.training.measures import InvalidSetting, check_gain
 from rehab.training.phases import Phase
 from rehab.training.plans import check_robot_intensity
+from rehab.training.schedules import Schedule
 from rehab.training.valences import find_valence
 
 MAX_ARMS = 8
@@ -32,6 +33,8 @@ class Condition:
         One of `ROBOT_LEVELS`.
     measure, protocol
         Keys of what is trained and of the phases.
+    schedule
+        After which steps the patient is told.
 
     Raises
     ------
@@ -44,6 +47,7 @@ class Condition:
     robot_intensity: float
     measure: int
     protocol: int
+    schedule: Schedule = field(default_factory=Schedule)
 
     def __post_init__(self) -> None:
         find_valence(self.valence)
@@ -94,8 +98,8 @@ def check_arms(arms: Sequence[ArmRule], *, crossover: bool) -> None:
         other = conditions.setdefault(arm.condition, arm)
         if other is not arm:
             raise InvalidSetting(
-                "Arms {first} and {second} do the same. Change the feedback type, gain, robot, "
-                "measure or protocol of one, or remove it.",
+                "Arms {first} and {second} do the same. Change the feedback type, its schedule, "
+                "gain, robot, measure or protocol of one, or remove it.",
                 first=other.code,
                 second=arm.code,
             )

@@ -17,12 +17,13 @@ from rehab.people.web.refusals import format_refusal
 from rehab.sessions.formatting import format_source
 from rehab.sessions.forms.answers import NumberField
 from rehab.sessions.services import check_station_is_free
+from rehab.sessions.setup.answers import USUAL_ANSWERS
 from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.sessions.setup.sources import build_source_args, source_choices
 from rehab.stations.models import Station
 from rehab.studies.allocation.lists import read_list
 from rehab.studies.allocation.scheme import Method, Secret
-from rehab.studies.models import OUTCOMES, Arm, Study
+from rehab.studies.models import OUTCOMES, SCHEDULE_FIELDS, Arm, Study
 from rehab.studies.registration import check_secret, describe
 from rehab.studies.sealing import seal, unseal
 from rehab.studies.visits import Place
@@ -147,8 +148,8 @@ class ArmForm(forms.ModelForm):
     class Meta:
         model = Arm
         fields = (
-            *("code", "name", "valence", "gain", "robot_intensity", "measure", "protocol"),
-            "weight",
+            *("code", "name", "valence", "gain", *SCHEDULE_FIELDS, "robot_intensity"),
+            *("measure", "protocol", "weight"),
         )
 
     def __init__(self, *args: Any, by: User, is_fixed: bool, **options: Any) -> None:
@@ -161,6 +162,14 @@ class ArmForm(forms.ModelForm):
             self.initial["measure"] = usual and usual.pk
         for name in ("code", "weight"):
             fields[name].disabled = is_fixed
+        for name in SCHEDULE_FIELDS:
+            fields[name].required = False
+
+    def clean(self) -> Any:
+        """Return the answers, with the usual ones for a schedule's that were left empty."""
+        data: Any = super().clean()
+        empty = [name for name in SCHEDULE_FIELDS if data.get(name) in (None, "")]
+        return data | {name: USUAL_ANSWERS[name] for name in empty if name not in self.errors}
 
 
 def build_arm_forms(study: Study, by: User, data: Any = None) -> Any:

@@ -13,22 +13,24 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic, User
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
-from rehab.sessions.formatting import ROBOT_LEVEL_LABELS
+from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_schedule
+from rehab.sessions.setup.answers import SCHEDULES, USUAL_ANSWERS, read_schedule
 from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.studies.allocation.crossover import VisitPlan, crossover_groups
 from rehab.studies.allocation.groups import Factor, Group
 from rehab.studies.allocation.minimization import DEFAULT_PROBABILITY
 from rehab.studies.allocation.scheme import Method, Scheme
+from rehab.studies.analysis import outcomes
 from rehab.studies.append_only import AppendOnlyModel
 from rehab.studies.arms import EARLY_MONTHS, ArmRule, Condition, check_arms
 from rehab.training.measures import InvalidSetting
-from rehab.training.metrics import METRICS
 from rehab.training.phases import Phase
 from rehab.training.plans import ROBOT_LEVELS
+from rehab.training.schedules import INTERVAL_MAX
 from rehab.training.valences import VALENCES
 
-# What counts days or sessions compares no arms.
-OUTCOMES = [(m.slug, _(m.label)) for m in METRICS.values() if m.unit not in {"days", "sessions"}]
+OUTCOMES = [(slug, _(label)) for slug, (label, _unit) in outcomes.OUTCOMES.items()]
+SCHEDULE_FIELDS = ("schedule", "schedule_steps", "schedule_band")
 METHODS = {
     Method.BLOCKS: _("Permuted blocks of random size"),
     Method.MINIMIZATION: _("Minimization"),
@@ -203,6 +205,19 @@ class Arm(ScopedModel):
         choices=[(value, ROBOT_LEVEL_LABELS[level]) for level, value in ROBOT_LEVELS.items()],
         default=1.0,
     )
+    schedule = models.CharField(
+        _("feedback comes"), max_length=16, choices=SCHEDULES, default=USUAL_ANSWERS["schedule"]
+    )
+    schedule_steps = models.PositiveSmallIntegerField(
+        _("steps between feedback"),
+        default=USUAL_ANSWERS["schedule_steps"],
+        validators=[MinValueValidator(1), MaxValueValidator(INTERVAL_MAX)],
+    )
+    schedule_band = models.PositiveSmallIntegerField(
+        _("band without feedback, ± % of the goal"),
+        default=USUAL_ANSWERS["schedule_band"],
+        validators=[MinValueValidator(1), MaxValueValidator(50)],
+    )
     measure = models.ForeignKey(
         Measure, on_delete=models.PROTECT, related_name="+", verbose_name=_("measure")
     )
@@ -221,6 +236,11 @@ class Arm(ScopedModel):
     def __str__(self) -> str:
         return f"{self.code}: {self.name}"
 
+    @property
+    def told(self) -> str:
+        """When feedback comes, in words."""
+        return format_schedule(self.to_rule().condition.schedule)
+
     def phases(self) -> tuple[Phase, ...]:
         """Return the protocol's phases with the arm's gain. Raises InvalidSetting without one."""
         if self.protocol is None:
@@ -230,8 +250,14 @@ class Arm(ScopedModel):
 
     def to_rule(self) -> ArmRule:
         """Return the arm in the form that the rules use. Raises InvalidSetting."""
+        answers = {name: getattr(self, name) for name in SCHEDULE_FIELDS}
         condition = Condition(
-            self.valence, self.gain, self.robot_intensity, self.measure_id, self.protocol_id or 0
+            self.valence,
+            self.gain,
+            self.robot_intensity,
+            self.measure_id,
+            self.protocol_id or 0,
+            read_schedule(answers).essential,
         )
         return ArmRule(self.code, self.name, self.weight, condition)
 

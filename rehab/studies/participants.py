@@ -123,6 +123,7 @@ class StudyEvent(AppendOnlyModel):
         UNBLINDED = "unblinded", _("Arm revealed")
         EMERGENCY = "emergency", _("Arm revealed in an emergency")
         REFUSED = "refused", _("Revealing the arm was refused")
+        LOOKED = "looked", _("Looked at results before the end")
 
     # Reasons may name the condition.
     scope = PatientScope(clinic="study__clinic", patient="enrollment__patient")

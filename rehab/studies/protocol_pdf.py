@@ -13,8 +13,10 @@ from reportlab.lib.styles import getSampleStyleSheet
 from reportlab.lib.units import mm
 from reportlab.platypus import Flowable, Paragraph, SimpleDocTemplate, Spacer, Table, TableStyle
 
+from rehab.sessions.formatting import format_schedule
 from rehab.studies.allocation.scheme import Method
 from rehab.studies.models import METHODS, OUTCOMES, Study, StudyVersion
+from rehab.training.schedules import Schedule, ScheduleKind
 
 MARGIN = 20 * mm
 LINES = TableStyle(
@@ -89,12 +91,21 @@ def _table(rows: list[tuple[object, ...]]) -> Table:
 
 
 def _arm_rows(told: dict[str, Any]) -> list[tuple[object, ...]]:
-    heads = ("Code", "Name", "Ratio", "Feedback type", "Gain", "Robot", "Measure")
-    keys = ("code", "name", "weight", "feedback_type", "gain", "robot_intensity", "measure")
+    heads = ("Code", "Name", "Ratio", "Feedback type", "Feedback comes", "Gain", "Robot", "Measure")
+    keys = ("code", "name", "weight", "feedback_type", "comes", "gain", "robot_intensity")
     return [
         tuple(gettext(head) for head in heads),
-        *(tuple(arm[key] for key in keys) for arm in told["arms"]),
+        *(
+            tuple((arm | {"comes": _comes(arm)})[key] for key in (*keys, "measure"))
+            for arm in told["arms"]
+        ),
     ]
+
+
+def _comes(arm: dict[str, Any]) -> str:
+    """Return when an arm's feedback comes; arms of before there was a choice answer every step."""
+    told = arm.get("schedule", {})
+    return format_schedule(Schedule(**told | {"kind": ScheduleKind(told.get("kind", "every"))}))
 
 
 def _phase_text(phase: dict[str, Any]) -> str:

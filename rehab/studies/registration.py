@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from datetime import datetime
 from hashlib import sha256
 from typing import Any
@@ -69,13 +70,14 @@ def describe(study: Study) -> dict[str, Any]:
 
 
 def _describe_arm(study: Study, arm: Any) -> dict[str, Any]:
-    phases = arm.phases()
+    phases, schedule = arm.phases(), arm.to_rule().condition.schedule
     SessionPlan(  # raises InvalidSetting for one that could not be walked
         measure=arm.measure.to_rule(),
         valence=find_valence(arm.valence),
         phases=phases,
         trained_side=Side.LEFT,
         goal=GoalRule(percent_of_baseline=study.goal_percent),
+        schedule=schedule,
     )
     return {
         "code": arm.code,
@@ -84,6 +86,8 @@ def _describe_arm(study: Study, arm: Any) -> dict[str, Any]:
         "feedback_type": arm.valence,
         "gain": arm.gain,
         "robot_intensity": arm.robot_intensity,
+        # Studies that were registered before arms had schedules keep their digest.
+        **({} if schedule.tells_all else {"schedule": asdict(schedule)}),
         "measure": arm.measure.slug,
         "protocol": arm.protocol.name,
         **(

@@ -2,7 +2,7 @@
 
 from django.urls import path
 
-from rehab.studies.pages import participants, planning
+from rehab.studies.pages import participants, planning, power, results
 
 urlpatterns = [
     path("studies/", planning.list_studies, name="studies"),
@@ -11,12 +11,26 @@ urlpatterns = [
     path("studies/<int:study_id>/plan/", planning.plan_study, name="plan-study"),
     path("studies/<int:study_id>/state/", planning.change_state, name="study-state"),
     path("studies/<int:study_id>/marks/", planning.change_marks, name="study-marks"),
-    path("studies/<int:study_id>/protocol.json", planning.download_protocol, name="study-protocol"),
+    path(
+        "studies/<int:study_id>/protocol.json",
+        planning.download_protocol,
+        {"kind": "json"},
+        name="study-protocol",
+    ),
     path(
         "studies/<int:study_id>/protocol.pdf",
-        planning.download_protocol_pdf,
+        planning.download_protocol,
+        {"kind": "pdf"},
         name="study-protocol-pdf",
     ),
+    path("studies/<int:study_id>/results/", results.show_results, name="study-results"),
+    path(
+        "studies/<int:study_id>/results/download/",
+        results.download_results,
+        name="study-results-file",
+    ),
+    path("studies/<int:study_id>/power/", power.show_power, name="study-power"),
+    path("power-runs/<int:run_id>/", power.go_on, name="power-run"),
     path("studies/<int:study_id>/enroll/", participants.enroll_patient, name="enroll"),
     path("participants/<int:enrollment_id>/", participants.show_participant, name="participant"),
     path("participants/<int:enrollment_id>/start/", participants.start_visit, name="start-visit"),

@@ -83,6 +83,7 @@ def start_session(
                 protocol=arm.protocol,
                 measure=arm.measure,
                 robot_intensity=arm.robot_intensity,
+                schedule=arm.to_rule().condition.schedule,
                 station=place.station,
                 created_by=by,
                 source=place.source,

@@ -6,7 +6,12 @@ from django.utils.html import format_html, json_script
 from django.utils.safestring import SafeString
 from django.utils.translation import gettext as _
 
-from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_duration, format_source
+from rehab.sessions.formatting import (
+    ROBOT_LEVEL_LABELS,
+    format_duration,
+    format_rate,
+    format_source,
+)
 from rehab.training.valences import VALENCES
 from robot.wire.close_codes import FINAL_FOR_PAGES
 from robot.wire.limits import PAGE_HEARTBEAT_S
@@ -39,6 +44,7 @@ def leg(side: str) -> str:
 
 register.filter("duration", format_duration)
 register.filter("source", format_source)
+register.filter("rate", format_rate)
 
 
 @register.filter

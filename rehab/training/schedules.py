@@ -72,6 +72,15 @@ class Schedule:
         """Whether each step is answered."""
         return self.kind is ScheduleKind.EVERY and self.interval == 1
 
+    @property
+    def essential(self) -> Schedule:
+        """The schedule without what its kind does not use: those that do the same are equal."""
+        if self.kind is ScheduleKind.BANDWIDTH:
+            return Schedule(self.kind, band=self.band)
+        if self.kind is ScheduleKind.FADED:
+            return Schedule(self.kind, self.interval, stage=self.stage)
+        return Schedule(self.kind, self.interval)
+
     def tells(self, count: int, performance: float) -> bool:
         """Return whether the page answers a step.
 

@@ -14,7 +14,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.support.browsers import SIZES
-from tests.support.servers import ROOT, Server, clean_environment
+from tests.support.servers import ROOT, Server, clean_environment, serve
 
 pytestmark = pytest.mark.browser
 
@@ -60,17 +60,16 @@ def page_of(browser: Browser, server: Server, cookie: str) -> Iterator[Page]:
     context.close()
 
 
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """Run a server that logs as much as any can."""
+    with serve(tmp_path_factory.mktemp("data"), settings={"GARRY_LOG_LEVEL": "DEBUG"}) as running:
+        yield running
+
+
 @pytest.fixture
 def people(server: Server) -> dict[str, Any]:
-    done = subprocess.run(
-        [sys.executable, "manage.py", "shell", "-v0", "-c", PEOPLE],
-        cwd=ROOT,
-        env=clean_environment(server.folder, server.port),
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    made: dict[str, Any] = json.loads(done.stdout)
+    made: dict[str, Any] = run_inside(server, PEOPLE)
     return made
 
 
@@ -111,6 +110,27 @@ def enroll_and_start(page: Page, study: str) -> str:
     page.click("button:has-text('Start visit 1')")
     page.wait_for_url("**/monitor/")
     return page.url
+
+
+AUDITED = """
+import json
+from rehab.people.audit.audit_log import AuditEntry
+rows = AuditEntry.everywhere.filter(by__username="asha")
+print(json.dumps([f"{row.act} {row.through} {row.about}" for row in rows]))
+"""
+
+
+def run_inside(server: Server, program: str) -> Any:
+    """Run a program with the server's rows; return the JSON that it prints."""
+    done = subprocess.run(
+        [sys.executable, "manage.py", "shell", "-v0", "-c", program],
+        cwd=ROOT,
+        env=clean_environment(server.folder, server.port),
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    return json.loads(done.stdout)
 
 
 def look_everywhere(page: Page, addresses: list[str]) -> None:
@@ -157,6 +177,7 @@ def test_a_study_is_planned_walked_blind_and_an_arm_is_revealed(server, browser,
         participant = f"{server.url}/participants/1/"
         session = re.search(r"/sessions/(\d+)/", monitor).group(1)
 
+        server.read_log()  # up to here others asked
         with page_of(browser, server, people["asha"]) as assessor:
             patient = f"/patients/{people['patient']}/"
             own = ["/start/", patient, f"{patient}sessions/", f"{patient}records/"]
@@ -174,6 +195,11 @@ def test_a_study_is_planned_walked_blind_and_an_arm_is_revealed(server, browser,
             assessor.click("button:has-text('Reveal')")
             expect(assessor.locator(".errorlist")).to_contain_text("Ask a lead")
             assert not TELLING.search(assessor.locator("main").inner_text())
+        logged = server.read_log()
+        assert not TELLING.search(logged)
+        audited = run_inside(server, AUDITED)
+        assert any(study.removeprefix(server.url) in row for row in audited)
+        assert not TELLING.search(" ".join(audited))
 
         pt.goto(participant)
         pt.click("text=Reveal the arm")

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -29,6 +29,17 @@ class Server:
     def url(self) -> str:
         """Its address."""
         return f"http://127.0.0.1:{self.port}"
+
+    def read_log(self) -> str:
+        """Return what it wrote since its start, or since this was asked last."""
+        assert self.process.stdout is not None
+        pipe = self.process.stdout.fileno()
+        os.set_blocking(pipe, False)
+        written = b""
+        with suppress(BlockingIOError):
+            while part := os.read(pipe, 1 << 16):
+                written += part
+        return written.decode(errors="replace")
 
     @property
     def password(self) -> str:

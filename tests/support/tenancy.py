@@ -22,6 +22,7 @@ from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.models import TrainingSession
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment
+from rehab.studies.power_runs import PowerRun
 from tests.support.archives import words_of
 from tests.support.identities import find_identities, identifying_texts
 from tests.support.world import Actor, World, all_actors, mark, scoped_models
@@ -39,6 +40,7 @@ KEYS: dict[str, tuple[type[Model], str]] = {
     "enrollment_id": (Enrollment, "pk"),
     "incident_id": (RobotIncident, "pk"),
     "patient_id": (Patient, "pk"),
+    "run_id": (PowerRun, "pk"),
     "session_id": (TrainingSession, "pk"),
     "study_id": (Study, "pk"),
 }

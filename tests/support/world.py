@@ -38,6 +38,7 @@ from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Pairing, PinAttempts, Station
 from rehab.studies.models import Arm, Study, StudyMark, StudyVersion
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
+from rehab.studies.power_runs import PowerRun
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.goals import GoalRule
 from rehab.training.steps import Measurement, Side
@@ -180,6 +181,13 @@ def close_study(name: str, patient: Patient, session: TrainingSession, by: User)
     )
     StudyEvent.everywhere.create(
         study=study, enrollment=enrollment, kind="enrolled", reason=mark(name, StudyEvent)
+    )
+    PowerRun.everywhere.create(
+        study=study,
+        settings={"effects": {"B": 5.0}, "participants": 8, "sd_percent": 10.0}
+        | {"kept_percent": 25.0, "dropout_percent": 0.0},
+        simulations=1,
+        trouble=mark(name, PowerRun),
     )
     return study
 
@@ -330,6 +338,7 @@ def build_world(name: str) -> World:
         Enrollment.everywhere.get(study=study),
         Allocation.everywhere.get(enrollment__study=study),
         StudyVisit.everywhere.get(enrollment__study=study),
+        PowerRun.everywhere.get(study=study),
         StudyEvent.everywhere.get(study=study),
         AuditEntry.everywhere.create(clinic=clinic, act="view", about=mark(name, AuditEntry)),
         HistoryEntry.everywhere.get(model_name="Patient", object_id=patient.pk),

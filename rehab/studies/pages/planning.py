@@ -32,6 +32,7 @@ from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent
 from rehab.studies.protocol_pdf import write_pdf
 from rehab.studies.registration import close, register, revise, start
+from rehab.studies.results import may_look
 from rehab.studies.sealing import unseal
 from rehab.studies.visits import next_visit
 from rehab.training.measures import InvalidSetting
@@ -113,6 +114,8 @@ def study_context(study: Study, user: User) -> dict[str, Any]:
         "blind": blind,
         "is_lead": is_lead,
         "by_name": by_name,
+        "may_look": may_look(study, user),
+        "may_plan": user.role in {Role.LEAD, Role.RESEARCHER},
         "may_treat": user.role in {Role.LEAD, Role.PT} and not blind,
         "arms": () if blind else study.arms.select_related("measure", "protocol"),
         "participants": _participants(study, user),
@@ -180,12 +183,20 @@ def change_marks(request: HttpRequest, study_id: int) -> HttpResponse:
 
 @for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
 @require_GET
-def download_protocol(request: HttpRequest, study_id: int) -> HttpResponse:
-    """Return the registered study with all its versions; of a closed one also the seed."""
+def download_protocol(request: HttpRequest, study_id: int, kind: str) -> HttpResponse:
+    """Return the registered study with all its versions, as JSON or as a document on paper."""
     user = user_of(request)
     study = get_study(user, study_id)
     if is_assessor(study, user) or study.is_draft:
         raise PermissionDenied
+    content: str | bytes = write_pdf(study) if kind == "pdf" else write_json(study)
+    response = HttpResponse(content, content_type=f"application/{kind}")
+    response["Content-Disposition"] = f'attachment; filename="{study.code}-protocol.{kind}"'
+    return response
+
+
+def write_json(study: Study) -> str:
+    """Return a registered study with all its versions; of a closed one also the seed."""
     told: dict[str, Any] = {
         "registered_at": study.registered_at,
         "closed_at": study.closed_at,
@@ -202,24 +213,7 @@ def download_protocol(request: HttpRequest, study_id: int) -> HttpResponse:
     }
     if study.state == StudyState.CLOSED and study.sealed:
         told["allocation_secret"] = asdict(unseal(study.sealed))
-    text = json.dumps(told, indent=2, ensure_ascii=False, default=_plain)
-    name = f"{study.code}-protocol.json"
-    response = HttpResponse(text + "\n", content_type="application/json")
-    response["Content-Disposition"] = f'attachment; filename="{name}"'
-    return response
-
-
-@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)
-@require_GET
-def download_protocol_pdf(request: HttpRequest, study_id: int) -> HttpResponse:
-    """Return the registered study as a document on paper."""
-    user = user_of(request)
-    study = get_study(user, study_id)
-    if is_assessor(study, user) or study.is_draft:
-        raise PermissionDenied
-    response = HttpResponse(write_pdf(study), content_type="application/pdf")
-    response["Content-Disposition"] = f'attachment; filename="{study.code}-protocol.pdf"'
-    return response
+    return json.dumps(told, indent=2, ensure_ascii=False, default=_plain) + "\n"
 
 
 def _plain(value: datetime) -> str:

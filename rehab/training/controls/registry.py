@@ -242,7 +242,7 @@ CONTROLS: dict[str, Control] = {
             mark=ChartMark("N", gettext_noop("next type"), ValueFormat.CHOICE, _TYPES),
         ),
         Control(
-            kind=ChangeKind.FEEDBACK_TEXT,  # edited with its feedback type, for all open sessions
+            kind=ChangeKind.FEEDBACK_TEXT,  # for the clinic, or for one session
             log_label=gettext_noop("words"),
             review_label=gettext_noop("Words edited"),
             value=ValueKind.MAPPING,

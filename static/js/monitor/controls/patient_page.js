@@ -23,7 +23,7 @@ export function createPatientPage({ announce, onPress, change }) {
         session.chart = event.value;
       },
       feedback_text() {
-        announce(_("The clinic’s words were edited; the patient reads them from the next step."));
+        announce(_("The words were edited; the patient reads them from the next step."));
       },
     },
   };

@@ -1,0 +1,1 @@
+"""What a study found: outcomes of sessions, curves, and differences between arms. Pure."""

@@ -1,0 +1,199 @@
+"""Participants with what their visits gave, sorted by arms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from rehab.studies.analysis.comparison import Difference, Interval, compare, mean_of
+from rehab.studies.analysis.curves import Curve, Point, average, curve_of
+from rehab.studies.analysis.outcomes import channel_changes, compute_outcomes, describe_phases
+from rehab.studies.analysis.walks import Walk
+
+CHANNEL = "channel:"  # begins the slug of a further channel's change: never registered
+
+
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """A planned visit: in which arm, and what it gave.
+
+    Attributes
+    ----------
+    number, arm
+        Of the visit, from 1; the arm's code.
+    is_due
+        Whether its day is past, or it was walked.
+    outcomes
+        By slug; empty where it was not walked or does not count.
+    phases
+        Figures of each phase, as `describe_phases` returns them.
+    """
+
+    number: int
+    arm: str
+    is_due: bool = True
+    outcomes: dict[str, float] = field(default_factory=dict)
+    phases: tuple[dict[str, Any], ...] = ()
+
+    @property
+    def is_walked(self) -> bool:
+        """Whether it gave anything."""
+        return bool(self.outcomes)
+
+
+@dataclass(frozen=True, slots=True)
+class Participant:
+    """One participant: code, visits in their order, whether they count, a curve for each arm."""
+
+    code: str
+    visits: tuple[Visit, ...]
+    has_left: bool = False
+    is_analyzed: bool = True
+    curves: dict[str, Curve] = field(default_factory=dict)
+
+    @property
+    def arms(self) -> tuple[str, ...]:
+        """The arms that were to be walked, in their order."""
+        return tuple(dict.fromkeys(visit.arm for visit in self.visits))
+
+    def outcome(self, slug: str, arm: str) -> float | None:
+        """Return the mean of an outcome over the visits in an arm; None where no one has it."""
+        found = [
+            visit.outcomes[slug]
+            for visit in self.visits
+            if visit.arm == arm and slug in visit.outcomes
+        ]
+        return sum(found) / len(found) if found and self.is_analyzed else None
+
+
+@dataclass(frozen=True, slots=True)
+class Walked:
+    """A session that counts: its strides, and the metrics that it stores of itself."""
+
+    walk: Walk
+    metrics: dict[str, float]
+
+
+def make_participant(
+    code: str,
+    planned: Sequence[tuple[Visit, Walked | None]],
+    *,
+    has_left: bool = False,
+    is_analyzed: bool = True,
+) -> Participant:
+    """Return a participant from the planned visits and what was walked of them."""
+    visits: list[Visit] = []
+    walks: dict[str, list[Walk | None]] = {}
+    before: Walk | None = None
+    for visit, walked in planned:
+        walks.setdefault(visit.arm, []).append(None if walked is None else walked.walk)
+        if walked is None:
+            visits.append(visit)
+            continue
+        channels = channel_changes(walked.walk)
+        outcomes = compute_outcomes(walked.walk, before, walked.metrics)
+        outcomes |= {f"{CHANNEL}{name}": value for name, value in channels.items()}
+        phases = tuple(describe_phases(walked.walk))
+        visits.append(Visit(visit.number, visit.arm, True, outcomes, phases))
+        before = walked.walk
+    curves = {arm: curve_of(of_arm) for arm, of_arm in walks.items()}
+    return Participant(code, tuple(visits), has_left, is_analyzed, curves)
+
+
+def by_arm(
+    participants: Sequence[Participant], arms: Sequence[str], slug: str
+) -> dict[str, dict[str, float]]:
+    """Return an outcome of those who have it, by arm and participant's code."""
+    return {
+        arm: {
+            one.code: value for one in participants if (value := one.outcome(slug, arm)) is not None
+        }
+        for arm in arms
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class ArmFigure:
+    """An outcome in one arm: how many have it and how many lack it, and its mean."""
+
+    arm: str
+    participants: int
+    missing: int
+    mean: Interval | None
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """An outcome over all arms, and the differences between them."""
+
+    slug: str
+    arms: tuple[ArmFigure, ...]
+    differences: tuple[Difference, ...]
+
+
+def find(
+    participants: Sequence[Participant], arms: Sequence[str], slug: str, *, crossover: bool
+) -> Finding:
+    """Return what was found of an outcome."""
+    groups = by_arm(participants, arms, slug)
+    figures = []
+    for arm in arms:
+        meant = sum(one.is_analyzed and arm in one.arms for one in participants)
+        values = list(groups[arm].values())
+        mean = mean_of(values) if values else None
+        figures.append(ArmFigure(arm, len(values), meant - len(values), mean))
+    return Finding(slug, tuple(figures), tuple(compare(groups, paired=crossover)))
+
+
+def curves_by_arm(
+    participants: Sequence[Participant], arms: Sequence[str]
+) -> dict[str, list[Point]]:
+    """Return the mean curve of each arm."""
+    return {
+        arm: average(
+            [one.curves[arm] for one in participants if one.is_analyzed and one.curves.get(arm)]
+        )
+        for arm in arms
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class ArmFlow:
+    """An arm's column of the flow of participants (CONSORT 2010)."""
+
+    arm: str
+    allocated: int
+    began: int
+    completed: int
+    left: int
+    removed: int
+    analyzed: int
+    visits_planned: int
+    visits_walked: int
+
+
+def flow(
+    participants: Sequence[Participant], arms: Sequence[str], primary: str
+) -> tuple[ArmFlow, ...]:
+    """Return how many were allocated to each arm, and what became of them.
+
+    ``analyzed``: those who have the primary outcome. Visits: those that are due.
+    """
+    return tuple(_flow_of(participants, arm, primary) for arm in arms)
+
+
+def _flow_of(participants: Sequence[Participant], arm: str, primary: str) -> ArmFlow:
+    mine = [one for one in participants if arm in one.arms]
+    visits = [[visit for visit in one.visits if visit.arm == arm] for one in mine]
+    return ArmFlow(
+        arm,
+        allocated=len(mine),
+        began=sum(any(visit.is_walked for visit in of_one) for of_one in visits),
+        completed=sum(all(visit.is_walked for visit in of_one) for of_one in visits),
+        left=sum(one.has_left for one in mine),
+        removed=sum(not one.is_analyzed for one in mine),
+        analyzed=sum(one.outcome(primary, arm) is not None for one in mine),
+        visits_planned=sum(visit.is_due for of_one in visits for visit in of_one),
+        visits_walked=sum(visit.is_walked for of_one in visits for visit in of_one),
+    )

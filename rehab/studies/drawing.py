@@ -1,0 +1,170 @@
+"""A study's results as figures and files, in the reader's language."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from django.utils.translation import gettext, ngettext
+
+from rehab.studies.analysis.outcomes import OUTCOMES
+from rehab.studies.analysis.participants import CHANNEL, by_arm
+from rehab.studies.figures.flow import Box, draw_flow
+from rehab.studies.figures.forest import Row, draw_forest
+from rehab.studies.figures.learning import PhaseLabel, Words, draw_curves
+from rehab.studies.figures.people import draw_people
+from rehab.studies.results import (
+    Results,
+    curve_rows,
+    difference_rows,
+    flow_rows,
+    outcome_rows,
+    phase_rows,
+)
+
+LONG = 18  # letters of a name of which two fit on a line
+
+
+def outcome_label(slug: str) -> str:
+    """Return an outcome's name, translated; a further channel's is its own."""
+    if slug.startswith(CHANNEL):
+        return slug.removeprefix(CHANNEL)
+    return gettext(OUTCOMES[slug][0])
+
+
+def outcome_unit(slug: str) -> str:
+    """Return an outcome's unit, translated; "" for ratios."""
+    unit = "%" if slug.startswith(CHANNEL) else OUTCOMES[slug][1]
+    return gettext(unit) if unit else ""
+
+
+def draw_learning(results: Results) -> str:
+    """Return the curves of learning and retention."""
+    words = Words(
+        gettext("Learning and retention, with 95 % bands"),
+        gettext("% of baseline"),
+        gettext("blocks of 10 strides"),
+        gettext("Visit {number}"),
+    )
+    return draw_curves(results.curves, results.arms, _phases(results), words)
+
+
+def _phases(results: Results) -> list[PhaseLabel]:
+    """Return the phases by their index, as the first participant with them walked them."""
+    found: dict[int, PhaseLabel] = {}
+    for one in results.participants:
+        for visit in one.visits:
+            for phase in visit.phases:
+                label = PhaseLabel(gettext(phase["name"]), phase["feedback"])
+                found.setdefault(phase["phase"], label)
+    return [found.get(index, PhaseLabel("", True)) for index in range(max(found, default=-1) + 1)]
+
+
+def draw_primary(results: Results) -> str:
+    """Return every participant's primary outcome, by arm."""
+    slug = results.study.primary_outcome
+    label, unit = outcome_label(slug), outcome_unit(slug)
+    values = by_arm(results.participants, list(results.arms), slug)
+    axis = f"{label} ({unit})" if unit else label
+    crossed = results.study.crossover
+    return draw_people(results.find(slug), values, results.arms, label, axis, joined=crossed)
+
+
+def draw_registered(results: Results) -> str:
+    """Return the effect sizes of the registered outcomes."""
+    return _forest(results, results.registered, gettext("Registered outcomes"))
+
+
+def draw_exploratory(results: Results) -> str:
+    """Return the effect sizes of all other outcomes."""
+    return _forest(results, results.exploratory, gettext("Exploratory outcomes"))
+
+
+def _forest(results: Results, slugs: Iterable[str], title: str) -> str:
+    rows = []
+    for slug in slugs:
+        primary = slug == results.study.primary_outcome
+        label = outcome_label(slug)
+        heading = gettext("%(outcome)s (primary)") % {"outcome": label} if primary else label
+        rows.append(Row(heading))
+        rows += [
+            Row(name_pair(results, one.group, one.reference), one, strong=primary)
+            for one in results.find(slug).differences
+        ]
+    return draw_forest(rows, title, gettext("effect size (Hedges’ g) with its 95 % interval"))
+
+
+def name_pair(results: Results, group: str, reference: str) -> str:
+    """Return two arms as a difference; by their codes where names are long."""
+    names = [results.arms[arm] for arm in (group, reference)]
+    if max(map(len, results.arms.values())) > LONG:
+        names = [name.partition(":")[0] for name in names]
+    return " − ".join(names)
+
+
+def draw_consort(results: Results) -> str:
+    """Return the flow of participants."""
+    columns = []
+    for one in results.flow:
+        left = [gettext("%(count)d left the study") % {"count": one.left}] if one.left else []
+        if one.removed:
+            left.append(gettext("%(count)d had agreed to removal") % {"count": one.removed})
+        told = {"walked": one.visits_walked, "planned": one.visits_planned}
+        columns.append(
+            [
+                Box(results.arms[one.arm], (_n(gettext("allocated"), one.allocated),)),
+                Box(
+                    _n(gettext("began"), one.began),
+                    (
+                        gettext("%(walked)d of %(planned)d visits walked") % told,
+                        _n(gettext("all visits"), one.completed),
+                        *left,
+                    ),
+                ),
+                Box(_n(gettext("analyzed"), one.analyzed)),
+            ]
+        )
+    total = len(results.participants)
+    taken = ngettext("%(count)d participant allocated", "%(count)d participants allocated", total)
+    return draw_flow(Box(taken % {"count": total}), columns, gettext("Flow of participants"))
+
+
+def _n(words: str, count: int) -> str:
+    return f"{words}: n = {count}"
+
+
+FIGURES: dict[str, Callable[[Results], str]] = {
+    "learning": draw_learning,
+    "primary": draw_primary,
+    "registered": draw_registered,
+    "exploratory": draw_exploratory,
+    "flow": draw_consort,
+}
+TABLES: dict[str, Callable[[Results], Iterable[dict[str, Any]]]] = {
+    "outcomes": outcome_rows,
+    "phases": phase_rows,
+    "differences": difference_rows,
+    "curves": curve_rows,
+    "flow": flow_rows,
+}
+
+
+def write_table(rows: Iterable[dict[str, Any]]) -> str:
+    """Return rows as CSV with a heading; numbers with a point, what is missing empty."""
+    text = io.StringIO()
+    writer: csv.DictWriter[str] | None = None
+    for row in rows:
+        if writer is None:
+            writer = csv.DictWriter(text, list(row), lineterminator="\n")
+            writer.writeheader()
+        writer.writerow({name: _cell(value) for name, value in row.items()})
+    return text.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    """Return a cell; text that a spreadsheet would take for a formula gets a quote before it."""
+    if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t"):
+        return f"'{value}"
+    return value

@@ -1,0 +1,153 @@
+"""Curves of learning and retention: each arm's mean with its band, visit by visit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+from rehab.studies.analysis.curves import Point
+from rehab.studies.figures.canvas import COLORS, GRID, INK, MUTED, QUIET, Canvas, number, ticks
+
+WIDTH, HEIGHT = 1000.0, 450.0
+LEFT, RIGHT, BOTTOM, BETWEEN = 62.0, 16.0, 54.0, 18.0
+
+
+@dataclass(frozen=True, slots=True)
+class PhaseLabel:
+    """A phase on the axis: its name, and whether it gives feedback."""
+
+    name: str
+    feedback: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """What a figure says, in the reader's language."""
+
+    title: str
+    y_axis: str
+    x_axis: str
+    visit: str  # with a place for its number: "Visit {number}"
+
+
+def draw_curves(
+    curves: Mapping[str, Sequence[Point]],
+    labels: Mapping[str, str],
+    phases: Sequence[PhaseLabel],
+    words: Words,
+) -> str:
+    """Return the figure. ``curves`` and ``labels`` by arm, in the order of the arms."""
+    everything = [point for points in curves.values() for point in points]
+    canvas = Canvas(WIDTH, HEIGHT, words.title)
+    foot = canvas.legend(LEFT, 26, [labels[arm] for arm in curves], dashed=True)
+    if not everything:
+        return canvas.to_text()
+    seen = [value for point in everything for value in (point.mean, point.low, point.high) if value]
+    levels = ticks(min(*seen, 95.0), max(*seen, 105.0))
+    top, bottom = foot + 52, HEIGHT - BOTTOM
+    places = _lay_out(everything, words)
+
+    def y(value: float) -> float:
+        return bottom - (bottom - top) * (value - levels[0]) / (levels[-1] - levels[0])
+
+    _draw_ground(canvas, places, phases, top, bottom)
+    for level in levels:
+        strong = level == 100
+        canvas.line(
+            LEFT, y(level), WIDTH - RIGHT, y(level), MUTED if strong else GRID, 1 + strong / 2
+        )
+        canvas.words(LEFT - 8, y(level) + 5, number(level), size=14, anchor="end", color=MUTED)
+    canvas.words(LEFT - 8, top - 12, words.y_axis, size=14, color=MUTED, anchor="start")
+    canvas.words(WIDTH - RIGHT, HEIGHT - 10, words.x_axis, size=14, anchor="end", color=MUTED)
+    for arm, points in enumerate(curves.values()):
+        for run in _runs(points):
+            _draw_band(canvas, arm, [(places.x(point), point) for point in run], y)
+    for arm, points in enumerate(curves.values()):
+        for run in _runs(points):
+            path = "M" + "L".join(f"{places.x(p):.1f} {y(p.mean):.1f}" for p in run)
+            canvas.stroke(path if len(run) > 1 else path + "h.1", arm)
+            for point in run[:: max(1, len(run) // 6)]:
+                canvas.mark(places.x(point), y(point.mean), arm, 4)
+    return canvas.to_text()
+
+
+@dataclass(frozen=True, slots=True)
+class _Places:
+    """Where bins lie: the first x and the count of bins of each visit's phases."""
+
+    starts: dict[tuple[int, int], tuple[float, int]]
+    step: float
+    visits: dict[int, str]
+
+    def x(self, point: Point) -> float:
+        start, _bins = self.starts[point.place.visit, point.place.phase]
+        return start + (point.place.bin + 0.5) * self.step
+
+
+def _lay_out(points: Sequence[Point], words: Words) -> _Places:
+    bins: dict[tuple[int, int], int] = {}
+    for point in points:
+        key = point.place.visit, point.place.phase
+        bins[key] = max(bins.get(key, 0), point.place.bin + 1)
+    visits = sorted({visit for visit, _phase in bins})
+    room = WIDTH - LEFT - RIGHT - BETWEEN * (len(visits) - 1)
+    step = room / sum(bins.values())
+    starts, x = {}, LEFT
+    for visit in visits:
+        for key in sorted(key for key in bins if key[0] == visit):
+            starts[key] = (x, bins[key])
+            x += step * bins[key]
+        x += BETWEEN
+    shown = {visit: words.visit.format(number=visit + 1) for visit in visits}
+    return _Places(starts, step, shown)
+
+
+def _draw_ground(
+    canvas: Canvas, places: _Places, phases: Sequence[PhaseLabel], top: float, bottom: float
+) -> None:
+    """Shade what was walked without feedback, and name visits and phases that are wide enough."""
+    for (visit, phase), (x, bins) in places.starts.items():
+        told, wide = phases[phase], bins * places.step
+        if not told.feedback:
+            canvas.add(
+                "rect",
+                x=round(x, 1),
+                y=round(top, 1),
+                width=round(wide, 1),
+                height=round(bottom - top, 1),
+                fill=QUIET,
+            )
+        if wide > 7.6 * len(told.name):
+            middle = x + wide / 2
+            canvas.words(middle, bottom + 18, told.name, size=13, anchor="middle", color=MUTED)
+        if phase == 0 and len(places.visits) > 1:
+            canvas.words(x, top - 32, places.visits[visit], size=15, color=INK, weight="700")
+
+
+def _runs(points: Sequence[Point]) -> list[list[Point]]:
+    """Return the points that a line joins: those of one phase, without a hole."""
+    numbered = enumerate(points)
+    return [
+        [point for _index, point in run]
+        for _key, run in groupby(
+            numbered,
+            key=lambda pair: (
+                pair[1].place.visit,
+                pair[1].place.phase,
+                pair[1].place.bin - pair[0],
+            ),
+        )
+    ]
+
+
+def _draw_band(
+    canvas: Canvas, arm: int, run: list[tuple[float, Point]], y: Callable[[float], float]
+) -> None:
+    told = [(x, p.low, p.high) for x, p in run if p.low is not None and p.high is not None]
+    if len(told) < 2:
+        return
+    upper = [f"{x:.1f} {y(high):.1f}" for x, _low, high in told]
+    lower = [f"{x:.1f} {y(low):.1f}" for x, low, _high in reversed(told)]
+    path = "M" + "L".join([*upper, *lower]) + "Z"
+    canvas.add("path", d=path, fill=COLORS[arm % len(COLORS)], opacity=0.15)

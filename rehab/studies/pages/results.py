@@ -1,0 +1,122 @@
+"""A study's results: figures and tables, for who may look."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.core.exceptions import PermissionDenied
+from django.http import Http404, HttpRequest, HttpResponse
+from django.shortcuts import render
+from django.utils import timezone
+from django.utils.safestring import mark_safe
+from django.views.decorators.http import require_safe
+
+from rehab.people.access import for_roles, user_of
+from rehab.people.audit import audit_log
+from rehab.people.audit.audit_log import Act
+from rehab.people.models import User
+from rehab.people.roles import Role
+from rehab.sessions.formatting import format_number
+from rehab.studies.analysis.comparison import Interval
+from rehab.studies.drawing import (
+    FIGURES,
+    TABLES,
+    name_pair,
+    outcome_label,
+    outcome_unit,
+    write_table,
+)
+from rehab.studies.models import Study, StudyState
+from rehab.studies.pages.planning import get_study
+from rehab.studies.results import Results, may_look, note_look, read_results
+
+
+def _open(request: HttpRequest, study_id: int) -> tuple[Study, User]:
+    """Return a study whose results a user may see now. Raises PermissionDenied, Http404."""
+    user = user_of(request)
+    study = get_study(user, study_id)
+    if not may_look(study, user):
+        raise PermissionDenied
+    return study, user
+
+
+@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
+@require_safe
+def show_results(request: HttpRequest, study_id: int) -> HttpResponse:
+    """Show what a study found. A look before its end is recorded."""
+    study, user = _open(request, study_id)
+    now = timezone.now()
+    note_look(study, user, now)
+    results = read_results(study, now)
+    context = {
+        "study": study,
+        "interim": study.state != StudyState.CLOSED,
+        "figures": {name: _inline(draw(results)) for name, draw in FIGURES.items()},
+        "registered": [_describe(results, slug) for slug in results.registered],
+        "exploratory": [_describe(results, slug) for slug in results.exploratory],
+        "tables": list(TABLES),
+    }
+    return render(request, "studies/results.html", context)
+
+
+def _inline(svg: str) -> str:
+    return mark_safe(svg)  # noqa: S308 (drawn by `figures`, which escapes every text)
+
+
+def _describe(results: Results, slug: str) -> dict[str, Any]:
+    """Return an outcome as the page's table has it."""
+    found, unit = results.find(slug), outcome_unit(slug)
+    return {
+        "label": outcome_label(slug),
+        "unit": unit,
+        "primary": slug == results.study.primary_outcome,
+        "arms": [
+            {
+                "label": results.arms[one.arm],
+                "count": one.participants,
+                "missing": one.missing,
+                "mean": _told(one.mean, unit),
+            }
+            for one in found.arms
+        ],
+        "differences": [
+            {
+                "label": name_pair(results, one.group, one.reference),
+                "paired": one.paired,
+                "difference": _told(one.difference, unit),
+                "effect": _told(one.effect, ""),
+            }
+            for one in found.differences
+        ],
+    }
+
+
+def _told(interval: Interval | None, unit: str) -> dict[str, str] | None:
+    if interval is None:
+        return None
+    places = 1 if unit else 2
+    low, high = (format_number(end, places) for end in (interval.low, interval.high))
+    told = format_number(interval.estimate, places)
+    within = "" if interval.low is None else f"{low} … {high}"
+    return {"estimate": f"{told} {unit}".strip(), "within": within}
+
+
+@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
+@require_safe
+def download_results(request: HttpRequest, study_id: int) -> HttpResponse:
+    """Return a figure as SVG, or the data behind the figures as CSV: the ``file`` of that name."""
+    study, user = _open(request, study_id)
+    name, _point, kind = request.GET.get("file", "outcomes.csv").partition(".")
+    if name not in {"svg": FIGURES, "csv": TABLES}.get(kind, {}):
+        raise Http404
+    now = timezone.now()
+    note_look(study, user, now)
+    audit_log.record(Act.EXPORT, user, about=f"{study.code} {name}.{kind}", now=now)
+    results = read_results(study, now)
+    if kind == "svg":
+        response = HttpResponse(FIGURES[name](results), content_type="image/svg+xml")
+    else:
+        text = write_table(TABLES[name](results))
+        response = HttpResponse(text, content_type="text/csv; charset=utf-8")
+    response["Content-Disposition"] = f'attachment; filename="{study.code}-{name}.{kind}"'
+    return response

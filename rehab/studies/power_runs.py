@@ -1,0 +1,162 @@
+"""Power by simulation: what was asked, and what the studies that were simulated so far found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime, timedelta
+from typing import Any, ClassVar
+
+from django.db import models
+from django.utils import timezone
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.models import User
+from rehab.people.scope import Scope, ScopedModel
+from rehab.studies.models import Study
+from rehab.studies.simulation.power import Found, PairPower, simulate_from, summarize
+from rehab.studies.simulation.trial import Trial, walkable
+from rehab.studies.simulation.walkers import Population
+from rehab.training.goals import GoalRule
+from rehab.training.measures import A2, InvalidSetting
+from rehab.training.plans import SessionPlan
+from rehab.training.steps import Side
+from rehab.training.valences import find_valence
+
+SIMULATIONS_MAX = 5000
+STORED_EVERY_S = 3.0  # so much work is lost at most
+STALLED_AFTER = timedelta(seconds=60)  # of a run that nobody has written to since
+
+
+class PowerRun(ScopedModel):
+    """Studies simulated from seeds 0, 1, 2 …, each once: whoever goes on begins where it stopped.
+
+    ``settings``: what `build_trial` reads. ``found``: by seed, what each comparison of arms found.
+    """
+
+    scope = Scope(clinic="study__clinic")
+
+    study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="power_runs")
+    by = models.ForeignKey(User, on_delete=models.SET_NULL, related_name="+", null=True)
+    at = models.DateTimeField(default=timezone.now)
+    settings = models.JSONField()
+    simulations = models.PositiveIntegerField(_("simulated studies"))
+    found = models.JSONField(default=dict)
+    worked_at = models.DateTimeField(null=True)
+    trouble = models.TextField(blank=True)
+
+    class Meta(ScopedModel.Meta):
+        verbose_name = _("power simulation")
+        ordering: ClassVar = ["-pk"]
+
+    def __str__(self) -> str:
+        return f"{self.study.code}: {self.simulations}"
+
+    @property
+    def done(self) -> int:
+        """How many studies are simulated."""
+        return len(self.found)
+
+    @property
+    def assumptions(self) -> str:
+        """From which seeds it simulates, and what it assumes, in words."""
+        names = ("sd_percent", "kept_percent", "dropout_percent")
+        told = {name: f"{self.settings[name]:g}" for name in names}
+        words = gettext(
+            "Seeds 0 to %(last)d; people differ by %(sd_percent)s %%, washout keeps "
+            "%(kept_percent)s %%, %(dropout_percent)s %% leave before each visit. Pairs are not "
+            "corrected for their number."
+        )
+        return words % (told | {"last": self.simulations - 1})
+
+    @property
+    def is_done(self) -> bool:
+        """Whether all are."""
+        return self.done >= self.simulations
+
+    def is_working(self, now: datetime) -> bool:
+        """Return whether somebody simulates for it now."""
+        if self.is_done or self.trouble or self.worked_at is None:
+            return False
+        return now - self.worked_at < STALLED_AFTER
+
+    @property
+    def power(self) -> list[PairPower]:
+        """What the simulated studies found, for each pair of arms."""
+        return summarize([Found(*row) for rows in self.found.values() for row in rows])
+
+    def build_trial(self) -> Trial:
+        """Return the study to simulate. Raises InvalidSetting."""
+        return build_trial(self.study, self.settings)
+
+
+def build_trial(study: Study, settings: dict[str, Any]) -> Trial:
+    """Return a study as it is simulated. Raises InvalidSetting for one that cannot be.
+
+    All arms walk the first one's phases, so that what was typed in is the whole difference between
+    them. Simulated people push with A2, in units of their baseline.
+    """
+    arms = list(study.arms.select_related("protocol", "measure"))
+    groups = study.groups()
+    plan = walkable(
+        SessionPlan(
+            measure=A2,
+            valence=find_valence(arms[0].valence),
+            phases=arms[0].phases(),
+            trained_side=Side.LEFT,
+            goal=GoalRule(percent_of_baseline=study.goal_percent),
+        )
+    )
+    effects = {arm.code: float(settings["effects"].get(arm.code, 0.0)) for arm in arms}
+    if not any(effects.values()):
+        raise InvalidSetting(gettext("Give an arm an effect: power is the chance to find it."))
+    return Trial(
+        plans={arm.code: plan for arm in arms},
+        effects=effects,
+        groups=groups,
+        participants=settings["participants"],
+        outcome=study.primary_outcome,
+        visits=study.visits,
+        population=Population(
+            settings["sd_percent"],
+            settings["kept_percent"] / 100,
+            settings["dropout_percent"] / 100,
+        ),
+    )
+
+
+def plan_run(
+    study: Study, settings: dict[str, Any], simulations: int, by: User | None, now: datetime
+) -> PowerRun:
+    """Store what is to be simulated. Raises InvalidSetting for what cannot be."""
+    if not 1 <= simulations <= SIMULATIONS_MAX:
+        message = gettext("Simulate 1 to %(most)d studies.")
+        raise InvalidSetting(message % {"most": SIMULATIONS_MAX})
+    build_trial(study, settings)
+    return PowerRun.everywhere.create(
+        study=study, settings=settings, simulations=simulations, by=by, at=now
+    )
+
+
+def work(run: PowerRun) -> Iterator[PowerRun]:
+    """Simulate what a run still lacks, and yield it each time something is stored.
+
+    Raises InvalidSetting, and notes it, where the study cannot be simulated any more.
+    """
+    try:
+        trial = run.build_trial()
+    except InvalidSetting as problem:
+        run.trouble = str(problem)
+        run.save(update_fields=["trouble"])
+        raise
+    missing = [seed for seed in range(run.simulations) if str(seed) not in run.found]
+    _store(run)
+    for seeds in simulate_from(trial, missing, STORED_EVERY_S):
+        run.found |= {str(seed): [list(one) for one in rows] for seed, rows in seeds.items()}
+        _store(run)
+        yield run
+
+
+def _store(run: PowerRun) -> None:
+    run.worked_at = timezone.now()
+    run.save(update_fields=["found", "worked_at"])

@@ -1,0 +1,268 @@
+"""A study's results, read from the logs of its sessions, and who may look at them when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import date, datetime
+from functools import cached_property
+from hashlib import sha256
+from typing import Any
+
+from django.utils.translation import gettext
+
+from rehab.people.models import User
+from rehab.people.roles import Role
+from rehab.sessions.formatting import clinic_time
+from rehab.sessions.log import Step
+from rehab.sessions.models import TrainingSession
+from rehab.studies.analysis.curves import Point
+from rehab.studies.analysis.outcomes import OUTCOMES
+from rehab.studies.analysis.participants import (
+    CHANNEL,
+    ArmFlow,
+    Finding,
+    Participant,
+    Visit,
+    Walked,
+    curves_by_arm,
+    find,
+    flow,
+    make_participant,
+)
+from rehab.studies.analysis.walks import COLUMNS, read_walk
+from rehab.studies.models import Study, StudyMark, StudyState, has_mark
+from rehab.studies.participants import Enrollment, StudyEvent, StudyVisit
+from rehab.studies.registration import note
+from rehab.studies.sealing import unseal
+from rehab.training.changes import State
+from rehab.training.plans import SessionPlan
+
+
+def may_look(study: Study, user: User) -> bool:
+    """Return whether somebody may see a study's results now.
+
+    Of a closed study all who see studies may; before that only who has the mark for interim looks.
+    """
+    if study.state == StudyState.CLOSED:
+        return user.role in {Role.LEAD, Role.PT, Role.RESEARCHER}
+    return study.state == StudyState.RUNNING and has_mark(study, user, StudyMark.Task.INTERIM)
+
+
+def note_look(study: Study, user: User, now: datetime) -> None:
+    """Record an interim look, once a day and person; the study's events tell it."""
+    if study.state == StudyState.CLOSED:
+        return
+    today = clinic_time(now, study.clinic).date()
+    looks = StudyEvent.everywhere.filter(study=study, kind=StudyEvent.Kind.LOOKED, by=user)
+    last = looks.order_by("-at").first()
+    if last is None or clinic_time(last.at, study.clinic).date() != today:
+        note(study, StudyEvent.Kind.LOOKED, user, now)
+
+
+@dataclass(frozen=True)
+class Results:
+    """What a study found, as far as it was walked.
+
+    Attributes
+    ----------
+    study, participants
+        The study, and everybody who was ever taken in.
+    arms
+        The arms' codes with the labels by which they are told, in the order in which they are told.
+    """
+
+    study: Study
+    participants: tuple[Participant, ...]
+    arms: dict[str, str]
+
+    @property
+    def registered(self) -> tuple[str, ...]:
+        """Slugs of the registered outcomes, the primary one first."""
+        others = (slug for slug in self.study.secondary_outcomes if slug in OUTCOMES)
+        return tuple(dict.fromkeys((self.study.primary_outcome, *others)))
+
+    @cached_property
+    def exploratory(self) -> tuple[str, ...]:
+        """Slugs of all other outcomes that anybody has."""
+        found = {slug for one in self.participants for v in one.visits for slug in v.outcomes}
+        rest = [slug for slug in OUTCOMES if slug in found and slug not in self.registered]
+        return (*rest, *sorted(slug for slug in found if slug.startswith(CHANNEL)))
+
+    @cached_property
+    def _findings(self) -> dict[str, Finding]:
+        return {}
+
+    def find(self, slug: str) -> Finding:
+        """Return what was found of an outcome."""
+        if slug not in self._findings:
+            arms, crossed = list(self.arms), self.study.crossover
+            self._findings[slug] = find(self.participants, arms, slug, crossover=crossed)
+        return self._findings[slug]
+
+    @cached_property
+    def curves(self) -> dict[str, list[Point]]:
+        """The mean curve of each arm, by its code."""
+        return curves_by_arm(self.participants, list(self.arms))
+
+    @cached_property
+    def flow(self) -> tuple[ArmFlow, ...]:
+        """How many were allocated to each arm, and what became of them."""
+        return flow(self.participants, list(self.arms), self.study.primary_outcome)
+
+
+def label_arms(study: Study) -> dict[str, str]:
+    """Return the arms' codes with their labels: names once the study is closed.
+
+    Before, groups are numbered in an order that the sealed seed draws: whoever looks early sees
+    that groups differ, not which one is which.
+    """
+    arms = list(study.arms.all())
+    if study.state == StudyState.CLOSED:
+        return {arm.code: str(arm) for arm in arms}
+    seed = unseal(study.sealed).seed
+    arms.sort(key=lambda arm: sha256(f"{seed}/{arm.code}".encode()).digest())
+    return {
+        arm.code: gettext("Group %(number)d") % {"number": number}
+        for number, arm in enumerate(arms, start=1)
+    }
+
+
+def read_results(study: Study, now: datetime) -> Results:
+    """Return a study's results. ``now`` says which visits are due."""
+    enrollments = study.enrollments.select_related("allocation", "clinic", "patient").order_by("pk")
+    participants = tuple(_read(one, clinic_time(now, study.clinic).date()) for one in enrollments)
+    return Results(study, participants, label_arms(study))
+
+
+def _read(enrollment: Enrollment, today: date) -> Participant:
+    group = enrollment.allocation.group.split("-")
+    planned = [
+        (
+            Visit(
+                visit.number, group[visit.period], visit.session is not None or visit.day <= today
+            ),
+            _walked(enrollment, visit),
+        )
+        for visit in latest_attempts(enrollment)
+    ]
+    return make_participant(
+        enrollment.code,
+        planned,
+        has_left=enrollment.withdrawn_at is not None,
+        is_analyzed=enrollment.is_analyzed,
+    )
+
+
+def latest_attempts(enrollment: Enrollment) -> list[StudyVisit]:
+    """Return the last attempt at each planned visit, in their order."""
+    visits = enrollment.visits.select_related("session").order_by("number", "attempt")
+    return list({visit.number: visit for visit in visits}.values())
+
+
+def _walked(enrollment: Enrollment, visit: StudyVisit) -> Walked | None:
+    """Return what a visit gave; None of one that does not count, or was corrected away."""
+    session = visit.session
+    if session is None or session.state != State.FINISHED or session.excluded:
+        return None
+    if session.patient_id != enrollment.patient_id or not enrollment.is_analyzed:
+        return None
+    return read_walked(session)
+
+
+def read_walked(session: TrainingSession) -> Walked:
+    """Return a finished session's strides and metrics."""
+    plan = SessionPlan.from_json(session.plan)
+    metrics = dict(session.metrics.values_list("slug", "value"))
+    rows = Step.everywhere.filter(session=session, side=session.trained_side).order_by("number")
+    walk = read_walk(
+        plan.phases,
+        rows.values_list(*COLUMNS).iterator(),
+        higher_is_better=plan.measure.higher_is_better,
+    )
+    return Walked(walk, metrics)
+
+
+def outcome_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """Yield one row for each participant, visit and outcome: missing ones are empty."""
+    slugs = (*results.registered, *results.exploratory)
+    for one in results.participants:
+        if not one.is_analyzed:
+            continue
+        for visit in one.visits:
+            for slug in slugs:
+                yield {
+                    "participant": one.code,
+                    "group": results.arms[visit.arm],
+                    "visit": visit.number,
+                    "outcome": slug,
+                    "status": _status(results, slug),
+                    "value": visit.outcomes.get(slug),
+                }
+
+
+def _status(results: Results, slug: str) -> str:
+    if slug == results.study.primary_outcome:
+        return "primary"
+    return "secondary" if slug in results.registered else "exploratory"
+
+
+def phase_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """Yield one row for each participant, visit and phase."""
+    for one in results.participants:
+        if not one.is_analyzed:
+            continue
+        for visit in one.visits:
+            head = {
+                "participant": one.code,
+                "group": results.arms[visit.arm],
+                "visit": visit.number,
+            }
+            for phase in visit.phases:
+                yield head | phase
+
+
+def difference_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """Yield one row for each outcome and pair of groups."""
+    for slug in (*results.registered, *results.exploratory):
+        for found in results.find(slug).differences:
+            yield {
+                "outcome": slug,
+                "status": _status(results, slug),
+                "group": results.arms[found.group],
+                "reference": results.arms[found.reference],
+                "participants": found.participants[0],
+                "participants_reference": found.participants[1],
+                "paired": found.paired,
+                "difference": found.difference.estimate,
+                "low_95": found.difference.low,
+                "high_95": found.difference.high,
+                "hedges_g": found.effect and found.effect.estimate,
+                "g_low_95": found.effect and found.effect.low,
+                "g_high_95": found.effect and found.effect.high,
+            }
+
+
+def curve_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """Yield one row for each point of each group's curve, in percent of the baseline."""
+    for arm, points in results.curves.items():
+        for point in points:
+            yield {
+                "group": results.arms[arm],
+                "visit": point.place.visit + 1,
+                "phase": point.place.phase + 1,
+                "block_of_10": point.place.bin + 1,
+                "participants": point.participants,
+                "percent_of_baseline": point.mean,
+                "low_95": point.low,
+                "high_95": point.high,
+            }
+
+
+def flow_rows(results: Results) -> Sequence[dict[str, Any]]:
+    """Return one row for each group of the flow of participants."""
+    names = [name for name in ArmFlow.__slots__ if name != "arm"]
+    return [
+        {"group": results.arms[one.arm]} | {name: getattr(one, name) for name in names}
+        for one in results.flow
+    ]

@@ -1,0 +1,1 @@
+"""Simulated studies: patients that answer feedback, with an effect of each arm put in."""

@@ -1,0 +1,152 @@
+"""A simulated study by the pure fold: no database, the same figures as by the real path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import date
+from operator import attrgetter
+
+from rehab.sources.synthetic import SyntheticWalker
+from rehab.studies.allocation.crossover import VisitPlan
+from rehab.studies.allocation.groups import Allocated, Group
+from rehab.studies.allocation.scheme import Method, Scheme, Secret
+from rehab.studies.analysis.comparison import Difference, compare
+from rehab.studies.analysis.participants import (
+    Participant,
+    Visit,
+    Walked,
+    by_arm,
+    make_participant,
+)
+from rehab.studies.analysis.walks import COLUMNS, read_walk
+from rehab.studies.simulation.walkers import ENDLESS, Person, Population, draw_person, walk_through
+from rehab.training.changes import Change, ChangeKind
+from rehab.training.fold import SessionFold
+from rehab.training.measures import InvalidSetting
+from rehab.training.metrics import compute_metrics
+from rehab.training.plans import SessionPlan
+
+PARTICIPANTS_MAX = 2000
+EFFECT_MAX = 100.0
+A_DAY = date(2026, 1, 1)  # days do not matter to simulated people
+of_columns = attrgetter(*COLUMNS)
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A study to simulate.
+
+    Attributes
+    ----------
+    plans
+        What each arm's sessions are scored with, by the arm's code.
+    effects
+        What each arm truly adds to training [% of the baseline].
+    groups
+        What is allocated: an arm, or arms in an order.
+    participants, visits
+        How many people, and visits of each in each period.
+    outcome
+        Slug of the primary outcome.
+    population
+        How people differ.
+    block_sizes
+        Of the permuted blocks.
+
+    Raises
+    ------
+    InvalidSetting
+        For what could not be simulated.
+    """
+
+    plans: Mapping[str, SessionPlan]
+    effects: Mapping[str, float]
+    groups: tuple[Group, ...]
+    participants: int
+    outcome: str
+    visits: int = 1
+    population: Population = field(default_factory=Population)
+    block_sizes: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not 2 <= self.participants <= PARTICIPANTS_MAX:
+            raise InvalidSetting("Simulate 2 to {most} participants.", most=PARTICIPANTS_MAX)
+        if any(abs(effect) > EFFECT_MAX for effect in self.effects.values()):
+            raise InvalidSetting("An arm adds at most 100 % of the baseline.")
+        VisitPlan(self.visits)
+        for plan in self.plans.values():
+            if any(phase.strides is None and phase.seconds is None for phase in plan.phases):
+                raise InvalidSetting(ENDLESS)
+        self.scheme.check_secret(self.secret(0))
+
+    @property
+    def is_crossover(self) -> bool:
+        """Whether everybody walks every arm."""
+        return len(self.groups[0].arms) > 1
+
+    @property
+    def scheme(self) -> Scheme:
+        """How participants are allocated."""
+        return Scheme(self.groups, Method.BLOCKS)
+
+    def secret(self, seed: int) -> Secret:
+        """Return what a seed's participants are allocated by."""
+        share = sum(group.weight for group in self.groups)
+        return Secret(f"simulated {seed:012}", self.block_sizes or (share,))
+
+    def allocate(self, seed: int) -> Iterator[tuple[Person, str]]:
+        """Yield the participants with their groups."""
+        scheme, secret = self.scheme, self.secret(seed)
+        earlier: list[Allocated] = []
+        periods = len(self.groups[0].arms)
+        for number in range(1, self.participants + 1):
+            group = scheme.allocate(secret, earlier, ())
+            earlier.append(Allocated((), group))
+            yield draw_person(seed, number, self.population, periods * self.visits), group
+
+
+def walkable(plan: SessionPlan) -> SessionPlan:
+    """Return a plan without rests: nobody waits for simulated people."""
+    return replace(plan, phases=tuple(replace(phase, rest_s=None) for phase in plan.phases))
+
+
+def walk_by_fold(plan: SessionPlan, walker: SyntheticWalker) -> Walked:
+    """Return one session, scored by the rules alone."""
+    fold = SessionFold(plan)
+    fold.change(Change(ChangeKind.START))
+    steps = [fold.step(stride) for stride in walk_through(walker, fold)]
+    fold.change(Change(ChangeKind.FINISH))
+    rows = (of_columns(step) for step in steps if step.side is plan.trained_side)
+    better = plan.measure.higher_is_better
+    return Walked(read_walk(plan.phases, rows, higher_is_better=better), compute_metrics(fold))
+
+
+def simulate(trial: Trial, seed: int) -> list[Participant]:
+    """Return a study's participants with all that they walked. The same seed gives the same."""
+    visit_plan = VisitPlan(trial.visits)
+    participants = []
+    for number, (person, group) in enumerate(trial.allocate(seed), start=1):
+        arms = group.split("-")
+        planned: list[tuple[Visit, Walked | None]] = []
+        for visit in visit_plan.plan(len(arms), A_DAY):
+            arm = arms[visit.period]
+            has_left = 0 < person.leaves_before <= visit.number
+            walked = None
+            if not has_left:
+                kept = trial.population.kept
+                walker = person.at_visit(visit.number, trial.effects[arm], kept)
+                walked = walk_by_fold(trial.plans[arm], walker)
+            planned.append((Visit(visit.number, arm), walked))
+        participants.append(
+            make_participant(f"{number:03}", planned, has_left=person.leaves_before > 0)
+        )
+    return participants
+
+
+def differences(
+    trial: Trial, participants: Sequence[Participant], slug: str = ""
+) -> list[Difference]:
+    """Return the differences between all pairs of arms in an outcome (the primary one)."""
+    groups = by_arm(participants, list(trial.plans), slug or trial.outcome)
+    return compare(groups, paired=trial.is_crossover)

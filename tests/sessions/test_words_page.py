@@ -1,0 +1,63 @@
+"""Words edited for one session: from the next step there, and nowhere else."""
+
+from __future__ import annotations
+
+import pytest
+from django.urls import reverse
+
+from rehab.people.roles import Role
+from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.log import SessionEvent
+from rehab.sessions.services import SessionRequest, change_session, create_session
+from rehab.training.changes import ChangeKind
+from rehab.training.goals import GoalRule
+from rehab.training.phases import make_phase
+from tests.support.world import client_of, signed_in
+
+pytestmark = pytest.mark.django_db(transaction=True)  # the writer has its own connection
+
+
+def begin(world):
+    session = create_session(
+        SessionRequest(
+            patient=world.patient,
+            valence="positive",
+            goal=GoalRule(value=2.0),
+            phases=[make_phase("training")],
+        )
+    )
+    change_session(session, ChangeKind.START)
+    session.refresh_from_db()
+    return session
+
+
+def words_of(session):
+    return [band.words for band in SessionAggregate.load(session).fold.valence.bands]
+
+
+def test_words_of_one_session_change_there_alone_and_who_did_it_is_logged(world):
+    session, other = begin(world), begin(world)
+    before, url = words_of(session), reverse("words", args=[session.pk])
+    sent = {f"words_{number}": words for number, words in enumerate(before)}
+    answer = client_of(world).post(url, sent | {"words_0": "Push, Ana!"})
+    assert answer["Location"] == reverse("monitor", args=[session.pk])
+    assert words_of(session) == ["Push, Ana!", *before[1:]]
+    assert words_of(other) == before
+    event = SessionEvent.everywhere.get(session=session, kind=ChangeKind.FEEDBACK_TEXT)
+    assert event.by == world.people[Role.PT]
+    page = client_of(world).get(url).content.decode()
+    assert "Push, Ana!" in page
+    assert reverse("admin:rehab_feedbacktype_changelist") in page
+
+
+def test_words_too_long_are_refused_and_an_ended_session_has_none_to_edit(world):
+    session = begin(world)
+    url = reverse("words", args=[session.pk])
+    assert (
+        "at most 60 characters"
+        in client_of(world).post(url, {"words_0": "x" * 61}).content.decode()
+    )
+    change_session(session, ChangeKind.FINISH)
+    answer = client_of(world).post(url, {"words_0": "late"}, follow=True)
+    assert "nobody reads its words any more" in answer.content.decode()
+    assert signed_in(world.people[Role.RESEARCHER]).get(url).status_code == 403

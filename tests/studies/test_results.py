@@ -1,0 +1,158 @@
+"""Results of studies: by the real path what the fold gives, told to whom they may be told."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+import pytest
+from django.urls import reverse
+
+from rehab.people.audit.audit_log import Act, AuditEntry
+from rehab.people.models import Clinic
+from rehab.people.roles import Role
+from rehab.studies.allocation.scheme import Secret
+from rehab.studies.blinding import Task, give_mark
+from rehab.studies.drawing import FIGURES, TABLES, write_table
+from rehab.studies.models import Arm
+from rehab.studies.registration import close, register, start
+from rehab.studies.results import label_arms, read_results
+from rehab.studies.sealing import seal
+from rehab.studies.simulation.example import example_trial
+from rehab.studies.simulation.study import find_or_plan, finish_study, walk_study
+from rehab.studies.simulation.trial import simulate
+from rehab.studies.simulation.walkers import Population
+from rehab.studies.visits import Place, start_session
+from rehab.training.measures import InvalidSetting
+from rehab.training.plans import SessionPlan
+from rehab.training.schedules import Schedule, ScheduleKind
+from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
+from tests.support.world import NOW, client_of
+
+pytestmark = pytest.mark.django_db
+
+
+def text_of(response) -> str:
+    return str(response.content.decode())
+
+
+def walk(trial, seed, clinic="Simulated studies"):
+    clinic, _is_new = Clinic.everywhere.get_or_create(name=clinic)
+    study = find_or_plan(clinic, trial, seed, NOW)
+    for _done in walk_study(study, trial, seed, NOW):
+        pass
+    return finish_study(study, NOW)
+
+
+def figures_of(participants):
+    """Return all that is analyzed of participants, without what they are called."""
+    return [
+        ([(v.number, v.arm, v.outcomes, v.phases) for v in one.visits], one.curves, one.has_left)
+        for one in participants
+    ]
+
+
+@pytest.mark.django_db(transaction=True)  # the writer has its own connection
+def test_three_seeds_by_the_real_path_agree_with_the_fold_to_the_last_digit():
+    trial = example_trial(4, visits=2, population=Population(dropout=0.2))
+    for seed in (1, 2, 3):
+        results = walk(trial, seed)
+        assert figures_of(results.participants) == figures_of(simulate(trial, seed))
+
+
+@pytest.mark.django_db(transaction=True)
+def test_a_simulated_study_goes_on_where_it_was_broken_off_and_writes_the_same_files():
+    trial = example_trial(4)
+    one, other = (Clinic.everywhere.create(name=name) for name in ("one", "other"))
+    study = find_or_plan(one, trial, 5, NOW)
+    next(walk_study(study, trial, 5, NOW))  # the first participant, then the power fails
+    broken, whole = walk(trial, 5, one.name), walk(trial, 5, other.name)
+    assert broken.study.enrollments.count() == 4
+    for name, draw in FIGURES.items():
+        assert draw(broken) == draw(whole), name
+    for name, rows in TABLES.items():
+        assert write_table(rows(broken)) == write_table(rows(whole)), name
+    with pytest.raises(InvalidSetting, match="has 4 participants"):
+        find_or_plan(one, example_trial(8), 5, NOW)
+
+
+# --- who may look ---------------------------------------------------------------------------------
+
+
+def test_before_the_end_only_the_marked_look_and_each_look_is_recorded(world):
+    study = running_study(world)
+    enrolled(study, new_patient(world))
+    url = reverse("study-results", args=[study.pk])
+    for role in (Role.LEAD, Role.PT, Role.RESEARCHER):
+        assert client_of(world, role).get(url).status_code == 403
+    give_mark(study, world.people[Role.RESEARCHER], Task.INTERIM, None, NOW)
+    researcher = client_of(world, Role.RESEARCHER)
+    page = text_of(researcher.get(url))
+    assert "this look is recorded" in page
+    assert "Group 1" in page
+    assert "positive" not in page.lower()
+    assert "negative" not in page.lower()
+    told = researcher.get(reverse("study-results-file", args=[study.pk]), {"file": "flow.csv"})
+    assert "positive" not in text_of(told).lower()
+    assert AuditEntry.everywhere.filter(act=Act.EXPORT, about="VAL flow.csv").count() == 1
+    assert study.events.filter(kind="looked").count() == 1  # a day
+    for role in (Role.LEAD, Role.PT):
+        assert client_of(world, role).get(url).status_code == 403
+
+
+def test_groups_are_numbered_by_the_sealed_seed_until_the_study_is_closed(world):
+    sealed = seal(Secret(SEED, (4, 8)))
+    study = running_study(world, "positive", "negative", "binary", "explicit", sealed=sealed)
+    labels = label_arms(study)
+    assert sorted(labels.values()) == [f"Group {number}" for number in (1, 2, 3, 4)]
+    assert list(labels) != ["A", "B", "C", "D"]  # of the tests' own seed
+    close(study, None, NOW)
+    assert label_arms(study)["A"] == "A: feedback positive"
+
+
+def test_of_a_closed_study_everybody_sees_names_registered_outcomes_first(world):
+    study = running_study(world, secondary_outcomes=["late_change"])
+    enrolled(study, new_patient(world))
+    close(study, None, NOW)
+    for role in (Role.LEAD, Role.PT, Role.RESEARCHER):
+        page = text_of(client_of(world, role).get(reverse("study-results", args=[study.pk])))
+        assert "feedback positive" in page
+        assert page.index("Retention in washout") < page.index("Late change")
+    assert study.events.filter(kind="looked").count() == 0
+    client = client_of(world, Role.LEAD)
+    for name in ("outcomes.csv", "learning.svg"):
+        answer = client.get(reverse("study-results-file", args=[study.pk]), {"file": name})
+        assert answer["Content-Disposition"] == f'attachment; filename="VAL-{name}"'
+    for name in ("learning.csv", "outcomes.svg", "../flow.csv", "learning"):
+        answer = client.get(reverse("study-results-file", args=[study.pk]), {"file": name})
+        assert answer.status_code == 404
+
+
+def test_visits_that_are_due_and_those_that_are_not_are_told_apart(world):
+    study = running_study(world)
+    enrolled(study, new_patient(world))
+    assert sum(one.visits_planned for one in read_results(study, NOW).flow) == 1
+    later = read_results(study, NOW + timedelta(days=1)).flow
+    assert sum(one.visits_planned for one in later) == 2
+
+
+# --- the schedule of an arm -----------------------------------------------------------------------
+
+
+def test_an_arms_schedule_is_registered_and_walked(world):
+    study = draft_study(world, "positive", "positive")
+    Arm.everywhere.filter(study=study, code="B").update(schedule="summary", schedule_steps=5)
+    version = register(study, None, NOW)
+    assert "schedule" not in version.document["arms"][0]
+    assert version.document["arms"][1]["schedule"]["interval"] == 5
+    start(study, None, NOW)
+    for number in range(2):
+        enrollment = enrolled(study, new_patient(world, number))
+        session = start_session(enrollment, Place(), None, NOW)
+        schedule = SessionPlan.from_json(session.plan).schedule
+        summary = Schedule(ScheduleKind.SUMMARY, 5)
+        expected = summary if enrollment.allocation.group == "B" else Schedule()
+        assert schedule == expected
+    lead = client_of(world, Role.LEAD)
+    assert "summary of 5 steps" in text_of(lead.get(reverse("study", args=[study.pk])))
+    told = lead.get(reverse("study-protocol-pdf", args=[study.pk])).content.decode("latin-1")
+    assert "summary" in told
