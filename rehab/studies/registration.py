@@ -77,7 +77,9 @@ def _describe_arm(study: Study, arm: Any) -> dict[str, Any]:
         trained_side=Side.LEFT,
         goal=GoalRule(percent_of_baseline=study.goal_percent),
     )
-    return {
+    # Studies that were registered before there were questionnaires keep their digest.
+    asked = arm.protocol.questionnaires
+    return ({"questionnaires": asked} if asked else {}) | {
         "code": arm.code,
         "name": arm.name,
         "weight": arm.weight,

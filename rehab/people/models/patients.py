@@ -39,6 +39,14 @@ class ScreenText(models.TextChoices):
     LARGEST = "largest", _("largest")
 
 
+class Severity(models.TextChoices):
+    """How severe the impairment of gait is, as the clinic judges it."""
+
+    MILD = "mild", _("mild")
+    MODERATE = "moderate", _("moderate")
+    SEVERE = "severe", _("severe")
+
+
 class BoardsConsent(models.TextChoices):
     """Which leaderboards a patient has agreed to stand on; each includes those before it."""
 
@@ -102,6 +110,20 @@ class Patient(ClinicModel):
         help_text=_("Needed when sensors send raw signals: A2 is power per kilogram."),
     )
     paretic_side = models.CharField(_("paretic side"), max_length=8, choices=SIDES, blank=True)
+    birth_year = models.PositiveSmallIntegerField(
+        _("year of birth"),
+        null=True,
+        blank=True,
+        validators=[MinValueValidator(1900), MaxValueValidator(2100)],
+        help_text=_("Researchers see the ten years of age alone."),
+    )
+    stroke_month = models.DateField(
+        _("month of the stroke"),
+        null=True,
+        blank=True,
+        help_text=_("Researchers see the months since then alone."),
+    )
+    severity = models.CharField(_("severity"), max_length=8, choices=Severity.choices, blank=True)
     language = models.CharField(_("language"), max_length=8, choices=LANGUAGES, default="en")
     screen_side = models.CharField(
         _("thermometer"), max_length=8, choices=ScreenSide.choices, default=ScreenSide.RIGHT

@@ -136,6 +136,8 @@ class Protocol(ClinicModel):
         validators=[MinValueValidator(1), MaxValueValidator(100)],
         help_text=_("Filled in where a session is set up with it; left empty, it stays."),
     )
+    # Slugs of what the patient is asked after a session (sessions/questionnaires.py).
+    questionnaires = models.JSONField(_("questionnaires"), default=list, blank=True)
 
     class Meta(ClinicModel.Meta):
         verbose_name = _("protocol")
