@@ -172,9 +172,10 @@ class Selection:
         for session in self.read_sessions():
             for row in responses.filter(session=session):
                 instrument, score = row.to_instrument(), row.score
-                about = (row.slug, instrument.title, row.asked_at, row.finished_at)
-                about += (instrument.language, instrument.validated)
-                head = (session.pk, session.patient.pseudonym, *about)
+                head = (
+                    *(session.pk, session.patient.pseudonym, row.slug, instrument.title),
+                    *(row.asked_at, row.finished_at, instrument.language, instrument.validated),
+                )
                 answered = zip(instrument.items, row.all_answers, strict=True)
                 for number, (item, given) in enumerate(answered, 1):
                     ends = (item.values[0], item.values[-1])

@@ -17,7 +17,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import user_of
-from rehab.people.web.admin_base import LabeledFormSet, ScopedAdmin, ScopedOptions
+from rehab.people.web.admin_base import ClinicForm, LabeledFormSet, ScopedAdmin, ScopedOptions
 from rehab.sessions.forms.initial import STRIDE_S, protocol_minutes
 from rehab.sessions.questionnaires import Questionnaire, questionnaire_choices
 from rehab.sessions.setup.gestures import robot_gesture_choices
@@ -110,7 +110,7 @@ class PhaseInline(ScopedOptions, admin.TabularInline):
         return 0 if obj else 1
 
 
-class ProtocolForm(forms.ModelForm):
+class ProtocolForm(ClinicForm):
     """A protocol; what is asked after it is chosen from what the clinic has."""
 
     clinic_id: int | None = None

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from django.db.models import QuerySet
 
@@ -160,7 +160,8 @@ class Package:
 
         A session that somebody may not see any more, or whose patient was erased, is left out.
         """
-        allowed, people = self._readable(), {}
+        allowed = self._readable()
+        people: dict[str, dict[str, Any]] = {}
         parts = []
         for key in self.keys:
             about = self._part(key) / ABOUT
