@@ -30,6 +30,7 @@ SMALLEST = """() => {
     wide: document.documentElement.scrollWidth <= innerWidth,
   };
 }"""
+NOTHING_BELOW = "() => document.documentElement.scrollHeight <= innerHeight"
 ENDED = """
 import json
 from django.utils import timezone
@@ -92,7 +93,7 @@ def test_a_patient_answers_in_spanish_with_the_largest_words(server: Server, bro
     page.set_viewport_size({"width": width, "height": height})
     page.evaluate(AXE.read_text())
     assert page.evaluate(CHECK, RULES) == []
-    assert page.evaluate("() => document.documentElement.scrollHeight <= innerHeight")
+    assert page.evaluate(NOTHING_BELOW)
 
     page.click(".scale label:nth-child(4)")
     page.keyboard.press("ArrowRight")  # by a key as by a finger
@@ -107,6 +108,7 @@ def test_a_patient_answers_in_spanish_with_the_largest_words(server: Server, bro
     for size in ("tablet-portrait", "tablet-landscape", "phone"):
         page.set_viewport_size(dict(zip(("width", "height"), SIZES[size], strict=True)))
         picture(page, f"tlx-{size}")
+        assert page.evaluate(NOTHING_BELOW), size
         assert page.evaluate(SMALLEST)["wide"], size
     for value in (5, 40, 0, 100, 55):
         page.click(f".scale label:has([value='{value}'])")

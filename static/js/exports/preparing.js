@@ -15,7 +15,7 @@ async function advance() {
 
 async function prepare() {
   const wrong = form.querySelector("[role=alert]");
-  for (let done = false; !done; ) {
+  for (let done = false; !done;) {
     try {
       done = await advance();
       wrong.hidden = true;
