@@ -25,21 +25,23 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import withdraw_consent
 from rehab.people.models import ErasureReason, Patient, User
 from rehab.people.roles import Role
+from rehab.sessions.live.aggregate import SessionAggregate
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sources.recording import read_recording
 from rehab.studies.enrolling import withdraw
 from rehab.studies.registration import close
-from rehab.studies.visits import Place, start_session
+from rehab.studies.visits import Place, next_visit, start_session
 from rehab.training.changes import Change, ChangeKind
 from rehab.training.fold import SessionFold
+from rehab.training.measures import InvalidSetting
 from rehab.training.phases import make_phase
 from rehab.training.scoring import RULES_VERSION
-from rehab.training.steps import Side
+from rehab.training.steps import Measurement, Side
 from tests.support.archives import body_of, rows_of
 from tests.support.studies import enrolled, new_patient, running_study
 from tests.support.walks import visit, walk
-from tests.support.world import NOW, client_of
+from tests.support.world import NOW, client_of, store
 
 pytestmark = pytest.mark.django_db
 
@@ -205,6 +207,35 @@ def test_data_of_who_left_go_or_stay_as_was_agreed(world, tmp_path):
     assert [row["withdrawn_at"] for row in table(files, "study_visits.csv")] == [""]
     again = unpack(export(lead, tmp_path / "y", study=study))
     assert [row["after_withdrawal"] for row in table(again, "study_visits.csv")] == ["true"]
+
+
+@pytest.mark.parametrize("keep_data", [True, False])
+def test_who_leaves_while_walking_walks_on_and_the_data_go_as_agreed(world, tmp_path, keep_data):
+    patient = new_patient(world)
+    enrollment = enrolled(running_study(world), patient, keep_data=keep_data)
+    session = start_session(enrollment, Place(), None, NOW)
+    aggregate = SessionAggregate(session)
+    store(aggregate, aggregate.change(Change(ChangeKind.START), None, NOW))
+
+    def stride(number: int) -> None:
+        stored = Measurement(number, float(number), Side.LEFT, 2.0)
+        store(aggregate, [aggregate.record_step(stored, NOW)])
+
+    stride(1)
+    withdraw(enrollment, world.people[Role.PT], NOW, reason="wants to stop the study")
+    session.refresh_from_db()
+    assert session.state == "running"
+    assert not Patient.everywhere.get(pk=patient.pk).blinded
+    stride(2)
+    store(aggregate, aggregate.change(Change(ChangeKind.FINISH), None, NOW))
+    session.refresh_from_db()
+    assert (session.state, session.steps.count()) == ("finished", 2)
+    files = unpack(export(world.people[Role.LEAD], tmp_path / "x"))
+    told = {row["session"] for row in table(files, "steps.csv")}
+    assert (str(session.pk) in told) == keep_data
+    assert next_visit(enrollment) is not None
+    with pytest.raises(InvalidSetting, match="has withdrawn"):
+        start_session(enrollment, Place(), None, NOW)
 
 
 def test_what_was_withdrawn_or_erased_after_it_was_written_is_not_given_out(world, tmp_path):
