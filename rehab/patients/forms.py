@@ -23,11 +23,6 @@ class MonthField(forms.DateField):
     widget = forms.DateInput(format="%Y-%m", attrs={"type": "month", "placeholder": "2026-03"})
     input_formats = ("%Y-%m", "%Y-%m-%d")
 
-    def to_python(self, value: Any) -> Any:
-        """Return the first day of the month."""
-        day = super().to_python(value)
-        return day and day.replace(day=1)
-
 
 class PatientForm(PatientFieldsForm):
     """A patient of the PT's clinic, new or to be edited."""

@@ -66,10 +66,11 @@ def test_the_api_has_covariates_of_patient_and_session(world):
     client = client_of(world)
     changed = client.patch(
         reverse("api:change_patient", kwargs={"patient_id": world.patient.pk}),
-        {"birth_year": 1961, "stroke_month": "2025-11-01", "severity": "mild"},
+        {"birth_year": 1961, "stroke_month": "2025-11-17", "severity": "mild"},
         content_type="application/json",
     )
     assert (changed.status_code, changed.json()["severity"]) == (200, "mild")
+    assert changed.json()["stroke_month"] == "2025-11-01"  # no day is kept
     made = client.post(
         reverse("api:add_session"),
         {

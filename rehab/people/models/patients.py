@@ -217,9 +217,14 @@ class Patient(ClinicModel):
             self.save(update_fields=fields)
 
     def clean(self) -> None:
-        """Refuse boards with others without consent, and any change to an erased patient."""
+        """Refuse boards with others without consent, and any change to an erased patient.
+
+        Of a date within the month of the stroke the day is dropped.
+        """
         if self.erased_at is not None:
             raise PatientErased
+        if self.stroke_month is not None:
+            self.stroke_month = self.stroke_month.replace(day=1)
         if self.boards == BoardsConsent.OWN or self.simulated:
             return
         has_consent = self.pk and self.consents.filter(purpose="boards", withdrawn_at=None).exists()

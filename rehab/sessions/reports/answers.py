@@ -7,6 +7,7 @@ from typing import Any
 from django.utils.translation import gettext as _
 
 from rehab.people.models import User
+from rehab.questionnaires.instrument import Scoring
 from rehab.sessions.formatting import MISSING, format_number
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import QuestionnaireResponse
@@ -41,7 +42,7 @@ def _describe(row: QuestionnaireResponse) -> dict[str, Any]:
         "title": instrument.title,
         "total": total,
         "items": items,
-        "on_paper": [] if score is not None else items[:MAX_ON_PAPER],
+        "on_paper": items[:MAX_ON_PAPER] if instrument.scoring is Scoring.NONE else [],
         "is_open": row.finished_at is None,
         "source": instrument.source,
         "license": instrument.license,
