@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, expect
 
-from tests.support.browsers import SIZES
+from tests.support.browsers import SIZES, picture
 from tests.support.servers import ROOT, Server, clean_environment
 
 pytestmark = pytest.mark.browser
@@ -55,12 +53,6 @@ token = tablet.new_token()
 tablet.save()
 print(json.dumps({"session": session.pk, "name": COOKIE, "value": token}))
 """
-
-
-def picture(page: Page, name: str) -> None:
-    """Keep a picture where somebody wants to look at it."""
-    if folder := os.environ.get("GARRY_TEST_PICTURES"):
-        page.screenshot(path=Path(folder) / f"{name}.png", full_page=True)
 
 
 def test_a_patient_answers_in_spanish_with_the_largest_words(server: Server, browser: Browser):
