@@ -18,6 +18,7 @@ from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.questionnaires import Questionnaire, QuestionnaireResponse
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Pairing, PinAttempts, Station
@@ -41,6 +42,7 @@ TRACKED = (
     FeedbackType,
     FeedbackBand,
     Preset,
+    Questionnaire,
     Leaderboard,
 )
 
@@ -74,6 +76,8 @@ __all__ = [
     "Preset",
     "Protocol",
     "ProtocolPhase",
+    "Questionnaire",
+    "QuestionnaireResponse",
     "RecoveryCode",
     "ResetRequest",
     "RobotIncident",

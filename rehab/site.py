@@ -29,6 +29,7 @@ HEADINGS = (
             "Protocol": _("The phases of a session: baseline, training, catch, washout."),
             "Gesture": _("What the robot does, composed of moves."),
             "Measure": _("What is trained: A2 and others, with their units."),
+            "Questionnaire": _("Your own questions with scales, asked after a session."),
         },
     ),
     (

@@ -24,6 +24,7 @@ PLACE = re.compile(r"\{\w+(?:![rs])?(?::[^}]*)?\}|%\(\w+\)[sdi]|%%|</?\w+>|https
 SENTENCE = 6  # words
 # The same in English and in another language.
 ALIKE = {"Borg", "Django", "Factor", "GARRY", "Robot", "Sensor", "extra", "min", "normal", "plan"}
+ALIKE |= {"questions", "questionnaire", "questionnaires", "Questionnaires"}  # in French
 ALIKE |= {"robot", "Quattrocchi 2017 (J Neurol Neurosurg Psychiatry 88:730); Paul (medRxiv)"}
 
 

@@ -20,14 +20,14 @@ from rehab.exports.tables import format_cells
 CHUNK_BYTES = 64 * 1024
 CSV_LINES = 500  # a chunk
 
-Files = Iterable[tuple[str, Iterable[str]]]
+Files = Iterable[tuple[str, Iterable[str] | Iterable[str | bytes]]]
 
 
 def write_zip(files: Files) -> Iterator[bytes]:
-    """Yield a ZIP of texts in chunks of some 64 KiB."""
+    """Yield a ZIP of texts and bytes in chunks of some 64 KiB."""
     archive = ZipStream(compress_type=ZIP_DEFLATED)
-    for name, texts in files:
-        archive.add((text.encode() for text in texts), name)
+    for name, pieces in files:
+        archive.add((each.encode() if isinstance(each, str) else each for each in pieces), name)
         yield from _join(archive.file())
     yield from _join(archive.finalize())
 

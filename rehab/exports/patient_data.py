@@ -13,7 +13,7 @@ from django.utils.translation import gettext_lazy as _
 from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.exports.archive import write_csv, write_json
 from rehab.exports.selection import Selection
-from rehab.exports.tables import TABLES, codebook_rows
+from rehab.exports.tables import CODEBOOK, TABLES, codebook_rows
 from rehab.patients.visits import Visit
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.consent.models import Consent
@@ -34,6 +34,9 @@ FILES = {
     "steps.csv": _("a row for each step"),
     "events.csv": _("a row for each thing done or noted during a session"),
     "corrections.csv": _("a row for each correction of a session after its end"),
+    "feedback.csv": _("what the page said and showed after each step"),
+    "answers.csv": _("a row for each question of a questionnaire"),
+    "study_visits.csv": _("which session was which visit of a study"),
     "incidents.csv": _("what the robot recorded around its stops"),
     "codebook.csv": _("what every column means, with its unit"),
 }
@@ -88,7 +91,7 @@ def _session_tables(selection: Selection) -> Iterator[tuple[str, Any]]:
     for table in TABLES:
         header = [column.name for column in table.columns]
         yield table.file, write_csv(header, selection.read(table))
-    yield "codebook.csv", write_csv(("file", "column", "unit", "meaning"), codebook_rows())
+    yield "codebook.csv", write_csv(CODEBOOK, codebook_rows())
 
 
 def describe_patient(patient: Patient) -> dict[str, Any]:
@@ -100,6 +103,9 @@ def describe_patient(patient: Patient) -> dict[str, Any]:
         "clinic": patient.clinic.name,
         "paretic_side": patient.paretic_side or None,
         "body_mass_kg": patient.body_mass_kg,
+        "birth_year": patient.birth_year,
+        "stroke_month": patient.stroke_month,
+        "severity": patient.severity or None,
         "language": patient.language,
         "screen_side": patient.screen_side,
         "screen_text": patient.screen_text,

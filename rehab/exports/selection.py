@@ -14,13 +14,28 @@ from typing import Any
 
 from django.db.models import QuerySet
 
-from rehab.exports.tables import CORRECTIONS, EVENTS, INCIDENTS, SESSIONS, STEPS, Table
+from rehab.exports.tables import (
+    ANSWERS,
+    CORRECTIONS,
+    EVENTS,
+    FEEDBACK,
+    INCIDENTS,
+    SESSIONS,
+    STEPS,
+    STUDY_VISITS,
+    Table,
+)
+from rehab.exports.told import told_steps
+from rehab.people.covariates import age_band, months_since
 from rehab.people.models import User
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.questionnaires import QuestionnaireResponse
 from rehab.sessions.replay import fold_log
+from rehab.studies.models import StudyState
+from rehab.studies.participants import StudyVisit
 from rehab.training.fold import SessionFold
 from rehab.training.metrics import METRICS
 from rehab.training.plans import SessionPlan
@@ -93,6 +108,7 @@ class Selection:
                 session.simulated,
                 session.legacy_id is not None,
                 session.source if self.named else "",
+                *_read_covariates(session),
                 *(metrics.get(slug) for slug in METRICS),
             )
 
@@ -144,6 +160,49 @@ class Selection:
             for _, *row in _read_pages(incidents.filter(session=session), names, "pk"):
                 yield (*head, *row)
 
+    def feedback_rows(self) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of ``FEEDBACK``: the log is folded again, as the live page folded it."""
+        for session in self.read_sessions():
+            head = (session.pk, session.patient.pseudonym)
+            yield from ((*head, *told) for told in told_steps(session))
+
+    def answer_rows(self) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of ``ANSWERS``."""
+        responses = QuestionnaireResponse.objects.visible_to(self.user).order_by("pk")
+        for session in self.read_sessions():
+            for row in responses.filter(session=session):
+                instrument, score = row.to_instrument(), row.score
+                head = (
+                    *(session.pk, session.patient.pseudonym, row.slug, instrument.title),
+                    *(row.asked_at, row.finished_at, instrument.language, instrument.validated),
+                )
+                answered = zip(instrument.items, row.all_answers, strict=True)
+                for number, (item, given) in enumerate(answered, 1):
+                    ends = (item.values[0], item.values[-1])
+                    yield (*head, number, item.text, given, *ends, score)
+
+    def study_visit_rows(self) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of ``STUDY_VISITS``. Allocations stay sealed until the study is closed."""
+        related = ("enrollment__study", "enrollment__allocation", "version")
+        visits = StudyVisit.objects.visible_to(self.user).select_related(*related).order_by("pk")
+        for session in self.read_sessions():
+            for visit in visits.filter(session=session):
+                enrollment = visit.enrollment
+                left, group = enrollment.withdrawn_at, ""
+                if enrollment.study.state == StudyState.CLOSED:
+                    group = enrollment.allocation.group
+                yield (
+                    session.pk,
+                    session.patient.pseudonym,
+                    *(enrollment.study.code, enrollment.code),
+                    *(visit.number, visit.attempt, visit.period, visit.day),
+                    visit.version and visit.version.number,
+                    ", ".join(enrollment.levels),
+                    *(enrollment.enrolled_at, left),
+                    left is not None and session.began_at >= left,
+                    *(group, group and group.split("-")[visit.period]),
+                )
+
     def read(self, table: Table) -> Iterator[tuple[Any, ...]]:
         """Return the rows of a table."""
         rows = {
@@ -152,6 +211,9 @@ class Selection:
             EVENTS.file: self.event_rows,
             CORRECTIONS.file: self.correction_rows,
             INCIDENTS.file: self.incident_rows,
+            FEEDBACK.file: self.feedback_rows,
+            ANSWERS.file: self.answer_rows,
+            STUDY_VISITS.file: self.study_visit_rows,
         }
         return rows[table.file]()
 
@@ -184,4 +246,15 @@ def _read_answers(plan: SessionPlan) -> tuple[Any, ...]:
         *(schedule.kind.value, schedule.interval, schedule.band),
         plan.adaptation.mode.value,
         plan.close_steps.part,
+    )
+
+
+def _read_covariates(session: TrainingSession) -> tuple[Any, ...]:
+    """Return what analyses adjust by, in bands: no date of birth or of the stroke."""
+    patient, day = session.patient, session.began_at.date()
+    return (
+        age_band(patient.birth_year, day),
+        months_since(patient.stroke_month, day),
+        *(patient.severity, patient.paretic_side),
+        *(session.device, session.belt_speed_m_s, session.weight_support_percent),
     )

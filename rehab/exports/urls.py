@@ -7,5 +7,8 @@ from rehab.exports import views
 urlpatterns = [
     path("patients/<int:patient_id>/records/data.zip", views.download_patient, name="patient-data"),
     path("export/", views.show_export, name="export"),
+    path("export/research/", views.prepare_research, name="prepare-research"),
+    path("export/research/advance/", views.advance_research, name="advance-research"),
+    path("export/research.zip", views.download_research, name="download-research"),
     path("export/sessions.zip", views.download_sessions, name="export-sessions"),
 ]

@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 from datetime import datetime
+from pathlib import Path
 from typing import Any
 
-from django.http import HttpRequest, HttpResponse
-from django.shortcuts import render
+from django.conf import settings
+from django.http import HttpRequest, HttpResponse, JsonResponse
+from django.shortcuts import redirect, render
 from django.utils import timezone
-from django.views.decorators.http import require_GET, require_safe
+from django.utils.translation import gettext
+from django.views.decorators.http import require_GET, require_POST, require_safe
 
 from rehab.exports.archive import ZipResponse
+from rehab.exports.forms import ResearchExportForm
 from rehab.exports.patient_data import patient_files, session_files
+from rehab.exports.research.package import Package, discard_old
 from rehab.patients.pages.records import get_patient
 from rehab.people.access import for_roles, user_of
 from rehab.people.audit import audit_log
 from rehab.people.audit.audit_log import Act
-from rehab.people.models import Patient
+from rehab.people.models import Patient, User
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
 from rehab.sessions.models import TrainingSession
+
+SECONDS_OF_A_CALL = 1.5  # in which an export goes on; the page asks again and again
 
 
 @for_roles(Role.LEAD, Role.PT, patients=False)  # audited here, before the first byte
@@ -42,7 +49,13 @@ def show_export(request: HttpRequest) -> HttpResponse:
     """Show what the export of all sessions contains."""
     user = user_of(request)
     sessions = TrainingSession.objects.visible_to(user)
+    folder, now = research_folder(user), timezone.now()
+    discard_old(folder.parent, now)
+    package = Package.find(folder, user, now)
     context = {
+        "form": ResearchExportForm(by=user),
+        "package": package,
+        "progress": package and package.progress,
         "sessions": sessions.count(),
         "patients": sessions.order_by().values("patient").distinct().count(),
         "needs_consent": user.clinic and user.clinic.research_needs_consent,
@@ -58,6 +71,57 @@ def download_sessions(request: HttpRequest) -> HttpResponse:
     user, now = user_of(request), timezone.now()
     audit_export(request, now)
     return _stream(session_files(user, now), f"garry-sessions-{now:%Y-%m-%d}.zip")
+
+
+def research_folder(user: User) -> Path:
+    """Return where an account's export for analysis is made; an account has one at a time."""
+    return Path(settings.DATA_DIR) / "exports" / str(user.pk)
+
+
+@for_roles(Role.LEAD, Role.RESEARCHER, patients=False)  # audited here, before the first file
+@step_up.required
+@require_POST
+def prepare_research(request: HttpRequest) -> HttpResponse:
+    """Begin an export for analysis, or remove the one that was begun."""
+    user, now = user_of(request), timezone.now()
+    form = ResearchExportForm(request.POST, by=user)
+    if "discard" in request.POST:
+        package = Package.find(research_folder(user), user, now)
+        if package is not None:
+            package.discard()
+    elif form.is_valid():
+        audit_export(request, now)
+        chosen, shift = form.cleaned_data["study"], form.cleaned_data["shift_dates"]
+        Package.create(research_folder(user), user, chosen, shift_dates=shift, now=now)
+    return redirect("export")
+
+
+@for_roles(Role.LEAD, Role.RESEARCHER, patients=False)
+@require_POST
+def advance_research(request: HttpRequest) -> HttpResponse:
+    """Write some more sessions of the export that was begun; tell how far it is."""
+    user = user_of(request)
+    package = Package.find(research_folder(user), user, timezone.now())
+    if package is None:
+        return JsonResponse({"message": gettext("This export is not there any more.")}, status=404)
+    reached = package.progress
+    for reached in package.advance(SECONDS_OF_A_CALL):  # noqa: B007 - the last one is told
+        pass
+    return JsonResponse({"done": reached.done, "total": reached.total})
+
+
+@for_roles(Role.LEAD, Role.RESEARCHER, patients=False)  # audited here, before the first byte
+@step_up.required_for_download
+@require_GET
+def download_research(request: HttpRequest) -> HttpResponse:
+    """Return the export for analysis, once all of it is written."""
+    user, now = user_of(request), timezone.now()
+    package = Package.find(research_folder(user), user, now)
+    if package is None or not package.progress.is_done:
+        return redirect("export")
+    audit_export(request, now)
+    name = f"garry-{package.study or 'sessions'}-{package.made_at:%Y-%m-%d}.zip"
+    return _stream(package.files(), name)
 
 
 def audit_export(request: HttpRequest, now: datetime, patient: Patient | None = None) -> None:

@@ -40,6 +40,8 @@ def erase(patient: Patient, reason: ErasureReason, by: User | None, now: datetim
         patient.pseudonym = patient.code = generate_pseudonym()
         patient.nickname = _("Erased")
         patient.body_mass_kg = patient.legacy_id = patient.alias = None
+        patient.birth_year = patient.stroke_month = None
+        patient.severity = ""
         patient.ended_at = patient.ended_at or now
         patient.erased_at, patient.erasure_reason = now, reason
         patient.save()

@@ -17,12 +17,23 @@ from rehab.people.forms import PatientFieldsForm
 from rehab.people.models import BoardsConsent, EndReason, ErasureReason, Patient, User
 
 
+class MonthField(forms.DateField):
+    """A month, kept as its first day."""
+
+    widget = forms.DateInput(format="%Y-%m", attrs={"type": "month", "placeholder": "2026-03"})
+    input_formats = ("%Y-%m", "%Y-%m-%d")
+
+
 class PatientForm(PatientFieldsForm):
     """A patient of the PT's clinic, new or to be edited."""
 
     class Meta:
         model = Patient
-        fields: ClassVar = ["nickname", "code", "paretic_side", "body_mass_kg"]
+        fields: ClassVar = [
+            *("nickname", "code", "paretic_side", "body_mass_kg"),
+            *("birth_year", "stroke_month", "severity"),
+        ]
+        field_classes: ClassVar = {"stroke_month": MonthField}
 
     def __init__(self, *args: Any, by: User, now: datetime, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -40,6 +51,18 @@ class PatientForm(PatientFieldsForm):
                     "Read the clinic's words to the patient first. It can change any time."
                 ),
             )
+
+    def clean(self) -> dict[str, Any]:
+        """Return the cleaned data. Refuses a birth or a stroke that is still to come."""
+        data: dict[str, Any] = super().clean() or {}
+        born, month, today = data.get("birth_year"), data.get("stroke_month"), self._now.date()
+        if born is not None and born > today.year:
+            self.add_error("birth_year", _("This year is still to come. Give the year of birth."))
+        if month is not None and month > today:
+            self.add_error("stroke_month", _("This month is still to come. Give a past one."))
+        elif month is not None and born is not None and month.year < born:
+            self.add_error("stroke_month", _("This is before the birth. Correct one of the two."))
+        return data
 
     def clean_code(self) -> str:
         """Return the code. Refuses one that is taken, with the name of its patient."""

@@ -277,6 +277,7 @@ class PatientAdmin(ScopedAdmin):
         "code",
         "nickname",
         "body_mass_kg",
+        ("birth_year", "stroke_month", "severity"),
         "paretic_side",
         "language",
         "boards_agreed",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import datetime
+from datetime import date, datetime
 from typing import Annotated, Any
 
 from django.core.exceptions import ValidationError
@@ -13,7 +13,7 @@ from django.shortcuts import get_object_or_404
 from ninja import Field, Path, Query, Router, Schema, Status
 
 from rehab.people.access import clinic_of, for_roles
-from rehab.people.models import LANGUAGES, Patient, User
+from rehab.people.models import LANGUAGES, Patient, Severity, User
 from rehab.people.roles import Role
 from rehab.people.web.api_base import (
     Key,
@@ -21,6 +21,7 @@ from rehab.people.web.api_base import (
     Paging,
     Rejected,
     RequestBody,
+    StrictInt,
     TextLine,
     caller,
     format_errors,
@@ -79,6 +80,9 @@ class PatientOut(PatientName):
 
     paretic_side: str | None
     body_mass_kg: float | None
+    birth_year: int | None
+    stroke_month: date | None
+    severity: str | None
     language: str
     simulated: bool
     created_at: datetime
@@ -88,6 +92,11 @@ class PatientOut(PatientName):
         """Return the side; null where it is not set."""
         return patient.paretic_side or None
 
+    @staticmethod
+    def resolve_severity(patient: Patient) -> str | None:
+        """Return the severity; null where it is not set."""
+        return patient.severity or None
+
 
 class PatientChanges(RequestBody):
     """Changes of a patient; omitted fields stay."""
@@ -96,6 +105,11 @@ class PatientChanges(RequestBody):
     nickname: ShortText = optional(description="What the screens say, never a full name.")
     paretic_side: Side = optional(strict=False)
     body_mass_kg: float | None = Field(None, ge=10, le=300)
+    birth_year: StrictInt | None = Field(None, ge=1900, le=2100)
+    stroke_month: date | None = Field(
+        None, strict=False, description="Its first day: `2026-03-01`."
+    )
+    severity: Severity = optional(strict=False)
     language: Language = optional()
 
 

@@ -71,6 +71,12 @@ RIGHTS: dict[str, dict[Role, Right]] = {
         Role.RESEARCHER: Right.VIEW,
     },
     "Preset": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
+    "Questionnaire": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
+    "QuestionnaireResponse": {
+        Role.LEAD: Right.VIEW,
+        Role.PT: Right.VIEW,
+        Role.RESEARCHER: Right.VIEW,
+    },
     "Gesture": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "GestureStep": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},
     "FeedbackType": {Role.LEAD: Right.ALL, Role.PT: Right.ALL, Role.RESEARCHER: Right.VIEW},

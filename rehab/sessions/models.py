@@ -17,6 +17,7 @@ from rehab.people.consent.models import PatientScope
 from rehab.people.models import SIDES, Clinic, Patient, User
 from rehab.people.scope import ClinicModel
 from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS, WalkingConditions
 from rehab.stations.models import Device, Station
 from rehab.training.changes import ENDED_STATES, OPEN_STATES, State
 from rehab.training.plans import SessionPlan
@@ -141,6 +142,10 @@ class TrainingSession(ClinicModel):
         help_text=_("Arguments of the source that the server runs."),
     )
     plan = models.JSONField(_("plan"))
+    # How somebody walked (setup/walking.py); for analyses, and in no score.
+    device = models.CharField(_("device"), max_length=MAX_DEVICE_LETTERS, blank=True)
+    belt_speed_m_s = models.FloatField(_("belt speed (m/s)"), null=True, blank=True)
+    weight_support_percent = models.FloatField(_("body-weight support (%)"), null=True, blank=True)
 
     state = models.CharField(
         _("state"),
@@ -195,6 +200,11 @@ class TrainingSession(ClinicModel):
     def to_plan(self) -> SessionPlan:
         """Return the plan in the form that the rules use."""
         return SessionPlan.from_json(self.plan)
+
+    @property
+    def walking(self) -> WalkingConditions:
+        """How somebody walked, as far as it was noted."""
+        return WalkingConditions(self.device, self.belt_speed_m_s, self.weight_support_percent)
 
     @property
     def began_at(self) -> datetime:

@@ -21,6 +21,7 @@ from rehab.people.web.api_base import (
 )
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.setup.walking import MAX_DEVICE_LETTERS
 from rehab.training.adaptation import AdaptationMode
 from rehab.training.changes import State
 from rehab.training.controls import requestable_kinds
@@ -31,6 +32,7 @@ from rehab.training.steps import Side
 from rehab.training.valences import VALENCES, find_valence
 
 STEPS_MAX = 1000
+ShortLine = Annotated[TextLine, Field(max_length=MAX_DEVICE_LETTERS)]
 FeedbackType = Annotated[
     str,
     AfterValidator(lambda slug: find_valence(slug).slug),
@@ -78,6 +80,9 @@ class SessionOut(Schema):
     simulated: bool
     excluded: bool = Field(description="Corrected: in no figure, board or trend.")
     imported: bool = Field(description="From the original GARRY, without steps.")
+    device: str
+    belt_speed_m_s: float | None
+    weight_support_percent: float | None
     created_at: datetime
     started_at: datetime | None
     ended_at: datetime | None
@@ -145,6 +150,9 @@ class SessionRequestBody(RequestBody):
     robot: TextLine = optional(description="As in the set-up: `off`, `gentle`, `normal`.")
     robot_above: TextLine = optional(description="Gesture after a window above the threshold.")
     robot_below: TextLine = optional(description="Gesture after a window below it.")
+    device: ShortLine = optional(description="What the patient walks on or with.")
+    belt_speed: float | None = Field(None, description="Of the treadmill, m/s.")
+    weight_support: float | None = Field(None, description="Percent of the body's weight.")
     robot_threshold: StrictInt = optional(description="Percent of the goal, 1 to 200.")
     robot_answers: CueRule = optional(strict=False, description="What a gesture answers.")
     robot_window: float = optional(description="Seconds of a window, 2 to 60.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 
 from asgiref.sync import async_to_sync
@@ -16,8 +16,10 @@ from rehab.people.models import Patient, User
 from rehab.people.models.blinding import hidden_patients
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.questionnaires import ask
 from rehab.sessions.setup.gestures import composed_gestures, silence_cue
 from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
 from rehab.training.adaptation import GoalAdaptation
 from rehab.training.changes import OPEN_STATES, ChangeKind, ChangeValue, PauseReason
@@ -65,6 +67,7 @@ class SessionRequest:
     source: str = ""
     simulated: bool = False
     source_args: Sequence[str] = ()
+    walking: WalkingConditions = field(default_factory=WalkingConditions)
 
 
 def check_station_is_free(station: Station) -> None:
@@ -105,6 +108,7 @@ def create_session(request: SessionRequest) -> TrainingSession:
         source_args=list(request.source_args),
         plan=plan.to_json(),
         goal=plan.goal.value,
+        **asdict(request.walking),
     )
     with transaction.atomic():
         patient.lock()  # so that the patient is not erased meanwhile
@@ -115,6 +119,8 @@ def create_session(request: SessionRequest) -> TrainingSession:
             Station.everywhere.select_for_update(no_key=True).get(pk=station.pk)
             check_station_is_free(station)
         session.save()
+        if request.protocol is not None:
+            ask(session, request.protocol.questionnaires, session.created_at)
         transaction.on_commit(partial(_announce, session))
     return session
 

@@ -17,8 +17,9 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import user_of
-from rehab.people.web.admin_base import LabeledFormSet, ScopedAdmin, ScopedOptions
+from rehab.people.web.admin_base import ClinicForm, LabeledFormSet, ScopedAdmin, ScopedOptions
 from rehab.sessions.forms.initial import STRIDE_S, protocol_minutes
+from rehab.sessions.questionnaires import Questionnaire, questionnaire_choices
 from rehab.sessions.setup.gestures import robot_gesture_choices
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase, display_name
@@ -109,10 +110,26 @@ class PhaseInline(ScopedOptions, admin.TabularInline):
         return 0 if obj else 1
 
 
+class ProtocolForm(ClinicForm):
+    """A protocol; what is asked after it is chosen from what the clinic has."""
+
+    clinic_id: int | None = None
+    questionnaires = forms.MultipleChoiceField(
+        label=_("Asked after the session"), required=False, widget=forms.CheckboxSelectMultiple
+    )
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        field: Any = self.fields.get("questionnaires")
+        if field is not None:  # not in a page that can only be read
+            field.choices = questionnaire_choices(self.clinic_id)
+
+
 @admin.register(Protocol)
 class ProtocolAdmin(SharedAdmin):
     """Protocols: the shared ones, and the clinic's own."""
 
+    form = ProtocolForm
     change_form_template = "sessions/protocol_form.html"
     list_display = ("named", "whose", "phase_count", "length", "about")
     search_fields = ("name", "description", "phases__name")
@@ -122,6 +139,12 @@ class ProtocolAdmin(SharedAdmin):
     def get_queryset(self, request: HttpRequest) -> QuerySet[Protocol]:
         """Return the visible protocols with their phases."""
         return super().get_queryset(request).prefetch_related("phases")
+
+    def get_form(self, request: HttpRequest, *args: Any, **options: Any) -> Any:
+        """Return the form with the questionnaires of the person's clinic."""
+        form = super().get_form(request, *args, **options)
+        form.clinic_id = user_of(request).clinic_id
+        return form
 
     @admin.display(description=_("description"))
     def about(self, protocol: Protocol) -> str:
@@ -188,11 +211,20 @@ class ProtocolAdmin(SharedAdmin):
             description=protocol.description,
             wanted_hits=protocol.wanted_hits,
             close_percent=protocol.close_percent,
+            questionnaires=protocol.questionnaires,
         )
         copy.save()
         for position, phase in enumerate(protocol.to_rules(), 1):
             ProtocolPhase(protocol=copy, position=position, **asdict(phase)).save()
         return copy
+
+
+@admin.register(Questionnaire)
+class QuestionnaireAdmin(ScopedAdmin):
+    """A clinic's own questions; those that GARRY brings are not changed."""
+
+    list_display = ("name", "language", "source")
+    search_fields = ("name", "items")
 
 
 @admin.register(Preset)

@@ -16,6 +16,7 @@ from rehab.people.models import Patient, User
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.formatting import format_source
 from rehab.sessions.forms.answers import NumberField
+from rehab.sessions.forms.walking import WalkingFields
 from rehab.sessions.services import check_station_is_free
 from rehab.sessions.setup.answers import USUAL_ANSWERS
 from rehab.sessions.setup.protocols import Measure, Protocol
@@ -239,8 +240,8 @@ class EnrollmentForm(forms.Form):
         return tuple(self.cleaned_data[f"level_{n}"] for n in range(len(self.study.factors)))
 
 
-class PlaceForm(forms.Form):
-    """Where a visit's session is walked, and where its steps come from."""
+class PlaceForm(WalkingFields):
+    """Where and how a visit's session is walked, and where its steps come from."""
 
     station: forms.ModelChoiceField[Station] = forms.ModelChoiceField(
         queryset=None, empty_label=None
@@ -277,4 +278,5 @@ class PlaceForm(forms.Form):
             source=dict(source_choices())[data["source"]],
             simulated=kind == "synthetic",
             source_args=tuple(build_source_args(kind, name, self.patient)),
+            walking=self.chosen_walking(),
         )

@@ -75,6 +75,9 @@ def _version_parts(version: StudyVersion) -> Iterator[Flowable]:
                 "phases": "; ".join(map(_phase_text, arm["phases"])),
             }
         )
+        for asked in arm.get("questionnaires", ()):
+            told_of = {"arm": arm["code"], "questionnaire": asked["title"]}
+            yield _text(gettext("Asked after sessions of %(arm)s: %(questionnaire)s") % told_of)
     yield _text(gettext("Plan"), "Heading2")
     yield _table(_plan_rows(told))
     yield _text(gettext("Seals (SHA-256)"), "Heading2")

@@ -12,7 +12,9 @@ from django.db import transaction
 from django.utils.translation import gettext
 
 from rehab.people.models import Patient, User
+from rehab.questionnaires.instrument import Instrument
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.questionnaires import find_instrument
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import Study, StudyState, StudyVersion
 from rehab.studies.participants import StudyEvent
@@ -79,7 +81,12 @@ def _describe_arm(study: Study, arm: Any) -> dict[str, Any]:
         goal=GoalRule(percent_of_baseline=study.goal_percent),
         schedule=schedule,
     )
-    return {
+    # Studies that were registered before there were questionnaires keep their digest.
+    asked = [
+        _describe_questionnaire(find_instrument(slug, study.clinic_id, "en"))
+        for slug in arm.protocol.questionnaires
+    ]
+    return ({"questionnaires": asked} if asked else {}) | {
         "code": arm.code,
         "name": arm.name,
         "weight": arm.weight,
@@ -107,6 +114,10 @@ def _describe_arm(study: Study, arm: Any) -> dict[str, Any]:
             for phase in phases
         ],
     }
+
+
+def _describe_questionnaire(instrument: Instrument) -> dict[str, Any]:
+    return {"title": instrument.title, "items": [item.text for item in instrument.items]}
 
 
 def digest_of(document: dict[str, Any]) -> str:

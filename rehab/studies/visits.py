@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 
 from django.db import transaction
@@ -11,6 +11,7 @@ from django.utils.translation import gettext
 from rehab.people.models import User
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
+from rehab.sessions.setup.walking import WalkingConditions
 from rehab.stations.models import Station
 from rehab.studies.models import StudyState
 from rehab.studies.participants import Enrollment, StudyVisit
@@ -28,6 +29,7 @@ class Place:
     source: str = ""
     simulated: bool = False
     source_args: tuple[str, ...] = ()
+    walking: WalkingConditions = field(default_factory=WalkingConditions)
 
 
 def next_visit(enrollment: Enrollment) -> StudyVisit | None:
@@ -89,6 +91,7 @@ def start_session(
                 source=place.source,
                 simulated=place.simulated,
                 source_args=place.source_args,
+                walking=place.walking,
             )
         )
         visit.save()

@@ -78,6 +78,7 @@ def test_a_patients_file_holds_everything_that_is_kept(world):
         *("README.txt", "patient.json", "consent.json", "codebook.csv"),
         *("visits.json", "boards.json", "studies.json", "changes.json"),
         *("sessions.csv", "steps.csv", "events.csv", "corrections.csv", "incidents.csv"),
+        *("feedback.csv", "answers.csv", "study_visits.csv"),
     }
     who = json.loads(files["patient.json"])
     assert (who["nickname"], who["code"]) == (world.patient.nickname, world.patient.code)
@@ -111,6 +112,7 @@ TOLD_IN = {
     "Enrollment": "studies.json",
     "StudyVisit": "studies.json",
     "RobotIncident": "incidents.csv",
+    "QuestionnaireResponse": "answers.csv",
     "AuditEntry": None,
 }
 RENAMED = {

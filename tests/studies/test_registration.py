@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from rehab.people.roles import Role
+from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.setup.protocols import Protocol, ProtocolPhase
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.append_only import AppendOnlyRow
@@ -187,3 +188,17 @@ def test_a_study_warns_of_negative_feedback_early_after_a_stroke(world):
 def test_a_commitment_depends_on_every_part_of_the_secret():
     secret = Secret(SEED, (2, 4))
     assert secret.commitment != replace(secret, block_sizes=(2,)).commitment
+
+
+def test_what_is_asked_is_registered_and_changed_questions_need_a_new_version(world):
+    study, own = draft_study(world), world.rows[Questionnaire]
+    protocol = own_protocol(world, study).protocol
+    protocol.questionnaires = ["sus", own.slug]
+    protocol.save()
+    version = register(study, None, NOW)
+    asked = version.document["arms"][0]["questionnaires"]
+    assert [row["title"] for row in asked] == ["System Usability Scale (SUS)", own.name]
+    assert current_version(study) == version
+    Questionnaire.everywhere.filter(pk=own.pk).update(items="Hungry? | no | very | 5")
+    with pytest.raises(InvalidSetting, match="new version"):
+        current_version(study)

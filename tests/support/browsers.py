@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
 
 from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
@@ -33,6 +35,12 @@ def go_on_to_scores(page: Page) -> None:
     page.wait_for_url("**/ending/")
     page.click(".go")
     page.wait_for_url("**/scores/")
+
+
+def picture(page: Page, name: str) -> None:
+    """Keep a picture in the folder GARRY_TEST_PICTURES, where somebody wants to look at it."""
+    if folder := os.environ.get("GARRY_TEST_PICTURES"):
+        page.screenshot(path=Path(folder) / f"{name}.png", full_page=True)
 
 
 class SharedChromium:

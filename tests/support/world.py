@@ -26,12 +26,14 @@ from rehab.people.sign_in.attempts import SignInAttempts
 from rehab.people.sign_in.factors import Authenticator, RecoveryCode
 from rehab.people.sign_in.resets import ResetRequest
 from rehab.people.sign_in.tokens import ApiToken
+from rehab.questionnaires.instrument import Instrument, Item
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.live.aggregate import Row, SessionAggregate
 from rehab.sessions.live.commits import Job, commit
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.questionnaires import Questionnaire, QuestionnaireResponse
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
@@ -322,6 +324,21 @@ def build_world(name: str) -> World:
             measure=measure,
             goal_value=1.5,
             protocol=protocol,
+        ),
+        Questionnaire.everywhere.create(
+            clinic=clinic, name=mark(name, Questionnaire), items="Tired? | no | very | 5"
+        ),
+        QuestionnaireResponse.everywhere.create(
+            session=session,
+            slug="own-0",
+            instrument=Instrument(
+                "own-0",
+                mark(name, QuestionnaireResponse),
+                "",
+                "en",
+                (Item("Tired?", "no", "very", 5), Item("Happy?", "no", "very", 5)),
+            ).to_json(),
+            answers=[4],
         ),
         Step.everywhere.get(session=session, number=3),
         SessionEvent.everywhere.filter(session=session).first(),

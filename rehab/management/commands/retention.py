@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser
+from pathlib import Path
 from typing import Any
 
+from django.conf import settings
 from django.core.management.base import BaseCommand
 from django.db import transaction
 from django.utils import timezone
 
+from rehab.exports.research.package import discard_old
 from rehab.patients.closure import SessionStillOpen
 from rehab.patients.erasure import delete_old_logs, erase, patients_past_retention
 from rehab.people.models import Clinic, ErasureReason
@@ -46,5 +49,7 @@ class Command(BaseCommand):
             self.stdout.write(
                 f"{clinic}: {erased} patient(s) erased, {action} {deleted} log entries."
             )
+        if not dry_run:
+            discard_old(Path(settings.DATA_DIR) / "exports", now)
         if dry_run:
             self.stdout.write("Nothing was changed (--dry-run).")

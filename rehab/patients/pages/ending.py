@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
-from django.urls import reverse
 from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_safe
@@ -15,6 +14,7 @@ from rehab.people.roles import Role
 from rehab.people.web.language import activate_patient_language
 from rehab.sessions.formatting import clinic_time, format_duration
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.pages.questions import page_after
 from rehab.training.changes import OPEN_STATES, State
 
 
@@ -30,14 +30,11 @@ def show_ending(request: HttpRequest, session_id: int) -> HttpResponse:
     if State(session.state) in OPEN_STATES:
         return redirect("walk", session_id=session.pk)
     tablet = not request.user.is_authenticated
-    after = reverse("tablet") if tablet else reverse("patient", args=[session.patient_id])
-    if not session.patient.blinded:
-        after = reverse("scores", args=[session.pk])
     context = {
         "session": session,
         "tablet": tablet,
         "walked": format_duration(session.active_s),
         "visit": next_visit(actor, session, clinic_time(timezone.now(), session.clinic).date()),
-        "after": after,
+        "after": page_after(session, actor, tablet=tablet),
     } | describe_ending(actor, session)
     return render(request, "patients/ending.html", context)

@@ -11,6 +11,7 @@ from rehab.people.models.patients import (
     PatientErased,
     ScreenSide,
     ScreenText,
+    Severity,
     generate_pseudonym,
 )
 
@@ -27,6 +28,7 @@ __all__ = [
     "ScreenSide",
     "ScreenText",
     "ServerUserManager",
+    "Severity",
     "User",
     "generate_pseudonym",
     "validate_time_zone",

@@ -39,6 +39,14 @@ class ScreenText(models.TextChoices):
     LARGEST = "largest", _("largest")
 
 
+class Severity(models.TextChoices):
+    """How severe the impairment of gait is, as the clinic judges it."""
+
+    MILD = "mild", _("mild")
+    MODERATE = "moderate", _("moderate")
+    SEVERE = "severe", _("severe")
+
+
 class BoardsConsent(models.TextChoices):
     """Which leaderboards a patient has agreed to stand on; each includes those before it."""
 
@@ -102,6 +110,20 @@ class Patient(ClinicModel):
         help_text=_("Needed when sensors send raw signals: A2 is power per kilogram."),
     )
     paretic_side = models.CharField(_("paretic side"), max_length=8, choices=SIDES, blank=True)
+    birth_year = models.PositiveSmallIntegerField(
+        _("year of birth"),
+        null=True,
+        blank=True,
+        validators=[MinValueValidator(1900), MaxValueValidator(2100)],
+        help_text=_("Researchers see the ten years of age alone."),
+    )
+    stroke_month = models.DateField(
+        _("month of the stroke"),
+        null=True,
+        blank=True,
+        help_text=_("Researchers see the months since then alone."),
+    )
+    severity = models.CharField(_("severity"), max_length=8, choices=Severity.choices, blank=True)
     language = models.CharField(_("language"), max_length=8, choices=LANGUAGES, default="en")
     screen_side = models.CharField(
         _("thermometer"), max_length=8, choices=ScreenSide.choices, default=ScreenSide.RIGHT
@@ -195,9 +217,14 @@ class Patient(ClinicModel):
             self.save(update_fields=fields)
 
     def clean(self) -> None:
-        """Refuse boards with others without consent, and any change to an erased patient."""
+        """Refuse boards with others without consent, and any change to an erased patient.
+
+        Of a date within the month of the stroke the day is dropped.
+        """
         if self.erased_at is not None:
             raise PatientErased
+        if self.stroke_month is not None:
+            self.stroke_month = self.stroke_month.replace(day=1)
         if self.boards == BoardsConsent.OWN or self.simulated:
             return
         has_consent = self.pk and self.consents.filter(purpose="boards", withdrawn_at=None).exists()

@@ -79,6 +79,9 @@ def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
             "robot": "normal",
             "robot_above": DEFAULT_GESTURE,
             "robot_below": DEFAULT_GESTURE,
+            "device": "",
+            "belt_speed": None,
+            "weight_support": None,
             **USUAL_ANSWERS,
         }
     plan = last.to_plan()
@@ -106,6 +109,9 @@ def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
         "robot": name_robot_level(at_end(ChangeKind.ROBOT_INTENSITY, plan.robot_intensity)),
         "robot_above": above,
         "robot_below": below,
+        "device": last.device,
+        "belt_speed": last.belt_speed_m_s,
+        "weight_support": last.weight_support_percent,
         **answers_of(
             plan,
             threshold=at_end(ChangeKind.ACTIVATION_THRESHOLD, plan.activation_threshold),

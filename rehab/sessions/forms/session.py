@@ -15,6 +15,7 @@ from rehab.people.web.refusals import format_refusal
 from rehab.sessions.formatting import ROBOT_LEVEL_LABELS, format_source
 from rehab.sessions.forms.answers import AnswerFields, NumberField
 from rehab.sessions.forms.initial import usual_measure
+from rehab.sessions.forms.walking import WalkingFields
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import (
     SessionRequest,
@@ -44,7 +45,7 @@ from rehab.training.steps import Side
 from rehab.training.valences import VALENCES
 
 
-class SessionForm(AnswerFields):
+class SessionForm(WalkingFields, AnswerFields):
     """The set-up of one patient's session. With its initial values it can be sent as it is."""
 
     valence = forms.ChoiceField(choices=[(v.slug, _(v.label)) for v in VALENCES.values()])
@@ -179,6 +180,7 @@ class SessionForm(AnswerFields):
                 source=dict(source_choices()).get(data["source"], ""),
                 simulated=kind == "synthetic",
                 source_args=build_source_args(kind, name, self.patient),
+                walking=self.chosen_walking(),
             )
         )
 

@@ -19,6 +19,8 @@ from rehab.sessions.formatting import clinic_time, format_day, format_state
 from rehab.sessions.forms.correction import CorrectionForm
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.questionnaires import questionnaire_choices
+from rehab.sessions.reports.answers import list_answers
 from rehab.sessions.reports.review import review_session
 from rehab.sessions.reports.summary import format_phases, format_summary
 from rehab.training.changes import OPEN_STATES, State
@@ -61,6 +63,8 @@ def show_session(request: HttpRequest, session_id: int) -> HttpResponse:
             summary.strides,
         ],
         "phases": format_phases(review),
+        "asked": list_answers(user, session),
+        "questionnaires": questionnaire_choices(session.clinic_id) if by_name else (),
     }
     return render(request, "sessions/session.html", context)
 

@@ -19,6 +19,7 @@ from rehab.sessions.formatting import (
 )
 from rehab.sessions.log import EVENTS, FallSeverity, Remark, RobotEntry, SessionEvent
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.answers import list_answers
 from rehab.sessions.reports.extras import mean_extras
 from rehab.sessions.reports.report_chart import draw_chart
 from rehab.sessions.reports.review import SessionReview, review_session
@@ -47,6 +48,7 @@ def report_context(user: User, session: TrainingSession) -> dict[str, Any]:
         "more_phases": max(0, len(phases) - MAX_PHASES),
         "remarks": _summarize_remarks(review.rows, session),
         "extras": mean_extras(user, session),
+        "answers": list_answers(user, session),
         "robot": _describe_robot(review.rows),
         "chart": draw_chart(review.chart),
         "has_close": bool(review.figures["close"]),

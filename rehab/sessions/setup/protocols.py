@@ -148,6 +148,8 @@ class Protocol(ClinicModel):
             "beyond the goal. Left empty, each step is a hit or a miss."
         ),
     )
+    # Slugs of what the patient is asked after a session (sessions/questionnaires.py).
+    questionnaires = models.JSONField(_("questionnaires"), default=list, blank=True)
 
     class Meta(ClinicModel.Meta):
         verbose_name = _("protocol")

@@ -1,0 +1,1 @@
+"""Sessions for analysis, by pseudonyms: tables, Parquet, recordings, BIDS and FHIR."""

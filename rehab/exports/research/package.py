@@ -1,0 +1,235 @@
+"""An export for analysis, made session by session: it can stop anywhere and goes on from there.
+
+A folder holds ``export.json`` (who asked, for what) and a folder for each session that is whole.
+Rights are asked again for every session, when it is written and when it is given out.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from django.db.models import QuerySet
+
+from rehab.exports.archive import write_csv
+from rehab.exports.patient_data import README_TEXT
+from rehab.exports.research.bids import dataset_files
+from rehab.exports.research.parts import ABOUT, write_part
+from rehab.exports.research.sinks import has_parquet
+from rehab.exports.tables import CODEBOOK, TABLES, codebook_rows
+from rehab.people.models import User
+from rehab.sessions.models import TrainingSession
+from rehab.studies.models import Study
+from rehab.studies.participants import StudyVisit
+from rehab.training.changes import ENDED_STATES
+from rehab.training.scoring import RULES_VERSION
+
+ABOUT_EXPORT = "export.json"
+KEPT_FOR = timedelta(hours=24)
+CHUNK_BYTES = 256 * 1024
+
+
+class Progress(NamedTuple):
+    """How many of the sessions are written."""
+
+    done: int
+    total: int
+
+    @property
+    def is_done(self) -> bool:
+        """Whether all of them are."""
+        return self.done == self.total
+
+
+def sessions_for(user: User, study: Study | None) -> QuerySet[TrainingSession]:
+    """Return the ended sessions that somebody may export: of a study, or all.
+
+    Those of participants who have left a study, and agreed that its data then go, are not among
+    them.
+    """
+    states = [state.value for state in ENDED_STATES]
+    sessions = TrainingSession.objects.visible_to(user).filter(state__in=states)
+    left = StudyVisit.everywhere.filter(
+        session__isnull=False, enrollment__keep_data=False, enrollment__withdrawn_at__isnull=False
+    )
+    sessions = sessions.exclude(pk__in=left.values("session"))
+    return sessions if study is None else sessions.filter(study_visit__enrollment__study=study)
+
+
+@dataclass(frozen=True)
+class Package:
+    """An export in a folder."""
+
+    folder: Path
+    user: User
+    keys: tuple[int, ...]
+    study: str
+    shift_dates: bool
+    made_at: datetime
+
+    @classmethod
+    def create(
+        cls, folder: Path, user: User, study: Study | None, *, shift_dates: bool, now: datetime
+    ) -> Package:
+        """Begin an export in place of whatever the folder holds."""
+        if folder.exists():
+            shutil.rmtree(folder)
+        folder.mkdir(parents=True, mode=0o700)
+        keys = sessions_for(user, study).order_by("pk").values_list("pk", flat=True)
+        about = {
+            "user": user.pk,
+            "keys": list(keys),
+            "study": study.code if study else "",
+            "shift_dates": shift_dates,
+            "made_at": now.isoformat(),
+        }
+        (folder / ABOUT_EXPORT).write_text(json.dumps(about), "utf-8")
+        package = cls.find(folder, user, now)
+        assert package is not None  # noqa: S101 - written just now
+        return package
+
+    @classmethod
+    def find(cls, folder: Path, user: User, now: datetime) -> Package | None:
+        """Return the export that somebody has begun in a folder; None if there is none.
+
+        One that is too old is removed; one of another account is left alone.
+        """
+        try:
+            about = json.loads((folder / ABOUT_EXPORT).read_text("utf-8"))
+            made_at = datetime.fromisoformat(about["made_at"])
+            package = cls(
+                folder, user, tuple(about["keys"]), about["study"], about["shift_dates"], made_at
+            )
+        except (OSError, ValueError, KeyError):
+            return None
+        if about["user"] != user.pk:
+            return None
+        if not timedelta() <= now - made_at < KEPT_FOR:
+            package.discard()
+            return None
+        return package
+
+    def discard(self) -> None:
+        """Remove the files."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _part(self, key: int) -> Path:
+        return self.folder / str(key)
+
+    @property
+    def progress(self) -> Progress:
+        """How far it is."""
+        return Progress(sum(self._part(key).is_dir() for key in self.keys), len(self.keys))
+
+    def advance(
+        self, seconds: float, clock: Callable[[], float] = time.monotonic
+    ) -> Iterator[Progress]:
+        """Write sessions until the time is over, one at least; yield the progress after each."""
+        until = clock() + seconds
+        done, total = self.progress
+        for key in self.keys:
+            if self._part(key).is_dir():
+                continue
+            rows = TrainingSession.objects.visible_to(self.user).select_related(
+                "patient", "measure"
+            )
+            session = rows.filter(pk=key).first()
+            if session is None:  # it may not be seen any more
+                self._part(key).mkdir()
+            else:
+                write_part(self.user, session, self._part(key), shift_dates=self.shift_dates)
+            done += 1
+            yield Progress(done, total)
+            if clock() >= until:
+                return
+
+    def _readable(self) -> dict[int, str]:
+        """Return the sessions that may still be given out, with their patients' pseudonyms now."""
+        rows = sessions_for(self.user, None).filter(pk__in=self.keys)
+        return dict(rows.values_list("pk", "patient__pseudonym"))
+
+    def files(self) -> Iterator[tuple[str, Iterable[str | bytes]]]:
+        """Yield the files of the archive: name and content in pieces.
+
+        A session that somebody may not see any more, or whose patient was erased, is left out.
+        """
+        allowed = self._readable()
+        people: dict[str, dict[str, Any]] = {}
+        parts = []
+        for key in self.keys:
+            about = self._part(key) / ABOUT
+            told = json.loads(about.read_text("utf-8")) if about.exists() else {}
+            if key in allowed and told.get("pseudonym") == allowed[key]:
+                parts.append(self._part(key))
+                if told["participant_id"]:
+                    people.setdefault(told["participant_id"], told)
+        yield "README.txt", [self._readme(len(parts))]
+        yield "codebook.csv", write_csv(CODEBOOK, codebook_rows())
+        for table in TABLES:
+            header = [column.name for column in table.columns]
+            yield table.file, _concatenate(header, [part / table.file for part in parts])
+        for name, text in dataset_files(people.values(), garry_version()) if people else ():
+            yield f"bids/{name}", [text]
+        for part in parts:
+            for kind in ("parquet", "bids", "recordings", "fhir"):
+                for file in sorted((part / kind).rglob("*.*")):
+                    if file.is_file():
+                        yield file.relative_to(part).as_posix(), _read(file)
+
+    def _readme(self, given: int) -> str:
+        what = f"study {self.study}" if self.study else "all sessions"
+        parquet = (
+            "Steps and feedback also as Parquet, a file for each session in one folder for each."
+            if has_parquet()
+            else "No Parquet: the server has no pyarrow (pip install 'garry[parquet]')."
+        )
+        dates = (
+            "Dates are shifted: for each patient by whole weeks that are always the same and that "
+            "only the server knows. Texts that people wrote may still name a date."
+            if self.shift_dates
+            else "Dates are true ones: with a gait they can tell who somebody is."
+        )
+        return (
+            f"GARRY {garry_version()}: {what} by pseudonyms, for analysis\n"
+            f"Made from {self.made_at:%Y-%m-%d %H:%M} UTC; {given} of {len(self.keys)} sessions. "
+            "Missing ones may not be seen any more.\n\n"
+            f"{dates}\n{parquet}\n"
+            "recordings/: sessions to play again in GARRY. bids/: BIDS motion. fhir/: FHIR R4B.\n"
+            "study_visits.csv has the allocation of closed studies; of others it is sealed.\n"
+            "Sessions of people who left a study and wanted their data removed are not here.\n\n"
+            f"{README_TEXT % {'version': RULES_VERSION}}"
+        )
+
+
+def discard_old(folder: Path, now: datetime) -> None:
+    """Remove exports that nobody has fetched for a day."""
+    for one in folder.iterdir() if folder.is_dir() else ():
+        if one.is_dir() and now.timestamp() - one.stat().st_mtime > KEPT_FOR.total_seconds():
+            shutil.rmtree(one, ignore_errors=True)
+
+
+def garry_version() -> str:
+    """Return the version of GARRY that is installed."""
+    try:
+        return version("garry")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _concatenate(header: list[str], files: Iterable[Path]) -> Iterator[str | bytes]:
+    yield ",".join(header) + "\r\n"
+    for file in files:
+        yield from _read(file)
+
+
+def _read(file: Path) -> Iterator[bytes]:
+    with file.open("rb") as content:
+        while chunk := content.read(CHUNK_BYTES):
+            yield chunk

@@ -1,0 +1,104 @@
+"""The files of one session of an export: written aside, and there at once when they are whole."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from rehab.exports.research.bids import EventSink, MotionSink
+from rehab.exports.research.dates import SINCE_1970_S, shift_of, shift_rows
+from rehab.exports.research.fhir import write_bundle
+from rehab.exports.research.recordings import PLACES, RecordingSink
+from rehab.exports.research.sinks import CsvSink, ParquetSink, Sink, has_parquet, pump
+from rehab.exports.selection import Selection
+from rehab.exports.tables import EVENTS, FEEDBACK, INCIDENTS, SESSIONS, STEPS, TABLES
+from rehab.people.models import User
+from rehab.sessions.log import Step
+from rehab.sessions.models import TrainingSession
+
+STRIDE_TABLES = (STEPS, FEEDBACK)  # also as Parquet
+ABOUT = "about.json"  # what the whole export needs to know of a part
+COVARIATES = ("age_band", "months_since_stroke", "severity", "paretic_side")
+
+
+def write_part(user: User, session: TrainingSession, folder: Path, *, shift_dates: bool) -> None:
+    """Write a session's files into a folder that does not exist before they are whole."""
+    aside = folder.with_name(folder.name + ".part")
+    if aside.exists():  # of an export that was broken off
+        shutil.rmtree(aside)
+    aside.mkdir(parents=True)
+    _write_files(user, session, aside, shift_dates=shift_dates)
+    aside.rename(folder)
+
+
+def _write_files(user: User, session: TrainingSession, aside: Path, *, shift_dates: bool) -> None:
+    pseudonym = session.patient.pseudonym
+    shift = shift_of(pseudonym) if shift_dates else None
+    sessions = TrainingSession.objects.visible_to(user).filter(pk=session.pk)
+    selection = Selection(user, sessions, named=False)
+    for name in ("parquet", "bids", "recordings", "fhir"):
+        (aside / name).mkdir()
+    motion = MotionSink(aside / "bids", pseudonym, session.pk, session.measure.unit)
+    recording = RecordingSink(
+        _of(aside / "recordings", session, "csv"),
+        _extras(user, session),
+        has_goal=_has_one_goal(user, session),
+    )
+    more: dict[str, Sequence[Sink]] = {
+        STEPS.file: (motion, recording),
+        EVENTS.file: (EventSink(motion),),
+    }
+    for table in TABLES:  # steps come before events, whose times count from the first step
+        sinks: list[Sink] = [CsvSink(aside / table.file), *more.get(table.file, ())]
+        if table in STRIDE_TABLES and has_parquet():
+            place = aside / "parquet" / table.file.removesuffix(".csv")
+            place.mkdir()
+            sinks.append(ParquetSink(_of(place, session, "parquet"), table))
+        rows: Iterable[Sequence[Any]] = shift_rows(selection.read(table), shift)
+        if shift is not None and table is STEPS:
+            rows = _from_first_step(rows)
+        if shift is not None and table is INCIDENTS:
+            rows = ([*row[:-1], ""] for row in rows)  # the robot's file may tell the time of day
+        pump(rows, sinks)
+    write_bundle(_of(aside / "fhir", session, "json"), user, session, shift)
+    about = {"pseudonym": pseudonym, "participant_id": motion.subject if motion.count else ""}
+    row = next(iter(selection.session_rows()))
+    names = [column.name for column in SESSIONS.columns]
+    about |= {name: row[names.index(name)] for name in COVARIATES}
+    (aside / ABOUT).write_text(json.dumps(about), "utf-8")
+
+
+def _of(folder: Path, session: TrainingSession, ending: str) -> Path:
+    return folder / f"session-{session.pk}.{ending}"
+
+
+def _extras(user: User, session: TrainingSession) -> list[str]:
+    """Return the names of all further values that the session's source sent."""
+    rows = Step.objects.visible_to(user).filter(session=session).exclude(extra={})
+    names: dict[str, None] = {}
+    for extra in rows.values_list("extra", flat=True).iterator():
+        names |= dict.fromkeys(extra)
+    return list(names)
+
+
+def _has_one_goal(user: User, session: TrainingSession) -> bool:
+    rows = Step.objects.visible_to(user).filter(session=session).order_by()
+    goals = list(rows.values_list("goal", flat=True).distinct()[:2])
+    return len(goals) == 1 and goals[0] is not None
+
+
+def _from_first_step(rows: Iterable[Sequence[Any]]) -> Iterator[Sequence[Any]]:
+    """Yield steps whose times do not tell the date: a clock since 1970 begins at the first one."""
+    at_time, origin = PLACES["time"], None
+    for row in rows:
+        if origin is None:
+            origin = row[at_time] if abs(row[at_time]) >= SINCE_1970_S else 0.0
+        if origin:
+            changed = list(row)
+            changed[at_time] = row[at_time] - origin
+            yield changed
+        else:
+            yield row

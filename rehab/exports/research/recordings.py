@@ -1,0 +1,60 @@
+"""A session's strides as a recording that GARRY plays again (layout "plain")."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rehab.exports.research.sinks import Rows
+from rehab.exports.tables import STEPS, format_cell
+from rehab.sources.recording.plain import PLAIN
+
+# Column of the recording: column of the table.
+COLUMNS = {
+    "number": "number",
+    "time_s": "time",
+    "side": "side",
+    "value": "value",
+    "goal": "goal",
+    "shown": "shown",
+    "hit": "hit",
+    "valid": "valid",
+    "reason": "reasons",
+    "phase": "phase_name",
+    "kind": "phase_kind",
+    "feedback": "feedback",
+    "gain": "gain",
+}
+PLACES = {column.name: place for place, column in enumerate(STEPS.columns)}
+
+
+class RecordingSink:
+    """Rows of ``STEPS`` as a recording. ``extras``: further named values that get a column.
+
+    A name that the layout itself uses is left out; ``steps.csv`` has it. A recording has one goal:
+    without ``has_goal`` it has none, since a session's goal may change on its way.
+    """
+
+    def __init__(self, file: Path, extras: Sequence[str], *, has_goal: bool) -> None:
+        self._file = file.open("w", encoding="utf-8", newline="")
+        self._writer = csv.writer(self._file, lineterminator="\r\n")
+        self._columns = {a: b for a, b in COLUMNS.items() if has_goal or a != PLAIN.goal}
+        used = {*COLUMNS, *PLAIN.required, *PLAIN.other}
+        self._extras = [name for name in extras if name not in used]
+        self._writer.writerow([*self._columns, *self._extras])
+
+    def write(self, rows: Rows) -> None:
+        """Write some strides."""
+        places, at_extra = [PLACES[name] for name in self._columns.values()], PLACES["extra"]
+        for row in rows:
+            extra: dict[str, Any] = row[at_extra] or {}
+            more = (extra.get(name) for name in self._extras)
+            self._writer.writerow(
+                [format_cell(cell) for cell in (*(row[p] for p in places), *more)]
+            )
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()

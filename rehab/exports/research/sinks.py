@@ -1,0 +1,115 @@
+"""Where the rows of one session's tables go, some hundred at a time: CSV and Parquet."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
+from importlib.util import find_spec
+from itertools import islice
+from pathlib import Path
+from typing import Any, Protocol
+
+from rehab.exports.tables import Table, Type, format_cells
+
+BATCH_ROWS = 1000  # held in memory
+Rows = list[Sequence[Any]]
+
+
+class Sink(Protocol):
+    """Takes the rows of a table, in their order."""
+
+    def write(self, rows: Rows) -> None:
+        """Take some rows."""
+
+    def close(self) -> None:
+        """Finish what was written."""
+
+
+def pump(rows: Iterable[Sequence[Any]], sinks: Sequence[Sink]) -> int:
+    """Write rows to every sink, finish them, and return how many rows there were."""
+    remaining, count = iter(rows), 0
+    with ExitStack() as closing:  # every file, also where a row cannot be written
+        for sink in reversed(sinks):
+            closing.callback(sink.close)
+        while batch := list(islice(remaining, BATCH_ROWS)):
+            count += len(batch)
+            for sink in sinks:
+                sink.write(batch)
+    return count
+
+
+class CsvSink:
+    """A table's rows as CSV without the header, which the whole file has once."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file.open("w", encoding="utf-8", newline="")
+        self._writer = csv.writer(self._file, lineterminator="\r\n")
+
+    def write(self, rows: Rows) -> None:
+        """Write some rows."""
+        self._writer.writerows(format_cells(rows))
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def has_parquet() -> bool:
+    """Return whether the library that writes Parquet is installed."""
+    return find_spec("pyarrow") is not None
+
+
+class ParquetSink:
+    """A table's rows as Parquet: types by the codebook, text and numbers as they are stored.
+
+    Each column's unit and meaning stand in its metadata.
+    """
+
+    def __init__(self, file: Path, table: Table) -> None:
+        import pyarrow as pa
+        from pyarrow import parquet
+
+        types = {
+            Type.TEXT: pa.string(),
+            Type.INTEGER: pa.int64(),
+            Type.NUMBER: pa.float64(),
+            Type.BOOLEAN: pa.bool_(),
+            Type.TIME: pa.timestamp("us", tz="UTC"),
+            Type.DATE: pa.date32(),
+            Type.JSON: pa.string(),
+        }
+        self._arrow = pa
+        self._json = [column.type is Type.JSON for column in table.columns]
+        self._schema = pa.schema(
+            [
+                pa.field(
+                    column.name,
+                    types[column.type],
+                    metadata={"unit": column.unit, "meaning": column.meaning},
+                )
+                for column in table.columns
+            ]
+        )
+        self._writer = parquet.ParquetWriter(file, self._schema)
+
+    def write(self, rows: Rows) -> None:
+        """Write some rows as one group."""
+        columns = [
+            [_to_text(cell) if is_json else cell for cell in cells]
+            for cells, is_json in zip(zip(*rows, strict=True), self._json, strict=True)
+        ]
+        arrays = [
+            self._arrow.array(cells, type=field.type)
+            for cells, field in zip(columns, self._schema, strict=True)
+        ]
+        self._writer.write_table(self._arrow.Table.from_arrays(arrays, schema=self._schema))
+
+    def close(self) -> None:
+        """Write the end of the file."""
+        self._writer.close()
+
+
+def _to_text(cell: Any) -> str | None:
+    return None if cell is None else json.dumps(cell, ensure_ascii=False)

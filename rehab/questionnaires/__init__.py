@@ -1,0 +1,1 @@
+"""Questionnaires: their items, scales and scores. Pure: no framework, no input or output."""

@@ -1,0 +1,68 @@
+"""An export for analysis by one button: prepared before one's eyes, left, gone on with, fetched."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+
+import pytest
+from playwright.sync_api import Browser
+
+from tests.support.browsers import SIZES, picture
+from tests.support.servers import ROOT, Server, clean_environment
+
+pytestmark = pytest.mark.browser
+WALKED = """
+from django.utils import timezone
+from rehab.people.models import Patient
+from rehab.people.sign_in.first_start import first_clinic
+from tests.support.walks import walk
+rosa = Patient.everywhere.create(
+    clinic=first_clinic(), code="R1", nickname="Rosa", paretic_side="left"
+)
+for day in range(3):
+    walk(rosa, "positive", [2.5, 1.5] * 10, days_ago=day, now=timezone.now())
+"""
+
+
+def test_an_export_is_prepared_left_gone_on_with_and_fetched(server: Server, browser: Browser):
+    subprocess.run(
+        [sys.executable, "manage.py", "shell", "-v0", "-c", WALKED],
+        cwd=ROOT,
+        env=clean_environment(server.folder, server.port),
+        check=True,
+    )
+    width, height = SIZES["laptop"]
+    context = browser.new_context(base_url=server.url, viewport={"width": width, "height": height})
+    context.set_default_timeout(40_000)
+    page = context.new_page()
+    page.goto("/start/")
+    page.fill("#id_username", "pt")
+    page.fill("#id_password", server.password)
+    page.click("[type=submit]")
+    page.wait_for_url("**/start/")
+    page.goto("/export/")
+    if "confirm" in page.url:
+        page.fill("input[type=password]", server.password)
+        page.click("main [type=submit], main button")
+        page.wait_for_url("**/export/")
+    picture(page, "export-before")
+    page.route("**/advance/", lambda route: route.abort())  # as without a network
+    page.click("button:has-text('Prepare')")
+    page.wait_for_selector(".preparing [role=alert]:not([hidden])")
+    assert page.is_hidden(".preparing a[download]")
+    page.unroute("**/advance/")
+    page.reload()  # it goes on where it was
+    page.wait_for_selector(".preparing a[download]:not([hidden])")
+    assert page.inner_text("#how-far") == "3 / 3 sessions"
+    picture(page, "export-done")
+    with page.expect_download() as fetched:
+        page.click(".preparing a[download]")
+    with zipfile.ZipFile(fetched.value.path()) as archive:
+        names = archive.namelist()
+    assert {"README.txt", "steps.csv", "codebook.csv", "bids/participants.tsv"} <= set(names)
+    page.click("[name=discard]")
+    page.wait_for_selector("button:has-text('Prepare')")
+    assert not list((server.folder / "exports").iterdir())
+    context.close()
