@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from datetime import datetime
 
 from django.db.models import Count, Max
 
@@ -57,21 +58,32 @@ def log_entries(session: TrainingSession, after: int = 0) -> Iterator[Measuremen
     ``after``: those after this step, which was the last thing that happened. Raises DamagedLog
     where a step is missing.
     """
-    changes = SessionEvent.everywhere.filter(session=session, kind__in=list(CONTROLS))
-    events = list(changes.filter(after_number__gte=after).order_by("pk"))
+    for _, entry in log_rows(session, list(CONTROLS), after):
+        yield entry if isinstance(entry, Measurement) else to_change(entry)
+
+
+def log_rows(
+    session: TrainingSession, kinds: Iterable[str], after: int = 0
+) -> Iterator[tuple[datetime, Measurement | SessionEvent]]:
+    """Return a session's committed steps and its events of these kinds, by our clock, in order.
+
+    ``after``, errors: as in ``log_entries``.
+    """
+    chosen = SessionEvent.everywhere.filter(session=session, kind__in=list(kinds))
+    events = list(chosen.filter(after_number__gte=after).order_by("pk"))
     events.reverse()
     number = after
     steps = Step.everywhere.filter(session=session, number__gt=after).order_by("number")
-    for stored in steps.values_list(*MEASURED).iterator():
+    for received_at, *stored in steps.values_list("received_at", *MEASURED).iterator():
         while events and events[-1].after_number <= number:
-            yield _to_change(events.pop())
+            yield events[-1].at, events.pop()
         step = _to_measurement(*stored)
         if step.number != number + 1:
             raise DamagedLog(describe_hole(session.pk, number, step.number))
-        yield step
+        yield received_at, step
         number = step.number
     while events:
-        yield _to_change(events.pop())
+        yield events[-1].at, events.pop()
 
 
 def check_log(session: TrainingSession) -> int:
@@ -92,7 +104,8 @@ def describe_hole(session_id: int, before: int, after: int) -> str:
     )
 
 
-def _to_change(event: SessionEvent) -> Change:
+def to_change(event: SessionEvent) -> Change:
+    """Return a change as its event records it."""
     return Change(event.kind, event.data.get("value", event.value))
 
 

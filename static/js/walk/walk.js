@@ -24,7 +24,8 @@ const sound = isMirror ? () => {} : createSounds(body.querySelector(".sound"));
 const drawFeedback = createFeedback(body);
 const fitCalm = createFitting(body);
 const page = { link: "", asking: false, still: false };
-let session, stillTimer, linkTimer, frame, leaveTimer;
+let session, linkTimer, frame, leaveTimer;
+let stopWaiting = () => {};
 let confetti = "none";
 
 const socket = connect(body.dataset.socket, {
@@ -60,11 +61,11 @@ const { showRobot, keepFocus, tellTherapist } = createControls(body, socket, (as
 // Begin to wait for the next step.
 function awaitStep() {
   page.still = false;
-  clearTimeout(stillTimer);
-  stillTimer = setTimeout(() => {
+  stopWaiting();
+  stopWaiting = socket.after(STILL_MS, () => {
     page.still = true;
     redraw();
-  }, STILL_MS);
+  });
   redraw();
 }
 
