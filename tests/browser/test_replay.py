@@ -77,7 +77,7 @@ def test_room_is_played_again_from_its_log(server, browser):
     assert patient.locator(".words").inner_text() == "Step not measured."
 
     # A note leads to its moment; that moment has an address.
-    page.click("text=pain")
+    page.click(".told button:has-text('Pain')")
     patient.locator("body[data-step='2']").wait_for()
     page.wait_for_function("() => location.search.startsWith('?at=')")
     page.reload()
