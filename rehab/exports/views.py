@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from datetime import datetime
 from typing import Any
 
@@ -12,6 +13,7 @@ from django.views.decorators.http import require_GET, require_safe
 
 from rehab.exports.archive import ZipResponse
 from rehab.exports.patient_data import patient_files, session_files
+from rehab.exports.tables import format_cells
 from rehab.patients.pages.records import get_patient
 from rehab.people.access import for_roles, user_of
 from rehab.people.audit import audit_log
@@ -21,6 +23,7 @@ from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.insight import read_view, to_table
 
 
 @for_roles(Role.LEAD, Role.PT, patients=False)  # audited here, before the first byte
@@ -58,6 +61,21 @@ def download_sessions(request: HttpRequest) -> HttpResponse:
     user, now = user_of(request), timezone.now()
     audit_export(request, now)
     return _stream(session_files(user, now), f"garry-sessions-{now:%Y-%m-%d}.zip")
+
+
+@for_roles(Role.LEAD, Role.PT, patients=False)  # audited here, before the first byte
+@step_up.required_for_download
+@require_GET
+def download_insight(request: HttpRequest) -> HttpResponse:
+    """Return the sessions that the insight page shows as a table, a session a line."""
+    user, now = user_of(request), timezone.now()
+    view = read_view(user, request.GET, now)
+    audit_export(request, now)
+    name = f"garry-insight-{now:%Y-%m-%d}.csv"
+    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    response = HttpResponse(content_type="text/csv; charset=utf-8", headers=headers)
+    csv.writer(response, lineterminator="\r\n").writerows(format_cells(to_table(view.shown)))
+    return response
 
 
 def audit_export(request: HttpRequest, now: datetime, patient: Patient | None = None) -> None:

@@ -28,6 +28,7 @@ PARTS = {
     "incident": "the-robot",
     "correct": "what-to-do-when-",
     "history": "progress",
+    "insight": "insight",
     "take-home": "progress",
     "pair": "pair-the-tablet",
     "first-steps": "first-steps",

@@ -245,7 +245,7 @@ class Runtime:
                 device.on_session_opened(session_id)
 
     def connected_device_ids(self) -> set[int | None]:
-        """Return the keys of the sources and robots that are connected; callable from any thread."""
+        """Return the keys of the sources and robots that are connected. Any thread may ask."""
         return {device.device_id for there in list(self.devices.values()) for device in list(there)}
 
     async def recover(self) -> int:
