@@ -89,6 +89,6 @@ class DeviceForm(forms.ModelForm):
 
     def issue(self) -> str:
         """Store the device and return its token, which is shown once."""
-        token = self.instance.new_token()
+        token: str = self.instance.new_token()
         self.save()
         return token
