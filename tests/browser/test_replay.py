@@ -41,6 +41,10 @@ def test_room_is_played_again_from_its_log(server, browser):
         robot.send(json.dumps({"type": "report", "report": CELEBRATES}))
         page.click("[data-remark=pain]")
         expect(page.locator(".said")).to_contain_text("pain")
+        page.click("[data-write]")
+        page.fill("#note", "Held on with the left hand.")
+        page.click("#written .primary")
+        expect(page.locator(".said")).to_contain_text("Held on")
         page.click("[data-goal='1']")
         page.wait_for_selector("[data-show=goal]:text-is('4.10')")
         feet.walk(1.2, None, 1.3)
@@ -60,6 +64,7 @@ def test_room_is_played_again_from_its_log(server, browser):
         live.locator("body[data-step='5']").wait_for()
         points_then = live.locator(".key").inner_text()
     page.goto(f"/sessions/{walk.session}/details/")
+    expect(page.locator(".note")).to_contain_text("Held on with the left hand.")
     page.click("text=Replay")
 
     # Step by step: each page shows what it showed then.
