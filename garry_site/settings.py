@@ -287,6 +287,11 @@ BROWSER_LIBRARIES = {  # browser libraries come from node_modules and are never 
 }
 STATICFILES_DIRS = [
     BASE_DIR / "static",
+    *(
+        (name, folder)
+        for name, folder in [("docs", BASE_DIR / "docs" / "images")]
+        if folder.is_dir()
+    ),
     *((name, folder) for name, folder in BROWSER_LIBRARIES.items() if folder.is_dir()),
 ]
 STORAGES = {

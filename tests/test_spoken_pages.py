@@ -21,7 +21,8 @@ from tests.support.world import World, fill_board, signed_in
 
 pytestmark = pytest.mark.django_db
 
-MACHINE = {"healthz", "readyz", "catalog", "tablet-state", "tablet-app", "sign-out"}
+# Addresses of machines, and the guide, which is English alone.
+MACHINE = {"help", "healthz", "readyz", "catalog", "tablet-state", "tablet-app", "sign-out"}
 # What nobody translates: names of ours, units, codes, what people typed, and how dates are told.
 AS_IT_IS = re.compile(
     r"[Zz]q\w+qz[\w-]*|\bzq\b|GARRY|W/kg|\b(?:kg|min|s|m)\b|(?:localhost|testserver|http)\S*|"

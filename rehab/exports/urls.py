@@ -6,6 +6,7 @@ from rehab.exports import views
 
 urlpatterns = [
     path("patients/<int:patient_id>/records/data.zip", views.download_patient, name="patient-data"),
+    path("insight/sessions.csv", views.download_insight, name="insight-file"),
     path("export/", views.show_export, name="export"),
     path("export/research/", views.prepare_research, name="prepare-research"),
     path("export/research/advance/", views.advance_research, name="advance-research"),

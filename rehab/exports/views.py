@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from rehab.exports.archive import ZipResponse
 from rehab.exports.forms import ResearchExportForm
 from rehab.exports.patient_data import patient_files, session_files
 from rehab.exports.research.package import Package, discard_old
+from rehab.exports.tables import format_cells
 from rehab.patients.pages.records import get_patient
 from rehab.people.access import for_roles, user_of
 from rehab.people.audit import audit_log
@@ -26,6 +28,7 @@ from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.insight import read_view, to_table
 
 SECONDS_OF_A_CALL = 1.5  # in which an export goes on; the page asks again and again
 
@@ -122,6 +125,21 @@ def download_research(request: HttpRequest) -> HttpResponse:
     audit_export(request, now)
     name = f"garry-{package.study or 'sessions'}-{package.made_at:%Y-%m-%d}.zip"
     return _stream(package.files(), name)
+
+
+@for_roles(Role.LEAD, Role.PT, patients=False)  # audited here, before the first byte
+@step_up.required_for_download
+@require_GET
+def download_insight(request: HttpRequest) -> HttpResponse:
+    """Return the sessions that the insight page shows as a table, a session a line."""
+    user, now = user_of(request), timezone.now()
+    view = read_view(user, request.GET, now)
+    audit_export(request, now)
+    name = f"garry-insight-{now:%Y-%m-%d}.csv"
+    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    response = HttpResponse(content_type="text/csv; charset=utf-8", headers=headers)
+    csv.writer(response, lineterminator="\r\n").writerows(format_cells(to_table(view.shown)))
+    return response
 
 
 def audit_export(request: HttpRequest, now: datetime, patient: Patient | None = None) -> None:

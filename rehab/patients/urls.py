@@ -2,10 +2,12 @@
 
 from django.urls import path
 
-from rehab.patients.pages import ending, records, start, visits
+from rehab.patients.pages import ending, first_steps, records, start, visits
 
 urlpatterns = [
     path("start/", start.choose_patient, name="start"),
+    path("first-steps/", first_steps.first_steps, name="first-steps"),
+    path("first-steps/state/", first_steps.first_steps_state, name="first-steps-state"),
     path("patients/new/", start.add_patient, name="new-patient"),
     path("patients/demo/", start.add_demo, name="demo"),
     path("patients/<int:patient_id>/", start.show_patient, name="patient"),

@@ -170,6 +170,20 @@ def correct_session(
     return corrections
 
 
+@transaction.atomic
+def add_note(session: TrainingSession, line: str, by: User, now: datetime) -> str:
+    """Add a line to a session's note, with its time of day; return the note. It may still run."""
+    rows = TrainingSession.objects.visible_to(by).select_for_update(of=("self",))
+    stored = rows.select_related("clinic").get(pk=session.pk)
+    old = current_note(stored, by)
+    said = f"{clinic_time(now, stored.clinic):%H:%M} {normalize_newlines(line)}"
+    note = f"{old}\n{said}" if old else said
+    SessionCorrection(
+        session=stored, field=CorrectedField.NOTE, old=old, new=note, by=by, at=now
+    ).save()
+    return note
+
+
 def _describe_conflict(
     session: TrainingSession, before: Values, expected: Values, reader: User
 ) -> str:

@@ -72,6 +72,7 @@ SOURCE_LABELS = (
     gettext_noop("Live sensor"),
     gettext_noop("Simulated patient, good"),
     gettext_noop("Simulated patient, poor"),
+    gettext_noop("Simulated patient, demo"),
     gettext_noop("Simulated patient, fatiguing"),
     gettext_noop("Simulated patient, dropout"),
 )

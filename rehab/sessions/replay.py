@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Collection, Iterable, Iterator
-from typing import NamedTuple
+from datetime import datetime
+from typing import Any, NamedTuple
 
 from django.db.models import Count, Max
 
@@ -80,17 +81,39 @@ def merge_entries(
 
     Both in the order of the log, behind step ``after``. Raises DamagedLog where a step is missing.
     """
-    events, number = changes[::-1], after
-    for stored in steps:
-        while events and events[-1].after_number <= number:
-            yield to_change(events.pop())
+    for _, entry in _merge(session_id, after, ((None, *step) for step in steps), changes):
+        yield entry if isinstance(entry, Measurement) else to_change(entry)
+
+
+def log_rows(
+    session: TrainingSession, kinds: Iterable[str], after: int = 0
+) -> Iterator[tuple[datetime, Measurement | SessionEvent]]:
+    """Return a session's committed steps and its events of these kinds, by our clock, in order.
+
+    ``after``, errors: as in ``log_entries``.
+    """
+    chosen = SessionEvent.everywhere.filter(session=session, kind__in=list(kinds))
+    events = chosen.filter(after_number__gte=after).order_by("pk")
+    steps = Step.everywhere.filter(session=session, number__gt=after).order_by("number")
+    stored = steps.values_list("received_at", *MEASURED).iterator()
+    return _merge(session.pk, after, stored, list(events))
+
+
+def _merge(
+    session_id: int, after: int, steps: Iterable[tuple[Any, ...]], events: list[SessionEvent]
+) -> Iterator[tuple[Any, Measurement | SessionEvent]]:
+    """Return steps, each with what stands before its columns, and events with their time."""
+    waiting, number = events[::-1], after
+    for received_at, *stored in steps:
+        while waiting and waiting[-1].after_number <= number:
+            yield waiting[-1].at, waiting.pop()
         step = to_measurement(*stored)
         if step.number != number + 1:
             raise DamagedLog(describe_hole(session_id, number, step.number))
-        yield step
+        yield received_at, step
         number = step.number
-    while events:
-        yield to_change(events.pop())
+    while waiting:
+        yield waiting[-1].at, waiting.pop()
 
 
 def check_log(session: TrainingSession) -> int:

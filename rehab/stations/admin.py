@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from django import forms
 from django.contrib import admin
 from django.contrib.admin import RelatedOnlyFieldListFilter
-from django.core.exceptions import ValidationError
 from django.db.models import Prefetch, QuerySet
 from django.http import HttpRequest
 from django.urls import reverse
@@ -17,8 +15,8 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.web.admin_base import ClinicForm, ScopedAdmin, ScopedOptions, TokenAdmin
+from rehab.stations.forms import PinForm
 from rehab.stations.models import Device, Station
-from rehab.stations.pins import MAX_LENGTH, set_pin
 from rehab.stations.presence import format_device_state
 
 
@@ -51,30 +49,8 @@ class DeviceInline(ScopedOptions, admin.TabularInline):
         return format_device_state(device, timezone.now())
 
 
-class StationForm(ClinicForm):
-    """A station with its PIN, which is never shown."""
-
-    pin = forms.CharField(
-        label=_("New PIN to leave the patient’s page"),
-        required=False,
-        max_length=MAX_LENGTH,
-        widget=forms.PasswordInput(attrs={"inputmode": "numeric", "autocomplete": "new-password"}),
-        help_text=_(
-            "Four to eight digits, asked for at this station’s tablet. Empty: stays as it is."
-        ),
-    )
-    no_pin = forms.BooleanField(label=_("No PIN: leaving asks a plain question"), required=False)
-
-    def clean(self) -> dict[str, Any] | None:
-        """Set the PIN; only its hash is stored."""
-        data = super().clean()
-        pin = self.cleaned_data.get("pin", "")
-        try:
-            if pin or self.cleaned_data.get("no_pin"):
-                set_pin(self.instance, pin)
-        except ValueError as problem:
-            raise ValidationError({"pin": str(problem)}) from problem
-        return data
+class StationForm(PinForm, ClinicForm):
+    """A station with its PIN."""
 
 
 @admin.register(Station)

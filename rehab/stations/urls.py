@@ -2,9 +2,14 @@
 
 from django.urls import path
 
-from rehab.stations import views
+from rehab.stations.pages import pairing, stations
 
 urlpatterns = [
-    path("tablets/pair/", views.pair, name="pair"),
-    path("tablets/leave/", views.leave, name="leave"),
+    path("tablets/pair/", pairing.pair, name="pair"),
+    path("tablets/leave/", pairing.leave, name="leave"),
+    path("stations/", stations.list_stations, name="stations"),
+    path("stations/new/", stations.edit_station, name="new-station"),
+    path("stations/<int:station_id>/", stations.edit_station, name="edit-station"),
+    path("stations/<int:station_id>/devices/", stations.add_device, name="new-device"),
+    path("devices/<int:device_id>/", stations.change_device, name="change-device"),
 ]

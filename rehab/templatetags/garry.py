@@ -1,11 +1,15 @@
 """Tags and filters of all templates."""
 
+from typing import Any
+
 from django import template
 from django.templatetags.static import static
+from django.urls import reverse
 from django.utils.html import format_html, json_script
 from django.utils.safestring import SafeString
 from django.utils.translation import gettext as _
 
+from rehab.people.web.help_pages import PARTS
 from rehab.sessions.formatting import (
     ROBOT_LEVEL_LABELS,
     format_duration,
@@ -34,6 +38,14 @@ def wire_limits() -> SafeString:
     """Return what a page's scripts have to know of the wire, as the JSON element ``wire``."""
     limits = {"final_codes": sorted(FINAL_FOR_PAGES), "heartbeat_ms": 1000 * PAGE_HEARTBEAT_S}
     return json_script(limits, "wire")
+
+
+@register.simple_tag(takes_context=True)
+def help_address(context: dict[str, Any]) -> str:
+    """Return the address of the help on the page that is shown."""
+    match = getattr(context.get("request"), "resolver_match", None)
+    part = PARTS.get(match.url_name or "", "") if match else ""
+    return f"{reverse('help')}#{part}" if part else reverse("help")
 
 
 @register.filter

@@ -89,7 +89,7 @@ def plan_by_clicks(page: Page) -> None:
         page.fill(f"#id_arm-{row}-name", name)
         page.select_option(f"#id_arm-{row}-valence", valence)
         page.select_option(f"#id_arm-{row}-protocol", label="Baseline, training, washout")
-    page.click("button:has-text('Keep')")
+    page.click("button:has-text('Save')")
     expect(page.locator("h1")).to_have_text("VAL Draft")
     expect(page.locator(".risk")).to_contain_text("punishment has worked worse")
     page.click("button:has-text('Register')")

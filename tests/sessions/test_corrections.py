@@ -18,7 +18,12 @@ from rehab.people.consent.services import record_consent
 from rehab.people.models import ErasureReason, Patient
 from rehab.people.roles import Role
 from rehab.sessions import corrections
-from rehab.sessions.corrections import CorrectedField, SessionCorrection, correct_session
+from rehab.sessions.corrections import (
+    CorrectedField,
+    SessionCorrection,
+    correct_session,
+    current_note,
+)
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.takehome import summarize_for_patient
@@ -338,3 +343,17 @@ def test_nobody_who_is_erased_is_offered_or_taken_as_who_walked(world, rosa, oma
     group = pt.get(reverse("admin:rehab_leaderboard_add")).content.decode()
     assert f'name="group" value="{omar.pk}"' in group
     assert f'name="group" value="{rosa.pk}"' not in group
+
+
+def test_notes_are_typed_while_a_session_runs_and_add_up(world):
+    session = world.session
+    TrainingSession.everywhere.filter(pk=session.pk).update(state="running")
+    client, url = client_of(world), f"/sessions/{session.pk}/note/"
+    before = current_note(session, world.people[Role.PT])
+    assert client.post(url, {"note": "Uses a cane.\r\nTired."}).status_code == 200
+    assert client.post(url, {"note": "  "}).status_code == 400
+    assert client.post(url, {"note": "x" * 501}).status_code == 400
+    note = current_note(session, world.people[Role.PT])
+    assert note.startswith(f"{before}\n")
+    assert note.endswith(" Uses a cane.\nTired.")
+    assert client_of(world, Role.RESEARCHER).post(url, {"note": "x"}).status_code == 403

@@ -20,6 +20,7 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.incidents import RobotIncident
 from rehab.sessions.models import TrainingSession
+from rehab.stations.models import Device, Station
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment
 from rehab.studies.power_runs import PowerRun
@@ -37,11 +38,13 @@ MARK = re.compile("zq[a-z]+?qz")  # of tests/support/world.py
 KEYS: dict[str, tuple[type[Model], str]] = {
     "board_id": (Leaderboard, "pk"),
     "code": (Patient, "code"),
+    "device_id": (Device, "pk"),
     "enrollment_id": (Enrollment, "pk"),
     "incident_id": (RobotIncident, "pk"),
     "patient_id": (Patient, "pk"),
     "run_id": (PowerRun, "pk"),
     "session_id": (TrainingSession, "pk"),
+    "station_id": (Station, "pk"),
     "study_id": (Study, "pk"),
 }
 

@@ -8,10 +8,11 @@ from datetime import datetime, timedelta
 from typing import Any, ClassVar, TypeVar
 
 from django.core.exceptions import ValidationError
-from django.db import models
+from django.db import models, transaction
 from django.utils import timezone
 from django.utils.translation import gettext_lazy as _
 
+from rehab.people.audit.audit_log import Act, record_security_change
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role, may_delegate
 from rehab.people.scope import ClinicModel, Scope
@@ -52,6 +53,16 @@ class TokenModel(ClinicModel):
         token = secrets.token_urlsafe(TOKEN_BYTES)
         self.token_hash = hash_token(token)
         return token
+
+
+def renew_token(holder: TokenModel, by: User, address: str, now: datetime) -> str:
+    """Store and return a new token of a row, of a revoked one too; the old one stops at once."""
+    with transaction.atomic():
+        record_security_change(Act.TOKEN, by, holder, address, now)
+        token = holder.new_token()
+        holder.revoked_at = None
+        holder.save()
+    return token
 
 
 T = TypeVar("T", bound=TokenModel)

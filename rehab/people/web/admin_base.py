@@ -9,7 +9,7 @@ from django.contrib import admin, messages
 from django.contrib.admin.exceptions import DisallowedModelAdminLookup
 from django.contrib.admin.options import IncorrectLookupParameters
 from django.contrib.admin.views.main import ChangeList
-from django.db import models, transaction
+from django.db import models
 from django.db.models import QuerySet
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import redirect
@@ -20,14 +20,13 @@ from django.utils.translation import gettext, ngettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.access import user_of
-from rehab.people.audit.audit_log import Act, record_security_change
 from rehab.people.audit.history import clinic_id_of
 from rehab.people.audit.history_text import changes_of
 from rehab.people.networks import client_address
 from rehab.people.roles import Right, Role, is_hidden_beside, rights_of
 from rehab.people.scope import ScopedModel, visible_rows
 from rehab.people.sign_in import step_up
-from rehab.people.sign_in.tokens import TokenModel
+from rehab.people.sign_in.tokens import TokenModel, renew_token
 
 
 def rights_for(request: HttpRequest, model: type[models.Model]) -> Right:
@@ -316,13 +315,8 @@ class TokenAdmin(ScopedAdmin):
             return None
         issued = []
         for holder in holders:
-            with transaction.atomic():
-                by, address = user_of(request), client_address(request)
-                record_security_change(Act.TOKEN, by, holder, address, timezone.now())
-                token = holder.new_token()
-                holder.revoked_at = None
-                holder.save()
-            issued.append((holder, token))
+            by, address = user_of(request), client_address(request)
+            issued.append((holder, renew_token(holder, by, address, timezone.now())))
         return self._show_tokens(request, issued)
 
     @admin.action(description=_("Revoke tokens"), permissions=["change"])

@@ -73,7 +73,7 @@ def initial_choices(patient: Patient, by: User) -> dict[str, Any]:
             "minutes": protocol_minutes(protocol) or PLANNED_MINUTES,
             "protocol": protocol,
             "station": _first_free_station(stations),
-            "source": (source := "synthetic good" if patient.simulated else LIVE),
+            "source": (source := "synthetic demo" if patient.simulated else LIVE),
             "source_words": format_source(sources[source]),
             "trained_side": patient.paretic_side or Side.LEFT.value,
             "robot": "normal",

@@ -9,7 +9,7 @@ import threading
 import time
 from collections import defaultdict
 from collections.abc import Awaitable, Callable, Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from asgiref.sync import sync_to_async
 from channels.db import database_sync_to_async
@@ -63,6 +63,17 @@ class Draining(NotStored):
     """The server is stopping and opens no session any more."""
 
 
+class ConnectedDevice(Protocol):
+    """A source or robot that is connected, with a session or without one."""
+
+    @property
+    def device_id(self) -> int | None:
+        """The device's key."""
+
+    def on_session_opened(self, session_id: int) -> None:
+        """Attach to a session that was just created for its station, unless it has one."""
+
+
 class Runtime:
     """All live sessions of one event loop."""
 
@@ -75,7 +86,7 @@ class Runtime:
         self._trouble = Trouble.NONE  # as it was told last
         self.writer = Writer(self._call)
         # By station: devices that wait for a session to open there.
-        self.waiting_devices: dict[int, set[Callable[[int], None]]] = defaultdict(set)
+        self.devices: dict[int, set[ConnectedDevice]] = defaultdict(set)  # by station
         self.audit_queue = AuditQueue()
         self.sockets: set[Any] = set()  # closed when the server stops
         self.requests: set[asyncio.Task[None]] = set()  # of pages, under way
@@ -366,7 +377,7 @@ class Runtime:
         return [one for one in there if one.location == live.location and one is not live]
 
     def announce(self, session_id: int, station_id: int | None) -> None:
-        """Tell a station's waiting devices, wherever they are, that a session has opened."""
+        """Tell a station's devices, wherever they are, that a session has opened."""
         if station_id is None:
             return
         self.announce_here(session_id, station_id)
@@ -374,9 +385,13 @@ class Runtime:
             self.servers.announce(session_id, station_id)
 
     def announce_here(self, session_id: int, station_id: int) -> None:
-        """Tell a station's devices that wait at this process."""
-        for tell in list(self.waiting_devices.get(station_id, ())):
-            tell(session_id)
+        """Tell a station's devices that are connected to this process."""
+        for device in list(self.devices.get(station_id, ())):
+            device.on_session_opened(session_id)
+
+    def connected_device_ids(self) -> set[int | None]:
+        """Return the keys of the sources and robots that are connected. Any thread may ask."""
+        return {device.device_id for there in list(self.devices.values()) for device in list(there)}
 
     async def take_over_left(self) -> None:
         """Take over sessions that run and have had no owner for a beat, or whose owner is gone.

@@ -9,7 +9,8 @@ from datetime import datetime
 from typing import NamedTuple, Protocol
 
 from rehab.people.models import User
-from rehab.sessions.events.change import change_event, phase_event, source_message
+from rehab.sessions.events.change import source_message
+from rehab.sessions.events.course import Before, events_of_change, events_of_step
 from rehab.sessions.events.event import (
     LiveEvent,
     presence_event,
@@ -19,7 +20,6 @@ from rehab.sessions.events.event import (
     robot_stopped_event,
 )
 from rehab.sessions.events.snapshot import snapshot
-from rehab.sessions.events.step import StepContext, step_event
 from rehab.sessions.live.aggregate import Row, SessionAggregate, StepRow, Summary
 from rehab.sessions.live.commits import Job
 from rehab.sessions.live.hub import EventFeed, Subscriber
@@ -155,33 +155,22 @@ class LiveSession:
     ) -> None:
         """Score a step and queue it for the log. Raises what ``SessionFold.step`` raises."""
         fold = self.aggregate.fold
-        index, goal, had_obstacle = fold.phase_index, fold.goal, fold.obstacle
-        context, switches = StepContext.of(fold), len(fold.switches)
-        was_running = self.is_running
+        before = Before.of(fold)
         row = self.aggregate.record_step(measurement, received_at)
         rows: list[Row] = [row]
         if late:
             self.late.append(row.step.number)
-        events = [step_event(fold, context, row.step, live=not late)]
-        moved = (fold.phase_index, fold.goal, fold.obstacle) != (index, goal, had_obstacle)
-        if moved and not (fold.adapted and fold.phase_index == index):
-            events.append(phase_event(fold, switched=len(fold.switches) > switches))
-        changed: list[str] = []
-        if fold.phase_index != index:
-            changed.append(ChangeKind.PHASE)
-        if fold.goal != goal:
-            events.append(change_event(fold, ChangeKind.GOAL))
-            changed.append(ChangeKind.GOAL)
+        events = events_of_step(fold, before, row.step, live=not late)
+        changed = before.changed_by_step(fold)
         if fold.adapted:
             followed = RuleEntry.GOAL_FOLLOWED
-            rows.append(self.aggregate.log_event(followed, None, received_at, {}, fold.goal, goal))
-        if was_running and not self.is_running:
+            old = before.goal
+            rows.append(self.aggregate.log_event(followed, None, received_at, {}, fold.goal, old))
+        if ChangeKind.PAUSE in changed:
             rest = RuleEntry.PLANNED_REST
             rows.append(self.aggregate.log_event(rest, None, received_at, {}, fold.rest_s))
-            events.append(change_event(fold, ChangeKind.PAUSE))
-            changed.append(ChangeKind.PAUSE)
         summary = None
-        if moved or self.aggregate.is_checkpoint_due:
+        if before.has_moved(fold) or self.aggregate.is_checkpoint_due:
             summary = self.aggregate.summary(with_checkpoint=True)
         self._submit(rows, events, changed, summary, row=row)
 
@@ -192,14 +181,11 @@ class LiveSession:
         """
         stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         fold = self.aggregate.fold
-        goal, switches = fold.goal, len(fold.switches)
+        before = Before.of(fold)
         rows = self.aggregate.change(change, by, at)
-        if len(fold.switches) > switches:
-            events = [phase_event(fold, switched=True)]
-        else:
-            events = [change_event(fold, change.kind, change.value)]
+        events = events_of_change(fold, before, change)
         changed = [change.kind]
-        if change.kind == ChangeKind.PHASE and fold.goal != goal:
+        if change.kind == ChangeKind.PHASE and fold.goal != before.goal:
             changed.append(ChangeKind.GOAL)
         self._submit(rows, events, changed, self.aggregate.summary(), stored=stored)
         return stored

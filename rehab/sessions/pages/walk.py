@@ -38,6 +38,7 @@ def show_walk(request: HttpRequest, session_id: int) -> HttpResponse:
     context = {
         "session": session,
         "mirror": mirror,
+        "replayed": mirror and "replay" in request.GET,  # in the frame of the replay
         "tablet": alone,
         "leave_to": reverse("start") if alone else reverse("patient", args=[session.patient_id]),
     }

@@ -134,6 +134,11 @@ GOOD = WalkerProfile()  # learns as HEBB_03 did in session 1
 # Only GOOD is fitted to recordings. The others are made up from it, to try rules and screens with.
 PROFILES: dict[str, WalkerProfile] = {
     "good": GOOD,
+    # For trying GARRY out: learns within minutes and then hits a goal at its baseline about six
+    # times of ten, so that praise, blame and the robot are all seen.
+    "demo": replace(
+        GOOD, exploration_strides=60, trained_level=1.05, trained_gain=1.0, learning_strides=80.0
+    ),
     # Never gets much above the usual walk, varies as in exploration, and walks slowly. Baseline:
     # HEBB_91's.
     "poor": replace(

@@ -37,7 +37,12 @@ export function createLastStride({ state, show }) {
     draw(session) {
       show("goal-line", describeGoal(session));
       const stride = state.lastStride;
-      if (!stride) return;
+      dot.hidden = stride?.performance == null;
+      if (!stride) {
+        for (const slot of ["number", "value", "extras", "verdict"]) show(slot, "");
+        show("performance", "–");
+        return;
+      }
       const isJudged = stride.performance != null;
       show("number", fill(_("no. %(number)s"), { number: stride.number }));
       show("performance", isJudged ? percent(stride.performance) : "—");
@@ -50,7 +55,6 @@ export function createLastStride({ state, show }) {
         ].join("\n"),
       );
       show("verdict", describeVerdict(stride, session.phase));
-      dot.hidden = !isJudged;
       dot.classList.toggle("miss", !stride.hit && !stride.close);
       dot.classList.toggle("close", Boolean(stride.close));
     },

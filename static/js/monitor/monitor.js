@@ -14,6 +14,7 @@ import { createFeedbackType } from "garry/monitor/controls/feedback_type";
 import { createGain } from "garry/monitor/controls/gain";
 import { createGoalCoach } from "garry/monitor/controls/goal_coach";
 import { createGoal } from "garry/monitor/controls/goal";
+import { createNote } from "garry/monitor/controls/note";
 import { createPatientPage } from "garry/monitor/controls/patient_page";
 import { createPhase } from "garry/monitor/controls/phase";
 import { createRemarks } from "garry/monitor/controls/remarks";
@@ -109,6 +110,7 @@ const parts = [
   createRobotLevel(page),
   createGain(page),
   createRemarks(page),
+  createNote(page),
   createFall(page),
   createStrideCharts(page),
   robot,

@@ -3,7 +3,7 @@
 import { _, fill } from "garry/shared/language";
 import { percent } from "garry/shared/format";
 import { RobotPlacing } from "garry/monitor/robot_placing";
-import { cureOf, describeReason, describeState } from "garry/monitor/robot_text";
+import { cureOf, describeDecision, describeReason, describeState } from "garry/monitor/robot_text";
 import { RobotScene } from "garry/shared/robot_scene";
 
 const KEPT_POSES = 240;
@@ -156,7 +156,7 @@ export class RobotPanel {
     show("share", share == null ? "" : fill(_("%(share)s of windows"), { share: percent(share) }));
     show("robot-why", this.#orderFailure || this.#describeHold());
     show("robot-cure", this.#describeCure());
-    show("robot-last", this.#isHeld || this.#orderFailure ? "" : this.#describeDecision());
+    show("robot-last", this.#isHeld || this.#orderFailure ? "" : describeDecision(this.#decision, this.#breakReason));
     // A real base waits for a person from the start; a stop stays until a person lifts it.
     this.#root.classList.toggle("still", this.#isHeld);
     show("robot-stop", this.#isStopped ? _("Robot stopped") : _("Stop robot"));
@@ -209,19 +209,6 @@ export class RobotPanel {
     if (!this.#isConnected || !isLow || reason === "charging") return "";
     const words = _("“Charge me”: battery %(share)s. It stands on its mark after each gesture; carry it from there.");
     return fill(words, { share: percent(share ?? 0) });
-  }
-
-  // What the last window came to, and what followed.
-  #describeDecision() {
-    if (!this.#decision) return _("Decides every five seconds of walking.");
-    const { mean, threshold, gesture, intensity, reason } = this.#decision;
-    const size = intensity == null || intensity === 1 ? "" : fill(_(" at %(share)s"), { share: percent(intensity) });
-    const end = this.#breakReason && fill(_(", broken off: %(why)s"), { why: describeReason(this.#breakReason) });
-    return fill(_("Last window %(mean)s, acts from %(threshold)s: %(what)s."), {
-      mean: percent(mean),
-      threshold: percent(threshold),
-      what: gesture ? gesture + size + end : describeReason(reason),
-    });
   }
 
   // Return why it stands although somebody walks, with the cure; "" where it does not.

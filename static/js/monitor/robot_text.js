@@ -1,6 +1,7 @@
 // What a robot's reasons and states are called on the PT's page.
 
-import { _ } from "garry/shared/language";
+import { _, fill } from "garry/shared/language";
+import { percent } from "garry/shared/format";
 
 // Why it does not move, or did not end what it began.
 const REASONS = {
@@ -83,3 +84,16 @@ const STATES = {
 export const describeReason = (reason) => REASONS[reason] ?? reason;
 export const cureOf = (reason) => CURES[reason] ?? "";
 export const describeState = (state) => STATES[state] ?? state;
+
+// What a window came to and what followed; `breakReason`: why the gesture after it did not end as it should.
+export function describeDecision(decision, breakReason) {
+  if (!decision) return _("Decides every five seconds of walking.");
+  const { mean, threshold, gesture, intensity, reason } = decision;
+  const size = intensity == null || intensity === 1 ? "" : fill(_(" at %(share)s"), { share: percent(intensity) });
+  const end = breakReason && fill(_(", broken off: %(why)s"), { why: describeReason(breakReason) });
+  return fill(_("Last window %(mean)s, acts from %(threshold)s: %(what)s."), {
+    mean: percent(mean),
+    threshold: percent(threshold),
+    what: gesture ? gesture + size + end : describeReason(reason),
+  });
+}

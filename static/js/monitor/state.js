@@ -5,11 +5,23 @@ export const SILENT_S = { stride: 4, tablet: 8 };
 const KEPT_STRIDES = 400;
 const TOTALS = ["hit_rate", "hits", "judged", "score"];
 const TIMES = ["active_s", "phase_s", "phase_strides"];
+const TYPES = ["began", "changed_to", "valence", "next_valence", "types"];
+// What of the session each kind of event tells.
+const TOLD = {
+  goal: ["goal"],
+  gain: ["gain"],
+  valence: TYPES,
+  state: ["state", "pause_reason", "rest_s"],
+  phase: ["phase", "goal", "gain", "obstacle", ...TIMES, ...TYPES],
+};
 
 // Copy those of the named fields that an event has.
 export function update(target, event, names) {
   for (const name of names) if (event[name] !== undefined) target[name] = event[name];
 }
+
+// A remark as charts show it: after a stride.
+export const annotationOf = ({ number, what, value }) => ({ after: number, kind: what, value });
 
 export class MonitorState {
   session = null; // the last snapshot, brought up to date by events
@@ -36,7 +48,9 @@ export class MonitorState {
   }
 
   apply(event) {
+    update(this.session, event, TOLD[event.kind] ?? []);
     if (event.mark) this.annotations.push(event.mark);
+    if (event.kind === "remark") this.annotations.push(annotationOf(event));
     if (event.kind === "step") this.#addStride(event);
     if (event.kind === "presence") {
       this.session.presence = event.presence;

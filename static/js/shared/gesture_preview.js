@@ -35,23 +35,27 @@ export function scheduleNotes(audio, notes) {
   return oscillators;
 }
 
-// Play a preview (robot/motion/preview.py) in a drawing; `audio` may be missing. Resolves at its end.
-export function playPreview(scene, { took_s, poses, lights, notes, mood }, audio) {
-  if (audio) scheduleNotes(audio, notes);
+// Draw a preview (robot/motion/preview.py) as it is at a moment; return whether it is over.
+export function drawMoment(scene, { took_s, poses, lights, mood }, at_s) {
+  const passed = poses.filter(([from_s]) => from_s <= at_s);
+  const shown = (passed.length ? passed : poses.slice(0, 1)).map(([, x_m, y_m, heading_rad]) => ({
+    x_m,
+    y_m,
+    heading_rad,
+  }));
+  const isOver = at_s >= took_s;
+  const [, first, second] = (!isOver && sinceOf(lights, at_s)) || [0, "off", "off"];
+  scene.draw({ poses: shown, lights: [first, second], mood: isOver ? "calm" : mood });
+  return isOver;
+}
+
+// Play a preview in a drawing; `audio` may be missing. Resolves at its end.
+export function playPreview(scene, preview, audio) {
+  if (audio) scheduleNotes(audio, preview.notes);
   const began = performance.now();
   return new Promise((resolve) => {
     const step = () => {
-      const at_s = (performance.now() - began) / 1000;
-      const passed = poses.filter(([from_s]) => from_s <= at_s);
-      const shown = (passed.length ? passed : poses.slice(0, 1)).map(([, x_m, y_m, heading_rad]) => ({
-        x_m,
-        y_m,
-        heading_rad,
-      }));
-      const isOver = at_s >= took_s;
-      const [, first, second] = (!isOver && sinceOf(lights, at_s)) || [0, "off", "off"];
-      scene.draw({ poses: shown, lights: [first, second], mood: isOver ? "calm" : mood });
-      if (isOver) resolve();
+      if (drawMoment(scene, preview, (performance.now() - began) / 1000)) resolve();
       else requestAnimationFrame(step);
     };
     step();

@@ -8,6 +8,9 @@
 // onEvent(event): what has just happened.
 // onLink(state, reason): "open", "lost" (it comes back by itself) or "closed" (it does not; `reason`
 //   is a text for people).
+//
+// A replay has the same interface (replay/session_socket.js). So that silence can be played, too, waiting is the
+// socket's: `after(ms, act)` returns what cancels it.
 
 import { _ } from "garry/shared/language";
 import { refusal } from "garry/shared/labels";
@@ -195,8 +198,13 @@ export function connect(path, { onSnapshot, onSteps, onEvent, onLink } = {}) {
     });
   }
 
+  function after(ms, act) {
+    const timer = setTimeout(act, ms);
+    return () => clearTimeout(timer);
+  }
+
   addEventListener("online", reconnectIfStale);
   document.addEventListener("visibilitychange", reconnectIfStale);
   open();
-  return { change, ask, send, close };
+  return { change, ask, send, close, after };
 }

@@ -24,7 +24,8 @@ const sound = isMirror ? () => {} : createSounds(body.querySelector(".sound"));
 const drawFeedback = createFeedback(body);
 const fitCalm = createFitting(body);
 const page = { link: "", asking: false, still: false };
-let session, stillTimer, linkTimer, frame, leaveTimer;
+let session, linkTimer, frame, leaveTimer;
+let stopWaiting = () => {};
 let confetti = "none";
 
 const socket = connect(body.dataset.socket, {
@@ -61,11 +62,11 @@ const { showRobot, keepFocus, tellTherapist, reportUnanswered } = createControls
 // Begin to wait for the next step.
 function awaitStep() {
   page.still = false;
-  clearTimeout(stillTimer);
-  stillTimer = setTimeout(() => {
+  stopWaiting();
+  stopWaiting = socket.after(STILL_MS, () => {
     page.still = true;
     redraw();
-  }, STILL_MS);
+  });
   redraw();
 }
 

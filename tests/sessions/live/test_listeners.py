@@ -174,4 +174,4 @@ async def test_idle_sessions_leave_memory_but_not_while_someone_comes(place, rea
     await tablet.hang_up()
     assert not runtime.sessions[session.pk].feed.subscribers
     assert not runtime.sockets
-    assert not any(runtime.waiting_devices.values())
+    assert not any(runtime.devices.values())

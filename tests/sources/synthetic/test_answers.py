@@ -7,7 +7,7 @@ from statistics import correlation, mean, stdev
 import numpy as np
 import pytest
 
-from rehab.sources.synthetic import ANSWERS, GOOD, SyntheticWalker, walk
+from rehab.sources.synthetic import ANSWERS, GOOD, PROFILES, SyntheticWalker, walk
 from rehab.training.phases import make_phase
 from rehab.training.steps import Side
 from tests.sources.synthetic.protocols import usable
@@ -39,6 +39,22 @@ def test_the_plateau_follows_the_goal():
     easy, hard = (find_plateau(0.85, goal_w_kg=share * GOOD.baseline_w_kg) for share in (0.9, 1.1))
 
     assert easy < 1.45 < hard
+
+
+def test_the_demo_patient_learns_and_hits_about_six_of_ten():
+    goal = GOOD.baseline_w_kg
+    early, late = [], []
+    for seed in range(6):
+        walker = SyntheticWalker(PROFILES["demo"], seed)
+        walker.goal_w_kg = goal
+        hits = [
+            value >= goal for value in usable(walker.next_stride(training(1)) for _ in range(400))
+        ]
+        early.append(mean(hits[:60]))
+        late.append(mean(hits[-200:]))
+
+    assert mean(early) < 0.45
+    assert 0.5 < mean(late) < 0.7
 
 
 def test_what_nobody_can_reach_is_given_up():

@@ -84,7 +84,7 @@ class DeviceSocket(Socket):
         self.hello_received = True
         self._first_frame_timer.cancel()
         device = self._authorize(self.device)
-        self.runtime.waiting_devices[device.station_id].add(self.on_session_opened)
+        self.runtime.devices[device.station_id].add(self)
         found = await find_open_session(device, session_id)
         if found is not None:
             await self._attach(found)
@@ -156,5 +156,5 @@ class DeviceSocket(Socket):
     def on_disconnect(self) -> None:
         """Free the session's slot."""
         if self.hello_received and self.device is not None:
-            self.runtime.waiting_devices[self.device.station_id].discard(self.on_session_opened)
+            self.runtime.devices[self.device.station_id].discard(self)
         self._leave_session()

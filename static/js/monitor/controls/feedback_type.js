@@ -2,9 +2,6 @@
 
 import { _, fill } from "garry/shared/language";
 import { phaseName, typeName } from "garry/shared/labels";
-import { update } from "garry/monitor/state";
-
-export const TYPE_FIELDS = ["began", "changed_to", "valence", "next_valence", "types"];
 
 export function createFeedbackType({ state, show, change }) {
   const choice = document.querySelector("[data-type]");
@@ -42,10 +39,5 @@ export function createFeedbackType({ state, show, change }) {
     if (state.session) change("valence", choice.value).finally(() => draw(state.session));
   });
 
-  return {
-    draw,
-    events: {
-      valence: (session, event) => update(session, event, TYPE_FIELDS),
-    },
-  };
+  return { draw };
 }

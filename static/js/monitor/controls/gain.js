@@ -24,10 +24,5 @@ export function createGain({ onPress, change }) {
       offer([...new Set([...OFFERED, gain])].sort((a, b) => a - b));
       markPressed(group, gain);
     },
-    events: {
-      gain(session, event) {
-        session.gain = event.gain;
-      },
-    },
   };
 }

@@ -33,9 +33,6 @@ export function createGoal({ state, show, announce, onPress, change }) {
   return {
     draw: ({ goal }) => show("goal", goal === null ? "–" : number(goal, 2)),
     events: {
-      goal(session, event) {
-        session.goal = event.goal;
-      },
       source_goal(_session, event) {
         announce(fill(_("The sensor’s own goal is %(goal)s; yours counts."), { goal: number(event.goal, 2) }));
       },

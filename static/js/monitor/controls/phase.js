@@ -1,72 +1,13 @@
-// The session's phases on top of the page, each as wide as it is long and filled as far as it is walked, and the
-// button that goes to the next one.
+// The phases, and the buttons that go to the next one and begin this one anew.
 
 import { _, fill } from "garry/shared/language";
-import { clock } from "garry/shared/format";
 import { phaseName } from "garry/shared/labels";
-import { TYPE_FIELDS } from "garry/monitor/controls/feedback_type";
-import { update } from "garry/monitor/state";
-
-const FIELDS = ["phase", "goal", "gain", "obstacle", "active_s", "phase_s", "phase_strides", ...TYPE_FIELDS];
-
-const STRIDE_S = 1.1; // of phases that end by strides, and only for their width
-const OPEN_S = 60; // the least width of a phase that a therapist ends
-
-const lengthOf = ({ seconds, strides }) => seconds || (strides ? STRIDE_S * strides : null);
-
-// Return how long each phase is drawn; those without an end share what is left of the planned time.
-function lengths({ phases, target }) {
-  const known = phases.map(lengthOf);
-  const open = known.filter((length) => length === null).length;
-  const rest = (target.duration_s ?? 0) - known.reduce((sum, length) => sum + (length ?? 0), 0);
-  return known.map((length) => length ?? Math.max(OPEN_S, rest / open));
-}
-
-// Return how far the phase at hand has come, 0 to 1, and what is left of it.
-function progress({ phase: { seconds, strides }, phase_s, phase_strides }, length) {
-  if (seconds) return [phase_s / seconds, clock(Math.max(0, seconds - phase_s))];
-  if (strides) return [phase_strides / strides, String(Math.max(0, strides - phase_strides))];
-  return [phase_s / length, ""];
-}
+import { createPhaseBar } from "garry/monitor/phase_bar";
 
 export function createPhase({ show, onPress, change }) {
-  const list = document.querySelector(".phases");
+  const drawBar = createPhaseBar(document.querySelector(".phases"));
   const button = document.querySelector("[data-next-phase]");
 
-  // Hide the names that have no room in their part of the bar.
-  function fitNames() {
-    for (const item of list.children) item.classList.remove("narrow");
-    const narrow = [...list.children].filter((item) => item.scrollWidth > item.clientWidth);
-    for (const item of narrow) item.classList.add("narrow");
-  }
-
-  function drawList(session) {
-    const { phases, phase } = session;
-    const long = lengths(session);
-    const [done, left] = progress(session, long[phase.index]);
-    if (list.children.length !== phases.length) {
-      const items = phases.map(({ name }) =>
-        Object.assign(document.createElement("li"), { textContent: phaseName(name) }),
-      );
-      list.replaceChildren(...items);
-    }
-    [...list.children].forEach((item, index) => {
-      const isNow = index === phase.index;
-      const text = isNow && left ? fill(_("%(phase)s · %(left)s left"), { phase: phaseName(phase.name), left }) : "";
-      const label = text || phaseName(phases[index].name);
-      if (item.textContent !== label) item.textContent = label;
-      item.style.setProperty("--share", long[index]);
-      item.style.setProperty("--done", isNow ? Math.min(1, done) : index < phase.index ? 1 : 0);
-      item.className = index < phase.index ? "was" : index === phase.index ? "is" : "";
-      if (index === phase.index) item.setAttribute("aria-current", "step");
-      else item.removeAttribute("aria-current");
-    });
-    if (list.dataset.of === list.textContent) return;
-    list.dataset.of = list.textContent;
-    fitNames();
-  }
-
-  new ResizeObserver(fitNames).observe(list);
   onPress("[data-next-phase]", (_button, { phase }) => change("phase", phase.index + 1));
 
   // What a phase has counted stays; its strides and seconds begin anew.
@@ -76,13 +17,10 @@ export function createPhase({ show, onPress, change }) {
   return {
     draw(session) {
       again.disabled = !["running", "paused"].includes(session.state);
-      drawList(session);
+      drawBar(session);
       const next = session.phases[session.phase.index + 1];
       show("next-phase", next ? fill(_("Go to %(phase)s"), { phase: phaseName(next.name) }) : _("No further phase"));
       button.disabled = !next;
-    },
-    events: {
-      phase: (session, event) => update(session, event, FIELDS),
     },
   };
 }

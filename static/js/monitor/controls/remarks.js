@@ -3,8 +3,9 @@
 import { _, fill } from "garry/shared/language";
 import { describe } from "garry/monitor/annotations";
 import { openDialog } from "garry/monitor/controls/open_dialog";
+import { annotationOf } from "garry/monitor/state";
 
-export function createRemarks({ state, announce, onPress, remark }) {
+export function createRemarks({ announce, onPress, remark }) {
   const exertion = document.getElementById("exertion");
 
   onPress("[data-remark]", ({ dataset }) => {
@@ -14,11 +15,7 @@ export function createRemarks({ state, announce, onPress, remark }) {
 
   return {
     events: {
-      remark(_session, { number, what, value }) {
-        const annotation = { after: number, kind: what, value };
-        state.annotations.push(annotation);
-        announce(fill(_("Noted: %(what)s"), { what: describe(annotation) }));
-      },
+      remark: (_session, event) => announce(fill(_("Noted: %(what)s"), { what: describe(annotationOf(event)) })),
     },
   };
 }

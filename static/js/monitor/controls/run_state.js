@@ -4,7 +4,6 @@ import { _, fill } from "garry/shared/language";
 import { clock } from "garry/shared/format";
 import { icon } from "garry/shared/svg";
 import { openDialog } from "garry/monitor/controls/open_dialog";
-import { update } from "garry/monitor/state";
 
 // The one main button, by the session's state: the change it asks for, its label and icon.
 const MAIN = {
@@ -61,9 +60,6 @@ export function createRunState({ state, show, onPress, change }) {
       drawTime(session);
       drawPause(session);
       drawButtons(session);
-    },
-    events: {
-      state: (session, event) => update(session, event, ["state", "pause_reason", "rest_s"]),
     },
   };
 }

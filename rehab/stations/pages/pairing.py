@@ -28,27 +28,37 @@ def pair(request: HttpRequest) -> HttpResponse:
     """Approve the tablet that shows a code, for a station of the person's own clinic."""
     user = user_of(request)
     first_station(clinic_of(user))
-    stations = Station.objects.visible_to(user)
     problem = ""
-    code = request.POST.get("code", request.GET.get("code", ""))[:16]
     if request.method == "POST":
-        chosen = request.POST.get("station", "")
-        station = stations.filter(pk=int(chosen)).first() if chosen.isdecimal() else None
-        try:
-            if station is None:
-                raise PairingRefused(_("Choose a station."))
-            device = approve_pairing(code, station, user.pk, timezone.now())
-        except PairingRefused as refused:
-            problem = str(refused)
-        else:
-            names = {"tablet": device.name, "station": station}
-            messages.success(request, _("%(tablet)s belongs to %(station)s now.") % names)
+        problem = let_in(request)
+        if not problem:
             return redirect("start")
-    context = {"stations": stations, "code": code, "problem": problem}
-    return render(request, "stations/pair.html", context | _tablet_address(request))
+    context = {
+        "stations": Station.objects.visible_to(user),
+        "code": request.POST.get("code", request.GET.get("code", ""))[:16],
+        "problem": problem,
+    }
+    return render(request, "stations/pair.html", context | tablet_address(request))
 
 
-def _tablet_address(request: HttpRequest) -> dict[str, str]:
+def let_in(request: HttpRequest) -> str:
+    """Approve the tablet that shows the code that was sent; return why not, "" where it worked."""
+    user, chosen = user_of(request), request.POST.get("station", "")
+    stations = Station.objects.visible_to(user)
+    station = stations.filter(pk=int(chosen)).first() if chosen.isdecimal() else None
+    if station is None:
+        return _("Choose a station.")
+    try:
+        code = request.POST.get("code", "")[:16]
+        device = approve_pairing(code, station, user.pk, timezone.now())
+    except PairingRefused as refused:
+        return str(refused)
+    names = {"tablet": device.name, "station": station}
+    messages.success(request, _("%(tablet)s belongs to %(station)s now.") % names)
+    return ""
+
+
+def tablet_address(request: HttpRequest) -> dict[str, str]:
     """Return the address that a tablet opens, and its drawing to scan; empty without one."""
     host = reachable_host(request.get_host(), [settings.HOST, *settings.ALLOWED_HOSTS])
     if host is None:

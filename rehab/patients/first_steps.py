@@ -1,0 +1,88 @@
+"""The first steps of a new clinic: what is there already, tested as far as a server can."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+
+from django.utils.functional import Promise
+from django.utils.translation import gettext as _
+from django.utils.translation import gettext_lazy
+
+from rehab.people.models import Patient, User
+from rehab.sessions.live import runtime
+from rehab.stations.models import Device, Station
+from rehab.stations.presence import JUST_NOW, format_device_state
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What is there of a step now: whether that is enough, in words."""
+
+    is_done: bool
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class FirstStep:
+    """A step: its name in addresses, its title, and what looks whether it is done."""
+
+    slug: str
+    title: str | Promise
+    look: Callable[[User, datetime], Found]
+
+
+def _look_for_station(user: User, now: datetime) -> Found:
+    names = [str(station) for station in Station.objects.visible_to(user)]
+    if not names:
+        return Found(False, _("No station yet."))
+    return Found(True, ", ".join(names))
+
+
+def _look_for_tablet(user: User, now: datetime) -> Found:
+    tablets = _devices(user, Device.Kind.TABLET)
+    if not tablets:
+        return Found(False, _("No tablet is paired yet."))
+    is_here = any(one.last_seen_at and now - one.last_seen_at < JUST_NOW for one in tablets)
+    return Found(is_here, _describe(tablets, now))
+
+
+def _look_for_sensor(user: User, now: datetime) -> Found:
+    sources = _devices(user, Device.Kind.SOURCE)
+    if not sources:
+        return Found(False, _("No sensor has a token yet."))
+    running = runtime.peek()
+    connected = running.connected_device_ids() if running else set()
+    here = [one.name for one in sources if one.pk in connected]
+    if here:
+        return Found(True, _("%(sensor)s is connected.") % {"sensor": ", ".join(here)})
+    words = _("Start the sensor’s program with its token. Not connected: %(sensors)s.")
+    return Found(False, words % {"sensors": _describe(sources, now)})
+
+
+def _look_for_patient(user: User, now: datetime) -> Found:
+    count = Patient.objects.visible_to(user).count()
+    return Found(count > 0, _("No patient yet.") if not count else _("There are patients."))
+
+
+STEPS = (
+    FirstStep("station", gettext_lazy("Station"), _look_for_station),
+    FirstStep("tablet", gettext_lazy("Tablet"), _look_for_tablet),
+    FirstStep("sensor", gettext_lazy("Sensor"), _look_for_sensor),
+    FirstStep("patient", gettext_lazy("First patient"), _look_for_patient),
+)
+
+
+def is_new(user: User) -> bool:
+    """Return whether a person's clinic has no patient yet."""
+    return not Patient.objects.visible_to(user).exists()
+
+
+def _devices(user: User, kind: Device.Kind) -> list[Device]:
+    devices = Device.objects.visible_to(user).filter(kind=kind, builtin=False, revoked_at=None)
+    return list(devices.order_by("name"))
+
+
+def _describe(devices: list[Device], now: datetime) -> str:
+    return ", ".join(f"{one.name}, {format_device_state(one, now)}" for one in devices)

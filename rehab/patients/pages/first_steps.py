@@ -1,0 +1,87 @@
+"""A new clinic is walked through: station, tablet, sensor, first patient."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.http import HttpRequest, HttpResponse, JsonResponse
+from django.shortcuts import redirect, render
+from django.urls import reverse
+from django.utils import timezone
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_http_methods, require_safe
+
+from rehab.patients.first_steps import STEPS
+from rehab.people.access import clinic_of, for_roles, user_of
+from rehab.people.roles import Right, Role, rights_of
+from rehab.people.sign_in import step_up
+from rehab.stations.builtin import first_station
+from rehab.stations.forms import DeviceForm, StationForm
+from rehab.stations.models import Device, Station
+from rehab.stations.pages.pairing import let_in, tablet_address
+from rehab.stations.pages.stations import show_token
+
+SKIPPED = "skipped_first_steps"  # key of the browser session
+
+
+@for_roles(Role.LEAD, Role.PT, patients=False)
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def first_steps(request: HttpRequest) -> HttpResponse:
+    """Show one step at a time; each can be done here, is looked at live, and can be skipped."""
+    user = user_of(request)
+    found = {step.slug: step.look(user, timezone.now()) for step in STEPS}
+    skipped = set(request.session.get(SKIPPED, []))
+    if request.method == "POST" and request.POST.get("skip") in found:
+        request.session[SKIPPED] = sorted(skipped | {request.POST["skip"]})
+        return redirect("first-steps")
+    open_ones = [slug for slug, one in found.items() if not one.is_done and slug not in skipped]
+    wanted = request.GET.get("step", "")
+    slug = wanted if wanted in found else open_ones[0] if open_ones else ""
+    context: dict[str, Any] = {
+        "steps": [(step, found[step.slug], step.slug in skipped) for step in STEPS],
+        "slug": slug,
+        "now": found.get(slug),
+        "may_edit": Right.CHANGE in rights_of(user.role, "Station"),
+    }
+    if slug == "tablet":
+        context |= tablet_address(request) | {"stations": Station.objects.visible_to(user)}
+    acted = _act(request, slug, context)
+    return acted or render(request, "patients/first_steps.html", context)
+
+
+def _act(request: HttpRequest, slug: str, context: dict[str, Any]) -> HttpResponse | None:
+    """Do what a step's form asks for. Return where that leads; None to show the step."""
+    user, sent = user_of(request), request.POST if request.method == "POST" else None
+    there = f"{reverse('first-steps')}?step={slug}"
+    if slug == "tablet" and sent is not None:
+        context["problem"] = let_in(request)
+        return None if context["problem"] else redirect(there)
+    if not context["may_edit"]:
+        return None
+    if slug == "station":
+        station = Station.objects.visible_to(user).order_by("pk").first()
+        form = context["form"] = StationForm(sent, instance=station, by=user)
+        if sent is not None and form.is_valid():
+            form.save()
+            return redirect("first-steps")
+    if slug == "sensor":
+        device = DeviceForm(sent, station=first_station(clinic_of(user)))
+        del device.fields["kind"]
+        device.instance.kind = Device.Kind.SOURCE
+        context["form"] = device
+        if sent is not None and not step_up.is_confirmed(request, timezone.now()):
+            return step_up.ask(request)
+        if sent is not None and device.is_valid():
+            return show_token(request, device.instance, device.issue())
+    return None
+
+
+@for_roles(Role.LEAD, Role.PT, patients=False)
+@never_cache
+@require_safe
+def first_steps_state(request: HttpRequest) -> JsonResponse:
+    """Return what is there of each step now."""
+    user, now = user_of(request), timezone.now()
+    found = {step.slug: step.look(user, now) for step in STEPS}
+    return JsonResponse({slug: [one.is_done, one.words] for slug, one in found.items()})

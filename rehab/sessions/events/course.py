@@ -1,0 +1,70 @@
+"""What a step or a change is told as: the same while a session runs and when it is played back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rehab.sessions.events.change import change_event, phase_event
+from rehab.sessions.events.event import LiveEvent
+from rehab.sessions.events.step import StepContext, step_event
+from rehab.training.changes import Change, ChangeKind, State
+from rehab.training.fold import SessionFold
+from rehab.training.steps import ScoredStep
+
+
+@dataclass(frozen=True, slots=True)
+class Before:
+    """How a session stood before a step or a change, which its events follow from."""
+
+    context: StepContext
+    phase_index: int
+    goal: float | None
+    obstacle: str
+    switches: int
+    is_running: bool
+
+    @classmethod
+    def of(cls, fold: SessionFold) -> Before:
+        """Return how a session stands now."""
+        return cls(
+            StepContext.of(fold),
+            fold.phase_index,
+            fold.goal,
+            fold.obstacle,
+            len(fold.switches),
+            fold.state is State.RUNNING,
+        )
+
+    def has_moved(self, fold: SessionFold) -> bool:
+        """Return whether phase, goal or what is in the plan's way are others since then."""
+        now = (fold.phase_index, fold.goal, fold.obstacle)
+        return now != (self.phase_index, self.goal, self.obstacle)
+
+    def changed_by_step(self, fold: SessionFold) -> list[str]:
+        """Return what a step has changed by the plan's own rules, as kinds of changes."""
+        has_paused = self.is_running and fold.state is not State.RUNNING
+        changed = {
+            ChangeKind.PHASE: fold.phase_index != self.phase_index,
+            ChangeKind.GOAL: fold.goal != self.goal,
+            ChangeKind.PAUSE: has_paused,
+        }
+        return [kind for kind, has_changed in changed.items() if has_changed]
+
+
+def events_of_step(
+    fold: SessionFold, before: Before, step: ScoredStep, *, live: bool
+) -> list[LiveEvent]:
+    """Return the events of a step that was just scored; see `step_event` for ``live``."""
+    events = [step_event(fold, before.context, step, live=live)]
+    only_adapted = fold.adapted and fold.phase_index == before.phase_index
+    if before.has_moved(fold) and not only_adapted:
+        events.append(phase_event(fold, switched=len(fold.switches) > before.switches))
+    changed = before.changed_by_step(fold)
+    return events + [change_event(fold, kind) for kind in changed if kind != ChangeKind.PHASE]
+
+
+def events_of_change(fold: SessionFold, before: Before, change: Change) -> list[LiveEvent]:
+    """Return the events of a change that was just applied."""
+    if len(fold.switches) > before.switches:
+        return [phase_event(fold, switched=True)]
+    return [change_event(fold, change.kind, change.value)]

@@ -1,0 +1,279 @@
+"""Sessions compared: weeks, feedback types and patients, at equal goals, with what went wrong.
+
+Descriptive. Sessions of one patient resemble each other, so where a group has several patients its
+interval is that of their means, and of the sessions' figures where it has one.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import date, datetime, timedelta
+from urllib.parse import urlencode
+
+from django.db.models import QuerySet
+from django.utils.formats import date_format
+from django.utils.functional import Promise
+from django.utils.translation import gettext, ngettext
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.models import User
+from rehab.sessions.corrections import CorrectedField, SessionCorrection
+from rehab.sessions.formatting import clinic_time, format_number
+from rehab.sessions.log import FallSeverity, Remark, SessionEvent
+from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.intervals import MeanInterval, mean_interval
+from rehab.sessions.reports.trend import metrics_by_session
+from rehab.training.valences import VALENCES
+
+MAX_SESSIONS = 2000  # the newest
+EQUAL_WITHIN = 1.1  # goals of one measure count as equal up to so much of the lowest
+ADVERSE = (Remark.FALL, Remark.NEAR_FALL, Remark.PAIN, Remark.DIZZINESS)
+
+
+@dataclass(slots=True)
+class Adverse:
+    """Something that went wrong in a session: what, when; of a fall how badly somebody was hurt."""
+
+    kind: str
+    at: datetime
+    severity: int | None = None
+
+    @property
+    def words(self) -> str:
+        """What it was."""
+        label = str(ADVERSE_LABELS[self.kind])
+        if self.severity is None:
+            return label
+        return f"{label}, {FallSeverity(self.severity).label}"
+
+
+ADVERSE_LABELS: dict[str, str | Promise] = {
+    Remark.FALL: _("fall"),
+    Remark.NEAR_FALL: _("near fall"),
+    Remark.PAIN: _("pain"),
+    Remark.DIZZINESS: _("dizziness"),
+}
+
+
+@dataclass(slots=True)
+class Walked:
+    """A session as it is compared."""
+
+    session: TrainingSession
+    at: datetime  # by the clinic's clock
+    hit_rate: float | None
+    adverse: list[Adverse] = field(default_factory=list)
+    exertion: float | None = None  # the highest that was noted, Borg CR10
+    note: str = ""
+    band: str = ""  # the goals that its goal is compared with (`goal_bands`)
+
+    @property
+    def week(self) -> date:
+        """The Monday of its week."""
+        return self.at.date() - timedelta(days=self.at.weekday())
+
+    @property
+    def type_label(self) -> str:
+        """Its feedback type; a session that was changed is none of one type."""
+        if self.session.changed_to:
+            return gettext("changed during the session")
+        return gettext(VALENCES[self.session.valence].label)
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Sessions that are compared as one: a week's, a type's, a patient's."""
+
+    label: str
+    sessions: int
+    patients: int
+    hit_rate: MeanInterval | None
+    minutes: float
+    adverse: list[tuple[str, int]]
+    exertion: MeanInterval | None
+
+    @property
+    def unit(self) -> str:
+        """What its interval is of."""
+        if self.hit_rate is None:
+            return ""
+        count = self.hit_rate.count
+        if self.patients > 1:
+            return ngettext("%(count)s patient", "%(count)s patients", count) % {"count": count}
+        return ngettext("%(count)s session", "%(count)s sessions", count) % {"count": count}
+
+
+def load_walked(user: User, sessions: QuerySet[TrainingSession]) -> list[Walked]:
+    """Return the newest of these sessions that count and were walked, the newest first."""
+    counted = sessions.filter(excluded=False, legacy_id=None, active_s__gt=0)
+    chosen = counted.select_related("patient", "clinic", "measure").defer("plan", "checkpoint")
+    rows = list(chosen.order_by("-created_at", "-pk")[:MAX_SESSIONS])
+    rates = metrics_by_session(user, rows)
+    walked = {
+        row.pk: Walked(
+            row, clinic_time(row.began_at, row.clinic), rates.get(row.pk, {}).get("hit_rate")
+        )
+        for row in rows
+    }
+    kinds = [*ADVERSE, Remark.FALL_SEVERITY, Remark.FALL_WITHDRAWN, Remark.BORG]
+    events = SessionEvent.objects.visible_to(user).filter(session__in=list(walked), kind__in=kinds)
+    for event in events.order_by("pk").defer("data"):
+        _note(walked[event.session_id], event)
+    notes = SessionCorrection.objects.visible_to(user).filter(field=CorrectedField.NOTE)
+    for correction in notes.filter(session__in=list(walked)).order_by("pk"):
+        walked[correction.session_id].note = correction.new
+    return list(walked.values())
+
+
+def _note(walked: Walked, event: SessionEvent) -> None:
+    falls = [one for one in walked.adverse if one.kind == Remark.FALL]
+    match event.kind:
+        case Remark.BORG:
+            walked.exertion = max(walked.exertion or 0.0, event.value or 0.0)
+        case Remark.FALL_SEVERITY:
+            if falls:
+                falls[-1].severity = int(event.value or 0)
+        case Remark.FALL_WITHDRAWN:
+            if falls:
+                walked.adverse.remove(falls[-1])
+        case _:
+            walked.adverse.append(Adverse(event.kind, event.at))
+
+
+def goal_bands(walked: Sequence[Walked]) -> list[tuple[str, str, int]]:
+    """Sort sessions into bands of equal goals; return these, the commonest first.
+
+    Each is its key, its goals in words, and how many sessions it has.
+    """
+    found: defaultdict[str, list[Walked]] = defaultdict(list)
+    with_goal = [one for one in walked if one.session.goal is not None and one.session.goal > 0]
+    lowest: dict[int, float] = {}  # of the present band, by measure
+    for one in sorted(with_goal, key=lambda one: one.session.goal or 0.0):
+        goal, measure = one.session.goal or 0.0, one.session.measure_id
+        if measure not in lowest or goal > EQUAL_WITHIN * lowest[measure]:
+            lowest[measure] = goal
+        one.band = f"{measure}:{lowest[measure]:g}"
+        found[one.band].append(one)
+    ordered = sorted(found.items(), key=lambda entry: -len(entry[1]))
+    return [(key, _describe_goals(members), len(members)) for key, members in ordered]
+
+
+def _describe_goals(walked: Sequence[Walked]) -> str:
+    goals = [one.session.goal or 0.0 for one in walked]
+    low, high = format_number(min(goals)), format_number(max(goals))
+    return f"{low if low == high else f'{low}–{high}'} {walked[0].session.measure.unit}"
+
+
+# What sessions may be compared by: the choice's label, the groups' sorting key, and their label.
+KEYS: dict[str, tuple[str | Promise, Callable[[Walked], str], Callable[[Walked], str]]] = {
+    "week": (
+        _("Weeks"),
+        lambda one: one.week.isoformat(),
+        lambda one: gettext("Week of %(day)s") % {"day": date_format(one.week, "DATE_FORMAT")},
+    ),
+    "type": (_("Feedback types"), lambda one: one.type_label, lambda one: one.type_label),
+    "patient": (
+        _("Patients"),
+        lambda one: f"{one.session.patient.nickname} {one.session.patient_id}",
+        lambda one: f"{one.session.patient.nickname} ({one.session.patient.code})",
+    ),
+}
+
+
+def compare(walked: Sequence[Walked], by: str) -> list[Group]:
+    """Return the groups that sessions fall in; weeks with the newest first, others by name."""
+    _label, key, describe = KEYS[by]
+    found: defaultdict[str, list[Walked]] = defaultdict(list)
+    for one in walked:
+        found[key(one)].append(one)
+    return [
+        _summarize(describe(found[name][0]), found[name])
+        for name in sorted(found, reverse=by == "week")
+    ]
+
+
+def _summarize(label: str, walked: Sequence[Walked]) -> Group:
+    kinds = Counter(adverse.kind for one in walked for adverse in one.adverse)
+    return Group(
+        label=label,
+        sessions=len(walked),
+        patients=len({one.session.patient_id for one in walked}),
+        hit_rate=mean_interval(_independent(walked, lambda one: one.hit_rate), (0, 1)),
+        minutes=sum(one.session.active_s for one in walked) / 60,
+        adverse=[(str(ADVERSE_LABELS[kind]), kinds[kind]) for kind in ADVERSE if kinds[kind]],
+        exertion=mean_interval(_independent(walked, lambda one: one.exertion), (0, 10)),
+    )
+
+
+def _independent(walked: Sequence[Walked], figure: Callable[[Walked], float | None]) -> list[float]:
+    """Return each patient's mean of a figure; of one patient the sessions' figures."""
+    values: defaultdict[int, list[float]] = defaultdict(list)
+    for one in walked:
+        value = figure(one)
+        if value is not None:
+            values[one.session.patient_id].append(value)
+    if len(values) == 1:
+        (only,) = values.values()
+        return only
+    return [sum(each) / len(each) for each in values.values()]
+
+
+PERIODS = {"4": _("4 weeks"), "12": _("12 weeks"), "52": _("a year"), "": _("All")}  # in weeks
+ANY_GOAL = "any"
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What the insight page was asked for: the choices, and the sessions that they leave.
+
+    ``bands`` are those of all sessions of the period.
+    """
+
+    by: str
+    weeks: str
+    band: str
+    bands: list[tuple[str, str, int]]
+    shown: list[Walked]
+
+    @property
+    def query(self) -> str:
+        """The choices as the query of an address."""
+        return urlencode({"by": self.by, "weeks": self.weeks, "goal": self.band})
+
+
+def read_view(user: User, query: Mapping[str, str], now: datetime) -> View:
+    """Return what a query asks for; the commonest goals where it names none that were walked."""
+    by = query.get("by", "")
+    weeks = query.get("weeks", "12")
+    weeks = weeks if weeks in PERIODS else "12"
+    sessions = TrainingSession.objects.visible_to(user).filter(simulated=False)
+    if weeks:
+        sessions = sessions.filter(created_at__gte=now - timedelta(weeks=int(weeks)))
+    walked = load_walked(user, sessions)
+    bands, band = goal_bands(walked), query.get("goal", "")
+    if band != ANY_GOAL and band not in {key for key, _words, _count in bands}:
+        band = bands[0][0] if bands else ANY_GOAL
+    shown = [one for one in walked if band in (ANY_GOAL, one.band)]
+    return View(by if by in KEYS else "week", weeks, band, bands, shown)
+
+
+def to_table(walked: Sequence[Walked]) -> Iterator[list[object]]:
+    """Yield a head and a line for each session; in English, as all files are."""
+    kinds = [str(kind) for kind in ADVERSE]
+    yield [
+        *("began", "code", "feedback_type", "measure", "unit", "goal", "hit_rate", "active_s"),
+        *kinds,
+        *("highest_borg", "note"),
+    ]
+    for one in walked:
+        session = one.session
+        counts = Counter(adverse.kind for adverse in one.adverse)
+        valences = "+".join([session.valence, *session.later_valences])
+        yield [
+            *(one.at, session.patient.code, valences, session.measure.slug, session.measure.unit),
+            *(session.goal, one.hit_rate, session.active_s),
+            *(counts[kind] for kind in kinds),
+            *(one.exertion, one.note),
+        ]

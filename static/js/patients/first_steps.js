@@ -1,0 +1,27 @@
+// The first steps of a clinic: what is there is looked at every two seconds.
+
+const EVERY_MS = 2_000;
+const root = document.querySelector("[data-state]");
+
+async function look() {
+  try {
+    const answer = await fetch(root.dataset.state, { cache: "no-store" });
+    for (const [slug, [isDone, words]] of Object.entries(await answer.json())) draw(slug, isDone, words);
+  } catch {
+    // asked again
+  }
+  setTimeout(look, EVERY_MS);
+}
+
+function draw(slug, isDone, words) {
+  const step = root.querySelector(`[data-step=${slug}]`);
+  const sign = step.querySelector("[data-sign]");
+  step.classList.toggle("done", isDone);
+  sign.textContent = isDone ? "✓" : sign.dataset.sign;
+  const live = root.querySelector(`[data-live=${slug}]`);
+  if (!live) return;
+  live.classList.toggle("done", isDone);
+  if (live.textContent !== words) live.textContent = words;
+}
+
+setTimeout(look, EVERY_MS);
