@@ -9,7 +9,17 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 from websockets.sync.client import connect
 
-from tests.support.layout import CORNERS, SCREENS, boxes, complaints, cut, set_screen, too_small
+from tests.support.layout import (
+    CORNERS,
+    LANGUAGES,
+    SCREENS,
+    boxes,
+    complaints,
+    cut,
+    from_right_to_left,
+    set_screen,
+    too_small,
+)
 from tests.support.servers import Server
 from tests.support.walk_seed import feet_of, make_walks
 
@@ -25,7 +35,7 @@ PHASES = [
 ]
 
 
-@pytest.fixture(scope="module", params=["en", "es"])
+@pytest.fixture(scope="module", params=LANGUAGES)
 def monitor(request: pytest.FixtureRequest, server: Server, browser: Browser) -> Iterator[Page]:
     """The page of a session that runs, with a robot, a goal that was changed and a note."""
     (walk,) = make_walks(server, {"name": "Rosalinda", "phases": PHASES})
@@ -42,6 +52,11 @@ def monitor(request: pytest.FixtureRequest, server: Server, browser: Browser) ->
         connect(url, additional_headers={"Authorization": header}) as robot,
     ):
         robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
+        page.wait_for_selector(".readiness li")
+        for screen in CORNERS:
+            set_screen(page, screen)
+            nothing_is_cut_or_too_small(page)
+            safety_is_within_reach(page)
         page.click("[data-main]")
         feet.hear("start")
         feet.walk(0.9, 1.1, 1.0, 0.8, 1.2, 1.0, None, 1.3)
@@ -55,6 +70,13 @@ def monitor(request: pytest.FixtureRequest, server: Server, browser: Browser) ->
 
 def safety_is_within_reach(page: Page) -> None:
     assert complaints(page, SAFETY, 44) == []
+
+
+def nothing_is_cut_or_too_small(page: Page) -> None:
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert cut(page, ".card:not(.strip), .bar-top, .whom, .phases li, .seg, .notices *") == []
+    assert cut(page, ".panels button, .panels select, .bar-top .btn, .panels h2") == []
+    assert too_small(page, ".panels button, .panels select, .bar-top .btn", 44) == []
 
 
 @pytest.mark.parametrize("screen", CORNERS)
@@ -76,11 +98,12 @@ def test_pause_stop_and_fall_keep_their_places_whatever_happens(monitor: Page, s
     monitor.wait_for_selector("[data-alarm=robot]")
     monitor.evaluate("document.querySelector('.said').textContent = 'x '.repeat(80)")
     safety_is_within_reach(monitor)
-    for question in ("[data-end]", "[data-remark=borg]"):
+    for question in ("[data-end]", "[data-remark=borg]", "[data-fall]"):
         monitor.click(question)
         expect(monitor.locator("dialog[open]")).to_be_visible()
         safety_is_within_reach(monitor)
         assert complaints(monitor, "dialog[open] button", 44) == []
+        assert cut(monitor, "dialog[open] :is(h2, p, button)") == []
         monitor.keyboard.press("Escape")
         expect(monitor.locator("dialog[open]")).to_have_count(0)
     assert boxes(monitor, SAFETY) == places
@@ -93,10 +116,7 @@ def test_pause_stop_and_fall_keep_their_places_whatever_happens(monitor: Page, s
 @pytest.mark.parametrize("screen", CORNERS)
 def test_nothing_is_cut_or_too_small(monitor: Page, screen: str) -> None:
     set_screen(monitor, screen)
-    assert monitor.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    assert cut(monitor, ".card:not(.strip), .bar-top, .whom, .phases li, .seg, .notices *") == []
-    assert cut(monitor, ".panels button, .panels select, .bar-top .btn, .panels h2") == []
-    assert too_small(monitor, ".panels button, .panels select, .bar-top .btn", 44) == []
+    nothing_is_cut_or_too_small(monitor)
     if screen in LAPTOPS:
         assert cut(monitor, ".panels, .controls, .side") == []
         assert complaints(monitor, ".panels .card", 44) == []
@@ -118,3 +138,11 @@ def test_a_phone_has_what_matters_first(monitor: Page) -> None:
     for part in (".last", ".goal.card"):
         (box,) = boxes(monitor, part)
         assert box["y"] + box["height"] <= bar["y"]
+
+
+@pytest.mark.parametrize("screen", CORNERS)
+def test_nothing_breaks_from_right_to_left(monitor: Page, screen: str) -> None:
+    set_screen(monitor, screen)
+    with from_right_to_left(monitor):
+        safety_is_within_reach(monitor)
+        nothing_is_cut_or_too_small(monitor)
