@@ -35,9 +35,9 @@ ALIKE_IN = {
     "es": "factor robot sensor extra normal plan",
     "de": "arm code codes design feedback minus monitor name normal passkey patient pause person "
     "phase plan plus sensor start tablet tablets training",
-    "fr": "code correction corrections date description migrations pages participant participants "
-    "patient patients pause performance phase phases plan plus point points position robot "
-    "signature source type version",
+    "fr": "code correction corrections date description migrations normal pages participant "
+    "participants patient patients pause performance phase phases plan plus point points position "
+    "robot signature source type version",
 }
 
 

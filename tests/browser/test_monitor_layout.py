@@ -96,6 +96,8 @@ def test_pause_stop_and_fall_keep_their_places_whatever_happens(monitor: Page, s
     expect(monitor.locator("[data-main]")).to_have_attribute("value", "resume")
     monitor.click("[data-robot=stop]")
     monitor.wait_for_selector("[data-alarm=robot]")
+    if screen in LAPTOPS:
+        assert cut(monitor, ".controls, .side, .last") == []
     monitor.evaluate("document.querySelector('.said').textContent = 'x '.repeat(80)")
     safety_is_within_reach(monitor)
     for question in ("[data-end]", "[data-remark=borg]", "[data-fall]"):
