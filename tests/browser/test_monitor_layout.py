@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 from websockets.sync.client import connect
 
+from tests.support.axe import check, go_dark
 from tests.support.layout import (
     CORNERS,
     LANGUAGES,
@@ -49,7 +50,8 @@ def monitor(request: pytest.FixtureRequest, server: Server, browser: Browser) ->
     url, header = f"ws://127.0.0.1:{server.port}/ws/robot/", f"Bearer {walk.robot}"
     with (
         feet_of(server, walk) as feet,
-        connect(url, additional_headers={"Authorization": header}) as robot,
+        # Nobody reads what this robot is told: all of it is kept, or its socket would be closed.
+        connect(url, additional_headers={"Authorization": header}, max_queue=None) as robot,
     ):
         robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
         page.wait_for_selector(".readiness li")
@@ -148,3 +150,14 @@ def test_nothing_breaks_from_right_to_left(monitor: Page, screen: str) -> None:
     with from_right_to_left(monitor):
         safety_is_within_reach(monitor)
         nothing_is_cut_or_too_small(monitor)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("screen", ["phone", "laptop", "wall"])
+def test_axe_finds_nothing_light_and_dark(monitor: Page, screen: str) -> None:
+    set_screen(monitor, screen)
+    monitor.evaluate("delete document.documentElement.dataset.theme")
+    monitor.wait_for_selector("html:not([data-pt=dark])")
+    check(monitor)
+    go_dark(monitor)
+    check(monitor)

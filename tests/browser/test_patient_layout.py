@@ -12,6 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 from websockets.sync.client import connect
 
+from tests.support.axe import check
 from tests.support.extent import EVERYTHING
 from tests.support.layout import COMPLAIN, DRAWN, LANGUAGES, TOO_WIDE, TURN, set_screen
 from tests.support.servers import Server
@@ -92,6 +93,8 @@ def look_everywhere(page: Page, before: Callable[[], None] = lambda: None) -> No
         assert (look, screen, said) == (look, screen, [])
         assert (look, screen, places) == (look, screen, [places[0]] * len(places))
         assert places[0][1][2] >= 0.94 * width
+    if EVERYTHING:
+        check(page, for_patients=True)
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -104,7 +107,7 @@ def test_pause_and_stop_robot_keep_their_places_and_no_word_is_cut(
         page_of(browser, server, walk, alone=False) as page,
         page_of(browser, server, walk, alone=True) as tablet,
         feet_of(server, walk) as feet,
-        connect(url, additional_headers={"Authorization": header}) as robot,
+        connect(url, additional_headers={"Authorization": header}, max_queue=None) as robot,
     ):
         robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
         page.wait_for_selector(".robot:not([hidden])")
