@@ -266,7 +266,13 @@ PROXIES = number(
 # --- languages, time, files ---------------------------------------------------------------------
 
 LANGUAGE_CODE = "en"  # of programs and commands, and of browsers that know none of these
-LANGUAGES = [("en", "English"), ("es", "Español")]
+# Where nobody who grew up with a language has read it yet, its name says so.
+LANGUAGES = [
+    ("en", "English"),
+    ("es", "Español"),
+    ("de", "Deutsch (Entwurf)"),
+    ("fr", "Français (ébauche)"),
+]
 LOCALE_PATHS = [BASE_DIR / "locale"]
 USE_TZ = True
 TIME_ZONE = text("GARRY_TIME_ZONE", "UTC", "time zone of dates in admin and reports")

@@ -9,23 +9,13 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
 
+from tests.support.axe import check, go_dark
 from tests.support.browsers import SIZES
 from tests.support.servers import ROOT, Server, clean_environment
 from tests.support.walk_seed import Walk, feet_of, make_walks
 
 pytestmark = pytest.mark.browser
 
-AXE = ROOT / "node_modules" / "axe-core" / "axe.min.js"
-STANDARDS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
-# WCAG 1.4.6: 7:1, for whoever reads from a treadmill.
-ENHANCED = {"color-contrast-enhanced": {"enabled": True}}
-CHECK = """async ([rules, standards]) => {
-  const { violations } = await axe.run(document, { runOnly: standards, rules });
-  const tell = ({ id, help, nodes }) =>
-    [`${id}: ${help}`, ...nodes.map(({ target, html }) => `  ${target.join(" ")} ${html}`)];
-  return violations.flatMap(tell).join("\\n");
-}"""
-COLORS_HAVE_CHANGED = "Promise.all(document.getAnimations().map((one) => one.finished))"
 WALKED = """
 from django.utils import timezone
 from rehab.people.sign_in.first_start import first_clinic
@@ -129,14 +119,6 @@ def context(browser: Browser, server: Server, walks: list[Walk]) -> Iterator[Bro
     made.close()
 
 
-def check(page: Page, *, for_patients: bool = False) -> None:
-    """Fail with axe-core's complaints about a page as it is now."""
-    if not page.evaluate("'axe' in window"):
-        page.evaluate(AXE.read_text())
-    if complaints := page.evaluate(CHECK, [ENHANCED if for_patients else {}, STANDARDS]):
-        pytest.fail(f"{page.url}\n{complaints}")
-
-
 def open_page(context: BrowserContext, path: str, size: str) -> Page:
     page = context.new_page()
     width, height = SIZES[size]
@@ -154,9 +136,7 @@ def test_pages_of_the_staff(context: BrowserContext, places: dict[str, str], pat
     check(page)
     width, height = SIZES["phone"]
     page.set_viewport_size({"width": width, "height": height})
-    page.evaluate("document.documentElement.dataset.theme = 'dark'")  # as the header's button does
-    page.wait_for_selector("html[data-pt=dark]")
-    page.evaluate(COLORS_HAVE_CHANGED)
+    go_dark(page)
     check(page)
 
 

@@ -9,7 +9,18 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 from websockets.sync.client import connect
 
-from tests.support.layout import CORNERS, SCREENS, boxes, complaints, cut, set_screen, too_small
+from tests.support.axe import check, go_dark
+from tests.support.layout import (
+    CORNERS,
+    LANGUAGES,
+    SCREENS,
+    boxes,
+    complaints,
+    cut,
+    from_right_to_left,
+    set_screen,
+    too_small,
+)
 from tests.support.servers import Server
 from tests.support.walk_seed import feet_of, make_walks
 
@@ -25,7 +36,7 @@ PHASES = [
 ]
 
 
-@pytest.fixture(scope="module", params=["en", "es"])
+@pytest.fixture(scope="module", params=LANGUAGES)
 def monitor(request: pytest.FixtureRequest, server: Server, browser: Browser) -> Iterator[Page]:
     """The page of a session that runs, with a robot, a goal that was changed and a note."""
     (walk,) = make_walks(server, {"name": "Rosalinda", "phases": PHASES})
@@ -39,9 +50,15 @@ def monitor(request: pytest.FixtureRequest, server: Server, browser: Browser) ->
     url, header = f"ws://127.0.0.1:{server.port}/ws/robot/", f"Bearer {walk.robot}"
     with (
         feet_of(server, walk) as feet,
-        connect(url, additional_headers={"Authorization": header}) as robot,
+        # Nobody reads what this robot is told: all of it is kept, or its socket would be closed.
+        connect(url, additional_headers={"Authorization": header}, max_queue=None) as robot,
     ):
         robot.send(json.dumps({"type": "hello", "version": 1, "base": "null"}))
+        page.wait_for_selector(".readiness li")
+        for screen in CORNERS:
+            set_screen(page, screen)
+            nothing_is_cut_or_too_small(page)
+            safety_is_within_reach(page)
         page.click("[data-main]")
         feet.hear("start")
         feet.walk(0.9, 1.1, 1.0, 0.8, 1.2, 1.0, None, 1.3)
@@ -55,6 +72,13 @@ def monitor(request: pytest.FixtureRequest, server: Server, browser: Browser) ->
 
 def safety_is_within_reach(page: Page) -> None:
     assert complaints(page, SAFETY, 44) == []
+
+
+def nothing_is_cut_or_too_small(page: Page) -> None:
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert cut(page, ".card:not(.strip), .bar-top, .whom, .phases li, .seg, .notices *") == []
+    assert cut(page, ".panels button, .panels select, .bar-top .btn, .panels h2") == []
+    assert too_small(page, ".panels button, .panels select, .bar-top .btn", 44) == []
 
 
 @pytest.mark.parametrize("screen", CORNERS)
@@ -74,13 +98,16 @@ def test_pause_stop_and_fall_keep_their_places_whatever_happens(monitor: Page, s
     expect(monitor.locator("[data-main]")).to_have_attribute("value", "resume")
     monitor.click("[data-robot=stop]")
     monitor.wait_for_selector("[data-alarm=robot]")
+    if screen in LAPTOPS:
+        assert cut(monitor, ".controls, .side, .last") == []
     monitor.evaluate("document.querySelector('.said').textContent = 'x '.repeat(80)")
     safety_is_within_reach(monitor)
-    for question in ("[data-end]", "[data-remark=borg]"):
+    for question in ("[data-end]", "[data-remark=borg]", "[data-fall]"):
         monitor.click(question)
         expect(monitor.locator("dialog[open]")).to_be_visible()
         safety_is_within_reach(monitor)
         assert complaints(monitor, "dialog[open] button", 44) == []
+        assert cut(monitor, "dialog[open] :is(h2, p, button)") == []
         monitor.keyboard.press("Escape")
         expect(monitor.locator("dialog[open]")).to_have_count(0)
     assert boxes(monitor, SAFETY) == places
@@ -93,10 +120,7 @@ def test_pause_stop_and_fall_keep_their_places_whatever_happens(monitor: Page, s
 @pytest.mark.parametrize("screen", CORNERS)
 def test_nothing_is_cut_or_too_small(monitor: Page, screen: str) -> None:
     set_screen(monitor, screen)
-    assert monitor.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    assert cut(monitor, ".card:not(.strip), .bar-top, .whom, .phases li, .seg, .notices *") == []
-    assert cut(monitor, ".panels button, .panels select, .bar-top .btn, .panels h2") == []
-    assert too_small(monitor, ".panels button, .panels select, .bar-top .btn", 44) == []
+    nothing_is_cut_or_too_small(monitor)
     if screen in LAPTOPS:
         assert cut(monitor, ".panels, .controls, .side") == []
         assert complaints(monitor, ".panels .card", 44) == []
@@ -118,3 +142,22 @@ def test_a_phone_has_what_matters_first(monitor: Page) -> None:
     for part in (".last", ".goal.card"):
         (box,) = boxes(monitor, part)
         assert box["y"] + box["height"] <= bar["y"]
+
+
+@pytest.mark.parametrize("screen", CORNERS)
+def test_nothing_breaks_from_right_to_left(monitor: Page, screen: str) -> None:
+    set_screen(monitor, screen)
+    with from_right_to_left(monitor):
+        safety_is_within_reach(monitor)
+        nothing_is_cut_or_too_small(monitor)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("screen", ["phone", "laptop", "wall"])
+def test_axe_finds_nothing_light_and_dark(monitor: Page, screen: str) -> None:
+    set_screen(monitor, screen)
+    monitor.evaluate("delete document.documentElement.dataset.theme")
+    monitor.wait_for_selector("html:not([data-pt=dark])")
+    check(monitor)
+    go_dark(monitor)
+    check(monitor)

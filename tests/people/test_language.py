@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
+from django.conf import settings
 from django.test import Client
 from django.urls import reverse
 from django.utils import translation
@@ -102,7 +103,7 @@ def test_programs_are_answered_in_english(world, pt):
 
 
 def test_the_words_of_scripts_are_public_and_kept(client):
-    for language in ("en", "es"):
+    for language, _name in settings.LANGUAGES:
         answer = client.get(f"/js/{language}/catalog.js")
         assert "django.gettext" in answer.content.decode()
         assert "max-age" in answer.headers["Cache-Control"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from playwright.sync_api import Page
@@ -19,6 +21,8 @@ SCREENS = {
     "wall": (3840, 2160),
 }
 CORNERS = ("phone", "old-laptop", "low-laptop") if not EVERYTHING else tuple(SCREENS)
+# German has the longest words.
+LANGUAGES = ("de", "en", "es", "fr") if EVERYTHING else ("de",)
 
 # Complaints about the elements that a selector finds: each whole on the screen, on top at its
 # middle, at least so large, none over another, and no text of theirs cut.
@@ -64,6 +68,31 @@ SMALL = """([selector, least]) => [...document.querySelectorAll(selector)]
   .map(([one, { width, height }]) => `${one.outerHTML.slice(0, 80)}: ${width} x ${height}`)"""
 
 
+DRAWN = """async () => {
+  dispatchEvent(new Event("resize"));
+  await new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)));
+}"""
+# The page as a language from right to left would have it: each letter is a Hebrew one, which stays
+# until the words are put back.
+TURN = """(done) => {
+  if (done) {
+    document.documentElement.dir = "ltr";
+    for (const [node, was, now] of window.turned) if (node.data === now) node.data = was;
+    return;
+  }
+  document.documentElement.dir = "rtl";
+  window.turned = [];
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walker.nextNode()) {
+    const node = walker.currentNode, was = node.data;
+    if (node.parentElement.closest("script, style, [dir=ltr]")) continue;
+    node.data = was.replace(/\\p{L}/gu, (letter) =>
+      "אבגדהוזחטיכלמנסעפצקרשת"[letter.codePointAt() % 22]);
+    window.turned.push([node, was, node.data]);
+  }
+}"""
+
+
 def set_screen(page: Page, name: str) -> None:
     """Give a page's window a size, and the page a moment to draw for it."""
     width, height = SCREENS[name]
@@ -72,6 +101,16 @@ def set_screen(page: Page, name: str) -> None:
         "() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame("
         "() => setTimeout(drawn))))"
     )
+
+
+@contextmanager
+def from_right_to_left(page: Page) -> Iterator[None]:
+    """Turn a page and its words around for a while."""
+    page.evaluate(TURN, False)
+    page.evaluate(DRAWN)
+    yield
+    page.evaluate(TURN, True)
+    page.evaluate(DRAWN)
 
 
 def complaints(page: Page, selector: str, least: int) -> list[str]:

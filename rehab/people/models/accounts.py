@@ -11,7 +11,7 @@ from django.db.models import F, Q
 from django.utils.crypto import salted_hmac
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.models.clinics import LANGUAGES, Clinic
+from rehab.people.models.clinics import Clinic, language_choices
 from rehab.people.roles import Role
 from rehab.people.scope import Scope, ScopedManager
 
@@ -52,7 +52,7 @@ class User(AbstractUser):
     language = models.CharField(
         _("language"),
         max_length=8,
-        choices=LANGUAGES,
+        choices=language_choices,
         blank=True,
         help_text=_("Of the pages that this account opens; empty: the clinic's."),
     )

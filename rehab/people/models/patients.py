@@ -10,7 +10,7 @@ from django.db import models, transaction
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.aliases import draw_alias
-from rehab.people.models.clinics import LANGUAGES, Clinic
+from rehab.people.models.clinics import Clinic, language_choices
 from rehab.people.random_codes import random_code
 from rehab.people.scope import ClinicModel, Scope
 from rehab.training.steps import Side
@@ -124,7 +124,7 @@ class Patient(ClinicModel):
         help_text=_("Researchers see the months since then alone."),
     )
     severity = models.CharField(_("severity"), max_length=8, choices=Severity.choices, blank=True)
-    language = models.CharField(_("language"), max_length=8, choices=LANGUAGES, default="en")
+    language = models.CharField(_("language"), max_length=8, choices=language_choices, default="en")
     screen_side = models.CharField(
         _("thermometer"), max_length=8, choices=ScreenSide.choices, default=ScreenSide.RIGHT
     )

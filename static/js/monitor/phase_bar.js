@@ -50,7 +50,8 @@ export function createPhaseBar(list) {
       if (item.textContent !== label) item.textContent = label;
       item.style.setProperty("--share", long[index]);
       item.style.setProperty("--done", isNow ? Math.min(1, done) : index < phase.index ? 1 : 0);
-      item.className = index < phase.index ? "was" : index === phase.index ? "is" : "";
+      item.classList.toggle("was", index < phase.index);
+      item.classList.toggle("is", isNow);
       if (index === phase.index) item.setAttribute("aria-current", "step");
       else item.removeAttribute("aria-current");
     });
