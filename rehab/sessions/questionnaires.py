@@ -12,7 +12,8 @@ from django.utils import timezone
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.models import LANGUAGES, Clinic
+from rehab.people.models import Clinic
+from rehab.people.models.clinics import language_choices
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
 from rehab.people.web.refusals import format_refusal
 from rehab.questionnaires.instrument import Instrument, read_items
@@ -33,7 +34,7 @@ class Questionnaire(ClinicModel):
     )
     name = models.CharField(_("name"), max_length=64)
     intro = models.CharField(_("words above each question"), max_length=200, blank=True, default="")
-    language = models.CharField(_("language"), max_length=8, choices=LANGUAGES, default="en")
+    language = models.CharField(_("language"), max_length=8, choices=language_choices, default="en")
     items = models.TextField(
         _("questions"),
         max_length=12_000,

@@ -130,8 +130,7 @@ def plan_run(
 ) -> PowerRun:
     """Store what is to be simulated. Raises InvalidSetting for what cannot be."""
     if not 1 <= simulations <= SIMULATIONS_MAX:
-        message = gettext("Simulate 1 to %(most)d studies.")
-        raise InvalidSetting(message % {"most": SIMULATIONS_MAX})
+        raise InvalidSetting("Simulate 1 to {most} studies.", most=SIMULATIONS_MAX)
     build_trial(study, settings)
     return PowerRun.everywhere.create(
         study=study, settings=settings, simulations=simulations, by=by, at=now

@@ -7,7 +7,7 @@ import rehab.people.models.clinics
 
 class Migration(migrations.Migration):
     dependencies = [
-        ("rehab", "0014_robot_incidents_and_tracks"),
+        ("rehab", "0018_demo_walker"),
     ]
 
     operations = [

@@ -10,7 +10,7 @@ from django.db import migrations, models
 
 class Migration(migrations.Migration):
     dependencies = [
-        ("rehab", "0014_robot_incidents_and_tracks"),
+        ("rehab", "0016_covariates_and_questionnaires"),
     ]
 
     operations = [

@@ -5,7 +5,7 @@ from django.db import migrations, models
 
 class Migration(migrations.Migration):
     dependencies = [
-        ("rehab", "0014_robot_incidents_and_tracks"),
+        ("rehab", "0017_study_outcomes"),
     ]
 
     operations = [

@@ -32,7 +32,7 @@ def drop(apps: Any, schema_editor: Any) -> None:
 
 class Migration(migrations.Migration):
     dependencies = [
-        ("rehab", "0014_robot_incidents_and_tracks"),
+        ("rehab", "0019_languages"),
     ]
 
     operations = [migrations.RunPython(create, drop)]

@@ -6,10 +6,12 @@ import django.db.models.manager
 import django.utils.timezone
 from django.db import migrations, models
 
+import rehab.people.models.clinics
+
 
 class Migration(migrations.Migration):
     dependencies = [
-        ("rehab", "0014_robot_incidents_and_tracks"),
+        ("rehab", "0015_close_steps"),
     ]
 
     operations = [
@@ -89,7 +91,7 @@ class Migration(migrations.Migration):
                 (
                     "language",
                     models.CharField(
-                        choices=[("en", "English"), ("es", "Español")],
+                        choices=rehab.people.models.clinics.language_choices,
                         default="en",
                         max_length=8,
                         verbose_name="language",
