@@ -32,7 +32,8 @@ def table():
 
 
 def make_check(**settings):
-    said, now = [], [0.0]
+    said: list[str] = []
+    now = [0.0]
     check = StreamCheck(IntakeSettings(**settings), said.append, lambda: now[0], 30.0)
     return check, said, now
 

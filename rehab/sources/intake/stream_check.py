@@ -65,7 +65,7 @@ class StreamCheck(Intake):
                 continue
             names = tuple(name for name, cell in row.items() if not isinstance(cell, str))
             cells = (row[name] for name in names)
-            self._keep(names, [[np.nan if cell is None else float(cell) for cell in cells]])  # type: ignore[arg-type]
+            self._keep(names, [[np.nan if cell is None else float(cell) for cell in cells]])
 
     def add_table(
         self,

@@ -118,7 +118,7 @@ function drawStrides(element) {
       { paths: () => null, points: { show: false } },
       pointSeries(size, width, "c-miss", "card"),
       pointSeries(size, width, "c-hit", "c-hit"),
-      pointSeries(size, width, "c-third", "card"),
+      pointSeries(0.6 * size, width, "c-third", "c-third"),
       { stroke: () => color("c-goal"), width: 2.5, paths: paths.stepped({ align: 1 }), points: { show: false } },
     ],
     scales: { x: { time: false }, y: { range: () => [0, top] } },

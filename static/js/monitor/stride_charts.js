@@ -33,7 +33,10 @@ export function createStrideCharts({ state, show }) {
     const decided = judged.filter(({ close }) => !close);
     const hits = decided.filter(({ hit }) => hit).length;
     if (!judged.length) return "";
-    return withClose(fill(_("%(hits)s of %(count)s hit"), { hits, count: decided.length }), judged.length - decided.length);
+    return withClose(
+      fill(_("%(hits)s of %(count)s hit"), { hits, count: decided.length }),
+      judged.length - decided.length,
+    );
   }
 
   // Steps that were close are counted apart.
@@ -43,7 +46,12 @@ export function createStrideCharts({ state, show }) {
 
   function describeRate({ hits, judged, close = 0, target }) {
     show("wanted", target.hit_rate ? fill(_("Wanted %(rate)s"), { rate: percent(target.hit_rate) }) : _("No rate set"));
-    show("judged", judged === undefined ? "" : withClose(fill(_("%(hits)s of %(count)s strides"), { hits, count: judged - close }), close));
+    show(
+      "judged",
+      judged === undefined
+        ? ""
+        : withClose(fill(_("%(hits)s of %(count)s strides"), { hits, count: judged - close }), close),
+    );
   }
 
   return {
