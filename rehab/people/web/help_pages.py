@@ -67,6 +67,7 @@ def render_guide(text: str) -> str:
     )
     # Other pages of the documentation are not served here.
     html = re.sub(r'<a href="(?!#|https?:)[^"]*">(.*?)</a>', r"\1", html, flags=re.DOTALL)
+    html = html.replace("<th></th>", "<td></td>")  # Markdown has no table without a head
     return html.replace("<table>", '<div class="wide"><table>').replace(
         "</table>", "</table></div>"
     )

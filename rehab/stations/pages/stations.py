@@ -76,7 +76,7 @@ def add_device(request: HttpRequest, station_id: int) -> HttpResponse:
 @step_up.required
 @require_POST
 def change_device(request: HttpRequest, device_id: int) -> HttpResponse:
-    """Give a device a new token, which is shown once; or with ``revoke`` end its token."""
+    """Renew a device's token and show it once; or with ``revoke`` end it."""
     user, now = user_of(request), timezone.now()
     device = get_object_or_404(Device.objects.visible_to(user), pk=device_id)
     if device.builtin:
