@@ -187,4 +187,13 @@ def _is_robot_stopped(session: TrainingSession, events: Sequence[SessionEvent]) 
 def find_newest_open(station_id: int) -> int | None:
     """Return the newest open session of a station."""
     there = TrainingSession.everywhere.filter(station=station_id, state__in=[*OPEN_STATES])
-    return there.order_by("-created_at", "-pk").values_list("pk", flat=True).first()
+    return find_newest(there)
+
+
+def find_newest(few: QuerySet[TrainingSession]) -> int | None:
+    """Return the newest of a few sessions.
+
+    Chosen here: to find it, a database may walk through all sessions of all clinics by their dates.
+    """
+    newest = max(few.order_by().values_list("created_at", "pk"), default=None)
+    return None if newest is None else newest[1]
