@@ -23,8 +23,7 @@ from rehab.people.models import Patient, User
 from rehab.people.networks import resolve_client_address
 from rehab.people.sign_in import browser_sessions
 from rehab.people.sign_in.flow import is_session_valid
-from rehab.sessions.live.loading import find_newest
-from rehab.sessions.models import TrainingSession
+from rehab.sessions.models import TrainingSession, find_newest
 from rehab.stations import tablets
 from rehab.stations.models import Device, find_device
 from rehab.stations.tablets import find_tablet

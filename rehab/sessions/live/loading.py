@@ -18,7 +18,7 @@ from rehab.sessions.live import owners
 from rehab.sessions.live.aggregate import MARKED, MARKS, SessionAggregate
 from rehab.sessions.live.session import RECENT_STEPS
 from rehab.sessions.log import RobotEntry, SessionEvent, Step, noted_end
-from rehab.sessions.models import TrainingSession
+from rehab.sessions.models import TrainingSession, find_newest
 from rehab.sessions.replay import (
     MEASURED,
     DamagedLog,
@@ -188,12 +188,3 @@ def find_newest_open(station_id: int) -> int | None:
     """Return the newest open session of a station."""
     there = TrainingSession.everywhere.filter(station=station_id, state__in=[*OPEN_STATES])
     return find_newest(there)
-
-
-def find_newest(few: QuerySet[TrainingSession]) -> int | None:
-    """Return the newest of a few sessions.
-
-    Chosen here: to find it, a database may walk through all sessions of all clinics by their dates.
-    """
-    newest = max(few.order_by().values_list("created_at", "pk"), default=None)
-    return None if newest is None else newest[1]
