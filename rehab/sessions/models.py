@@ -226,3 +226,12 @@ class TrainingSession(ClinicModel):
             "first": names[0],
             "others": ", ".join(names[1:]),
         }
+
+
+def find_newest(few: QuerySet[TrainingSession, Any]) -> int | None:
+    """Return the newest of a few sessions.
+
+    Chosen here: to find it, a database may walk through all sessions of all clinics by their dates.
+    """
+    newest = max(few.order_by().values_list("created_at", "pk"), default=None)
+    return None if newest is None else newest[1]

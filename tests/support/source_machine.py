@@ -6,8 +6,6 @@ import asyncio
 import os
 import socket
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 from asgiref.sync import sync_to_async
@@ -23,8 +21,6 @@ from hypothesis.stateful import (
 
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.aggregate import SessionAggregate
-from rehab.sessions.live.session import NotStored
-from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import log_entries
@@ -42,34 +38,11 @@ from tests.support.callers import (
     open_session,
     turns,
 )
+from tests.support.power_switch import PowerSwitch
 
 PHASES = (make_phase("training", strides=5), make_phase("catch", strides=3), make_phase("training"))
 VALUES = st.sampled_from([None, 2.0, 3.0, 4.5, 99.0])
 SIDES = st.sampled_from(["left", "left", "right"])
-
-
-class PowerSwitch:
-    """Takes the power from a runtime's writer: what is queued is neither written nor reported.
-
-    One that is frozen writes it later, as a process that was suspended.
-    """
-
-    def __init__(self) -> None:
-        self.dead: set[Writer] = set()  # the objects: numbers are used again
-        self.frozen: dict[Writer, threading.Event] = {}
-        self.open = threading.Event()
-        self.open.set()
-
-    def release(self) -> None:
-        """Let every writer go on."""
-        for event in (self.open, *self.frozen.values()):
-            event.set()
-
-    def wait(self, writer: Writer) -> None:
-        """Wait until a writer may write (in its thread)."""
-        self.open.wait(callers.PATIENCE_S)
-        if writer in self.frozen:
-            self.frozen[writer].wait(callers.PATIENCE_S)
 
 
 class Sources(RuleBasedStateMachine):
@@ -399,50 +372,6 @@ class Sources(RuleBasedStateMachine):
                 task.cancel()
             await asyncio.wait(left, timeout=callers.PATIENCE_S)
         await sync_to_async(connections.close_all)()
-
-
-class Found(BaseException):  # Hypothesis lets through what is no Exception
-    """A machine has found a fault."""
-
-    def __init__(self, fault: Exception) -> None:
-        super().__init__(fault)
-        self.fault = fault
-
-
-class FirstFault(Sources):
-    """The same machine, which ends the test with the first fault that it finds.
-
-    Whether a seeded fault shows depends on how far the server's threads are, as real ones do.
-    Hypothesis would try the same example again, and call it flaky if the fault did not show.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.found: Found | None = None
-
-    def go(self, work: Any) -> Any:
-        with self._ending():
-            return super().go(work)
-
-    @invariant()
-    def the_source_is_still_welcome(self) -> None:
-        with self._ending():
-            super().the_source_is_still_welcome()
-
-    @contextmanager
-    def _ending(self) -> Iterator[None]:
-        """End the test with what fails inside."""
-        try:
-            yield
-        except (AssertionError, TimeoutError, NotStored) as fault:  # HungUp is an assertion, too
-            self.found = self.found or Found(fault)
-            raise self.found from fault
-
-    def teardown(self) -> None:
-        """Look at the log, unless there is a fault already."""
-        if self.found is not None:
-            del self.session
-        super().teardown()
 
 
 def plain(entry: Measurement | Change) -> Any:

@@ -23,7 +23,7 @@ from rehab.people.models import Patient, User
 from rehab.people.networks import resolve_client_address
 from rehab.people.sign_in import browser_sessions
 from rehab.people.sign_in.flow import is_session_valid
-from rehab.sessions.models import TrainingSession
+from rehab.sessions.models import TrainingSession, find_newest
 from rehab.stations import tablets
 from rehab.stations.models import Device, find_device
 from rehab.stations.tablets import find_tablet
@@ -193,4 +193,4 @@ def find_open_session(device: Device, session_id: int | None) -> int | None:
     )
     if session_id is not None:
         sessions = sessions.filter(pk=session_id)
-    return sessions.order_by("-created_at", "-pk").values_list("pk", flat=True).first()
+    return find_newest(sessions)

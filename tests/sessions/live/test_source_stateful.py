@@ -19,7 +19,9 @@ from rehab.sessions.live.writer import Writer
 from rehab.training.steps import Measurement
 from tests.support import callers
 from tests.support.callers import Caller, build_place
-from tests.support.source_machine import FirstFault, Found, PowerSwitch, Sources
+from tests.support.first_fault import FirstFault, Found
+from tests.support.power_switch import PowerSwitch
+from tests.support.source_machine import Sources
 
 
 @pytest.fixture
