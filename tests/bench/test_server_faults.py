@@ -192,9 +192,8 @@ def test_each_part_fails_under_load_and_nothing_is_lost(tmp_path: Path) -> None:
     with run_postgres(restarts) as database, run_redis(restarts) as redis:
         pair = Pair(tmp_path / "garry", database, redis)
         with run_nginx(tmp_path / "nginx", *pair.ports, restarts=restarts) as (_, secure, tls):
-            print(
-                f"\nlog: {pair.log}; seed {seed}, each fault {times} times, {SESSIONS} sessions × {RATE:g}/s"
-            )
+            print(f"\nlog: {pair.log}")
+            print(f"seed {seed}, each fault {times} times, {SESSIONS} sessions × {RATE:g}/s")
             faults = asyncio.run(story(pair, Entrance(secure, tls)))
             problems: list[str] = []
             for walk in faults.walks:

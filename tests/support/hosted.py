@@ -108,7 +108,11 @@ def _run_postgres(folder: Path, restarts: Restarts) -> Iterator[str]:
         nonlocal server
         server.send_signal(signal.SIGQUIT)  # at once, as in a crash: it recovers from its log
         server.wait(30)
-        server = start()
+        for _ in range(100):  # not while a process of the old one has its memory still
+            server = start()
+            time.sleep(0.2)
+            if server.poll() is None:
+                break
         _wait_for_postgres(bin_folder, port)
 
     server = start()
