@@ -1,7 +1,8 @@
 """Two servers behind nginx under load, and each part of the set fails in turn.
 
-GARRY_TEST_FAULTS times each (20), by GARRY_TEST_SEED (GARRY_TEST_FAULT: only those so named): no acknowledged step lost or doubled, no gap
-at a viewer, orderly restarts pause nobody, a stop at the other server arrives or is refused.
+GARRY_TEST_FAULTS times each (20), by GARRY_TEST_SEED (GARRY_TEST_FAULT: only those so named): no
+acknowledged step lost or doubled, no gap at a viewer, orderly restarts pause nobody, a stop at the
+other server arrives or is refused.
 """
 
 from __future__ import annotations
