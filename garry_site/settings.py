@@ -216,7 +216,8 @@ CHANNEL_LAYERS = {
     "default": {
         # Pub/sub, not the core layer: docs/reference/stack.md#several-processes.
         "BACKEND": "channels_redis.pubsub.RedisPubSubChannelLayer",
-        "CONFIG": {"hosts": [REDIS_URL]},
+        # Orders to robots go over it: who does not know the key cannot give or read any.
+        "CONFIG": {"hosts": [REDIS_URL], "symmetric_encryption_keys": [SECRET_KEY]},
     }
     if REDIS_URL
     else {"BACKEND": "channels.layers.InMemoryChannelLayer"}

@@ -104,14 +104,19 @@ def _run_postgres(folder: Path, restarts: Restarts) -> Iterator[str]:
             **account,
         )
 
+    server = start()
+
     def restart() -> None:
         nonlocal server
         server.send_signal(signal.SIGQUIT)  # at once, as in a crash: it recovers from its log
         server.wait(30)
-        server = start()
+        for _ in range(100):  # not while a process of the old one has its memory still
+            server = start()
+            time.sleep(0.2)
+            if server.poll() is None:
+                break
         _wait_for_postgres(bin_folder, port)
 
-    server = start()
     restarts["postgres"] = restart
     try:
         _wait_for_postgres(bin_folder, port)
@@ -133,6 +138,8 @@ def run_redis(restarts: Restarts | None = None) -> Iterator[str]:
             command = ["redis-server", *at, "--dir", folder]
             return subprocess.Popen(command, stdout=subprocess.DEVNULL, cwd=folder)
 
+        server = start()
+
         def restart() -> None:
             nonlocal server
             server.kill()
@@ -141,7 +148,6 @@ def run_redis(restarts: Restarts | None = None) -> Iterator[str]:
             server = start()
             _wait_for_port(port)
 
-        server = start()
         if restarts is not None:
             restarts["redis"] = restart
         try:
@@ -154,9 +160,10 @@ def run_redis(restarts: Restarts | None = None) -> Iterator[str]:
 
 def _wait_for_postgres(bin_folder: Path, port: int) -> None:
     ready = [str(bin_folder / "pg_isready"), "-q", "-h", "127.0.0.1", "-p", str(port), "-t", "1"]
-    for _ in range(60):
+    for _ in range(240):
         if subprocess.run(ready).returncode == 0:
             return
+        time.sleep(0.25)  # it says at once that it recovers from its log
     raise RuntimeError("PostgreSQL does not answer")
 
 
@@ -261,6 +268,7 @@ def run_nginx(
     command = [find_nginx(), "-p", str(folder), "-c", str(main)]
     tried = subprocess.run([*command, "-t"], capture_output=True, text=True)
     assert tried.returncode == 0, tried.stderr
+    server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
 
     def restart() -> None:
         nonlocal server
@@ -271,7 +279,6 @@ def run_nginx(
         server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
         _wait_for_port(secure)
 
-    server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
     if restarts is not None:
         restarts["nginx"] = restart
     try:

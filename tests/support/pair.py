@@ -121,7 +121,7 @@ class Pair:
             "GARRY_DATABASE_URL": database,
             "GARRY_REDIS_URL": redis,
         }
-        self.processes: list[subprocess.Popen[str] | None] = [None] * count
+        self.processes: list[subprocess.Popen[bytes] | None] = [None] * count
         self._open: list[Dialed] = []
 
     async def __aenter__(self) -> Self:

@@ -173,8 +173,8 @@ class Lease:
                     log.critical("Another server has taken this database; this one ends.")
                     self._on_excluded()
                     return
-            except (DatabaseError, InterfaceError):
-                log.warning("The server's lease could not be renewed.", exc_info=True)
+            except (DatabaseError, InterfaceError) as problem:
+                log.warning("The server's lease could not be renewed: %s", problem)
                 self._disconnect()
 
     def _enter(self) -> bool:

@@ -12,7 +12,8 @@ from django.db import DEFAULT_DB_ALIAS, connection, connections
 from django.db.backends.base.base import BaseDatabaseWrapper
 
 SQLITE_TIMEOUT_S = 10
-P, R = ParamSpec("P"), TypeVar("R")
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 def own_connection(lock_timeout_ms: int, statement_timeout_ms: int) -> BaseDatabaseWrapper:

@@ -29,7 +29,7 @@ def quick(monkeypatch: pytest.MonkeyPatch, settings: Any) -> Iterator[None]:
     sql("DELETE FROM rehab_server")
 
 
-def sql(statement: str, *values: object) -> list[Any]:
+def sql(statement: str, *values: Any) -> list[Any]:
     with connection.cursor() as cursor:
         cursor.execute(statement, values)
         return cursor.fetchall() if cursor.description else []
