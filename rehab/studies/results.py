@@ -131,16 +131,18 @@ def label_arms(study: Study) -> dict[str, str]:
 def read_results(study: Study, now: datetime) -> Results:
     """Return a study's results. ``now`` says which visits are due."""
     enrollments = study.enrollments.select_related("allocation", "clinic", "patient").order_by("pk")
-    participants = tuple(_read(one, clinic_time(now, study.clinic).date()) for one in enrollments)
+    is_closed = study.state == StudyState.CLOSED  # then whatever was planned was due
+    until = date.max if is_closed else clinic_time(now, study.clinic).date()
+    participants = tuple(_read(one, until) for one in enrollments)
     return Results(study, participants, label_arms(study))
 
 
-def _read(enrollment: Enrollment, today: date) -> Participant:
+def _read(enrollment: Enrollment, until: date) -> Participant:
     group = enrollment.allocation.group.split("-")
     planned = [
         (
             Visit(
-                visit.number, group[visit.period], visit.session is not None or visit.day <= today
+                visit.number, group[visit.period], visit.session is not None or visit.day <= until
             ),
             _walked(enrollment, visit),
         )

@@ -133,6 +133,8 @@ def test_visits_that_are_due_and_those_that_are_not_are_told_apart(world):
     assert sum(one.visits_planned for one in read_results(study, NOW).flow) == 1
     later = read_results(study, NOW + timedelta(days=1)).flow
     assert sum(one.visits_planned for one in later) == 2
+    close(study, None, NOW)
+    assert sum(one.visits_planned for one in read_results(study, NOW).flow) == 2
 
 
 # --- the schedule of an arm -----------------------------------------------------------------------

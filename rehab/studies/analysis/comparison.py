@@ -3,8 +3,8 @@
 A participant's sessions in an arm become one figure, their mean, and arms are compared over
 participants (summary measures: Matthews et al. 1990, BMJ 300:230-235), since strides and sessions
 of one person are no independent observations. With as many sessions of each this is what a mixed
-model with a random intercept for each participant gives, and unlike a bootstrap its interval covers
-as often as it says in arms of a dozen people, too; `make bench` counts it.
+model with a random intercept for each participant gives. How often the intervals cover a true
+effect in arms of fifteen is counted by `make bench` (docs/internals.md, Studies).
 """
 
 from __future__ import annotations

@@ -129,4 +129,4 @@ def begin(run: PowerRun) -> None:
 def _start(live: runtime.Runtime, run_id: int, command: list[str]) -> None:
     name = f"power of run {run_id}"
     if name not in live.supervisor.children:
-        live.supervisor.start(name, [*command, "--run", str(run_id), "--gently"], once=True)
+        live.supervisor.start(name, [*command, "--run", str(run_id), "--child"], once=True)

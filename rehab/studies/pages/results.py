@@ -107,7 +107,8 @@ def download_results(request: HttpRequest, study_id: int) -> HttpResponse:
     """Return a figure as SVG, or the data behind the figures as CSV: the ``file`` of that name."""
     study, user = _open(request, study_id)
     name, _point, kind = request.GET.get("file", "outcomes.csv").partition(".")
-    if name not in {"svg": FIGURES, "csv": TABLES}.get(kind, {}):
+    known = {"svg": list(FIGURES), "csv": list(TABLES)}
+    if name not in known.get(kind, []):
         raise Http404
     now = timezone.now()
     note_look(study, user, now)
