@@ -1,7 +1,8 @@
 """The questionnaires that GARRY brings: only those that anybody may use.
 
-Sources and licenses: docs/reference/questionnaires.md. The Intrinsic Motivation Inventory is not
-among them, since its items are copyrighted; a clinic that may use it enters it as its own.
+Sources and licenses: docs/reference/questionnaires.md#sus and below. The Intrinsic Motivation
+Inventory is not among them, since its items are copyrighted; a clinic that may use it enters it as
+its own.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ import resource
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 STRIDES_EACH = 2_000  # of a session: half an hour of walking with both legs
 
@@ -26,7 +27,7 @@ def fill(sessions: int) -> None:
     )
     walked = walk(patient, "positive", strides(STRIDES_EACH // 2, STRIDES_EACH // 2))
 
-    def copy(model: type, key: str, changed: dict[str, str]) -> None:
+    def copy(model: Any, key: str, changed: dict[str, str]) -> None:
         columns = [f.column for f in model._meta.concrete_fields if f.column != "id"]
         chosen = ", ".join(changed.get(column, f"t.{column}") for column in columns)
         table = model._meta.db_table

@@ -77,7 +77,7 @@ def test_a_patient_answers_in_spanish_with_the_largest_words(server: Server, bro
         "Creo que me gustaría usar este sistema con frecuencia."
     )
     for size in ("tablet-portrait", "tablet-landscape", "phone"):
-        page.set_viewport_size(dict(zip(("width", "height"), SIZES[size], strict=True)))
+        page.set_viewport_size({"width": SIZES[size][0], "height": SIZES[size][1]})
         picture(page, f"sus-{size}")
         fits = page.evaluate(SMALLEST)
         assert fits["wide"], size
@@ -98,7 +98,7 @@ def test_a_patient_answers_in_spanish_with_the_largest_words(server: Server, bro
     page.click("[name=stop]")
     expect(page.locator("h1")).to_have_text("¿Qué exigencia mental tuvo la tarea?")
     for size in ("tablet-portrait", "tablet-landscape", "phone"):
-        page.set_viewport_size(dict(zip(("width", "height"), SIZES[size], strict=True)))
+        page.set_viewport_size({"width": SIZES[size][0], "height": SIZES[size][1]})
         picture(page, f"tlx-{size}")
         assert page.evaluate(NOTHING_BELOW), size
         assert page.evaluate(SMALLEST)["wide"], size

@@ -59,6 +59,7 @@ def test_every_actor_sees_rows_of_the_own_clinic_only(worlds):
                         "Step",
                         "SessionEvent",
                         "SessionMetric",
+                        "QuestionnaireResponse",
                     }
                     expected = actor.clinic == world.name and model.__name__ in station_side
                 else:
