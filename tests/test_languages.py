@@ -33,11 +33,12 @@ PLURALS = {  # as Django's own catalogs have them
 ALIKE = "borg django garry min quattrocchi neurol neurosurg psychiatry paul medrxiv"
 ALIKE_IN = {
     "es": "factor robot sensor extra normal plan",
-    "de": "arm code codes design feedback minus monitor name normal passkey patient pause person "
-    "phase plan plus sensor start tablet tablets training",
-    "fr": "code correction corrections date description migrations normal pages participant "
-    "participants patient patients pause performance phase phases plan plus point points position "
-    "robot signature source type version",
+    "de": "arm code codes design feedback hedges minus monitor name normal passkey patient pause "
+    "person phase plan plus sensor start tablet tablets training",
+    "fr": "code correction corrections date description migrations minutes moment normal pages "
+    "participant participants patient patients pause performance phase phases plan plus point "
+    "points position questionnaire questionnaires questions robot signature source type variation "
+    "version",
 }
 
 
@@ -162,7 +163,7 @@ def test_the_catalogs_have_every_marked_word(tmp_path):
 
 # --- templates ----------------------------------------------------------------------------------
 
-UNMARKED = {"GARRY", "JSON", "PDF", "W/kg", "W", "kg", "min", "s"}
+UNMARKED = {"CSV", "GARRY", "JSON", "PDF", "SVG", "W/kg", "W", "kg", "min", "s"}
 SAID = {"aria-label", "title", "placeholder", "alt", "label"}
 BLOCK = re.compile(
     r"{% (blocktranslate|comment)\b.*?{% end\1 %}|{#.*?#}|"

@@ -15,7 +15,7 @@ class Migration(migrations.Migration):
             name="close_percent",
             field=models.PositiveSmallIntegerField(
                 blank=True,
-                help_text="A step pays and takes nothing where more than this part of its 95 % interval lies beyond the goal. Left empty, each step is a hit or a miss.",
+                help_text="A step pays and takes nothing where more than this part of its interval (95 %) lies beyond the goal. Left empty, each step is a hit or a miss.",
                 null=True,
                 validators=[django.core.validators.MaxValueValidator(49)],
                 verbose_name="close steps, % beyond the goal",

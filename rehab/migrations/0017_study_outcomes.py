@@ -72,7 +72,7 @@ class Migration(migrations.Migration):
                     ("catch_change", "Change in catch blocks"),
                     ("washout_change", "Change in washout"),
                     ("after_effect", "After-effect (first 20 strides)"),
-                    ("strides_to_success", "Strides to 80 % hits"),
+                    ("strides_to_success", "Strides until 80 % are hits"),
                     ("percent_of_goal", "Real value of the goal"),
                     ("absolute_error", "Distance from the goal"),
                     ("variation", "Variation (CV)"),

@@ -93,7 +93,7 @@ def _forest(results: Results, slugs: Iterable[str], title: str) -> str:
             Row(name_pair(results, one.group, one.reference), one, strong=primary)
             for one in results.find(slug).differences
         ]
-    return draw_forest(rows, title, gettext("effect size (Hedges’ g) with its 95 % interval"))
+    return draw_forest(rows, title, gettext("effect size (Hedges’ g) with its interval (95 %)"))
 
 
 def name_pair(results: Results, group: str, reference: str) -> str:

@@ -326,7 +326,7 @@ def build_world(name: str) -> World:
             protocol=protocol,
         ),
         Questionnaire.everywhere.create(
-            clinic=clinic, name=mark(name, Questionnaire), items="Tired? | no | very | 5"
+            clinic=clinic, name=mark(name, Questionnaire), items="Zqtiredqz | zq | zq | 5"
         ),
         QuestionnaireResponse.everywhere.create(
             session=session,
@@ -336,7 +336,7 @@ def build_world(name: str) -> World:
                 mark(name, QuestionnaireResponse),
                 "",
                 "en",
-                (Item("Tired?", "no", "very", 5), Item("Happy?", "no", "very", 5)),
+                (Item("Zqtiredqz", "zq", "zq", 5), Item("Zqhappyqz", "zq", "zq", 5)),
             ).to_json(),
             answers=[4],
         ),

@@ -73,7 +73,7 @@ class Command(BaseCommand):
 
 
 def live_with_parent() -> None:
-    """Give live sessions the processor first, and end when standard input does: with the server.
+    """Leave the processor to live sessions first; end when standard input does: with the server.
 
     What a study found is stored in one transaction, so that an end at any moment harms nothing.
     """

@@ -34,7 +34,7 @@ class StepRow(NamedTuple):
 Row = StepRow | SessionEvent | SessionMetric
 CHECKPOINT_STEPS = 100
 MARKS = 100  # the newest; more would hide the strides
-MARKED = (*marked_kinds(), *Remark, RuleEntry.GOAL_FOLLOWED)  # kinds of events that leave one
+MARKED_KINDS = (*marked_kinds(), *Remark, RuleEntry.GOAL_FOLLOWED)  # kinds of events that leave one
 Summary = dict[str, Any]
 
 
@@ -57,7 +57,9 @@ class SessionAggregate:
         """Return the aggregate of a session, rebuilt from its log."""
         aggregate = cls.from_checkpoint(session)
         aggregate.fold = fold_log(aggregate.fold, session)
-        marked = SessionEvent.everywhere.filter(session=session, kind__in=MARKED).order_by("-pk")
+        marked = SessionEvent.everywhere.filter(session=session, kind__in=MARKED_KINDS).order_by(
+            "-pk"
+        )
         aggregate.keep_marks(reversed(marked[:MARKS]))
         return aggregate
 

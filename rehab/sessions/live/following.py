@@ -95,7 +95,7 @@ class FollowedSession(LiveSession):
         return self._presence
 
     def announce_presence(self, now: datetime) -> None:
-        """Say nothing: the owner is told of the pages here, and tells all."""
+        """Do nothing: the owner is told of the pages here, and tells all."""
 
     def take_hint(self, hint: Data) -> None:
         """Publish what the owner tells and no log has."""
@@ -186,11 +186,11 @@ class Follower(Subscriber):
         return now_s - self._heard_s > self.EXPIRES_S
 
     def queue_heartbeat(self, text: str) -> None:
-        """Give a hint, which has who is there."""
+        """Send a hint, which has who is there."""
         self.wake()
 
     def _flush(self) -> None:
-        """Give one hint for all that happened in this turn of the event loop."""
+        """Send one hint for all that happened in this turn of the event loop."""
         self._is_due = False
         live = self.live
         hint = {"presence": live.presence(timezone.now()), "robot": live.robot_reports}

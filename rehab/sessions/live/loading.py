@@ -15,7 +15,7 @@ from django.db import transaction
 from django.db.models import QuerySet
 
 from rehab.sessions.live import owners
-from rehab.sessions.live.aggregate import MARKED, MARKS, SessionAggregate
+from rehab.sessions.live.aggregate import MARKED_KINDS, MARKS, SessionAggregate
 from rehab.sessions.live.session import RECENT_STEPS
 from rehab.sessions.log import RobotEntry, SessionEvent, Step, noted_end
 from rehab.sessions.models import TrainingSession, find_newest
@@ -44,7 +44,7 @@ class LoadedSession(NamedTuple):
     was_orphaned: bool  # its process died while it was open
 
 
-Loaded = LoadedSession | Exception
+LoadResult = LoadedSession | Exception
 
 
 class Loader:
@@ -68,7 +68,7 @@ class Loader:
     async def _run(self) -> None:
         await asyncio.sleep(0)  # who asks in this turn of the event loop comes along
         while some := dict(islice(self._wanted.items(), TOGETHER)):
-            loaded: dict[int, Loaded]
+            loaded: dict[int, LoadResult]
             try:
                 loaded = await sync_to_async(load_together)(some)
             except Exception as problem:
@@ -96,7 +96,7 @@ def load(session_id: int) -> LoadedSession:
     return found
 
 
-def load_together(session_ids: Collection[int]) -> dict[int, Loaded]:
+def load_together(session_ids: Collection[int]) -> dict[int, LoadResult]:
     """Rebuild sessions from their logs, and become the writer of those that are open.
 
     For one that cannot be loaded its error is returned: what ``load`` raises, or the database's.
@@ -110,10 +110,10 @@ def load_together(session_ids: Collection[int]) -> dict[int, Loaded]:
         return {key: found for one in session_ids for key, found in load_together([one]).items()}
 
 
-def _load(session_ids: Collection[int]) -> dict[int, Loaded]:
+def _load(session_ids: Collection[int]) -> dict[int, LoadResult]:
     chosen = TrainingSession.everywhere.select_related("patient", "measure", "station")
     sessions = chosen.order_by().in_bulk(session_ids)
-    found: dict[int, Loaded] = {
+    found: dict[int, LoadResult] = {
         key: TrainingSession.DoesNotExist(f"There is no session {key}.")
         for key in session_ids
         if key not in sessions
@@ -141,7 +141,7 @@ def _load(session_ids: Collection[int]) -> dict[int, Loaded]:
         session, events = sessions[key], logs.get(key, [])
         aggregate = SessionAggregate.from_checkpoint(session)
         _fold_rest(aggregate, events)
-        aggregate.keep_marks([event for event in events if event.kind in MARKED][-MARKS:])
+        aggregate.keep_marks([event for event in events if event.kind in MARKED_KINDS][-MARKS:])
         before = owned_before.get(key, "")
         found[key] = LoadedSession(
             aggregate=aggregate,
@@ -170,7 +170,7 @@ def _read_steps(session_id: int, after: int) -> QuerySet[Step]:
 
 def _read_events(session_ids: Collection[int]) -> dict[int, list[SessionEvent]]:
     """Return of each session the events that change it, leave a mark or concern its robot."""
-    kinds = {*CONTROLS, *MARKED, RobotEntry.STOP, RobotEntry.ARM}
+    kinds = {*CONTROLS, *MARKED_KINDS, RobotEntry.STOP, RobotEntry.ARM}
     events = SessionEvent.everywhere.filter(session__in=session_ids, kind__in=kinds)
     ordered = events.order_by("session_id", "pk")
     return {key: list(some) for key, some in groupby(ordered, attrgetter("session_id"))}

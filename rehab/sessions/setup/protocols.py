@@ -144,7 +144,7 @@ class Protocol(ClinicModel):
         blank=True,
         validators=[MaxValueValidator(49)],
         help_text=_(
-            "A step pays and takes nothing where more than this part of its 95 % interval lies "
+            "A step pays and takes nothing where more than this part of its interval (95 %) lies "
             "beyond the goal. Left empty, each step is a hit or a miss."
         ),
     )

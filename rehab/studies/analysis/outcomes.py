@@ -159,7 +159,9 @@ OF_STRIDES: dict[str, Outcome] = {
         Outcome(
             "after_effect", gettext_noop("After-effect (first 20 strides)"), "%", _after_effect
         ),
-        Outcome("strides_to_success", gettext_noop("Strides to 80 % hits"), "steps", _to_success),
+        Outcome(
+            "strides_to_success", gettext_noop("Strides until 80 % are hits"), "steps", _to_success
+        ),
         Outcome("percent_of_goal", gettext_noop("Real value of the goal"), "%", _of_goal),
         Outcome("absolute_error", gettext_noop("Distance from the goal"), "%", _error),
         Outcome("variation", gettext_noop("Variation (CV)"), "%", _cv),
