@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 from websockets.sync.client import connect
 
 from robot.wire.incident import pack
-from tests.browser.test_robot_scene import BUMPED
+from tests.support.incidents import BUMPED
 from tests.support.walk_seed import feet_of, make_walks
 
 pytestmark = pytest.mark.browser

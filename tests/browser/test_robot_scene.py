@@ -14,6 +14,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from robot.wire.incident import pack, read_lines
 from tests.support.browsers import SIZES
+from tests.support.incidents import BUMPED
 from tests.support.servers import ROOT, Server, clean_environment
 from tests.support.walk_seed import make_walks
 
@@ -33,14 +34,6 @@ STATUS = {
     "battery_low": False,
 }
 
-
-# A robot went ahead for a second, bumped, and stood.
-BUMPED = [
-    *({"at_s": n / 50, "tick": [0.2, 0, n / 250, 0, 0, 0.2, 0]} for n in range(50)),
-    {"at_s": 1.0, "tick": [0.2, 0, 0.2, 0, 0, 0.2, 0], "hazards": ["bump"]},
-    {"at_s": 1.0, "kept": "bump", "is_first": True},
-    *({"at_s": 1 + n / 50, "tick": [0, 0, 0.2, 0, 0, 0, 0]} for n in range(1, 50)),
-]
 
 SEED = """
 from rehab.gestures.models import Gesture

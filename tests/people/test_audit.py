@@ -68,6 +68,7 @@ SILENT = {
     *("stations", "new-station", "edit-station", "new-device"),
     *("own-sign-ins", "end-sign-ins", "help"),
     *("studies", "new-study", "plan-study", "study-protocol", "study-protocol-pdf"),
+    "study-power",
     *("api:api-root", "api:openapi-json", "api:openapi-view", "api:show_me"),
     *("api:list_protocols", "api:list_stations", "api:list_boards", "api:list_measures"),
     *("admin:login", "admin:logout", "admin:jsi18n"),
@@ -79,7 +80,7 @@ def is_silent(name: str) -> bool:
     """Return, apart from the code under test, whether a route shows nothing of patients."""
     bare = {
         *("clinic", "user", "apitoken", "station", "device", "measure", "protocol", "gesture"),
-        *("feedbacktype", "preset"),
+        *("feedbacktype", "preset", "questionnaire"),
     }
     return name in SILENT or any(name.startswith(f"admin:rehab_{noun}_") for noun in bare)
 

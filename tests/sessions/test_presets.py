@@ -76,7 +76,8 @@ def filled(page: str) -> dict[str, str]:
             name = re.search(r'name="(\w+)"', tag)[1]
             found[name] = re.search(r'value="([^"]*)"', tag)[1]
     for tag in re.findall(r"<input type=\"number\"[^>]*>", page):
-        found[re.search(r'name="(\w+)"', tag)[1]] = re.search(r'value="([^"]*)"', tag)[1]
+        given = re.search(r'value="([^"]*)"', tag)
+        found[re.search(r'name="(\w+)"', tag)[1]] = given[1] if given else ""
     for name, options in re.findall(r'<select name="(\w+)"[^>]*>(.*?)</select>', page, re.DOTALL):
         found[name] = re.search(r'value="([^"]*)" selected', options)[1]
     return found
@@ -97,6 +98,8 @@ def test_one_tap_fills_the_set_up_and_leaves_person_and_place(pt, world, patient
         "goal_percent": "118",
         "wanted_hits": "70",
         "minutes": "20",
+        "belt_speed": "",
+        "weight_support": "",
         "protocol": str(preset.protocol_id),
         "robot": "gentle",
         "robot_above": "nod",

@@ -14,7 +14,7 @@ from rehab.sessions.forms.session import SessionForm
 from rehab.sessions.setup.presets import NAME_TAKEN, Preset
 
 # Not part of a preset: they depend on the patient and the place.
-EXCLUDED_FIELDS = ("station", "trained_side")
+EXCLUDED_FIELDS = ("station", "trained_side", "device", "belt_speed", "weight_support")
 
 
 def save_preset(data: Any, patient: Patient, by: User, name: str) -> Preset:

@@ -34,8 +34,12 @@ class StepRow(NamedTuple):
 Row = StepRow | SessionEvent | SessionMetric
 CHECKPOINT_STEPS = 100
 MARKS = 100  # the newest; more would hide the strides
-MARKED_KINDS = (*marked_kinds(), *Remark, RuleEntry.GOAL_FOLLOWED)  # kinds of events that leave one
 Summary = dict[str, Any]
+
+
+def kinds_with_marks() -> set[str]:
+    """Return the kinds of events that leave a mark on a therapist's chart."""
+    return {*marked_kinds(), *Remark, RuleEntry.GOAL_FOLLOWED}
 
 
 class SessionAggregate:
@@ -57,10 +61,8 @@ class SessionAggregate:
         """Return the aggregate of a session, rebuilt from its log."""
         aggregate = cls.from_checkpoint(session)
         aggregate.fold = fold_log(aggregate.fold, session)
-        marked = SessionEvent.everywhere.filter(session=session, kind__in=MARKED_KINDS).order_by(
-            "-pk"
-        )
-        aggregate.keep_marks(reversed(marked[:MARKS]))
+        marked = SessionEvent.everywhere.filter(session=session, kind__in=kinds_with_marks())
+        aggregate.keep_marks(reversed(marked.order_by("-pk")[:MARKS]))
         return aggregate
 
     @classmethod

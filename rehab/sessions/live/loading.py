@@ -15,7 +15,7 @@ from django.db import transaction
 from django.db.models import QuerySet
 
 from rehab.sessions.live import owners
-from rehab.sessions.live.aggregate import MARKED_KINDS, MARKS, SessionAggregate
+from rehab.sessions.live.aggregate import MARKS, SessionAggregate, kinds_with_marks
 from rehab.sessions.live.session import RECENT_STEPS
 from rehab.sessions.log import RobotEntry, SessionEvent, Step, noted_end
 from rehab.sessions.models import TrainingSession, find_newest
@@ -136,12 +136,12 @@ def _load(session_ids: Collection[int]) -> dict[int, LoadResult]:
     behind = [key for key, last in last_numbers.items() if last > sessions[key].last_number]
     if behind:  # their owner did not come to note it
         TrainingSession.everywhere.filter(pk__in=behind).update(last_number=noted_end())
-    logs = _read_events(last_numbers)
+    logs, marked = _read_events(last_numbers), kinds_with_marks()
     for key, last in last_numbers.items():
         session, events = sessions[key], logs.get(key, [])
         aggregate = SessionAggregate.from_checkpoint(session)
         _fold_rest(aggregate, events)
-        aggregate.keep_marks([event for event in events if event.kind in MARKED_KINDS][-MARKS:])
+        aggregate.keep_marks([event for event in events if event.kind in marked][-MARKS:])
         before = owned_before.get(key, "")
         found[key] = LoadedSession(
             aggregate=aggregate,
@@ -170,7 +170,7 @@ def _read_steps(session_id: int, after: int) -> QuerySet[Step]:
 
 def _read_events(session_ids: Collection[int]) -> dict[int, list[SessionEvent]]:
     """Return of each session the events that change it, leave a mark or concern its robot."""
-    kinds = {*CONTROLS, *MARKED_KINDS, RobotEntry.STOP, RobotEntry.ARM}
+    kinds = {*CONTROLS, *kinds_with_marks(), RobotEntry.STOP, RobotEntry.ARM}
     events = SessionEvent.everywhere.filter(session__in=session_ids, kind__in=kinds)
     ordered = events.order_by("session_id", "pk")
     return {key: list(some) for key, some in groupby(ordered, attrgetter("session_id"))}

@@ -101,7 +101,7 @@ def _told(interval: Interval | None, unit: str) -> dict[str, str] | None:
     return {"estimate": f"{told} {unit}".strip(), "within": within}
 
 
-@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER)
+@for_roles(Role.LEAD, Role.PT, Role.RESEARCHER, patients=False)  # audited here, as an export
 @require_safe
 def download_results(request: HttpRequest, study_id: int) -> HttpResponse:
     """Return a figure as SVG, or the data behind the figures as CSV: the ``file`` of that name."""
