@@ -22,6 +22,7 @@ def blocks(language: str) -> str:
     return "\n".join(re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL))
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("curl") is None, reason="no curl here")
 def test_the_documented_examples_run(tmp_path: Path):
     with serve(tmp_path) as server:

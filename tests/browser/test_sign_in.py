@@ -15,7 +15,7 @@ from tests.support.servers import Server, serve
 pytestmark = pytest.mark.browser
 
 
-@pytest.fixture(params=["daphne", "uvicorn"])
+@pytest.fixture(params=["daphne", pytest.param("uvicorn", marks=pytest.mark.long)])
 def server(request, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     with serve(tmp_path_factory.mktemp("data"), "--server", request.param) as running:
         yield running

@@ -78,6 +78,7 @@ def until(folder: Path, count: int) -> None:
         time.sleep(0.05)
 
 
+@pytest.mark.long
 def test_a_recording_is_walked_once_also_over_a_killed_server(tmp_path: Path) -> None:
     walked = [round(3.5 + 0.01 * number, 2) for number in range(STRIDES)]
     file = tmp_path / "walk.csv"

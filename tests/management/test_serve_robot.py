@@ -165,6 +165,7 @@ def test_a_killed_server_leaves_no_robot(tmp_path):
         assert still_running(started, 10) == []
 
 
+@pytest.mark.long
 @pytest.mark.server
 def test_a_station_with_a_robot_of_its_own_gets_no_other(tmp_path):
     python(tmp_path, 'KINDS = ["robot"]\n' + PREPARE)
