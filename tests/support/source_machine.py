@@ -299,7 +299,7 @@ class Sources(RuleBasedStateMachine):
 
     async def _end(self, runtime: runtimes.Runtime) -> None:
         await runtime.loop.run_in_executor(None, runtime.writer.close)
-        for routine in runtime.background_tasks:
+        for routine in runtime.routines.tasks:
             routine.cancel()
         for caller in list(Caller.open_ones):
             await caller.hang_up()

@@ -8,30 +8,25 @@ import logging
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from asgiref.sync import sync_to_async
-from channels.db import database_sync_to_async
 from django.conf import settings
 from django.db import DatabaseError
 from django.utils import timezone
 
-from rehab.people.audit.seals import SEALED_AFTER, seal_logs
 from rehab.people.models import User
-from rehab.sessions.events.event import to_text
 from rehab.sessions.live import lease, owners, sources
 from rehab.sessions.live.audit_queue import AuditQueue
-from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
 from rehab.sessions.live.commits import Fenced
-from rehab.sessions.live.instruments import LATE_S
 from rehab.sessions.live.loading import Loader, find_newest_open
 from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.process import move_database_log
+from rehab.sessions.live.routines import Routines
 from rehab.sessions.live.servers import Servers
 from rehab.sessions.live.session import LiveSession, NotStored, RobotStop
 from rehab.sessions.live.supervisor import Supervisor
-from rehab.sessions.live.trouble import WORDS, Trouble, describe_failure
+from rehab.sessions.live.trouble import describe_failure
 from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Remark
 from rehab.sessions.models import TrainingSession
@@ -46,17 +41,10 @@ from rehab.training.changes import (
     PauseReason,
     State,
 )
-from rehab.training.controls import CONTROLS, Audience
+from rehab.training.controls import CONTROLS
 from robot.wire.close_codes import CloseCode
-from robot.wire.limits import PAGE_HEARTBEAT_S, ROBOT_HEARTBEAT_S
 
 log = logging.getLogger(__name__)
-
-# Robot heartbeats between those of pages, sweeps of idle sessions and checks of sign-ins.
-SWEEP = round(PAGE_HEARTBEAT_S / ROBOT_HEARTBEAT_S)
-CHECKPOINT = 8  # heartbeats
-SEAL = round(600 / ROBOT_HEARTBEAT_S)
-HEARTBEAT = to_text({"type": "heartbeat"})
 
 
 class Draining(NotStored):
@@ -81,43 +69,26 @@ class Runtime:
         self.loop = asyncio.get_running_loop()
         self.sessions: dict[int, LiveSession] = {}
         self.draining = False
-        self._beat = 0
         self.is_ready = False  # the sessions of the last run are back
-        self._trouble = Trouble.NONE  # as it was told last
         self.writer = Writer(self._call)
-        # By station: devices that wait for a session to open there.
         self.devices: dict[int, set[ConnectedDevice]] = defaultdict(set)  # by station
         self.audit_queue = AuditQueue()
         self.sockets: set[Any] = set()  # closed when the server stops
         self.requests: set[asyncio.Task[None]] = set()  # of pages, under way
         self.supervisor = Supervisor(settings.DATA_DIR / "children.json")
-        self.address = sources.local_address(
-            settings.HOST, settings.PORT
-        )  # where child processes connect
+        # Where child processes connect.
+        self.address = sources.local_address(settings.HOST, settings.PORT)
         self._loader = Loader()
         self._opening: dict[int, asyncio.Task[None]] = {}
         self._held: set[int] = set()  # sessions that this process may be the owner of
         self._orphaned: set[int] = set()  # sessions of dead processes: paused if they run
-        self._unlogged_stops: dict[
-            str, RobotStop
-        ] = {}  # at locations whose sessions were all dropped
+        # At locations whose sessions were all dropped.
+        self._unlogged_stops: dict[str, RobotStop] = {}
         own = lease.held()
         # The other servers on the database, where there may be any.
         self.servers = Servers(self, own) if own is not None and own.shares else None
         self._left_before: set[int] = set()  # sessions without an owner, a beat ago
-        # One task each: robots stop without heartbeats, so none may wait for the disk.
-        self.background_tasks = [
-            self.loop.create_task(self._repeat(beats, work), context=contextvars.Context())
-            for beats, work in (
-                (1, self._send_robot_heartbeats),
-                (1, self._watch_storage),
-                (1, self._send_page_heartbeats),
-                (SWEEP, self._close_idle),
-                (SWEEP, self._check_sign_ins),
-                (CHECKPOINT, self._checkpoint_log),
-                (SEAL, self._seal_logs),
-            )
-        ]
+        self.routines = Routines(self)
 
     def _call(self, function: Callable[[], None]) -> None:
         self.loop.call_soon_threadsafe(function)
@@ -424,71 +395,7 @@ class Runtime:
         except Exception:  # one broken session must not keep the server from starting
             log.exception("Session %s could not be recovered", session_id)
 
-    async def _repeat(self, beats: int, work: Callable[[], Awaitable[None]]) -> None:
-        """Call a function periodically; log its failures and go on."""
-        while True:
-            due_s = self.loop.time() + beats * ROBOT_HEARTBEAT_S
-            await asyncio.sleep(beats * ROBOT_HEARTBEAT_S)
-            LATE_S.observe(self.loop.time() - due_s)
-            try:
-                await work()
-            except Exception:
-                log.exception("A periodic task (every %.2f s) failed", beats * ROBOT_HEARTBEAT_S)
-
-    async def _send_robot_heartbeats(self) -> None:
-        for live in self.sessions.values():
-            if live.robot is not None:
-                live.robot.tell({"type": "heartbeat", "watched": live.is_watched})
-
-    async def _watch_storage(self) -> None:
-        """Tell monitors, robots and the log when steps cannot be stored, and when they can."""
-        trouble = self.writer.trouble
-        if trouble == self._trouble:
-            return
-        self._trouble = trouble
-        log.error("%s", WORDS.get(trouble, "Steps are stored again."))
-        for live in self.sessions.values():
-            live.announce_storage(timezone.now())
-
-    async def _send_page_heartbeats(self) -> None:
-        """Send heartbeats to the pages of some sessions: of all of them within an interval."""
-        self._beat = (self._beat + 1) % SWEEP
-        followed = self.servers.followed.values() if self.servers is not None else ()
-        for live in (*self.sessions.values(), *followed):
-            if live.id % SWEEP != self._beat or not live.feed.subscribers:
-                continue
-            presence = live.presence(timezone.now())
-            quality = to_text({"type": "heartbeat", "presence": presence})
-            for subscriber in live.feed.subscribers:
-                if subscriber.audience is Audience.MONITOR:
-                    subscriber.queue_heartbeat(quality)
-                elif subscriber.audience is Audience.PATIENT and not subscriber.was_sent_something(
-                    within_s=1.0
-                ):  # robots have their own
-                    subscriber.queue_heartbeat(HEARTBEAT)
-
-    async def _close_idle(self) -> None:
-        for live in list(self.sessions.values()):
-            if self.sessions.get(live.id) is live and live.is_idle and not live.recently_used:
-                await self._close(live)
-            live.recently_used = False  # who gets it now has until the next sweep to subscribe
-
-    async def _checkpoint_log(self) -> None:
-        await self.loop.run_in_executor(None, move_database_log)
-
-    async def _seal_logs(self) -> None:
-        await database_sync_to_async(seal_logs)(timezone.now() - SEALED_AFTER)
-
-    async def _check_sign_ins(self) -> None:
-        """Extend sign-ins at a running session; close sockets that are no longer authorized."""
-        sockets = [socket for socket in self.sockets if socket.actor is not None]
-        running = [one.scope for one in sockets if one.live is not None and one.live.is_running]
-        await extend_sign_ins(running, timezone.now())
-        admitted = [(one.actor, one.scope) for one in sockets]
-        for index in await find_unauthorized(admitted, timezone.now()):
-            sockets[index].revoke()
-
-    async def _close(self, live: LiveSession) -> None:
+    async def close(self, live: LiveSession) -> None:
         """Unload a session that nobody uses; it can be rebuilt from its log."""
         if live.aggregate.fold.state is State.RUNNING:
             return  # its source may reconnect
@@ -503,9 +410,7 @@ class Runtime:
         """Close every socket so that clients reconnect, commit everything, stop."""
         self.draining = True
         await self.supervisor.stop_all()
-        for task in self.background_tasks:
-            task.cancel()
-        await asyncio.gather(*self.background_tasks, return_exceptions=True)
+        await self.routines.stop()
         closing = [socket.close_now(CloseCode.RESTARTING) for socket in list(self.sockets)]
         await asyncio.gather(*closing, self.audit_queue.join(), return_exceptions=True)
         await asyncio.gather(*self._opening.values(), return_exceptions=True)

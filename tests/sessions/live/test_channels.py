@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from rehab.sessions.live import owners
+from rehab.sessions.live import owners, routines
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.session import LiveSession
 from rehab.training.phases import make_phase
@@ -90,7 +90,7 @@ async def test_a_step_carries_the_feedback_of_its_valence(place, begun, valence)
 
 
 async def test_a_robot_hears_its_cue_states_and_steps(place, begun, ready, monkeypatch):
-    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.005)
+    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.005)
     session = await begun(place)
     robot = await place.robot().dial()
     welcome = await robot.hello()
@@ -123,7 +123,7 @@ async def test_a_robot_waits_for_a_session_at_its_station(place, ready):
 
 
 async def test_pages_hear_a_heartbeat(place, begun, monkeypatch):
-    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.002)
     session = await begun(place)
     tablet = place.tablet(session)
     await tablet.watch()
@@ -131,7 +131,7 @@ async def test_pages_hear_a_heartbeat(place, begun, monkeypatch):
 
 
 async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch):
-    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.002)
     disk, database = threading.Event(), asyncio.Event()
     waiting: set[str] = set()
 
@@ -151,8 +151,8 @@ async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch)
     robot, tablet = await place.robot().dial(), place.tablet(session)
     await robot.hello()
     await tablet.watch()
-    monkeypatch.setattr(runtimes, "move_database_log", move_log)
-    monkeypatch.setattr(runtimes, "extend_sign_ins", extend_sign_ins)
+    monkeypatch.setattr(routines, "move_database_log", move_log)
+    monkeypatch.setattr(routines, "extend_sign_ins", extend_sign_ins)
     monkeypatch.setattr(owners, "release", release)
     await runtimes.current().session((await ready(place, at_station=False)).pk)  # soon idle
     while len(waiting) < 3:
@@ -169,7 +169,7 @@ async def test_no_heartbeat_waits_for_the_disk(place, begun, ready, monkeypatch)
 
 
 async def test_heartbeats_and_housekeeping_go_on_whatever_fails(place, begun, monkeypatch, caplog):
-    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.002)
     failed: Counter[str] = Counter()
 
     def fail(what: str) -> Callable[..., None]:
@@ -183,7 +183,7 @@ async def test_heartbeats_and_housekeeping_go_on_whatever_fails(place, begun, mo
     robot = await place.robot().dial()
     await robot.hello()
     for name in ("move_database_log", "extend_sign_ins"):
-        monkeypatch.setattr(runtimes, name, fail(name))
+        monkeypatch.setattr(routines, name, fail(name))
     with monkeypatch.context() as patch:
         patch.setattr(LiveSession, "is_watched", property(fail("robots")))
         patch.setattr(LiveSession, "presence", fail("pages"))

@@ -10,6 +10,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from rehab.sessions.events.event import LiveEvent
+from rehab.sessions.live import routines
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers.base import Outbox
 from rehab.sessions.live.hub import MAX_UNCONFIRMED, RING, EventFeed, Lagged, Subscriber
@@ -69,7 +70,7 @@ async def test_a_frame_is_a_sign_of_life():
 async def test_pages_have_a_heartbeat_each_interval_unless_they_were_just_sent_a_step(
     place, elsewhere, begun, monkeypatch
 ):
-    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.005)
+    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.005)
     tablets, sessions = [], []
     for somewhere in (place, elsewhere):
         session = await begun(somewhere)

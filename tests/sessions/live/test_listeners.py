@@ -13,6 +13,7 @@ from django.utils import timezone
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.browser_sessions import digest_of
+from rehab.sessions.live import routines
 from rehab.sessions.live import runtime as runtimes
 from tests.support.callers import (
     Message,
@@ -132,7 +133,7 @@ async def test_a_switched_off_account_opens_nothing(place, begun):
 
 
 async def test_open_sockets_end_with_their_token_or_sign_in(place, begun, monkeypatch):
-    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.002)
     session = await begun(place)
     source, robot = await place.source().dial(), await place.robot().dial()
     await source.hello()
@@ -159,14 +160,14 @@ async def test_open_sockets_end_with_their_token_or_sign_in(place, begun, monkey
 
 
 async def test_idle_sessions_leave_memory_but_not_while_someone_comes(place, ready, monkeypatch):
-    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.001)
+    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.001)
     session = await ready(place)
     runtime = runtimes.current()
     live = await runtime.session(session.pk)
     while session.pk in runtime.sessions:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
     assert (await runtime.session(session.pk)) is not live
-    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 60)
+    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 60)
     tablet = place.tablet(session)
     await tablet.watch()
     await change(session, "start")

@@ -11,6 +11,7 @@ from django.utils import timezone
 
 from rehab.people.models import Clinic
 from rehab.people.sign_in.browser_sessions import SIGNED_IN_AT, SessionStore, digest_of
+from rehab.sessions.live import routines
 from rehab.sessions.live import runtime as runtimes
 from tests.support.callers import sign_in
 
@@ -19,7 +20,7 @@ pytestmark = pytest.mark.django_db(transaction=True)
 
 @pytest.fixture(autouse=True)
 def _hasty(monkeypatch):
-    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.002)
+    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.002)
 
 
 async def end_in(key: str, minutes: float) -> None:
@@ -43,7 +44,7 @@ async def test_a_running_training_keeps_its_therapist_signed_in(place, begun, se
         await monitor.hear("heartbeat")
     await monitor.change("pause")  # nobody walks: a page left open is nobody who is there
     await end_in(sign_in(place.pt), 1)
-    await runtimes.current()._check_sign_ins()
+    await runtimes.current().routines.check_sign_ins()
     assert await minutes_left(sign_in(place.pt)) <= 1
     await end_in(sign_in(place.pt), -1)
     assert (await monitor.sent_away())[0] == 4001
@@ -54,7 +55,7 @@ async def test_a_working_day_ends_though_a_training_runs(place, begun, settings)
     store = await sync_to_async(_signed_in_since)(sign_in(place.pt), 11.9, settings)
     monitor = place.monitor(session)
     await monitor.watch()
-    await runtimes.current()._check_sign_ins()
+    await runtimes.current().routines.check_sign_ins()
     assert await minutes_left(store) <= 6
 
 

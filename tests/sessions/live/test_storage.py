@@ -13,7 +13,7 @@ from asgiref.sync import sync_to_async
 from django.db import OperationalError, connection, connections, transaction
 from django.test import Client
 
-from rehab.sessions.live import process
+from rehab.sessions.live import process, routines
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import writer as writers
 from rehab.sessions.live.commits import Job
@@ -34,7 +34,7 @@ async def health(path: str = "/healthz") -> tuple[int, str]:
 
 
 async def test_a_writer_that_is_late_is_told_to_all(place, begun, stall, monkeypatch, caplog):
-    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.01)
+    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.01)
     session = await begun(place)
     monitor, robot = place.monitor(session), await place.robot().dial()
     assert (await monitor.watch())["presence"]["storage"] == ""
@@ -60,7 +60,7 @@ async def test_a_writer_that_is_late_is_told_to_all(place, begun, stall, monkeyp
 
 
 async def test_a_full_disk_is_said_in_words(place, begun, stall, monkeypatch):
-    monkeypatch.setattr(runtimes, "ROBOT_HEARTBEAT_S", 0.01)
+    monkeypatch.setattr(routines, "ROBOT_HEARTBEAT_S", 0.01)
     session = await begun(place)
     source = await place.source().dial()
     await source.hello()

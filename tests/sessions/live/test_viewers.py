@@ -75,11 +75,11 @@ async def test_a_tablet_hears_an_ended_session_until_the_next_one_starts(place, 
     for page in (tablet, monitor):
         await page.watch()
     await change(session, "finish")
-    await runtimes.current()._check_sign_ins()
+    await runtimes.current().routines.check_sign_ins()
     await tablet.overhear()
     assert tablet.code is None
     await change(await ready(place), "start")
-    await runtimes.current()._check_sign_ins()
+    await runtimes.current().routines.check_sign_ins()
     assert (await tablet.sent_away())[0] == 4001
     await monitor.overhear()
     assert monitor.code is None

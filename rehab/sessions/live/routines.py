@@ -1,0 +1,142 @@
+"""What a runtime does again and again: heartbeats, sweeps, checkpoints, seals."""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+import logging
+from collections.abc import Awaitable, Callable
+from typing import Any, Protocol
+
+from channels.db import database_sync_to_async
+from django.utils import timezone
+
+from rehab.people.audit.seals import SEALED_AFTER, seal_logs
+from rehab.sessions.events.event import to_text
+from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
+from rehab.sessions.live.instruments import LATE_S
+from rehab.sessions.live.process import move_database_log
+from rehab.sessions.live.servers import Servers
+from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live.trouble import WORDS, Trouble
+from rehab.sessions.live.writer import Writer
+from rehab.training.controls import Audience
+from robot.wire.limits import PAGE_HEARTBEAT_S, ROBOT_HEARTBEAT_S
+
+log = logging.getLogger(__name__)
+
+# Robot heartbeats between those of pages, sweeps of idle sessions and checks of sign-ins.
+SWEEP = round(PAGE_HEARTBEAT_S / ROBOT_HEARTBEAT_S)
+CHECKPOINT = 8  # heartbeats
+SEAL = round(600 / ROBOT_HEARTBEAT_S)
+HEARTBEAT = to_text({"type": "heartbeat"})
+
+
+class Process(Protocol):
+    """What routines look after: the sessions of a process."""
+
+    loop: asyncio.AbstractEventLoop
+    sessions: dict[int, LiveSession]
+    sockets: set[Any]
+    writer: Writer
+    servers: Servers | None
+
+    async def close(self, live: LiveSession) -> None:
+        """Unload a session that nobody uses."""
+
+
+class Routines:
+    """One task each: robots stop without heartbeats, so none may wait for the disk."""
+
+    def __init__(self, process: Process) -> None:
+        self._process = process
+        self._beat = 0
+        self._trouble = Trouble.NONE  # as it was told last
+        self.tasks = [
+            process.loop.create_task(self._repeat(beats, work), context=contextvars.Context())
+            for beats, work in (
+                (1, self._send_robot_heartbeats),
+                (1, self._watch_storage),
+                (1, self._send_page_heartbeats),
+                (SWEEP, self._close_idle),
+                (SWEEP, self.check_sign_ins),
+                (CHECKPOINT, self._checkpoint_log),
+                (SEAL, self._seal_logs),
+            )
+        ]
+
+    async def stop(self) -> None:
+        """End all of them."""
+        for task in self.tasks:
+            task.cancel()
+        await asyncio.gather(*self.tasks, return_exceptions=True)
+
+    async def _repeat(self, beats: int, work: Callable[[], Awaitable[None]]) -> None:
+        """Call a function periodically; log its failures and go on."""
+        while True:
+            due_s = self._process.loop.time() + beats * ROBOT_HEARTBEAT_S
+            await asyncio.sleep(beats * ROBOT_HEARTBEAT_S)
+            LATE_S.observe(self._process.loop.time() - due_s)
+            try:
+                await work()
+            except Exception:
+                log.exception("A periodic task (every %.2f s) failed", beats * ROBOT_HEARTBEAT_S)
+
+    async def _send_robot_heartbeats(self) -> None:
+        for live in self._process.sessions.values():
+            if live.robot is not None:
+                live.robot.tell({"type": "heartbeat", "watched": live.is_watched})
+
+    async def _watch_storage(self) -> None:
+        """Tell monitors, robots and the log when steps cannot be stored, and when they can."""
+        trouble = self._process.writer.trouble
+        if trouble == self._trouble:
+            return
+        self._trouble = trouble
+        log.error("%s", WORDS.get(trouble, "Steps are stored again."))
+        for live in self._process.sessions.values():
+            live.announce_storage(timezone.now())
+
+    async def _send_page_heartbeats(self) -> None:
+        """Send heartbeats to the pages of some sessions: of all of them within an interval."""
+        self._beat = (self._beat + 1) % SWEEP
+        followed = (
+            self._process.servers.followed.values() if self._process.servers is not None else ()
+        )
+        for live in (*self._process.sessions.values(), *followed):
+            if live.id % SWEEP != self._beat or not live.feed.subscribers:
+                continue
+            presence = live.presence(timezone.now())
+            quality = to_text({"type": "heartbeat", "presence": presence})
+            for subscriber in live.feed.subscribers:
+                if subscriber.audience is Audience.MONITOR:
+                    subscriber.queue_heartbeat(quality)
+                elif subscriber.audience is Audience.PATIENT and not subscriber.was_sent_something(
+                    within_s=1.0
+                ):  # robots have their own
+                    subscriber.queue_heartbeat(HEARTBEAT)
+
+    async def _close_idle(self) -> None:
+        for live in list(self._process.sessions.values()):
+            if (
+                self._process.sessions.get(live.id) is live
+                and live.is_idle
+                and not live.recently_used
+            ):
+                await self._process.close(live)
+            live.recently_used = False  # who gets it now has until the next sweep to subscribe
+
+    async def _checkpoint_log(self) -> None:
+        await self._process.loop.run_in_executor(None, move_database_log)
+
+    async def _seal_logs(self) -> None:
+        await database_sync_to_async(seal_logs)(timezone.now() - SEALED_AFTER)
+
+    async def check_sign_ins(self) -> None:
+        """Extend sign-ins at a running session; close sockets that are no longer authorized."""
+        sockets = [socket for socket in self._process.sockets if socket.actor is not None]
+        running = [one.scope for one in sockets if one.live is not None and one.live.is_running]
+        await extend_sign_ins(running, timezone.now())
+        admitted = [(one.actor, one.scope) for one in sockets]
+        for index in await find_unauthorized(admitted, timezone.now()):
+            sockets[index].revoke()
