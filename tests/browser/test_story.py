@@ -201,11 +201,10 @@ def test_a_session_from_start_to_scores(stories: list[Story], server: Server) ->
         end(story, server)
     states = query(server, "SELECT state, simulated FROM rehab_trainingsession")
     assert [tuple(state) for state in states] == [("finished", 1)] * len(stories)
+    like_last_time_is_three_taps(stories[0].page, server)
 
 
-def test_like_last_time_is_three_taps(stories: list[Story], server: Server) -> None:
-    story = stories[0]
-    page = story.page
+def like_last_time_is_three_taps(page: Page, server: Server) -> None:
     page.goto("/start/")
     page.tap("text=Rosa 0")
     page.tap("text=Like last time")

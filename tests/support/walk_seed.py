@@ -13,7 +13,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import django
@@ -143,7 +143,14 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
             device = Device(clinic=clinic, station=station, kind=kind, name=kind)
             tokens[kind] = device.new_token()
             device.save()
-        phases = wish.get("phases", [{"kind": "training"}])
+        phases = [make_phase(**phase) for phase in wish.get("phases", [{"kind": "training"}])]
+        protocol = None
+        if "close_percent" in wish:
+            protocol = Protocol.everywhere.create(
+                clinic=clinic, name=name, close_percent=wish["close_percent"]
+            )
+            for position, phase in enumerate(phases, 1):
+                protocol.phases.create(position=position, **asdict(phase))
         session = create_session(
             SessionRequest(
                 patient=patient,
@@ -151,10 +158,8 @@ def seed(wanted: list[dict[str, Any]]) -> list[dict[str, Any]]:
                 goal=GoalRule(percent_of_baseline=wish["goal_percent"])
                 if "goal_percent" in wish
                 else GoalRule(value=wish.get("goal", GOAL)),
-                phases=[make_phase(**phase) for phase in phases],
-                protocol=Protocol.everywhere.create(
-                    clinic=clinic, name=name, close_percent=wish.get("close_percent")
-                ),
+                phases=phases,
+                protocol=protocol,
                 target=Target(duration_s=60 * wish.get("minutes", 10)),
                 station=station,
                 created_by=person,
