@@ -260,7 +260,8 @@ def _bridge_gaps(window: Floats, clock: StanceClock, critical: int) -> tuple[Flo
     rows = window[: ANGLE + 1]
     if time is not window[TIME] and clock.late_s > 0:
         rows = np.vstack((rows, time))
-    longest_s = find_maximum(time[critical:] - time[critical - 1 : -1])
+    steps = time[critical:] - time[critical - 1 : -1]
+    longest_s = find_maximum(steps) if len(steps) else 0.0
     if math.isfinite(rows[MOMENT : ANGLE + 1].sum()):
         return rows, longest_s
     bridged = rows.copy()
