@@ -43,6 +43,11 @@ class Table:
     columns: tuple[Column, ...]
 
 
+# Which session a row is of, and whose.
+WHOSE = (
+    Column("session", "", "Number of the session.", Type.INTEGER),
+    Column("patient", "", "Pseudonym."),
+)
 SESSIONS = Table(
     "sessions.csv",
     (
@@ -129,8 +134,7 @@ SESSIONS = Table(
 STEPS = Table(
     "steps.csv",
     (
-        Column("session", "", "Number of the session.", Type.INTEGER),
-        Column("patient", "", "Pseudonym."),
+        *WHOSE,
         Column("number", "", "Number of the step in its session, from 1, both legs.", Type.INTEGER),
         Column("time", "s", "Time of the step on the source's clock.", Type.NUMBER),
         Column("received_at", "UTC", "When the server received it.", Type.TIME),
@@ -163,8 +167,7 @@ STEPS = Table(
 EVENTS = Table(
     "events.csv",
     (
-        Column("session", "", "Number of the session.", Type.INTEGER),
-        Column("patient", "", "Pseudonym."),
+        *WHOSE,
         Column("at", "UTC", "When it happened.", Type.TIME),
         Column("after_number", "", "Number of the last step before it; 0 for none.", Type.INTEGER),
         Column("kind", "", "What was done, noted, or done by the robot."),
@@ -204,8 +207,7 @@ INCIDENTS = Table(
 FEEDBACK = Table(
     "feedback.csv",
     (
-        Column("session", "", "Number of the session.", Type.INTEGER),
-        Column("patient", "", "Pseudonym."),
+        *WHOSE,
         Column("number", "", "Number of the step that was answered.", Type.INTEGER),
         Column("kind", "", "step, or missing: the page said that it had no value."),
         Column("words", "", "What the page said, in the patient's language; empty: nothing."),
@@ -221,8 +223,7 @@ FEEDBACK = Table(
 ANSWERS = Table(
     "answers.csv",
     (
-        Column("session", "", "Number of the session.", Type.INTEGER),
-        Column("patient", "", "Pseudonym."),
+        *WHOSE,
         Column("questionnaire", "", "sus, tlx, or own- and a number for a clinic's own one."),
         Column("title", "", "Its name."),
         Column("asked_at", "UTC", "When it was planned.", Type.TIME),
