@@ -35,6 +35,7 @@ class ChangeKind(StrEnum):
     ACTIVATION_THRESHOLD = gettext_noop("activation_threshold")
     ROBOT_INTENSITY = gettext_noop("robot_intensity")
     VALENCE = gettext_noop("valence")
+    VALENCE_NOW = gettext_noop("valence_now")
     FEEDBACK_TEXT = gettext_noop("feedback_text")
     WORDS_SHOWN = gettext_noop("words_shown")
     CHART_STYLE = gettext_noop("chart_style")

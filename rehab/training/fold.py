@@ -332,9 +332,7 @@ class SessionFold:
         self.obstacle = ""  # why the plan cannot go on, in words for the PT
         self.completed = False  # the last phase has reached its limit
         if self.next_valence and self.phase.feedback:
-            self.valence = self.valences[self.next_valence]
-            self.next_valence = ""
-            self.switches.append((self.last_number, self.valence.slug))
+            self.switch_valence(self.next_valence)
 
     def _goal_from_baseline(self, rule: GoalRule) -> float | None:
         if self.baseline_mean is None:
@@ -372,21 +370,32 @@ class SessionFold:
 
     def schedule_valence(self, slug: object) -> None:
         """Schedule the valence of the next phase with feedback; the current one cancels that."""
-        if not isinstance(slug, str) or slug not in self.valences:
-            known = ", ".join(self.valences)
-            raise InvalidSetting(
-                "The feedback type of this session can be changed to one of: {known}.",
-                known=known,
-            )
-        if slug == self.valence.slug:
+        wanted = self._check_valence(slug)
+        if wanted == self.valence.slug:
             self.next_valence = ""
         elif any(phase.feedback for phase in self.plan.phases[self.phase_index + 1 :]):
-            self.next_valence = slug
+            self.next_valence = wanted
         else:
             raise NotAllowed(
-                "The feedback type changes with a phase, and no phase with feedback follows. "
-                "End this session and set up another one."
+                "No phase with feedback follows this one. Change the feedback type from the next "
+                "stride on instead."
             )
+
+    def switch_valence(self, slug: object) -> None:
+        """Change the valence from the next step on, which cancels a scheduled one."""
+        wanted = self._check_valence(slug)
+        self.next_valence = ""
+        if wanted != self.valence.slug:
+            self.valence = self.valences[wanted]
+            self.switches.append((self.last_number, wanted))
+
+    def _check_valence(self, slug: object) -> str:
+        if not isinstance(slug, str) or slug not in self.valences:
+            raise InvalidSetting(
+                "The feedback type of this session can be changed to one of: {known}.",
+                known=", ".join(self.valences),
+            )
+        return slug
 
     def edit_feedback_text(self, value: object) -> None:
         """Replace the bands of a valence. What a step earns stays as it was planned."""

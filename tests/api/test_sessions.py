@@ -268,7 +268,7 @@ def test_a_session_is_started_steered_paused_and_finished(world, pt, rosa):
     assert pt.post(path, kind="chart_style", value="line")[0] == 200
     assert pt.post(path, kind="words_shown", value=0)[0] == 200
     status, problem = pt.post(path, kind="valence", value="negative")
-    assert (status, "no phase with feedback follows" in problem["message"]) == (409, True)
+    assert (status, "No phase with feedback follows" in problem["message"]) == (409, True)
     status, problem = pt.post(path, kind="valence", value=2)
     assert (status, "can be changed to one of" in problem["fields"]["value"]) == (409, True)
     status, problem = pt.post(path, kind="feedback_text", value="Go!")

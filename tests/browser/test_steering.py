@@ -119,13 +119,23 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
         expect(emblem).to_have_attribute("data-emblem", "loss")
         expect(monitor.locator("[data-show=types]")).to_have_text("Positive, changed to Negative")
 
+        # No phase with feedback follows the last one; the next stride does.
+        expect(monitor.locator("[data-type] optgroup")).to_have_count(1)
+        monitor.select_option("[data-type]", "now:binary")
+        expect(tablet.locator("body")).to_have_attribute("data-theme", "binary")
+        feet.walk(1.3)
+        at_step(tablet, 14)
+        expect(words).to_have_text("You reached the goal!")
+        types = "Positive, changed to Negative, Binary"
+        expect(monitor.locator("[data-show=types]")).to_have_text(types)
+
         legend = monitor.locator(".legend")
         for told in ("goal 4.10", "words on", "line", "robot gentle", "feedback type Negative"):
             expect(legend).to_contain_text(told)
         monitor.locator("[data-main]").click()
         expect(monitor.locator(".notice.why")).to_have_text("Paused by the therapist.")
         expect(tablet.locator(".sub")).to_contain_text("Rest now.")
-        expect(monitor.locator("[data-presence=source]")).to_contain_text("✓ 13 of 13 valid")
+        expect(monitor.locator("[data-presence=source]")).to_contain_text("✓ 14 of 14 valid")
 
 
 def steer_the_robot(server: Server, walk: Walk, monitor: Page) -> None:

@@ -15,7 +15,7 @@ from tests.support.servers import ROOT, Server, clean_environment, serve
 
 pytestmark = pytest.mark.server
 
-STRIDES = 24
+STRIDES = 60  # 9 s: a slow machine takes some of them to kill a server
 
 SEED = """
 from rehab.people.sign_in.first_start import first_clinic

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 
 from rehab.people.models import Patient, User
@@ -34,5 +35,11 @@ def identifying_texts(reader: Actor) -> dict[str, str]:
 
 
 def find_identities(hidden: Mapping[str, str], answer: str) -> Iterator[str]:
-    """Return whom an answer names of those that are hidden from its reader."""
-    return (whose for text, whose in hidden.items() if text in answer)
+    """Return whom an answer names of those that are hidden from its reader.
+
+    A number ends before what is no digit: "#2" is in "#2, left leg", not in the color #22aa44.
+    """
+    for text, whose in hidden.items():
+        ends = "(?![0-9a-fA-F])" if text.startswith("#") else ""
+        if text in answer and re.search(re.escape(text) + ends, answer):
+            yield whose

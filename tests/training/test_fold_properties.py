@@ -56,6 +56,7 @@ changes = st.builds(
     lambda slug: st.sampled_from(
         [
             Change(ChangeKind.VALENCE, slug),
+            Change(ChangeKind.VALENCE_NOW, slug),
             Change(ChangeKind.FEEDBACK_TEXT, {"valence": slug, "bands": bands_to_json(ONE_BAND)}),
             Change(ChangeKind.FEEDBACK_TEXT, {"valence": slug, "bands": bands_to_json(TWO_BANDS)}),
         ]
@@ -239,7 +240,7 @@ def valence_at(fold: SessionFold, step: ScoredStep) -> Valence:
 
 
 @given(sessions())
-def test_the_feedback_type_changes_with_a_phase_of_feedback_alone(
+def test_the_feedback_type_changes_by_hand_or_with_a_phase_of_feedback(
     session: tuple[SessionPlan, Log],
 ) -> None:
     plan, log = session
@@ -250,11 +251,14 @@ def test_the_feedback_type_changes_with_a_phase_of_feedback_alone(
         assert fold.valence == fold.valences[fold.valence.slug]
         if fold.valence.slug == before[0]:
             continue
+        assert len(fold.switches) == before[2] + 1
+        if isinstance(entry, Change) and entry.kind is ChangeKind.VALENCE_NOW:
+            assert fold.valence.slug == entry.value
+            continue
         assert fold.phase.feedback
         assert fold.phase_strides == 0
         by_hand = isinstance(entry, Change) and entry.kind is ChangeKind.PHASE
         assert fold.phase_index != before[1] or by_hand
-        assert len(fold.switches) == before[2] + 1
     assert fold.next_valence != fold.valence.slug
     assert {fold.valence.slug, *fold.changed_to} <= {plan.valence.slug, *fold.valences}
 

@@ -57,6 +57,7 @@ NUMBERS = {
 VALUES: dict[ChangeKind, ChangeValue] = {
     **NUMBERS,
     K.VALENCE: "negative",
+    K.VALENCE_NOW: "negative",
     K.CHART_STYLE: "line",
     K.GOAL_ADAPTATION: "automatic",
     K.FEEDBACK_TEXT: {"valence": "binary", "bands": bands_to_json(BINARY.bands)},
@@ -136,6 +137,7 @@ def test_a_pause_has_a_reason_until_the_session_goes_on() -> None:
         (K.WORDS_SHOWN, 0.5, "shown"),
         (K.CHART_STYLE, "bars", "points, line"),
         (K.VALENCE, "happy", "binary, negative"),
+        (K.VALENCE_NOW, "happy", "binary, negative"),
         (K.FEEDBACK_TEXT, {"valence": "positive", "bands": []}, "one of the session's"),
         (K.FEEDBACK_TEXT, {"valence": "binary", "bands": []}, "begins at 0"),
         (K.FEEDBACK_TEXT, {"valence": "binary", "bands": [{"words": "Go"}]}, "from_performance"),

@@ -150,6 +150,32 @@ def test_after_a_change_of_type_steps_earn_what_they_earn_in_that_one(
         assert fold.valence.cue == CueGestures()  # the robot stands still
 
 
+@pytest.mark.parametrize("valence", list(EARNED))
+@pytest.mark.parametrize("later", list(EARNED))
+def test_a_type_changed_at_once_holds_from_the_next_step_of_the_same_phase(
+    valence: str, later: str
+) -> None:
+    plan = make_plan(
+        make_phase("training"),
+        make_phase("training"),
+        valence=valence,
+        alternatives=others_than(valence),
+    )
+    fold = start(plan)
+    before = walk(fold, [HIT, MISS])
+    fold.change(Change(ChangeKind.VALENCE, later))  # which the other change makes needless
+    fold.change(Change(ChangeKind.VALENCE_NOW, later))
+    after = walk(fold, [HIT, MISS])
+    assert tuple(step.points for step in before) == EARNED[valence]
+    assert tuple(step.points for step in after) == EARNED[later]
+    assert (fold.phase_index, fold.next_valence) == (0, "")
+    assert fold.switches == ([] if later == valence else [(2, later)])
+    walked = [phase for phase in summarize_phases(fold) if phase["strides"]]
+    assert [(phase["valence"], phase["strides"]) for phase in walked] == (
+        [(valence, 4)] if later == valence else [(valence, 2), (later, 2)]
+    )
+
+
 def test_only_explicit_has_no_score(valence: str) -> None:
     fold = start(make_plan(valence=valence))
     assert fold.score == (None if valence == "explicit" else 0)

@@ -21,6 +21,7 @@ from rehab.sessions.log import FallSeverity, Remark, RobotEntry, SessionEvent, S
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import fold_log
 from rehab.sessions.reports.trend import metrics_by_session
+from rehab.training.changes import ChangeKind
 from rehab.training.controls import CONTROLS, marked_kinds
 from rehab.training.fold import SessionFold
 from rehab.training.plans import SessionPlan
@@ -138,7 +139,7 @@ def stride_chart(
             column.append(entry)
     runs = groupby(zip(columns.pop("phase"), columns["number"], strict=True), lambda pair: pair[0])
     phases = [(plan.phases[index], [number for _, number in run]) for index, run in runs]
-    marked = marked_kinds()
+    marked = {*marked_kinds(), ChangeKind.VALENCE_NOW}  # live, its mark comes with the switch
     valences = _valences_by_run(fold, [run for _, run in phases])
     return {
         "unit": plan.measure.unit,

@@ -96,6 +96,9 @@ class ControlledSession(Protocol):
     def schedule_valence(self, slug: object) -> None:
         """Schedule the valence of the next phase with feedback."""
 
+    def switch_valence(self, slug: object) -> None:
+        """Change the valence from the next step on."""
+
     def edit_feedback_text(self, value: object) -> None:
         """Replace the bands of a valence."""
 

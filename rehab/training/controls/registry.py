@@ -242,6 +242,17 @@ CONTROLS: dict[str, Control] = {
             mark=ChartMark("N", gettext_noop("next type"), ValueFormat.CHOICE, _TYPES),
         ),
         Control(
+            kind=ChangeKind.VALENCE_NOW,  # from the next step on; a switch tells more (`course.py`)
+            log_label=gettext_noop("feedback type from the next step"),
+            review_label=gettext_noop("Feedback type"),
+            value=ValueKind.NAME,
+            apply=lambda session, slug: session.switch_valence(slug),
+            current=lambda session: session.valence.slug,
+            tells={Audience.MONITOR: Payload.TYPES},
+            value_format=ValueFormat.CHOICE,
+            choices=_TYPES,
+        ),
+        Control(
             kind=ChangeKind.FEEDBACK_TEXT,  # for the clinic, or for one session
             log_label=gettext_noop("words"),
             review_label=gettext_noop("Words edited"),

@@ -94,7 +94,7 @@ async def test_without_a_further_phase_the_type_stays(place, begun):
     await monitor.watch()
     answer = await monitor.change("valence", "negative")
     assert answer["code"] == "refused"
-    assert "no phase with feedback follows" in answer["message"]
+    assert "No phase with feedback follows" in answer["message"]
     answer = await monitor.change("valence", "happy")
     assert "can be changed to one of: binary, positive" in answer["message"]
     assert await events_of(session, "valence") == []
