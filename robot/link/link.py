@@ -1,14 +1,4 @@
-"""The websocket client of robots and sources: it connects to the server, and reconnects.
-
-::
-
-    async with Link(url, token, greet=lambda: {"type": "hello", …}) as link:
-        async for message in link:  # goes on over every reconnection; each begins with the greeting
-            …
-            await link.send({"type": "report", …})
-
-docs/protocol.md is the contract; the close codes here are its table.
-"""
+"""The link itself: one connection at a time, its messages, and why it ended."""
 
 from __future__ import annotations
 
@@ -27,56 +17,22 @@ from urllib.parse import urlsplit
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
 
+from robot.link.back_off import BackOff
+from robot.link.refusals import (
+    PASSING_STATUSES,
+    REFUSALS,
+    STATUS_CODES,
+    TROUBLE,
+    LinkRefused,
+)
 from robot.wire.close_codes import CloseCode
 from robot.wire.limits import MAX_FRAME_BYTES
 
 Message = dict[str, Any]
 
-# Close code: the cure, for a server that does not name one. Dialing in again unchanged would not
-# help; after 4009 it would close the newer socket, which would dial in again, and so on.
-REFUSALS: dict[int, str] = {
-    CloseCode.UNAUTHORIZED: (
-        "The token is missing, wrong or revoked. Make a new one for this device in the admin."
-    ),
-    CloseCode.NO_SESSION: (
-        "There is no such session for this device. Check the address and the station."
-    ),
-    CloseCode.REPLACED: (
-        "Another program dialed in with the same token. Stop one of them, or give each its own "
-        "device."
-    ),
-    CloseCode.NOT_PROTOCOL: (
-        "The server does not understand this client. Use the version that fits the server."
-    ),
-    CloseCode.BUSY: "The session has another source or robot. Stop that one first.",
-    CloseCode.ENDED: "The session has ended.",
-}
-# After these the pause is not reset to the shortest: the server, or what we send, is at fault, and
-# a quick reconnection would make it worse.
-_TROUBLE = frozenset({CloseCode.NOT_STORED, CloseCode.TOO_MANY, 1002, 1003, 1007, 1009})
-
 # Tells a proxy before several servers which of them to choose: what the error `elsewhere` named.
 SERVER_HEADER = "GARRY-Server"
 ADDRESS = re.compile(r"[A-Za-z0-9.:\[\]_-]{1,100}")
-
-# Handshakes that are refused by a status instead of a close code.
-_STATUS_CODES = {
-    401: CloseCode.UNAUTHORIZED,
-    403: CloseCode.UNAUTHORIZED,
-    404: CloseCode.NO_SESSION,
-}
-_PASSING_STATUSES = frozenset({408, 425, 429})
-
-
-class LinkRefused(Exception):
-    """The server refuses this client; the message says what to do.
-
-    ``code`` is a close code of docs/protocol.md.
-    """
-
-    def __init__(self, code: int, message: str) -> None:
-        super().__init__(message)
-        self.code = code
 
 
 class FrameTooLarge(ValueError):
@@ -96,29 +52,6 @@ class Timing:
     ping_every_s: float = 4.0
     pong_within_s: float = 4.0
     close_within_s: float = 1.0
-
-
-class BackOff:
-    """The pauses [s] between attempts: each twice as long as the one before, up to a longest.
-
-    ``jitter`` returns numbers in [0, 1) and shortens a pause by up to half, so that a thousand
-    clients of a server that restarts do not come back at once.
-    """
-
-    def __init__(self, first_s: float, longest_s: float, jitter: Callable[[], float]) -> None:
-        self._first_s = self._pause_s = first_s
-        self._longest_s = longest_s
-        self._jitter = jitter
-
-    def next_s(self) -> float:
-        """Return the pause before the next attempt [s]."""
-        pause_s = self._pause_s
-        self._pause_s = min(2 * pause_s, self._longest_s)
-        return pause_s * (1 - self._jitter() / 2)
-
-    def reset(self) -> None:
-        """Start again with the shortest pause."""
-        self._pause_s = self._first_s
 
 
 def _ignore_loss(_reason: str, _pause_s: float) -> None:
@@ -313,7 +246,7 @@ class Link:
         reason = self._error or ("" if closed.rcvd is None else closed.rcvd.reason)
         if code in REFUSALS:
             raise LinkRefused(code, reason or REFUSALS[code]) from closed
-        if self._was_heard and code not in _TROUBLE:
+        if self._was_heard and code not in TROUBLE:
             self._back_off.reset()
         if closed.rcvd is None:
             silent = closed.sent is not None and closed.sent.code == 1011
@@ -331,11 +264,11 @@ class Link:
             )
         if isinstance(problem, InvalidStatus):
             status = problem.response.status_code
-            code = _STATUS_CODES.get(status, CloseCode.NOT_PROTOCOL)
-            fatal = status < 500 and status not in _PASSING_STATUSES
+            code = STATUS_CODES.get(status, CloseCode.NOT_PROTOCOL)
+            fatal = status < 500 and status not in PASSING_STATUSES
             # A proxy may answer 404 while the server restarts, but only the server answers 401.
             if fatal and (code == CloseCode.UNAUTHORIZED or not self._was_welcome):
-                cure = REFUSALS[code] if status in _STATUS_CODES else "Check the address."
+                cure = REFUSALS[code] if status in STATUS_CODES else "Check the address."
                 raise LinkRefused(code, f"{self.url} answers with HTTP {status}. {cure}")
             return f"The server answers with HTTP {status}"
         if isinstance(problem.__cause__, EOFError):
