@@ -222,7 +222,7 @@ def _valence_switches(session: TrainingSession) -> list[tuple[int, str]]:
     """Return the valences in force, the last one first, each with the step that it came after."""
     if not session.changed_to:
         return [(-1, session.valence)]
-    switches = fold_log(SessionFold(session.to_plan()), session).switches
+    switches = fold_log(SessionFold(session.to_plan()), session).valences.switches
     return [*reversed(switches), (-1, session.valence)]
 
 

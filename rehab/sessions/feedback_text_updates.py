@@ -60,7 +60,7 @@ async def _update_session(session_id: int, valence: Valence, by: User) -> None:
     live_runtime = runtime.current()
     try:
         live = await live_runtime.viewed_session(session_id)
-        known = live.aggregate.fold.valences.get(valence.slug)
+        known = live.aggregate.fold.valences.known.get(valence.slug)
         if known is None or known.bands == valence.bands:
             return
         value = {"valence": valence.slug, "bands": bands_to_json(valence.bands)}

@@ -21,14 +21,15 @@ from rehab.training.valences import bands_from_json, bands_to_json
 CHECKPOINT_VERSION = 2
 # What is plain data already.
 PLAIN = (
-    *("last_number", "last_time_s", "active_s", "goal", "next_valence", "was_walking"),
+    *("last_number", "last_time_s", "active_s", "goal", "was_walking"),
     *("phase_index", "phase_strides", "phase_s", "gain", "obstacle", "completed"),
-    *("rest_s", "adapted"),
+    "rest_s",
 )
 
 
 def fold_to_json(fold: SessionFold) -> dict[str, Any]:
     """Return the state of a fold as JSON has it."""
+    following, telling = fold.following, fold.telling
     planned = {one.slug: one for one in (fold.plan.valence, *fold.plan.alternatives)}
     return {
         "version": CHECKPOINT_VERSION,
@@ -36,24 +37,26 @@ def fold_to_json(fold: SessionFold) -> dict[str, Any]:
         "state": fold.state.value,
         "pause_reason": None if fold.pause_reason is None else fold.pause_reason.value,
         "valence": fold.valence.slug,
+        "next_valence": fold.valences.next_slug,
         "last_times_s": {side.value: time_s for side, time_s in fold.last_times_s.items()},
-        "switches": fold.switches,
+        "switches": fold.valences.switches,
         "settings": {
             str(kind): value.value if isinstance(value, Enum) else value
             for kind, value in fold.settings.items()
         },
-        "staircase": asdict(fold.staircase),
-        "latest": list(fold.latest),
-        "untold": asdict(fold.untold),
-        "answer": None if fold.answer is None else asdict(fold.answer),
-        "told": list(fold.told),
+        "staircase": asdict(following.staircase),
+        "latest": list(following.latest),
+        "adapted": following.moved,
+        "untold": asdict(telling.untold),
+        "answer": None if telling.answer is None else asdict(telling.answer),
+        "told": list(telling.told),
         "trained": asdict(fold.trained),
         "feedback": asdict(fold.feedback),
         "phases": [asdict(tally) for tally in fold.phases],
         "blocks": [[*block, asdict(tally)] for block, tally in fold.blocks.items()],
         "bands": {
             slug: bands_to_json(valence.bands)
-            for slug, valence in fold.valences.items()
+            for slug, valence in fold.valences.known.items()
             if valence.bands != planned[slug].bands
         },
     }
@@ -70,22 +73,25 @@ def fold_from_json(plan: SessionPlan, data: Mapping[str, Any]) -> SessionFold | 
     fold.state, fold.pause_reason = State(data["state"]), reason and PauseReason(reason)
     fold.phase = plan.phases[fold.phase_index]
     fold.last_times_s = {Side(side): time_s for side, time_s in data["last_times_s"].items()}
-    fold.switches = [(after, slug) for after, slug in data["switches"]]
+    fold.valences.switches = [(after, slug) for after, slug in data["switches"]]
     for kind, value in data["settings"].items():
         initial = CONTROLS[kind].initial
         if initial is not None:
             fold.settings[kind] = type(initial(plan))(value)
-    fold.staircase, fold.untold = Staircase(**data["staircase"]), Untold(**data["untold"])
-    fold.answer = None if data["answer"] is None else Untold(**data["answer"])
-    fold.latest.extend(data["latest"])
-    fold.told.extend(data["told"])
+    following, telling = fold.following, fold.telling
+    following.staircase, following.moved = Staircase(**data["staircase"]), data["adapted"]
+    following.latest.extend(data["latest"])
+    telling.untold = Untold(**data["untold"])
+    telling.answer = None if data["answer"] is None else Untold(**data["answer"])
+    telling.told.extend(data["told"])
     fold.trained, fold.feedback = Tally(**data["trained"]), Tally(**data["feedback"])
     fold.phases = tuple(Tally(**tally) for tally in data["phases"])
     fold.blocks = {
         Block(phase, gain, valence): Tally(**tally)
         for phase, gain, valence, tally in data["blocks"]
     }
+    known = fold.valences.known
     for slug, bands in data["bands"].items():
-        fold.valences[slug] = replace(fold.valences[slug], bands=bands_from_json(bands))
-    fold.valence = fold.valences[data["valence"]]
+        known[slug] = replace(known[slug], bands=bands_from_json(bands))
+    fold.valences.current, fold.valences.next_slug = known[data["valence"]], data["next_valence"]
     return fold

@@ -2,18 +2,9 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
-from rehab.training.adaptation import (
-    DEFAULT_HIT_RATE,
-    SUGGESTION_STRIDES,
-    AdaptationMode,
-    Staircase,
-    suggest_goal,
-)
+from rehab.training.adaptation import AdaptationMode
 from rehab.training.changes import (
     STATE_LABELS,
     Change,
@@ -23,11 +14,11 @@ from rehab.training.changes import (
     State,
 )
 from rehab.training.controls import CONTROLS
+from rehab.training.goal_following import GoalFollowing
 from rehab.training.goals import MIN_BASELINE_STRIDES, GoalRule
 from rehab.training.marking import Marked, gettext_noop
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import ChartStyle, SessionPlan
-from rehab.training.schedules import Untold
 from rehab.training.scoring import RULES_VERSION, score_measurement
 from rehab.training.steps import (
     InvalidMeasurement,
@@ -40,14 +31,14 @@ from rehab.training.steps import (
     select_value,
 )
 from rehab.training.tallies import Block, Tally
-from rehab.training.valences import Valence, bands_from_json
+from rehab.training.telling import Telling
+from rehab.training.valence_course import ValenceCourse
+from rehab.training.valences import Valence
 
 # Strides further apart than this were not walked without a break, or a clock jumped: no more than
 # so much counts as walked. Recorded strides last 1-2 s, gaps between recorded trials 3.2-5.2 s
 # (docs/reference/gait.md#protocol).
 MAX_GAP_S = 10.0
-# Strides of which it is known whether the patient was told of them: as many as a page begins with.
-KEPT_TOLD = 60
 ASKS_FOR_GOAL = gettext_noop("The baseline is walked. Go to the next phase to accept its goal.")
 
 
@@ -80,41 +71,13 @@ class SessionFold:
         self.feedback = Tally()  # those in feedback phases: what score and hit rate count
         self.phases = tuple(Tally() for _ in plan.phases)
         self.blocks: dict[Block, Tally] = {}  # the same strides, apart where gain or type changed
-        # What may be in force, as it is worded now; which is, and which will be with the next
-        # feedback; after which step it changed to which.
-        self.valences = {one.slug: one for one in (plan.valence, *plan.alternatives)}
-        self.valence: Valence = plan.valence
-        self.next_valence = ""
-        self.switches: list[tuple[int, str]] = []
+        self.valences = ValenceCourse(plan)
         self.pause_reason: PauseReason | None = None
         self.rest_s: float | None = None  # how long the rest should be that is under way
         self.was_walking = False  # whether the time since the last step was walked
-        self.staircase = Staircase()
-        self.latest: deque[float] = deque(maxlen=SUGGESTION_STRIDES)  # values that goals may follow
-        self.adapted = False  # whether the last step moved the goal
-        # By the feedback schedule: what the patient does not know yet; of what the last step told;
-        # the latest steps that were told (unused where all are).
-        self.untold = Untold()
-        self.answer: Untold | None = None
-        self.told: deque[int] = deque(maxlen=KEPT_TOLD)
+        self.following = GoalFollowing(plan)
+        self.telling = Telling(plan.schedule)
         self._begin_phase(0)
-
-    @classmethod
-    def replay(cls, plan: SessionPlan, log: Iterable[Measurement | Change]) -> SessionFold:
-        """Return the fold of a whole log.
-
-        Raises
-        ------
-        NotAllowed, InvalidMeasurement, InvalidSetting
-            For a log that no session can have written.
-        """
-        fold = cls(plan)
-        for entry in log:
-            if isinstance(entry, Change):
-                fold.change(entry)
-            else:
-                fold.step(entry)
-        return fold
 
     @property
     def activation_threshold(self) -> float:
@@ -147,12 +110,6 @@ class SessionFold:
         return mode
 
     @property
-    def wanted_hit_rate(self) -> float:
-        """The share of hits that goals are to give."""
-        wanted = self.plan.target.hit_rate
-        return DEFAULT_HIT_RATE if wanted is None else wanted
-
-    @property
     def suggested_goal(self) -> float | None:
         """The goal that the latest strides would have reached as often as is wanted, if any.
 
@@ -160,22 +117,12 @@ class SessionFold:
         """
         if self.adaptation_mode is AdaptationMode.OFF or not self.phase.adapts:
             return None
-        shown = [self.gain * value for value in self.latest]
-        return suggest_goal(self.plan.measure, shown, self.wanted_hit_rate)
+        return self.following.suggest(self.gain)
 
     @property
     def score(self) -> int | None:
         """Points of the session, of all its valences; None where none of them had points."""
-        walked = (self.plan.valence.slug, *self.changed_to)
-        paid = any(self.valences[slug].has_points for slug in walked)
-        return self.feedback.points if paid else None
-
-    @property
-    def changed_to(self) -> tuple[str, ...]:
-        """The valences that the session was changed to, in that order, each once."""
-        others = dict.fromkeys(slug for _, slug in self.switches)
-        others.pop(self.plan.valence.slug, None)
-        return tuple(others)
+        return self.feedback.points if self.valences.have_points else None
 
     def tally_of(self, kind: str) -> Tally:
         """Return the sums over all phases of one kind."""
@@ -231,12 +178,12 @@ class SessionFold:
             phase=self.phase_index,
             gain=self.gain,
             goal=self.goal,
-            valence=self.valence if self.phase.feedback else None,
+            valence=self.valences.current if self.phase.feedback else None,
             close_steps=self.plan.close_steps,
             rules_version=version,
         )
         self.last_number = scored.number
-        self.adapted, self.answer = False, None
+        self.following.moved, self.telling.answer = False, None
         if scored.side == self.plan.trained_side:
             self._count(scored, running)
         if self.was_walking and not backwards:
@@ -257,43 +204,18 @@ class SessionFold:
         self.trained.add(step)
         if running:
             self.phases[self.phase_index].add(step)
-            valence = self.valence.slug if self.phase.feedback else ""
+            valence = self.valences.current.slug if self.phase.feedback else ""
             block = Block(self.phase_index, self.gain, valence)
             self.blocks.setdefault(block, Tally()).add(step)
             if self.phase.feedback:
                 self.feedback.add(step)
-                self._tell(step)
+                self.telling.add(step, self.feedback.judged)
             if self.phase.adapts and step.valid and step.value is not None:
-                self.latest.append(step.value)
-                self._adapt(step)
+                self.following.latest.append(step.value)
+                if self.adaptation_mode is AdaptationMode.AUTOMATIC:
+                    goal = self.following.move(step)
+                    self.goal = self.goal if goal is None else goal
             self.phase_strides += 1
-
-    def _tell(self, step: ScoredStep) -> None:
-        """Keep whether the schedule tells the patient of a step, and of which ones with it."""
-        if step.performance is None or step.hit is None or step.shown is None:
-            return
-        self.untold.add(step.performance, step.shown, step.hit, step.close)
-        if self.plan.schedule.tells(self.feedback.judged, step.performance):
-            self.answer, self.untold = self.untold, Untold()
-            if not self.plan.schedule.tells_all:
-                self.told.append(step.number)
-
-    def _adapt(self, step: ScoredStep) -> None:
-        """Move the goal as the staircase has it, where goals are automatic."""
-        if self.adaptation_mode is not AdaptationMode.AUTOMATIC:
-            return
-        if step.goal is None or step.hit is None:
-            return
-        goal = self.staircase.add(
-            self.plan.adaptation,
-            self.plan.measure,
-            self.wanted_hit_rate,
-            goal=step.goal,
-            gain=step.gain,
-            hit=step.hit,
-        )
-        if goal is not None:
-            self.goal, self.adapted = goal, True
 
     def _advance_phase(self) -> None:
         """Begin the next phase, or note why that cannot be."""
@@ -326,15 +248,12 @@ class SessionFold:
     def _begin_phase(self, index: int) -> None:
         self.phase_index = index
         self.phase = self.plan.phases[index]  # the one that the next step falls in
-        self.phase_strides = 0
-        self.phase_s = 0.0
+        self.phase_strides, self.phase_s = 0, 0.0
         self.gain = self.phase.gain
         self.obstacle = ""  # why the plan cannot go on, in words for the PT
         self.completed = False  # the last phase has reached its limit
-        if self.next_valence and self.phase.feedback:
-            self.valence = self.valences[self.next_valence]
-            self.next_valence = ""
-            self.switches.append((self.last_number, self.valence.slug))
+        if self.phase.feedback:
+            self.valences.begin_phase(self.last_number)
 
     def _goal_from_baseline(self, rule: GoalRule) -> float | None:
         if self.baseline_mean is None:
@@ -363,38 +282,18 @@ class SessionFold:
 
     def pause(self, reason: PauseReason | None) -> None:
         """Note that the time from here on is not walked, and why; None where nobody knows."""
-        self.was_walking = False
-        self.pause_reason = reason
+        self.was_walking, self.pause_reason = False, reason
 
     def resume(self) -> None:
         """Forget why the session was paused."""
         self.pause_reason = self.rest_s = None
 
+    @property
+    def valence(self) -> Valence:
+        """The valence that is in force."""
+        return self.valences.current
+
     def schedule_valence(self, slug: object) -> None:
         """Schedule the valence of the next phase with feedback; the current one cancels that."""
-        if not isinstance(slug, str) or slug not in self.valences:
-            known = ", ".join(self.valences)
-            raise InvalidSetting(
-                "The feedback type of this session can be changed to one of: {known}.",
-                known=known,
-            )
-        if slug == self.valence.slug:
-            self.next_valence = ""
-        elif any(phase.feedback for phase in self.plan.phases[self.phase_index + 1 :]):
-            self.next_valence = slug
-        else:
-            raise NotAllowed(
-                "The feedback type changes with a phase, and no phase with feedback follows. "
-                "End this session and set up another one."
-            )
-
-    def edit_feedback_text(self, value: object) -> None:
-        """Replace the bands of a valence. What a step earns stays as it was planned."""
-        given = value if isinstance(value, Mapping) else {}
-        slug = given.get("valence")
-        if not isinstance(slug, str) or slug not in self.valences:
-            raise InvalidSetting("Words are given with their valence, one of the session's.")
-        worded = replace(self.valences[slug], bands=bands_from_json(given.get("bands")))
-        self.valences[slug] = worded
-        if self.valence.slug == slug:
-            self.valence = worded
+        later = self.plan.phases[self.phase_index + 1 :]
+        self.valences.schedule(slug, is_possible=any(phase.feedback for phase in later))

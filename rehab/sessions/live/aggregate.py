@@ -169,7 +169,7 @@ class SessionAggregate:
             "active_s": self.fold.active_s,
             "started_at": self.session.started_at,
             "ended_at": self.session.ended_at,
-            "changed_to": ",".join(self.fold.changed_to),
+            "changed_to": ",".join(self.fold.valences.changed_to),
         }
 
 

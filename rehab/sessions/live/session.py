@@ -125,7 +125,7 @@ class LiveSession:
             self.late.append(row.step.number)
         events = events_of_step(fold, before, row.step, live=not late)
         changed = before.changed_by_step(fold)
-        if fold.adapted:
+        if fold.following.moved:
             followed = RuleEntry.GOAL_FOLLOWED
             old = before.goal
             rows.append(self.aggregate.log_event(followed, None, received_at, {}, fold.goal, old))
@@ -276,7 +276,7 @@ class LiveSession:
 
     def _marks(self) -> list[Message]:
         """Return the marks of a PT's chart, in the order of the steps."""
-        switches = [type_mark(after, slug) for after, slug in self.aggregate.fold.switches]
+        switches = [type_mark(after, slug) for after, slug in self.aggregate.fold.valences.switches]
         return sorted([*self.aggregate.marks, *switches], key=lambda mark: mark["after"])
 
     async def wait_until_committed(self) -> None:

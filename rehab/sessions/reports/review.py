@@ -165,7 +165,9 @@ def _valences_by_run(fold: SessionFold, runs: Sequence[list[int]]) -> list[str]:
     ends = [0, *(run[-1] for run in runs)]
     return [
         "".join(
-            f" · {_valence_label(slug)}" for after, slug in fold.switches if end <= after < run[0]
+            f" · {_valence_label(slug)}"
+            for after, slug in fold.valences.switches
+            if end <= after < run[0]
         )
         for end, run in zip(ends, runs, strict=False)
     ]
