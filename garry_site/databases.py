@@ -19,7 +19,7 @@ SQLITE_OPTIONS = {
     ),
 }
 # Nobody waits for ever for a lock, or for a database that is gone. The writer of steps has a
-# connection of its own, which gives up sooner (rehab/sessions/live/writer.py).
+# connection of its own, which gives up sooner (rehab/sessions/live/session/writer.py).
 POSTGRESQL_OPTIONS = {
     "connect_timeout": 5,
     "keepalives_idle": 10,

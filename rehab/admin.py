@@ -5,7 +5,6 @@ from rehab.feedback import admin as feedback
 from rehab.gestures import admin as gestures
 from rehab.people import admin as people
 from rehab.sessions import admin as sessions
-from rehab.sessions import setup_admin as session_setup
 from rehab.stations import admin as stations
 
 __all__ = [
@@ -13,7 +12,6 @@ __all__ = [
     "feedback",
     "gestures",
     "people",
-    "session_setup",
     "sessions",
     "stations",
 ]

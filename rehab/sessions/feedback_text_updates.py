@@ -16,8 +16,8 @@ from rehab.feedback.models import FeedbackType, feedback_text_edited
 from rehab.people.models import User
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.live import runtime
-from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.trouble import NotStored
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN_STATES, ChangeKind
 from rehab.training.measures import InvalidSetting

@@ -9,10 +9,10 @@ from django.utils.translation import gettext, override
 from rehab.training.changes import ChangeValue, State
 from rehab.training.controls import CONTROLS
 from rehab.training.fold import SessionFold
+from rehab.training.fold.tallies import Tally
 from rehab.training.goals import MIN_BASELINE_STRIDES
 from rehab.training.phases import find_phase_kind
 from rehab.training.plans import SessionPlan
-from rehab.training.tallies import Tally
 from rehab.training.valences import VALENCES, Valence
 
 Message = dict[str, Any]

@@ -10,8 +10,8 @@ from django.urls import reverse
 
 from rehab.feedback.models import FeedbackType
 from rehab.people.roles import Role
-from rehab.sessions.live import owners
-from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.live.database import owners
+from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.training.goals import GoalRule

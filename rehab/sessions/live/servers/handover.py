@@ -9,10 +9,11 @@ from typing import Protocol
 from asgiref.sync import sync_to_async
 from django.utils import timezone
 
-from rehab.sessions.live import owners, sources
-from rehab.sessions.live.commits import Fenced
-from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live import sources
+from rehab.sessions.live.database import owners
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.session.commits import Fenced
+from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.supervisor import Supervisor
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import Change, ChangeKind, PauseReason

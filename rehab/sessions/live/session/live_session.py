@@ -18,14 +18,14 @@ from rehab.sessions.events.event import (
     robot_state_event,
 )
 from rehab.sessions.events.snapshot import snapshot
-from rehab.sessions.live.aggregate import Row, SessionAggregate, StepRow, Summary
-from rehab.sessions.live.commits import Job
-from rehab.sessions.live.hub import EventFeed, Subscriber
-from rehab.sessions.live.lateness import Lateness
-from rehab.sessions.live.peers import Peer
-from rehab.sessions.live.robot_orders import RobotOrders
-from rehab.sessions.live.subscription_gate import SubscriptionGate
-from rehab.sessions.live.trouble import WORDS, NotStored, Trouble, classify_failure
+from rehab.sessions.live.database.trouble import WORDS, NotStored, Trouble, classify_failure
+from rehab.sessions.live.session.aggregate import Row, SessionAggregate, StepRow, Summary
+from rehab.sessions.live.session.commits import Job
+from rehab.sessions.live.session.hub import EventFeed, Subscriber
+from rehab.sessions.live.session.lateness import Lateness
+from rehab.sessions.live.session.peers import Peer
+from rehab.sessions.live.session.robot_orders import RobotOrders
+from rehab.sessions.live.session.subscription_gate import SubscriptionGate
 from rehab.sessions.log import Remark, RuleEntry, Step
 from rehab.sessions.payloads import Message, type_mark
 from rehab.training.changes import Change, ChangeKind, State

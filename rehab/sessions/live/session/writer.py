@@ -19,10 +19,10 @@ from weakref import WeakSet
 
 from django.db import DEFAULT_DB_ALIAS, close_old_connections, connection, connections
 
-from rehab.sessions.live.commits import EarlierWriteFailed, Job, commit
+from rehab.sessions.live.database.own_connection import own_connection
+from rehab.sessions.live.database.trouble import Trouble, classify_failure, concerns_all
 from rehab.sessions.live.instruments import COMMIT_S, STEPS, WRITE_FAILURES
-from rehab.sessions.live.own_connection import own_connection
-from rehab.sessions.live.trouble import Trouble, classify_failure, concerns_all
+from rehab.sessions.live.session.commits import EarlierWriteFailed, Job, commit
 
 log = logging.getLogger(__name__)
 

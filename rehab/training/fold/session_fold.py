@@ -14,7 +14,10 @@ from rehab.training.changes import (
     State,
 )
 from rehab.training.controls import CONTROLS
-from rehab.training.goal_following import GoalFollowing
+from rehab.training.fold.goal_following import GoalFollowing
+from rehab.training.fold.tallies import Block, Tally
+from rehab.training.fold.telling import Telling
+from rehab.training.fold.valence_course import ValenceCourse
 from rehab.training.goals import MIN_BASELINE_STRIDES, GoalRule
 from rehab.training.marking import Marked, gettext_noop
 from rehab.training.measures import InvalidSetting
@@ -30,9 +33,6 @@ from rehab.training.steps import (
     find_invalid_reasons,
     select_value,
 )
-from rehab.training.tallies import Block, Tally
-from rehab.training.telling import Telling
-from rehab.training.valence_course import ValenceCourse
 from rehab.training.valences import Valence
 
 # Strides further apart than this were not walked without a break, or a clock jumped: no more than

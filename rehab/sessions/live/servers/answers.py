@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from rehab.sessions.live.intercom import Data
-from rehab.sessions.live.trouble import NotStored
+from rehab.sessions.live.database.trouble import NotStored
+from rehab.sessions.live.servers.intercom import Data
 from rehab.training.changes import NotAllowed
 from rehab.training.marking import AnyOf, Marked
 from rehab.training.measures import InvalidSetting

@@ -18,14 +18,14 @@ from django.db.models import Max, Q
 from django.utils import timezone
 
 from rehab.sessions.events.event import presence_event, robot_report_event
-from rehab.sessions.live.aggregate import SessionAggregate
-from rehab.sessions.live.commits import Job
-from rehab.sessions.live.hub import Subscriber
-from rehab.sessions.live.intercom import Data
-from rehab.sessions.live.loading import is_robot_stopped
-from rehab.sessions.live.robot_orders import LOGGED_REPORTS
-from rehab.sessions.live.session import RECENT_STEPS, LiveSession
-from rehab.sessions.live.trouble import Trouble
+from rehab.sessions.live.database.trouble import Trouble
+from rehab.sessions.live.servers.intercom import Data
+from rehab.sessions.live.session.aggregate import SessionAggregate
+from rehab.sessions.live.session.commits import Job
+from rehab.sessions.live.session.hub import Subscriber
+from rehab.sessions.live.session.live_session import RECENT_STEPS, LiveSession
+from rehab.sessions.live.session.loading import is_robot_stopped
+from rehab.sessions.live.session.robot_orders import LOGGED_REPORTS
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.payloads import Message

@@ -12,7 +12,7 @@ import msgspec
 from django.db import connection, transaction
 from django.db.backends.base.operations import BaseDatabaseOperations
 
-from rehab.sessions.live.aggregate import Row, StepRow, Summary
+from rehab.sessions.live.session.aggregate import Row, StepRow, Summary
 from rehab.sessions.log import (
     RobotEntry,
     SessionEvent,

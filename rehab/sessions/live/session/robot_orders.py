@@ -9,9 +9,9 @@ from typing import NamedTuple, Protocol
 
 from rehab.people.models import User
 from rehab.sessions.events.event import robot_report_event, robot_stopped_event
-from rehab.sessions.live.aggregate import SessionAggregate
-from rehab.sessions.live.hub import EventFeed
-from rehab.sessions.live.peers import Peer
+from rehab.sessions.live.session.aggregate import SessionAggregate
+from rehab.sessions.live.session.hub import EventFeed
+from rehab.sessions.live.session.peers import Peer
 from rehab.sessions.log import RobotEntry
 from rehab.sessions.payloads import Message
 

@@ -17,19 +17,19 @@ from typing import Protocol
 from django.utils import timezone
 
 from rehab.people.models import User
-from rehab.sessions.live import lease
-from rehab.sessions.live.answers import pack, raise_refusal
+from rehab.sessions.live.database import lease
+from rehab.sessions.live.database.own_connection import DatabaseThread
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.devices import Devices
-from rehab.sessions.live.followed_sessions import FollowedSessions
-from rehab.sessions.live.following import FollowedSession, Follower
-from rehab.sessions.live.handover import Handover
-from rehab.sessions.live.intercom import Data, Intercom, Unheard
 from rehab.sessions.live.orders import Orders
-from rehab.sessions.live.own_connection import DatabaseThread
-from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live.servers.answers import pack, raise_refusal
+from rehab.sessions.live.servers.followed_sessions import FollowedSessions
+from rehab.sessions.live.servers.following import FollowedSession, Follower
+from rehab.sessions.live.servers.handover import Handover
+from rehab.sessions.live.servers.intercom import Data, Intercom, Unheard
+from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.station_robots import StationRobots
-from rehab.sessions.live.trouble import NotStored
 from rehab.sessions.log import Remark
 from rehab.sessions.payloads import Message
 from rehab.training.changes import ChangeValue

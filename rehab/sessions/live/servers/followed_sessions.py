@@ -9,9 +9,9 @@ from collections.abc import Callable
 
 from django.utils import timezone
 
-from rehab.sessions.live.following import FollowedSession, load_followed, read_new_rows
-from rehab.sessions.live.own_connection import DatabaseThread
-from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live.database.own_connection import DatabaseThread
+from rehab.sessions.live.servers.following import FollowedSession, load_followed, read_new_rows
+from rehab.sessions.live.session.live_session import LiveSession
 
 log = logging.getLogger(__name__)
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from django.db import DatabaseError, InterfaceError, connection
 
-from rehab.sessions.live.own_connection import own_connection
+from rehab.sessions.live.database.own_connection import own_connection
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -12,17 +12,17 @@ from typing import Any
 from django.utils import timezone
 
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sources.recording import Recording
 from rehab.sources.synthetic import SyntheticWalker
 from rehab.training.changes import ChangeKind
+from rehab.training.figures.summary import summarize_session
 from rehab.training.fold import SessionFold
 from rehab.training.measures import A2
 from rehab.training.scoring import judge
 from rehab.training.steps import Measurement
-from rehab.training.summary import summarize_session
 
 # Steps that are queued before waiting for the disk: few commits, constant memory.
 BATCH = 500

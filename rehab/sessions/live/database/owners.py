@@ -15,7 +15,7 @@ from pathlib import Path
 
 from django.conf import settings
 
-from rehab.sessions.live import lease
+from rehab.sessions.live.database import lease
 from rehab.sessions.log import noted_end
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State

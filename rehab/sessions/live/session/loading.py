@@ -14,9 +14,9 @@ from asgiref.sync import sync_to_async
 from django.db import transaction
 from django.db.models import QuerySet
 
-from rehab.sessions.live import owners
-from rehab.sessions.live.aggregate import MARKS, SessionAggregate, kinds_with_marks
-from rehab.sessions.live.session import RECENT_STEPS
+from rehab.sessions.live.database import owners
+from rehab.sessions.live.session.aggregate import MARKS, SessionAggregate, kinds_with_marks
+from rehab.sessions.live.session.live_session import RECENT_STEPS
 from rehab.sessions.log import RobotEntry, SessionEvent, Step, noted_end
 from rehab.sessions.models import TrainingSession, find_newest
 from rehab.sessions.replay import (
