@@ -8,10 +8,10 @@ import math
 import pytest
 
 from rehab.training.changes import Change, ChangeKind
+from rehab.training.figures.summary import summarize_phases
 from rehab.training.phases import make_phase
 from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import InvalidReason, Measurement, ScoredStep, Side
-from rehab.training.summary import summarize_phases
 from rehab.training.valences import VALENCES, CueGestures
 from tests.training.sessions import make_plan, others_than, start, walk
 
@@ -143,7 +143,7 @@ def test_after_a_change_of_type_steps_earn_what_they_earn_in_that_one(
     assert tuple(step.points for step in after) == EARNED[later]
     paid = [step.points for step in (*before, *after) if step.points is not None]
     assert fold.score == (sum(paid) if paid else None)
-    assert fold.changed_to == (() if later == valence else (later,))
+    assert fold.valences.changed_to == (() if later == valence else (later,))
     training = [phase for phase in summarize_phases(fold) if phase["feedback"]]
     assert [phase["valence"] for phase in training] == list(dict.fromkeys((valence, later)))
     if later == "explicit":
@@ -168,8 +168,8 @@ def test_a_type_changed_at_once_holds_from_the_next_step_of_the_same_phase(
     after = walk(fold, [HIT, MISS])
     assert tuple(step.points for step in before) == EARNED[valence]
     assert tuple(step.points for step in after) == EARNED[later]
-    assert (fold.phase_index, fold.next_valence) == (0, "")
-    assert fold.switches == ([] if later == valence else [(2, later)])
+    assert (fold.phase_index, fold.valences.next_slug) == (0, "")
+    assert fold.valences.switches == ([] if later == valence else [(2, later)])
     walked = [phase for phase in summarize_phases(fold) if phase["strides"]]
     assert [(phase["valence"], phase["strides"]) for phase in walked] == (
         [(valence, 4)] if later == valence else [(valence, 2), (later, 2)]

@@ -75,7 +75,7 @@ def step_event(
     """
     tally, score, plan, walked = fold.feedback, fold.score, fold.plan, describe_walked(fold)
     streak, rates = tally.streak, describe_rates(tally)
-    answer, coaching = fold.answer, describe_coaching(fold)
+    answer, coaching = fold.telling.answer, describe_coaching(fold)
 
     def build(audience: Audience) -> Message | None:
         match audience:

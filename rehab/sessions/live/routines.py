@@ -14,12 +14,12 @@ from django.utils import timezone
 from rehab.people.audit.seals import SEALED_AFTER, seal_logs
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live.auth import extend_sign_ins, find_unauthorized
+from rehab.sessions.live.database.trouble import WORDS, Trouble
 from rehab.sessions.live.instruments import LATE_S
 from rehab.sessions.live.process import move_database_log
-from rehab.sessions.live.servers import Servers
-from rehab.sessions.live.session import LiveSession
-from rehab.sessions.live.trouble import WORDS, Trouble
-from rehab.sessions.live.writer import Writer
+from rehab.sessions.live.servers.servers import Servers
+from rehab.sessions.live.session.live_session import LiveSession
+from rehab.sessions.live.session.writer import Writer
 from rehab.training.controls import Audience
 from robot.wire.limits import PAGE_HEARTBEAT_S, ROBOT_HEARTBEAT_S
 
@@ -100,9 +100,8 @@ class Routines:
     async def _send_page_heartbeats(self) -> None:
         """Send heartbeats to the pages of some sessions: of all of them within an interval."""
         self._beat = (self._beat + 1) % SWEEP
-        followed = (
-            self._process.servers.followed.values() if self._process.servers is not None else ()
-        )
+        servers = self._process.servers
+        followed = () if servers is None else servers.followed.sessions.values()
         for live in (*self._process.sessions.values(), *followed):
             if live.id % SWEEP != self._beat or not live.feed.subscribers:
                 continue

@@ -10,7 +10,7 @@ from asgiref.sync import sync_to_async
 from rehab.people.models import Clinic, User
 from rehab.sessions.events.snapshot import snapshot
 from rehab.sessions.live import runtime
-from rehab.sessions.live import session as sessions
+from rehab.sessions.live.session import live_session as sessions
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.controls import Audience
@@ -257,7 +257,7 @@ async def test_whoever_waits_for_a_viewer_is_not_overtaken(place, begun, monkeyp
     order, tasks = [], []
 
     async def ask(name):
-        await live.wait_for_subscriptions()
+        await live.gate.wait()
         order.append(name)
 
     def snapshot_meanwhile(*args, **facts):

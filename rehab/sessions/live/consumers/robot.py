@@ -12,9 +12,9 @@ from django.utils import timezone
 
 from rehab.sessions.incidents import store_incident
 from rehab.sessions.live.consumers.device import DeviceSocket
-from rehab.sessions.live.hub import Lagged, Subscriber
-from rehab.sessions.live.messages import Incident, read_incident, read_report
-from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live.protocol.messages import Incident, read_incident, read_report
+from rehab.sessions.live.session.hub import Lagged, Subscriber
+from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message, describe_cue
 from rehab.stations.models import Device
 from rehab.training.controls import Audience
@@ -63,7 +63,7 @@ class RobotConsumer(DeviceSocket):
             self.subscriber = subscriber
             fold = live.aggregate.fold
             cue, state = describe_cue(fold), live.state_for_robot
-            stopped, watched = live.robot_stopped, live.is_watched
+            stopped, watched = live.robot_orders.is_stopped, live.is_watched
             welcome = {"type": "welcome", "session": live.id, "state": state, "cue": cue}
             welcome["valence"] = fold.valence.slug
             await self.send_message(welcome | {"stopped": stopped, "watched": watched})
@@ -84,7 +84,7 @@ class RobotConsumer(DeviceSocket):
             told = {"device": self.device_id, "reason": report["reason"]}
             self.runtime.stop_robots(self.live, None, told)
         else:
-            self.live.record_robot_report(report, timezone.now())
+            self.live.robot_orders.record_report(report, timezone.now())
 
     def _keep_incident(self, incident: Incident) -> None:
         """Have an incident stored, if it is of the present session; nothing waits for it."""
@@ -109,7 +109,7 @@ class RobotConsumer(DeviceSocket):
         finally:
             self._incidents_waiting -= 1
         if stored is not None:
-            live.record_robot_report({"kind": "incident", "incident": stored}, now)
+            live.robot_orders.record_report({"kind": "incident", "incident": stored}, now)
 
     def on_disconnect(self) -> None:
         """Unsubscribe, and free the session's slot."""

@@ -21,18 +21,19 @@ from rehab.people.web.refusals import format_refusal
 from rehab.sessions.events.event import to_text
 from rehab.sessions.events.snapshot import history_entry
 from rehab.sessions.live.auth import Actor, authenticate, may_open, may_watch
-from rehab.sessions.live.backlog import read_backlog
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
-from rehab.sessions.live.following import FollowedSession
-from rehab.sessions.live.hub import Lagged, Stalled, Subscriber
-from rehab.sessions.live.messages import (
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.trouble import NotStored
+from rehab.sessions.live.protocol.backlog import read_backlog
+from rehab.sessions.live.protocol.messages import (
     read_change,
     read_frame,
     read_order,
     read_remark,
 )
-from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.session import LiveSession, NotStored
+from rehab.sessions.live.servers.following import FollowedSession
+from rehab.sessions.live.session.hub import Lagged, Stalled, Subscriber
+from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message
 from rehab.sessions.replay import DamagedLog
 from rehab.stations.models import Device
@@ -132,7 +133,7 @@ class ScreenConsumer(Socket):
         self, live: LiveSession, subscriber: Subscriber, after: int, until: int
     ) -> None:
         """Send the steps after a number from the log, oldest first."""
-        plan, told = live.aggregate.fold.plan, tuple(live.aggregate.fold.told)
+        plan, told = live.aggregate.fold.plan, tuple(live.aggregate.fold.telling.told)
         while after < until:
             steps = await read_backlog(live.id, after, until)
             if not steps:
@@ -228,7 +229,7 @@ class ScreenConsumer(Socket):
             told = {} if device_id is None else {"device": device_id}
             self.runtime.stop_robots(live, by, told)
         elif by is not None:  # in a task, so that a stop meanwhile does not wait
-            self.start(self.runtime.arm_robots(live, by))
+            self.start(self.runtime.robots.arm(live, by))
         if by is not None or order == "stop":  # queued: no robot waits for the audit log
             act = Act(f"robot_{order}")
             self.runtime.audit_queue.add(act, self.actor, live.id, self.scope, timezone.now())
@@ -257,7 +258,7 @@ class ScreenConsumer(Socket):
         if isinstance(live, FollowedSession) and servers is not None:
             servers.drive_robot(live.owner, live.id, drive)
         elif live is not None:
-            self.runtime.drive_own_robot(live.id, drive)
+            self.runtime.robots.drive(live.id, drive)
 
     async def _refuse(self, request_id: str, code: str, message: str) -> None:
         await self.send_message(
