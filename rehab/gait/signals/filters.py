@@ -8,6 +8,8 @@ from scipy.signal import butter, lfilter
 
 Floats = NDArray[np.float64]
 
+_FIVE_POINTS = np.array([1.0, -8.0, 0.0, 8.0, -1.0])
+
 
 class ZeroPhaseFilter:
     """A Butterworth low-pass of second order, run forward and backward: no delay, -6 dB at cut-off.
@@ -33,7 +35,7 @@ class ZeroPhaseFilter:
         impulse = np.zeros(4 * self.reach + 1)
         impulse[2 * self.reach] = 1.0
         response = lfilter(b, a, lfilter(b, a, impulse)[::-1])[self.reach : -self.reach]
-        self._response: Floats = np.asarray((response + response[::-1]) / (2 * response.sum()))
+        self.response: Floats = np.asarray((response + response[::-1]) / (2 * response.sum()))
 
     def smooth(self, signals: Floats) -> Floats:
         """Return each row filtered, extended point-symmetrically beyond its ends for the purpose.
@@ -61,11 +63,17 @@ class ZeroPhaseFilter:
         wide[:, more : more + count] = signals
         wide[:, more + count :] = signals[:, -1:]
         cut = max(0, padding - self.reach)
+        smooth = self.smooth_wide(wide)
+        return smooth[:, cut : smooth.shape[1] - cut]
+
+    def smooth_wide(self, wide: Floats) -> Floats:
+        """Return rows filtered and without the ``reach`` samples that they have at each end."""
         # One run over all rows; what spans two of them is left out. (The response is symmetric.)
-        whole = np.empty(wide.size)
-        smooth = wide.shape[1] - 2 * self.reach
-        whole[: wide.size - 2 * self.reach] = np.correlate(wide.ravel(), self._response, "valid")
-        return whole.reshape(wide.shape)[:, cut : smooth - cut]
+        whole = np.empty(wide.shape)
+        whole.ravel()[: wide.size - 2 * self.reach] = np.correlate(
+            wide.ravel(), self.response, "valid"
+        )
+        return whole[:, : wide.shape[1] - 2 * self.reach]
 
 
 def differentiate(values: Floats, rate_hz: float) -> Floats:
@@ -83,11 +91,11 @@ def differentiate(values: Floats, rate_hz: float) -> Floats:
         Of the samples.
     """
     slope = np.empty_like(values)
-    slope[2:-2] = (8 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])) * (rate_hz / 12)
-    slope[1] = (values[2] - values[0]) * (rate_hz / 2)
-    slope[-2] = (values[-1] - values[-3]) * (rate_hz / 2)
-    slope[0] = (values[1] - values[0]) * rate_hz
-    slope[-1] = (values[-1] - values[-2]) * rate_hz
+    slope[2:-2] = np.correlate(values, _FIVE_POINTS * (rate_hz / 12), "valid")
+    first, second, third = values[:3].tolist()
+    slope[0], slope[1] = (second - first) * rate_hz, (third - first) * (rate_hz / 2)
+    third, second, first = values[-3:].tolist()
+    slope[-2], slope[-1] = (first - third) * (rate_hz / 2), (first - second) * rate_hz
     return slope
 
 
@@ -101,7 +109,7 @@ def interpolate_peak(values: Floats, index: int) -> tuple[float, float]:
     index
         Of the highest sample, with a neighbor on each side.
     """
-    left, top, right = (float(v) for v in values[index - 1 : index + 2])
+    left, top, right = values[index - 1 : index + 2].tolist()
     bend = left - 2 * top + right
     if bend >= 0:
         return float(index), top
@@ -114,12 +122,12 @@ def interpolate_peak(values: Floats, index: int) -> tuple[float, float]:
 
 def find_maximum(values: Floats) -> float:
     """Return the largest value, NaN if there is a NaN."""
-    return float(values[values.argmax()])
+    return values.item(values.argmax())
 
 
 def find_minimum(values: Floats) -> float:
     """Return the smallest value, NaN if there is a NaN."""
-    return float(values[values.argmin()])
+    return values.item(values.argmin())
 
 
 def find_upper_median(values: Floats) -> float:
@@ -127,4 +135,12 @@ def find_upper_median(values: Floats) -> float:
     place = len(values) // 2
     ordered = values.copy()
     ordered.partition(place)
-    return float(ordered[place])
+    return ordered.item(place)
+
+
+def find_last(found: NDArray[np.bool_]) -> int:
+    """Return the index of the last true value, -1 without one."""
+    if not len(found):
+        return -1
+    behind = int(found[::-1].argmax())
+    return len(found) - 1 - behind if behind or found[-1] else -1

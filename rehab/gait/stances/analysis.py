@@ -9,9 +9,15 @@ import numpy as np
 
 from rehab.gait.contacts.force_plate import Contact
 from rehab.gait.signals.buffer import LegBuffer
-from rehab.gait.signals.filters import Floats, ZeroPhaseFilter, find_maximum, find_minimum
+from rehab.gait.signals.filters import (
+    Floats,
+    ZeroPhaseFilter,
+    find_last,
+    find_maximum,
+    find_minimum,
+)
 from rehab.gait.signals.samples import ANGLE, FORCE, FORWARD, MOMENT, POSITION, TIME
-from rehab.gait.stances.continuity import check_samples, check_steps
+from rehab.gait.stances.continuity import check_samples, check_steps, read_channel
 from rehab.gait.stances.kinetics import PushOff, PushOffAnalyzer
 from rehab.gait.stances.lag_watch import (
     ANGLE_LAG_MAX_S,
@@ -30,7 +36,7 @@ from rehab.gait.stances.plausibility import (
     check_push_off,
     has_clonus,
 )
-from rehab.gait.stances.resampling import ResampledStance, resample_stance
+from rehab.gait.stances.resampling import ResampledStance, Resampler
 from rehab.gait.stances.timing import HARMFUL_FROM, ClockJudge, StanceClock
 from rehab.gait.stances.uncertainty import Uncertainty
 from rehab.gait.strides import Flag, RejectionReason
@@ -105,6 +111,7 @@ class StanceAnalyzer:
         self._analyzer = PushOffAnalyzer(self._even_hz, mass_kg, cutoff_hz, is_velocity)
         self._uncertainty = Uncertainty(self._even_hz, cutoff_hz, is_velocity)
         self._forward_filter = ZeroPhaseFilter(FORWARD_HZ, self._even_hz)
+        self._resampler = Resampler(self._even_hz, LONGEST_S)
         self._before = int(BEFORE_S * rate_hz)
         self._clock = ClockJudge(rate_hz)
         self._braking = BrakingFinder()
@@ -119,32 +126,43 @@ class StanceAnalyzer:
         if end - begin > 1.2 * STANCE_MAX_S * self._rate_hz:
             return Stance([RejectionReason.LONG_STANCE])
         reasons = [] if contact.is_onset_seen else [RejectionReason.FORCE_LOST]
-        before = self._find_before(begin)
-        window = self._buffer.view(begin - before, stop)
-        time = window[TIME, before:]
-        if not find_minimum(time[1:] - time[:-1]) > 0:
+        window, steps_s, before = self._find_window(begin, stop)
+        if not find_minimum(steps_s[before:]) > 0:
             return Stance([*reasons, RejectionReason.TIME_BACKWARDS])
         late_s = self._buffer.samples.find_lateness(begin - before, stop)
+        time = window[TIME, before:]
         critical_s = begin_s + HARMFUL_FROM * (end_s - begin_s)
-        critical = before + max(1, int(np.searchsorted(time, critical_s)))
-        clock = self._clock.judge(window, late_s, before, critical)
+        critical = before + max(1, int(time.searchsorted(critical_s)))
+        clock = self._clock.judge(window, steps_s, late_s, before, critical)
         reasons += clock.reasons
+        channels = read_channel(window[MOMENT]), read_channel(window[ANGLE])
         reasons += check_samples(
-            window, before, clock, self._rate_hz, self._mass_kg, self._is_velocity
+            time.item(-1) - time.item(0),
+            channels,
+            before,
+            clock,
+            self._rate_hz,
+            self._mass_kg,
+            self._is_velocity,
         )
         if end_s - begin_s < STANCE_MIN_S:
             reasons.append(RejectionReason.SHORT_STANCE)
         elif end_s - begin_s > STANCE_MAX_S:
             reasons.append(RejectionReason.LONG_STANCE)
-        force = window[FORCE, before : before + end - begin + 1] - contact.offset_n
-        reasons += check_force(force, contact.peak_n, self._weight_n, self._rate_hz)
+        force = window[FORCE, before : before + end - begin + 1]
+        reasons += check_force(
+            force, contact.offset_n, contact.peak_n, self._weight_n, self._rate_hz
+        )
         is_sure = late_s is None and contact.known_index == end
         self._watch_angle((end, end_s) if is_sure else None, end)
-        bridged, gap_s = _bridge_gaps(window, clock, critical)
+        is_known = all(math.isfinite(channel.jump) for channel in channels)
+        bridged, gap_s = _bridge_gaps(window, clock, critical, is_known)
         clean = None if bridged is None else _decimate(bridged, self._decimation)
         push_off, a2_sd, flags = None, None, list(clock.flags)
         if clean is not None and clean[TIME, -1] - clean[TIME, 0] < LONGEST_S:
-            stance = self._resample(contact, clean)
+            stance = self._resampler.resample(
+                clean[: ANGLE + 1], begin_s, end_s, clean[-1] if len(clean) > ANGLE + 1 else None
+            )
             push_off = None if stance is None else self._analyzer.measure(stance)
             if stance is not None and push_off is not None:
                 self._check_push_off(contact, stance, push_off, gap_s, reasons, flags)
@@ -166,13 +184,6 @@ class StanceAnalyzer:
     def locate(self, contact: Contact) -> Stance:
         """Return what is known of the stance of a contact that has not ended: its position."""
         return Stance([], position_m=self._find_position(contact))
-
-    def _resample(self, contact: Contact, clean: Floats) -> ResampledStance | None:
-        """Return samples whose gaps are bridged at evenly spaced times."""
-        kinetics_s = clean[ANGLE + 1] if len(clean) > ANGLE + 1 else None
-        return resample_stance(
-            clean, self._even_hz, contact.begin_s, contact.end_s or 0.0, kinetics_s
-        )
 
     def _check_push_off(
         self,
@@ -222,13 +233,19 @@ class StanceAnalyzer:
             reasons.append(RejectionReason.ANGLE_OUT_OF_STEP)
         return reasons
 
-    def _find_before(self, begin: int) -> int:
-        """Return how many samples before a stance follow each other closely enough to be used."""
+    def _find_window(self, begin: int, stop: int) -> tuple[Floats, Floats, int]:
+        """Return the samples from swing to ``stop``, the steps of their times, and how many are
+
+        before the stance: as many as follow each other closely enough to be used.
+        """
         before = min(self._before, begin)
-        times = self._buffer.channel(TIME, begin - before, begin + 1)
-        steps = times[1:] - times[:-1]
-        breaks = np.flatnonzero(~((steps > 0) & (steps <= BEFORE_S)))
-        return before - int(breaks[-1]) - 1 if len(breaks) else before
+        window = self._buffer.view(begin - before, stop)
+        steps_s = window[TIME, 1:] - window[TIME, :-1]
+        swing_s = steps_s[:before]
+        if before and not (find_minimum(swing_s) > 0 and find_maximum(swing_s) <= BEFORE_S):
+            cut = find_last(~((swing_s > 0) & (swing_s <= BEFORE_S))) + 1
+            window, steps_s, before = window[:, cut:], steps_s[cut:], before - cut
+        return window, steps_s, before
 
     def _find_propulsion(self, window: Floats) -> float | None:
         forward = window[FORWARD : FORWARD + 1]
@@ -242,13 +259,18 @@ class StanceAnalyzer:
 
     def _find_position(self, contact: Contact) -> float | None:
         index = contact.begin_index
-        (t0, t1), (p0, p1) = self._buffer.view(index - 1, index + 1)[[TIME, POSITION]].tolist()
+        p0, p1 = self._buffer.channel(POSITION, index - 1, index + 1).tolist()
+        if not math.isfinite(p1 - p0):
+            return None
+        t0, t1 = self._buffer.channel(TIME, index - 1, index + 1).tolist()
         share = (contact.begin_s - t0) / (t1 - t0) if t1 > t0 else 1.0
         position = p0 + share * (p1 - p0)
         return position if math.isfinite(position) else None
 
 
-def _bridge_gaps(window: Floats, clock: StanceClock, critical: int) -> tuple[Floats | None, float]:
+def _bridge_gaps(
+    window: Floats, clock: StanceClock, critical: int, is_known: bool
+) -> tuple[Floats | None, float]:
     """Return a stance's samples with gaps in moment and angle bridged, and the longest bridge [s].
 
     The samples are None where nothing is known to bridge between; a fifth row is when moment and
@@ -262,7 +284,7 @@ def _bridge_gaps(window: Floats, clock: StanceClock, critical: int) -> tuple[Flo
         rows = np.vstack((rows, time))
     steps = time[critical:] - time[critical - 1 : -1]
     longest_s = find_maximum(steps) if len(steps) else 0.0
-    if math.isfinite(rows[MOMENT : ANGLE + 1].sum()):
+    if is_known:
         return rows, longest_s
     bridged = rows.copy()
     for row in bridged[MOMENT : ANGLE + 1]:
@@ -278,12 +300,10 @@ def _decimate(window: Floats, factor: int) -> Floats | None:
     """Return the means of each ``factor`` neighbors, aligned to the end, if there are two."""
     if factor == 1:
         return window
-    count = window.shape[1] // factor
+    rows, samples = window.shape
+    count = samples // factor
     if count < 2:
         return None
-    first = window.shape[1] - count * factor
-    decimated = window[:, first::factor].copy()
-    for neighbor in range(1, factor):
-        decimated += window[:, first + neighbor :: factor]
-    decimated /= factor
+    neighbors = window[:, samples - count * factor :].reshape(rows, count, factor)
+    decimated: Floats = neighbors @ np.full(factor, 1 / factor)
     return decimated

@@ -6,13 +6,14 @@ These are faults of sensors and of their connection; physiological limits are ch
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rehab.gait.signals.filters import Floats, find_maximum, find_minimum, find_upper_median
-from rehab.gait.signals.samples import ANGLE, FORCE, MOMENT, TIME
+from rehab.gait.signals.samples import ANGLE, FORCE, MOMENT
 from rehab.gait.stances.kinetics import PushOff
 from rehab.gait.stances.resampling import ResampledStance
 from rehab.gait.stances.timing import GAP_S, StanceClock
@@ -21,7 +22,7 @@ from rehab.gait.strides import RejectionReason
 RATE_TOLERANCE = 0.2
 # One value repeated for this long is no measurement. The moment changes all through stance; the
 # angle rests where the ankle turns, but not to the last digit.
-FROZEN_S = {MOMENT: 0.02, ANGLE: 0.04}
+MOMENT_FROZEN_S, ANGLE_FROZEN_S = 0.02, 0.04
 MOMENT_JUMP = (0.15, 40.0)  # Nm/kg at once, and Nm/kg/s; walking reaches 20
 ANGLE_JUMP = (0.05, 15.0)  # rad at once, and rad/s; walking reaches 8
 VELOCITY_JUMP = (5.0, 400.0)  # rad/s, where velocities are sent
@@ -39,8 +40,31 @@ CHECK_FROM = 0.3  # of stance; before that it is too far from push-off to change
 MOMENT_TO_S = 0.02  # before its end; a moment that is computed from the force ends with a step
 
 
+class Channel(NamedTuple):
+    """A channel around a stance, and how it changes from sample to sample.
+
+    Attributes
+    ----------
+    values, steps
+        Shape (n,), and their differences, shape (n - 1,).
+    jump
+        The largest of these; not finite where values are missing.
+    """
+
+    values: Floats
+    steps: Floats
+    jump: float
+
+
+def read_channel(values: Floats) -> Channel:
+    """Return a channel of shape (n,) and how it changes."""
+    steps = values[1:] - values[:-1]
+    return Channel(values, steps, max(find_maximum(steps), -find_minimum(steps)))
+
+
 def check_samples(
-    window: Floats,
+    taken_s: float,
+    channels: Sequence[Channel],
     stance: int,
     clock: StanceClock,
     rate_hz: float,
@@ -51,8 +75,10 @@ def check_samples(
 
     Parameters
     ----------
-    window
-        Shape (channels, n): time, force, moment, angle, …
+    taken_s
+        From the first to the last sample of the stance.
+    channels
+        Moment and angle.
     stance
         The sample at which the stance begins.
     clock
@@ -62,34 +88,35 @@ def check_samples(
     is_velocity
         Whether the angle is a velocity [rad/s].
     """
-    part = window[MOMENT : ANGLE + 1, stance:]
-    steps = part[:, 1:] - part[:, :-1]
     reasons = []
-    if clock.lost_s <= GAP_S:
-        taken_s = float(window[TIME, -1] - window[TIME, stance])
-        if abs(steps.shape[1] / (taken_s * rate_hz) - 1) > RATE_TOLERANCE:
-            reasons.append(RejectionReason.RATE)
-    time = clock.kinetics_s[stance:]
-    for row, scale, (at_once, by_time), reason in (
-        (MOMENT, mass_kg, MOMENT_JUMP, RejectionReason.MOMENT_LOST),
-        (ANGLE, 1.0, VELOCITY_JUMP if is_velocity else ANGLE_JUMP, RejectionReason.ANGLE_LOST),
+    count = len(clock.kinetics_s) - stance
+    if clock.lost_s <= GAP_S and abs((count - 1) / (taken_s * rate_hz) - 1) > RATE_TOLERANCE:
+        reasons.append(RejectionReason.RATE)
+    for channel, frozen_s, scale, (at_once, by_time), reason in (
+        (channels[0], MOMENT_FROZEN_S, mass_kg, MOMENT_JUMP, RejectionReason.MOMENT_LOST),
+        (
+            channels[1],
+            ANGLE_FROZEN_S,
+            1.0,
+            VELOCITY_JUMP if is_velocity else ANGLE_JUMP,
+            RejectionReason.ANGLE_LOST,
+        ),
     ):
-        values, moved, steps_s = part[row - MOMENT], steps[row - MOMENT], None
-        jump = max(find_maximum(moved), -find_minimum(moved))
-        if not math.isfinite(jump):  # some are missing
+        values, moved = channel.values[stance:], channel.steps[stance:]
+        if not channel.jump <= scale * (at_once + by_time / rate_hz):
+            time = clock.kinetics_s[stance:]
             known = np.flatnonzero(np.isfinite(values))
-            if _has_gap(time, known):
+            if len(known) < count:
+                if _has_gap(time, known):
+                    reasons.append(reason)
+                    continue
+                time, values = time[known], values[known]
+                moved = np.diff(values)
+            taken = np.maximum(np.diff(time), 1 / rate_hz)
+            if (np.abs(moved) > scale * (at_once + by_time * taken)).any():
                 reasons.append(reason)
                 continue
-            steps_s = np.diff(time[known])
-            values = values[known]
-            moved = np.diff(values)
-            jump = find_maximum(np.abs(moved))
-        is_jumping = jump > scale * (at_once + by_time / rate_hz)
-        if is_jumping:
-            taken = np.maximum(np.diff(time) if steps_s is None else steps_s, 1 / rate_hz)
-            is_jumping = bool((np.abs(moved) > scale * (at_once + by_time * taken)).any())
-        if is_jumping or _is_frozen(values, moved, FROZEN_S[row] * rate_hz):
+        if _is_frozen(values, moved, frozen_s * rate_hz):
             reasons.append(reason)
     return reasons
 

@@ -149,6 +149,8 @@ class PushOffAnalyzer:
         self._is_velocity = is_velocity
         self._filter = ZeroPhaseFilter(cutoff_hz, rate_hz)
         self._beyond_s = np.arange(1, round(BEYOND_S * rate_hz) + 1) / rate_hz
+        # At most as many samples beyond each end are looked at by the filter.
+        self._known = min(len(self._beyond_s), self._filter.reach)
         back = np.arange(-max(2, round(SLOPE_S * rate_hz)), 1) / rate_hz
         self._slope = (back - back.mean()) / ((back - back.mean()) ** 2).sum()  # least squares
 
@@ -183,23 +185,30 @@ class PushOffAnalyzer:
 
     def _smooth(self, signals: Floats, known_s: float) -> Floats:
         """Return moment and angle filtered, known until ``known_s`` after terminal contact."""
-        n = len(self._beyond_s)
-        moment, angle = signals
-        extended = np.empty((2, len(angle) + 2 * n))
-        extended[:, :n] = 2 * signals[:, :1] - signals[:, n:0:-1]
-        extended[:, n:-n] = signals
-        extended[0, -n:] = moment[-1]
-        left = len(angle) - min(round(known_s * self._rate_hz), len(angle) // 2)
+        n, reach = self._known, self._filter.reach
+        angle = signals[1]
+        count = len(angle)
+        end = reach + count
+        wide = np.empty((2, end + reach))
+        before = wide[:, reach - n : reach]
+        np.subtract(2 * signals[:, :1], signals[:, n:0:-1], out=before)
+        wide[:, : reach - n] = before[:, :1]
+        wide[:, reach:end] = signals
+        wide[0, end:] = signals[0, -1]
+        left = count - min(round(known_s * self._rate_hz), count // 2)
         braking = self._find_velocity(angle[:left]) / STOP_S
         # The slope is that of half its stretch ago, for as much of it as the ankle brakes already.
         late_s = 0.0 if self._is_velocity else min(max(known_s, 0.0), SLOPE_S) / 2
-        velocity = self._find_velocity(angle) - braking * (self._beyond_s + late_s)
+        velocity = self._beyond_s[:n] * -braking
+        velocity += self._find_velocity(angle) - braking * late_s
         np.maximum(velocity, -TURN_S * braking, out=velocity)
-        if self._is_velocity:
-            extended[1, -n:] = velocity
-        else:
-            extended[1, -n:] = angle[-1] + velocity.cumsum() / self._rate_hz
-        return self._filter.smooth_extended(extended, n)
+        if not self._is_velocity:
+            velocity /= self._rate_hz
+            velocity[0] += angle[-1]
+            velocity = np.add.accumulate(velocity)
+        wide[1, end : end + n] = velocity
+        wide[1, end + n :] = velocity[-1]
+        return self._filter.smooth_wide(wide)
 
     def _find_velocity(self, motion: Floats) -> float:
         """Return the ankle's velocity at the end of a stretch of motion, 0 if it dorsiflexes."""

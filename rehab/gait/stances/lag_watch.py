@@ -12,7 +12,14 @@ from statistics import median
 
 import numpy as np
 
-from rehab.gait.signals.filters import Floats, ZeroPhaseFilter, differentiate, interpolate_peak
+from rehab.gait.signals.filters import (
+    Floats,
+    ZeroPhaseFilter,
+    differentiate,
+    find_last,
+    find_maximum,
+    interpolate_peak,
+)
 
 # A foot that has left the floor stops plantarflexing: the ankle brakes hardest 51 ms after terminal
 # contact (moore2013, shown to be in time by its authors: 52.7 ms left, 49.2 ms right). The peak
@@ -58,34 +65,33 @@ class LagWatch:
         self._most_s = most_s
         self._newest: deque[float] = deque(maxlen=STRIDES)
         self._own: list[float] = []
+        self._lag_s = self._own_s = 0.0  # medians of these
         self._run: deque[float] = deque(maxlen=SLOPE_STRIDES)
 
     def add(self, lag_s: float | None) -> None:
         """Add a stride's lag, None where it has none."""
-        if lag_s is not None:
-            self._newest.append(lag_s)
-            self._run.append(lag_s)
-            if len(self._own) < OWN_STRIDES:
-                self._own.append(lag_s)
+        if lag_s is None:
+            return
+        self._newest.append(lag_s)
+        self._run.append(lag_s)
+        self._lag_s = median(self._newest)
+        if len(self._own) < OWN_STRIDES:
+            self._own.append(lag_s)
+            self._own_s = median(self._own)
 
     @property
     def is_off(self) -> bool:
         """Whether the channel is out of time, or has drifted since the first strides."""
         if not self._newest:
             return False
-        lag_s = median(self._newest)
-        if abs(lag_s - self._usual_s) > self._most_s:
+        if abs(self._lag_s - self._usual_s) > self._most_s:
             return True
-        is_known = len(self._own) == OWN_STRIDES
-        is_far = is_known and abs(lag_s - median(self._own)) > DRIFT_MAX_S
-        return is_far or self._runs_away()
+        return abs(self.moved_s) > DRIFT_MAX_S or self._runs_away()
 
     @property
     def moved_s(self) -> float:
         """By how much the lag has changed since the first strides [s]; 0 until there are enough."""
-        if len(self._own) < OWN_STRIDES:
-            return 0.0
-        return median(self._newest) - median(self._own)
+        return self._lag_s - self._own_s if len(self._own) == OWN_STRIDES else 0.0
 
     def _runs_away(self) -> bool:
         """Return whether the lag has changed steadily over the newest strides."""
@@ -115,10 +121,13 @@ class BrakingFinder:
         self._search_s = search_s
         self._grid = np.arange(-round(AROUND_S * GRID_HZ), round(AROUND_S * GRID_HZ) + 1) / GRID_HZ
         self._first, last = np.searchsorted(self._grid, search_s).tolist()
-        # Filter and derivatives are linear: one matrix takes a wave to its braking in the search.
-        units = ZeroPhaseFilter(CUTOFF_HZ, GRID_HZ).smooth(np.eye(len(self._grid)))
-        bent = [-differentiate(differentiate(unit, GRID_HZ), GRID_HZ) for unit in units]
-        self._bend = np.ascontiguousarray(np.array(bent).T[self._first : last])
+        # Filter and derivatives are linear: their one response takes a wave to its braking.
+        response = ZeroPhaseFilter(CUTOFF_HZ, GRID_HZ).response
+        padded = np.pad(response, 8)
+        self._bend = -differentiate(differentiate(padded, GRID_HZ), GRID_HZ)[4:-4]
+        reach = len(self._bend) // 2
+        self._looked_at = slice(self._first - reach, last + reach)
+        self._beyond = max(0, self._looked_at.stop - len(self._grid))
 
     def find(self, time_s: Floats, angle_rad: Floats, end_s: float) -> float | None:
         """Return the seconds from terminal contact to the hardest braking, None without one.
@@ -142,7 +151,10 @@ class BrakingFinder:
 
     def find_in_wave(self, wave: Floats) -> float | None:
         """Return the same for an angle around terminal contact, at the times of the grid."""
-        braking: Floats = self._bend @ wave
+        # Extended point-symmetrically behind its end, as far as the last times look.
+        after = 2 * wave[-1] - wave[-2 : -2 - self._beyond : -1]
+        seen = np.concatenate((wave, after))[self._looked_at]
+        braking = np.correlate(seen, self._bend, "valid")
         peak = int(braking.argmax())
         if peak in (0, len(braking) - 1) or braking[peak] < DECELERATION_MIN_RAD_S2:
             return None
@@ -170,11 +182,12 @@ def _find_fall(values: Floats) -> float | None:
     """Return where values fall below half of their peak for the last time, in samples."""
     if len(values) < 4:
         return None
-    half = HALF * float(values.max())
-    above = np.flatnonzero(values > half)
-    if half <= 0 or not len(above):
+    half = HALF * find_maximum(values)
+    if half <= 0:
         return None
-    at = int(above[-1])
-    if at + 1 >= len(values):
-        return float(at)
-    return at + float((values[at] - half) / (values[at] - values[at + 1]))
+    at = find_last(values > half)
+    if at < 0 or at + 1 == len(values):
+        return float(at) if at >= 0 else None
+    value, after = values[at : at + 2].tolist()
+    beyond: float = (value - half) / (value - after)
+    return at + beyond

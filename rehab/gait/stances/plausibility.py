@@ -5,9 +5,17 @@ The comments of the limits name their sources.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from rehab.gait.signals.filters import Floats, find_maximum, find_minimum, find_upper_median
+from rehab.gait.signals.filters import (
+    Floats,
+    find_last,
+    find_maximum,
+    find_minimum,
+    find_upper_median,
+)
 from rehab.gait.stances.kinetics import PushOff
 from rehab.gait.stances.resampling import ResampledStance
 from rehab.gait.strides import RejectionReason
@@ -55,22 +63,23 @@ SWING_S = 0.03  # before initial contact; later, the filter has some of the stan
 
 
 def check_force(
-    force_n: Floats, peak_n: float, weight_n: float, rate_hz: float
+    force_n: Floats, offset_n: float, peak_n: float, weight_n: float, rate_hz: float
 ) -> list[RejectionReason]:
     """Return what is wrong with the vertical force of a stance.
 
     Parameters
     ----------
     force_n
-        Above the plate's zero [N], from contact to contact, shape (n,).
-    peak_n, weight_n
-        Its peak, and body weight [N].
+        From contact to contact [N], shape (n,).
+    offset_n, peak_n, weight_n
+        The plate's zero, the force's peak above it, and body weight [N].
     rate_hz
         Of the samples.
     """
     reasons = []
     tail = force_n[-max(2, round(CUT_S * rate_hz) + 1) : -1]
-    if not np.isfinite(force_n).all() or (len(tail) and tail[0] > CUT_SHARE * weight_n):
+    is_known = math.isfinite(find_maximum(force_n) - find_minimum(force_n))
+    if not is_known or (len(tail) and tail[0] - offset_n > CUT_SHARE * weight_n):
         reasons.append(RejectionReason.FORCE_LOST)
     if peak_n > FORCE_MAX * weight_n:
         reasons.append(RejectionReason.FORCE_TOO_LARGE)
@@ -97,8 +106,8 @@ def has_clonus(push_off: PushOff, stance: ResampledStance) -> bool:
     """
     part = slice(stance.begin, stance.index(CLONUS_TO) + 1)
     velocity = push_off.velocity_rad_s[part]
-    turning = np.sign(velocity[np.abs(velocity) > CLONUS_RAD_S])
-    return int((turning[1:] != turning[:-1]).sum()) >= CLONUS_TURNS
+    rising = velocity[np.abs(velocity) > CLONUS_RAD_S] > 0
+    return int(np.count_nonzero(rising[1:] != rising[:-1])) >= CLONUS_TURNS
 
 
 def check_lever(stance: ResampledStance, offset_n: float, weight_n: float) -> list[RejectionReason]:
@@ -115,14 +124,16 @@ def check_lever(stance: ResampledStance, offset_n: float, weight_n: float) -> li
     late = slice(half, stance.end + 1)
     force, moment = stance.signals[0, late] - offset_n, stance.signals[1, late]
     toes = stance.index(LEVER_FROM) - half
-    loaded = force[toes:] > LEVER_FORCE * weight_n
-    if (loaded & (moment[toes:] > LEVER_MAX_M * force[toes:])).any():
+    # Where the force is too small to tell, the moment may be anything.
+    beyond = moment[toes:] > LEVER_MAX_M * force[toes:]
+    beyond &= force[toes:] > LEVER_FORCE * weight_n
+    if find_last(beyond) >= 0:
         return [RejectionReason.MOMENT_OUT_OF_STEP]
-    leaving = np.flatnonzero(force > LEAVING_SHARE * find_maximum(force))
-    if not len(leaving):  # there is no force, or not all of it
+    leaving = find_last(force > LEAVING_SHARE * find_maximum(force))
+    if leaving < 0:  # there is no force, or not all of it
         return []
     lever_m = _find_lever(force, moment, int(moment.argmax()))
-    last_m = _find_lever(force, moment, int(leaving[-1]))
+    last_m = _find_lever(force, moment, leaving)
     low, high = LEVER_CHANGE
     # A moment that is not positive at its peak is refused by other checks.
     if lever_m > 0 and not low * lever_m <= last_m <= high * lever_m:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehab.gait.signals.filters import Floats
+from rehab.gait.signals.filters import Floats, find_maximum
 from rehab.gait.signals.samples import ANGLE, MOMENT, TIME
 from rehab.gait.strides import Flag, RejectionReason
 
@@ -60,7 +60,12 @@ class ClockJudge:
         self._by_number = 0.0  # evidence for it; below 0 against
 
     def judge(
-        self, window: Floats, late_s: Floats | None, stance: int, critical: int
+        self,
+        window: Floats,
+        steps_s: Floats,
+        late_s: Floats | None,
+        stance: int,
+        critical: int,
     ) -> StanceClock:
         """Return the clock of a stance.
 
@@ -68,24 +73,25 @@ class ClockJudge:
         ----------
         window
             Shape (channels, n): time, force, moment, angle, …
+        steps_s
+            Between the times, shape (n - 1,).
         late_s
             By how much each sample came late [s], shape (n,), or None.
         stance, critical
             The samples at which the stance begins, and from which a fault harms A2.
         """
         time = window[TIME]
-        steps = time[stance:] - time[stance - 1 : -1] if stance else np.diff(time)
         reasons: list[RejectionReason] = []
         flags: list[Flag] = []
-        longest_s = float(steps[steps.argmax()])
+        steps_s = steps_s[max(0, stance - 1) :]
+        longest_s = find_maximum(steps_s)
         lost_s = max(0.0, longest_s - 1 / self._rate_hz)
         least_s = max(GAP_S, 2.5 / self._rate_hz)
         if longest_s > least_s:
-            late_part = time[critical:] - time[critical - 1 : -1]
             is_harmful = (
-                steps[0] > least_s  # it hides the initial contact
+                steps_s[0] > least_s  # it hides the initial contact
                 or longest_s > GAP_MAX_S
-                or (len(late_part) and late_part.max() > least_s)
+                or steps_s[critical - 1 - max(0, stance - 1) :].max(initial=0.0) > least_s
             )
             if is_harmful:
                 reasons.append(RejectionReason.GAP)

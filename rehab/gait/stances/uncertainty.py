@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from rehab.gait.signals.filters import Floats, ZeroPhaseFilter, differentiate, find_upper_median
+from rehab.gait.signals.filters import Floats, ZeroPhaseFilter, differentiate
 from rehab.gait.stances.kinetics import PUSH_OFF_FROM, PushOff
 from rehab.gait.stances.resampling import ResampledStance
 
@@ -55,7 +55,7 @@ class Uncertainty:
         """
         peak, velocity = push_off.peak, push_off.velocity_rad_s
         part = slice(stance.index(PUSH_OFF_FROM), stance.end + 1)
-        moment_nm, angle = (_find_noise(row[part]) for row in stance.signals[1:])
+        moment_nm, angle = _find_noise(stance.signals[1:, part])
         noise = math.hypot(
             push_off.a2_velocity_rad_s * moment_nm / push_off.mass_kg * self._moment_gain,
             push_off.a2_moment_nm_kg * angle * self._velocity_gain,
@@ -69,9 +69,12 @@ class Uncertainty:
         return math.hypot(noise, ahead, by_time * apart_s)
 
 
-def _find_noise(values: Floats) -> float:
-    """Return the sd of a channel's noise, 0 of too few samples."""
-    if len(values) < 8:
-        return 0.0
-    third = values[3:] - 3 * (values[2:-1] - values[1:-2]) - values[:-3]
-    return find_upper_median(np.abs(third)) / THIRD_DIFFERENCE
+def _find_noise(rows: Floats) -> list[float]:
+    """Return the sd of each channel's noise, 0 of too few samples."""
+    if rows.shape[1] < 8:
+        return [0.0] * len(rows)
+    steps = rows[:, 1:] - rows[:, :-1]
+    third = np.abs(steps[:, 2:] - 2 * steps[:, 1:-1] + steps[:, :-2])
+    place = third.shape[1] // 2
+    third.partition(place, axis=1)
+    return [size / THIRD_DIFFERENCE for size in third[:, place].tolist()]
