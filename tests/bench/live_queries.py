@@ -78,8 +78,9 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
     from django.utils import timezone
 
     from rehab.boards.building.scheduler import find_ended
-    from rehab.sessions.live import auth, backlog, loading, owners
+    from rehab.sessions.live import auth, backlog, following, loading, owners
     from rehab.sessions.live.commits import Job, commit
+    from rehab.sessions.log import SessionEvent
     from rehab.stations.models import Device
     from rehab.training.changes import Change, ChangeKind
     from rehab.training.measures import Measure
@@ -112,6 +113,10 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
         "commit a change",
         lambda: commit([job(aggregate.change(pause, None, timezone.now()), aggregate.summary())]),
     )
+    yield "follow one", lambda: following.load_followed(keys[60])
+    newest = SessionEvent.everywhere.order_by("-pk")[0].pk
+    behind = [(key, WALKED - 2, newest) for key in keys]
+    yield "follow a hundred", lambda: following.read_new_rows(behind)
     yield "a page's past steps", lambda: async_to_sync(backlog.read_backlog)(keys[0], 900, 1800)
     resent, measure = Measurement(900, 990.0, Side.LEFT, 3.0), aggregate.fold.plan.measure
     assert isinstance(measure, Measure)
