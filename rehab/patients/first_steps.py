@@ -53,7 +53,7 @@ def _look_for_sensor(user: User, now: datetime) -> Found:
     if not sources:
         return Found(False, _("No sensor has a token yet."))
     running = runtime.peek()
-    connected = running.connected_device_ids() if running else set()
+    connected = running.devices.connected_ids() if running else set()
     here = [one.name for one in sources if one.pk in connected]
     if here:
         return Found(True, _("%(sensor)s is connected.") % {"sensor": ", ".join(here)})

@@ -17,7 +17,7 @@ from rehab.people.models import User
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.live import runtime
 from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.session import NotStored
+from rehab.sessions.live.trouble import NotStored
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN_STATES, ChangeKind
 from rehab.training.measures import InvalidSetting

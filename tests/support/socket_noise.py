@@ -247,7 +247,7 @@ class Ward:
                 await asyncio.sleep(0)
         noisy = runtime.sessions.get(self.session.pk)
         assert noisy is None or not (noisy.feed.subscribers or noisy.source or noisy.robot)
-        assert not runtime.devices[self.noisy.station.pk]
+        assert not runtime.devices.at(self.noisy.station.pk)
 
 
 async def begin(place: Place) -> TrainingSession:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rehab.sessions.live.intercom import Data
-from rehab.sessions.live.session import NotStored
+from rehab.sessions.live.trouble import NotStored
 from rehab.training.changes import NotAllowed
 from rehab.training.marking import AnyOf, Marked
 from rehab.training.measures import InvalidSetting

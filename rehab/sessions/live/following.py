@@ -23,7 +23,8 @@ from rehab.sessions.live.commits import Job
 from rehab.sessions.live.hub import Subscriber
 from rehab.sessions.live.intercom import Data
 from rehab.sessions.live.loading import is_robot_stopped
-from rehab.sessions.live.session import LOGGED_REPORTS, RECENT_STEPS, LiveSession
+from rehab.sessions.live.robot_orders import LOGGED_REPORTS
+from rehab.sessions.live.session import RECENT_STEPS, LiveSession
 from rehab.sessions.live.trouble import Trouble
 from rehab.sessions.log import Remark, RobotEntry, SessionEvent, Step
 from rehab.sessions.models import TrainingSession
@@ -104,8 +105,8 @@ class FollowedSession(LiveSession):
         if any(before[name] != self._presence[name] for name in WHO):  # ages go with heartbeats
             self.feed.publish(presence_event(self.aggregate.fold, self._presence))
         for kind, report in hint["robot"].items():
-            if report is not None and report != self.robot_reports.get(kind):
-                self.robot_reports[kind] = report
+            if report is not None and report != self.robot_orders.reports.get(kind):
+                self.robot_orders.reports[kind] = report
                 if kind not in LOGGED_REPORTS:  # these come with the log
                     self.feed.publish(robot_report_event(self.aggregate.fold, report))
 
@@ -136,12 +137,12 @@ class FollowedSession(LiveSession):
         elif kind in list(Remark):
             self.remark(Remark(kind), event.value, None, event.at)
         elif kind == RobotEntry.STOP:
-            self.stop_robot(None, event.at, event.data)
+            self.robot_orders.stop(None, event.at, event.data)
         elif kind == RobotEntry.ARM:
-            self.arm_robot(None, event.at)
+            self.robot_orders.arm(None, event.at)
         elif kind in list(RobotEntry):
             name = next(name for name, entry in LOGGED_REPORTS.items() if entry == kind)
-            self.record_robot_report({"kind": name, **event.data}, event.at)
+            self.robot_orders.record_report({"kind": name, **event.data}, event.at)
         # What the plan did by itself follows from its step.
 
 
@@ -193,7 +194,7 @@ class Follower(Subscriber):
         """Send one hint for all that happened in this turn of the event loop."""
         self._is_due = False
         live = self.live
-        hint = {"presence": live.presence(timezone.now()), "robot": live.robot_reports}
+        hint = {"presence": live.presence(timezone.now()), "robot": live.robot_orders.reports}
         self._tell({"session": live.id, "late": list(live.late), **hint})
 
 

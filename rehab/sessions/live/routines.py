@@ -100,9 +100,8 @@ class Routines:
     async def _send_page_heartbeats(self) -> None:
         """Send heartbeats to the pages of some sessions: of all of them within an interval."""
         self._beat = (self._beat + 1) % SWEEP
-        followed = (
-            self._process.servers.followed.values() if self._process.servers is not None else ()
-        )
+        servers = self._process.servers
+        followed = () if servers is None else servers.followed.sessions.values()
         for live in (*self._process.sessions.values(), *followed):
             if live.id % SWEEP != self._beat or not live.feed.subscribers:
                 continue

@@ -6,7 +6,7 @@ import asyncio
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
 from datetime import datetime
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 from rehab.people.models import User
 from rehab.sessions.events.change import source_message
@@ -15,17 +15,18 @@ from rehab.sessions.events.event import (
     LiveEvent,
     presence_event,
     remark_event,
-    robot_report_event,
     robot_state_event,
-    robot_stopped_event,
 )
 from rehab.sessions.events.snapshot import snapshot
 from rehab.sessions.live.aggregate import Row, SessionAggregate, StepRow, Summary
 from rehab.sessions.live.commits import Job
 from rehab.sessions.live.hub import EventFeed, Subscriber
 from rehab.sessions.live.lateness import Lateness
-from rehab.sessions.live.trouble import WORDS, Trouble, classify_failure
-from rehab.sessions.log import Remark, RobotEntry, RuleEntry, Step
+from rehab.sessions.live.peers import Peer
+from rehab.sessions.live.robot_orders import RobotOrders
+from rehab.sessions.live.subscription_gate import SubscriptionGate
+from rehab.sessions.live.trouble import WORDS, NotStored, Trouble, classify_failure
+from rehab.sessions.log import Remark, RuleEntry, Step
 from rehab.sessions.payloads import Message, type_mark
 from rehab.training.changes import Change, ChangeKind, State
 from rehab.training.controls import Audience
@@ -33,31 +34,6 @@ from rehab.training.steps import Measurement, ScoredStep
 
 LATE_STEPS = 256
 RECENT_STEPS = 60  # strides that a page's chart may begin with
-LOGGED_REPORTS = {
-    "decision": RobotEntry.DECISION,
-    "gesture": RobotEntry.GESTURE,
-}  # of a robot's reports
-
-
-class NotStored(RuntimeError):
-    """A change or step could not be committed; the session is rebuilt from its log."""
-
-
-class Peer(Protocol):
-    """A connected source or robot."""
-
-    @property
-    def device_id(self) -> int | None:
-        """The device's key."""
-
-    def tell(self, message: Message) -> None:
-        """Queue a message."""
-
-    def acknowledge(self, number: int) -> None:
-        """Queue the acknowledgment of the steps up to this one."""
-
-    def evict(self, code: int, error: str, message: str) -> None:
-        """Close its connection with an error."""
 
 
 class Log(Protocol):
@@ -69,14 +45,6 @@ class Log(Protocol):
 
     def submit(self, job: Job) -> None:
         """Queue a job without waiting."""
-
-
-class RobotStop(NamedTuple):
-    """A stop of the robot: who stopped it, when, and which device if it was no person."""
-
-    by: User | None
-    at: datetime
-    data: Message
 
 
 class LiveSession:
@@ -106,9 +74,7 @@ class LiveSession:
         self.source: Peer | None = None
         self.source_clock: Lateness | None = None  # of its latest run
         self.robot: Peer | None = None
-        self.robot_stopped = robot_stopped  # until a person arms it again
-        self.unlogged_stop: RobotStop | None = None  # in force, not committed yet
-        self.robot_reports: Message = {"status": None, "decision": None}  # the latest
+        self.robot_orders = RobotOrders(self, self._submit, is_stopped=robot_stopped)
         self.tablets = 0
         self.late: deque[int] = deque(maxlen=LATE_STEPS)  # steps that were not shown as live
         self.tablet_heard_at: datetime | None = None
@@ -116,6 +82,7 @@ class LiveSession:
         self.committed = aggregate.fold.last_number
         self.recently_used = True  # since the last sweep of idle sessions
         self.uncommitted = 0
+        self.gate = SubscriptionGate()
         self.about: Message = {
             "session": session.pk,
             "nickname": session.patient.nickname,
@@ -124,10 +91,6 @@ class LiveSession:
         }
         self._writer = writer
         self._on_failure = on_failure
-        self._subscribing = 0
-        self._nobody_subscribes = asyncio.Event()
-        self._turn = asyncio.Lock()  # first come, first served
-        self._in_turn = 0  # how many wait for it
 
     @property
     def next_number(self) -> int:
@@ -200,49 +163,6 @@ class LiveSession:
         self._submit([row], [event], [], stored=stored)
         return stored
 
-    def stop_robot(self, by: User | None, at: datetime, data: Message) -> None:
-        """Stop the robot at once, until a person arms it.
-
-        ``data``: which device stopped it, if it was no person.
-        """
-        if self.robot is not None:
-            self.robot.tell({"type": "stop"})
-        if not self.robot_stopped:
-            self.robot_stopped = True
-            self.unlogged_stop = stop = RobotStop(by, at, data)
-            row = self.aggregate.log_event(RobotEntry.STOP, by, at, data)
-            event = robot_stopped_event(self.aggregate.fold, True)
-            self._submit([row], [event], [], stop=stop)
-
-    def arm_robot(self, by: User | None, at: datetime) -> asyncio.Future[None]:
-        """Let the robot move again once that is committed; then the future is done."""
-        stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self.robot_stopped = False
-
-        def tell(result: asyncio.Future[None]) -> None:
-            failed = result.cancelled() or result.exception() is not None
-            if not failed and not self.robot_stopped and self.robot is not None:
-                self.robot.tell({"type": "arm"})
-
-        stored.add_done_callback(tell)
-        row = self.aggregate.log_event(RobotEntry.ARM, by, at, {})
-        event = robot_stopped_event(self.aggregate.fold, False)
-        self._submit([row], [event], [], stored=stored)
-        return stored
-
-    def record_robot_report(self, report: Message, at: datetime) -> None:
-        """Publish a report of the robot; decisions and gestures are logged first."""
-        event = robot_report_event(self.aggregate.fold, report)
-        kind = report.get("kind")
-        if kind in self.robot_reports:
-            self.robot_reports[kind] = report
-        if kind in LOGGED_REPORTS:
-            data = {name: value for name, value in report.items() if name != "kind"}
-            row = self.aggregate.log_event(LOGGED_REPORTS[kind], None, at, data)
-            self._submit([row], [event], [])
-        else:
-            self.feed.publish(event)
-
     def _submit(
         self,
         rows: list[Row],
@@ -252,7 +172,7 @@ class LiveSession:
         *,
         row: StepRow | None = None,
         stored: asyncio.Future[None] | None = None,
-        stop: RobotStop | None = None,
+        on_stored: Callable[[], None] | None = None,
     ) -> None:
         """Queue rows; after their commit, send the source what changed and publish the events."""
         for_source = [
@@ -269,8 +189,8 @@ class LiveSession:
                     stored.set_exception(NotStored(words or "It could not be stored. Try again."))
                 self._on_failure(self, problem)
                 return
-            if stop is not None and self.unlogged_stop is stop:
-                self.unlogged_stop = None
+            if on_stored is not None:
+                on_stored()
             if self.source is not None:
                 for message in for_source:  # before the ack, which a simulated patient waits for
                     self.source.tell(message)
@@ -336,9 +256,7 @@ class LiveSession:
         New steps wait some milliseconds until everything queued is committed, so that a page sees
         nothing uncommitted and nothing twice.
         """
-        self._subscribing += 1
-        self._nobody_subscribes.clear()
-        try:
+        with self.gate.closed():
             while self.uncommitted:
                 await self.wait_until_committed()
             about = self.about if audience is Audience.MONITOR else _for_patient(self.about)
@@ -348,42 +266,18 @@ class LiveSession:
                 about,
                 self.presence(now),
                 self.recent,
-                robot=self.robot_reports,
-                robot_stopped=self.robot_stopped,
+                robot=self.robot_orders.reports,
+                robot_stopped=self.robot_orders.is_stopped,
                 marks=self._marks(),
             )
             subscriber = Subscriber(self.feed, audience, send, write)
             self.feed.subscribers.add(subscriber)
             return shown, subscriber
-        finally:
-            self._subscribing -= 1
-            if not self._subscribing:
-                self._nobody_subscribes.set()
 
     def _marks(self) -> list[Message]:
         """Return the marks of a PT's chart, in the order of the steps."""
         switches = [type_mark(after, slug) for after, slug in self.aggregate.fold.switches]
         return sorted([*self.aggregate.marks, *switches], key=lambda mark: mark["after"])
-
-    @property
-    def is_free(self) -> bool:
-        """Whether nobody subscribes, and nobody waits for that."""
-        return not (self._subscribing or self._in_turn)
-
-    async def wait_for_subscriptions(self) -> None:
-        """Wait while somebody subscribes; to be called before recording steps or changes.
-
-        Waiting callers continue in the order in which they came.
-        """
-        if self.is_free:
-            return
-        self._in_turn += 1
-        try:
-            async with self._turn:
-                while self._subscribing:
-                    await self._nobody_subscribes.wait()
-        finally:
-            self._in_turn -= 1
 
     async def wait_until_committed(self) -> None:
         """Wait until everything queued so far is committed. Raises NotStored."""

@@ -20,6 +20,10 @@ class Trouble(StrEnum):
     DISK_FULL = "disk_full"
 
 
+class NotStored(RuntimeError):
+    """A change or step could not be committed; the session is rebuilt from its log."""
+
+
 WORDS = {
     Trouble.LATE: "The database does not answer: steps wait to be stored. Look at the database and "
     "its disk; the log of the server says since when.",

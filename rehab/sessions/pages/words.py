@@ -18,7 +18,7 @@ from rehab.people.roles import Role
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.live.aggregate import SessionAggregate
 from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.session import NotStored
+from rehab.sessions.live.trouble import NotStored
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import change_session
 from rehab.training.changes import OPEN_STATES, ChangeKind

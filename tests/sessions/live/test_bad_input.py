@@ -414,11 +414,11 @@ async def test_a_source_is_let_into_no_session_that_was_dropped_meanwhile(place,
     await source.say(a_step(2))
     await turns()
     await place.tablet(session).dial()
-    while not live._subscribing:  # noqa: ASYNC110
+    while live.gate.is_open:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
     again = await place.source().dial()  # it gives up waiting, and waits for the page to join
     await again.say({"type": "hello", "version": 1, "run": "r1", "last": 2})
-    while not live._turn.locked():  # noqa: ASYNC110
+    while not live.gate._turn.locked():  # noqa: ASYNC110
         await asyncio.sleep(0.001)
     stall.problem = OperationalError("database is locked")
     stall.end()

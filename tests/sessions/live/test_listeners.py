@@ -175,4 +175,4 @@ async def test_idle_sessions_leave_memory_but_not_while_someone_comes(place, rea
     await tablet.hang_up()
     assert not runtime.sessions[session.pk].feed.subscribers
     assert not runtime.sockets
-    assert not any(runtime.devices.values())
+    assert not runtime.devices.connected_ids()

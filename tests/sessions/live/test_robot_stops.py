@@ -11,7 +11,7 @@ from django.db import OperationalError
 from rehab.sessions.live import commits
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live import writer as writers
-from rehab.sessions.live.session import NotStored
+from rehab.sessions.live.trouble import NotStored
 from tests.support.callers import change, restart, turns
 from tests.support.robot_reports import ARM, STOP, is_stopped, log_of
 from tests.support.world import NOW
@@ -206,7 +206,7 @@ async def test_a_stop_holds_in_a_session_that_is_loaded_before_it_is_stored(
     await tablet.say(STOP)
     await turns()
     live = await runtimes.current().session(second.pk)
-    assert live.robot_stopped
+    assert live.robot_orders.is_stopped
     stall.end()
     await live.wait_until_committed()
     assert [row["kind"] for row in await log_of(second)] == ["robot_stop"]
@@ -223,14 +223,14 @@ async def test_a_stop_lost_in_one_session_holds_in_the_other_of_its_station(
         await here.session(second.pk)
     with monkeypatch.context() as patch:
         break_disk(patch, first.pk)
-        live.stop_robot(None, NOW, {})  # as a page that has not heard yet that it is dropped
+        live.robot_orders.stop(None, NOW, {})  # as a page that has not heard yet that it is dropped
         with pytest.raises(NotStored):
             await live.wait_until_committed()
     other = await here.session(second.pk)
-    assert other.robot_stopped
+    assert other.robot_orders.is_stopped
     await other.wait_until_committed()
     assert [row["kind"] for row in await log_of(second)] == ["robot_stop"]
-    assert (await here.session(first.pk)).robot_stopped
+    assert (await here.session(first.pk)).robot_orders.is_stopped
 
 
 ASKED = [

@@ -325,17 +325,14 @@ async def test_nothing_comes_before_the_welcome(place, begun):
     """Also where a page joins just then, and the session is paused by a server that came back."""
     session = await begun(place)
     live = await runtimes.current().session(session.pk)
-    live._subscribing += 1  # a page that is on its way in
-    live._nobody_subscribes.clear()
     live.recently_used = False
     source = await place.source().dial()
-    await source.say({"type": "hello", "version": 1, "run": "r1", "last": 0})
-    async with asyncio.timeout(10):
-        while not live.recently_used:
-            await turns()
-    await turns()
-    await live.change(Change(ChangeKind.PAUSE, PauseReason.RESTART.value), None, NOW)
-    live._subscribing -= 1
-    live._nobody_subscribes.set()
+    with live.gate.closed():  # a page is on its way in
+        await source.say({"type": "hello", "version": 1, "run": "r1", "last": 0})
+        async with asyncio.timeout(10):
+            while not live.recently_used:
+                await turns()
+        await turns()
+        await live.change(Change(ChangeKind.PAUSE, PauseReason.RESTART.value), None, NOW)
     assert (await source.hear())["type"] == "welcome"
     assert source.heard[0]["state"] == "paused"

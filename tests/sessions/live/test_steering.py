@@ -257,7 +257,7 @@ async def test_whoever_waits_for_a_viewer_is_not_overtaken(place, begun, monkeyp
     order, tasks = [], []
 
     async def ask(name):
-        await live.wait_for_subscriptions()
+        await live.gate.wait()
         order.append(name)
 
     def snapshot_meanwhile(*args, **facts):

@@ -17,7 +17,8 @@ from rehab.sessions.live.auth import (
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
 from rehab.sessions.live.messages import read_frame
 from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.session import LiveSession, Peer
+from rehab.sessions.live.peers import Peer
+from rehab.sessions.live.session import LiveSession
 from rehab.sessions.payloads import Message
 from rehab.sessions.replay import DamagedLog
 from rehab.stations.models import Device
@@ -84,7 +85,7 @@ class DeviceSocket(Socket):
         self.hello_received = True
         self._first_frame_timer.cancel()
         device = self._authorize(self.device)
-        self.runtime.devices[device.station_id].add(self)
+        self.runtime.devices.add(device.station_id, self)
         found = await find_open_session(device, session_id)
         if found is not None:
             await self._attach(found)
@@ -156,5 +157,5 @@ class DeviceSocket(Socket):
     def on_disconnect(self) -> None:
         """Free the session's slot."""
         if self.hello_received and self.device is not None:
-            self.runtime.devices[self.device.station_id].discard(self)
+            self.runtime.devices.discard(self.device.station_id, self)
         self._leave_session()

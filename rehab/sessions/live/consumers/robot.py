@@ -63,7 +63,7 @@ class RobotConsumer(DeviceSocket):
             self.subscriber = subscriber
             fold = live.aggregate.fold
             cue, state = describe_cue(fold), live.state_for_robot
-            stopped, watched = live.robot_stopped, live.is_watched
+            stopped, watched = live.robot_orders.is_stopped, live.is_watched
             welcome = {"type": "welcome", "session": live.id, "state": state, "cue": cue}
             welcome["valence"] = fold.valence.slug
             await self.send_message(welcome | {"stopped": stopped, "watched": watched})
@@ -84,7 +84,7 @@ class RobotConsumer(DeviceSocket):
             told = {"device": self.device_id, "reason": report["reason"]}
             self.runtime.stop_robots(self.live, None, told)
         else:
-            self.live.record_robot_report(report, timezone.now())
+            self.live.robot_orders.record_report(report, timezone.now())
 
     def _keep_incident(self, incident: Incident) -> None:
         """Have an incident stored, if it is of the present session; nothing waits for it."""
@@ -109,7 +109,7 @@ class RobotConsumer(DeviceSocket):
         finally:
             self._incidents_waiting -= 1
         if stored is not None:
-            live.record_robot_report({"kind": "incident", "incident": stored}, now)
+            live.robot_orders.record_report({"kind": "incident", "incident": stored}, now)
 
     def on_disconnect(self) -> None:
         """Unsubscribe, and free the session's slot."""

@@ -32,7 +32,8 @@ from rehab.sessions.live.messages import (
     read_remark,
 )
 from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.session import LiveSession, NotStored
+from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live.trouble import NotStored
 from rehab.sessions.payloads import Message
 from rehab.sessions.replay import DamagedLog
 from rehab.stations.models import Device
@@ -228,7 +229,7 @@ class ScreenConsumer(Socket):
             told = {} if device_id is None else {"device": device_id}
             self.runtime.stop_robots(live, by, told)
         elif by is not None:  # in a task, so that a stop meanwhile does not wait
-            self.start(self.runtime.arm_robots(live, by))
+            self.start(self.runtime.robots.arm(live, by))
         if by is not None or order == "stop":  # queued: no robot waits for the audit log
             act = Act(f"robot_{order}")
             self.runtime.audit_queue.add(act, self.actor, live.id, self.scope, timezone.now())
@@ -257,7 +258,7 @@ class ScreenConsumer(Socket):
         if isinstance(live, FollowedSession) and servers is not None:
             servers.drive_robot(live.owner, live.id, drive)
         elif live is not None:
-            self.runtime.drive_own_robot(live.id, drive)
+            self.runtime.robots.drive(live.id, drive)
 
     async def _refuse(self, request_id: str, code: str, message: str) -> None:
         await self.send_message(

@@ -51,7 +51,7 @@ class SourceConsumer(DeviceSocket):
     def handle_now(self, text: str) -> bool:
         """Record the next step, as most frames bring it; all else takes its turn."""
         live = self.live
-        if live is None or not self.hello_received or not live.is_free:
+        if live is None or not self.hello_received or not live.gate.is_open:
             return False
         message = read_frame(text)
         if message.get("type") != "step":
@@ -119,7 +119,7 @@ class SourceConsumer(DeviceSocket):
                 "no_session", "This station has no open session. Wait for welcome."
             )
             return
-        await live.wait_for_subscriptions()
+        await live.gate.wait()
         received_at = timezone.now()
         for measurement in measurements:
             if measurement.number < live.next_number:
@@ -158,7 +158,7 @@ class SourceConsumer(DeviceSocket):
             await self._handle_hello(PLAIN_HELLO)
         live = self.live
         if live is not None:
-            await live.wait_for_subscriptions()
+            await live.gate.wait()
         if live is None or live.aggregate.fold.state in (State.READY, *ENDED_STATES):
             await self._send_error("not_running", "No session is running at this station.")
             return
