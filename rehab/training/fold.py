@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -49,6 +49,10 @@ MAX_GAP_S = 10.0
 # Strides of which it is known whether the patient was told of them: as many as a page begins with.
 KEPT_TOLD = 60
 ASKS_FOR_GOAL = gettext_noop("The baseline is walked. Go to the next phase to accept its goal.")
+
+
+def _suggest_nothing() -> None:
+    """Return None: goals may not follow."""
 
 
 class SessionFold:
@@ -158,16 +162,22 @@ class SessionFold:
 
         Nothing while goals may not follow: in a phase without feedback, and while the mode is off.
         """
+        return self.suggestion()()
+
+    def suggestion(self) -> Callable[[], float | None]:
+        """Return what computes, later, the goal that is suggested now."""
         if self.adaptation_mode is AdaptationMode.OFF or not self.phase.adapts:
-            return None
-        shown = [self.gain * value for value in self.latest]
-        return suggest_goal(self.plan.measure, shown, self.wanted_hit_rate)
+            return _suggest_nothing
+        measure, gain, latest = self.plan.measure, self.gain, tuple(self.latest)
+        wanted = self.wanted_hit_rate
+        return lambda: suggest_goal(measure, [gain * value for value in latest], wanted)
 
     @property
     def score(self) -> int | None:
         """Points of the session, of all its valences; None where none of them had points."""
-        walked = (self.plan.valence.slug, *self.changed_to)
-        paid = any(self.valences[slug].has_points for slug in walked)
+        paid = self.plan.valence.has_points or any(
+            self.valences[slug].has_points for slug in self.changed_to
+        )
         return self.feedback.points if paid else None
 
     @property
