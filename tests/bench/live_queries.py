@@ -81,8 +81,10 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
     from rehab.sessions.live import auth
     from rehab.sessions.live.database import owners
     from rehab.sessions.live.protocol import backlog
+    from rehab.sessions.live.servers import following
     from rehab.sessions.live.session import loading
     from rehab.sessions.live.session.commits import Job, commit
+    from rehab.sessions.log import SessionEvent
     from rehab.stations.models import Device
     from rehab.training.changes import Change, ChangeKind
     from rehab.training.measures import Measure
@@ -115,6 +117,10 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
         "commit a change",
         lambda: commit([job(aggregate.change(pause, None, timezone.now()), aggregate.summary())]),
     )
+    yield "follow one", lambda: following.load_followed(keys[60])
+    newest = SessionEvent.everywhere.order_by("-pk")[0].pk
+    behind = [(key, WALKED - 2, newest) for key in keys]
+    yield "follow a hundred", lambda: following.read_new_rows(behind)
     yield "a page's past steps", lambda: async_to_sync(backlog.read_backlog)(keys[0], 900, 1800)
     resent, measure = Measurement(900, 990.0, Side.LEFT, 3.0), aggregate.fold.plan.measure
     assert isinstance(measure, Measure)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from rehab.sessions.events.change import change_event, phase_event
 from rehab.sessions.events.event import LiveEvent
@@ -12,8 +12,7 @@ from rehab.training.fold import SessionFold
 from rehab.training.steps import ScoredStep
 
 
-@dataclass(frozen=True, slots=True)
-class Before:
+class Before(NamedTuple):
     """How a session stood before a step or a change, which its events follow from."""
 
     context: StepContext
@@ -37,12 +36,17 @@ class Before:
 
     def has_moved(self, fold: SessionFold) -> bool:
         """Return whether phase, goal or what is in the plan's way are others since then."""
-        now = (fold.phase_index, fold.goal, fold.obstacle)
-        return now != (self.phase_index, self.goal, self.obstacle)
+        return (
+            fold.phase_index != self.phase_index
+            or fold.goal != self.goal
+            or fold.obstacle != self.obstacle
+        )
 
     def changed_by_step(self, fold: SessionFold) -> list[str]:
         """Return what a step has changed by the plan's own rules, as kinds of changes."""
         has_paused = self.is_running and fold.state is not State.RUNNING
+        if not (has_paused or self.has_moved(fold)):
+            return []  # as after most steps
         changed = {
             ChangeKind.PHASE: fold.phase_index != self.phase_index,
             ChangeKind.GOAL: fold.goal != self.goal,

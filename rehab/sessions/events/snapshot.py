@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Sequence
-from dataclasses import replace
 
 from rehab.sessions.events.event import presence_for_patient
 from rehab.sessions.events.step import StepContext, StoredStep, patient_step
@@ -126,7 +125,7 @@ def _last_step(fold: SessionFold, recent: Sequence[StoredStep]) -> Message | Non
             continue
         if step.side == plan.trained_side and InvalidReason.PAUSED not in step.reasons:
             score, streak = fold.score, fold.feedback.streak
-            context = replace(context, phase=plan.phases[step.phase])
+            context = context._replace(phase=plan.phases[step.phase])
             return patient_step(
                 plan, context, step, score, streak, live=False, answer=Untold(steps=1)
             )

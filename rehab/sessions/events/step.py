@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from rehab.sessions.events.event import LiveEvent
 from rehab.sessions.payloads import (
     Message,
-    describe_coaching,
+    Standing,
+    coaching_of,
     describe_rates,
     describe_walked,
 )
@@ -51,8 +51,7 @@ class StoredStep(Protocol):
     def reasons(self) -> Sequence[str]: ...
 
 
-@dataclass(frozen=True, slots=True)
-class StepContext:
+class StepContext(NamedTuple):
     """What a step's feedback follows from, as it was when the step came."""
 
     phase: Phase
@@ -73,18 +72,19 @@ def step_event(
 
     ``live`` is False for a step that came too late to be shown as one.
     """
-    tally, score, plan, walked = fold.feedback, fold.score, fold.plan, describe_walked(fold)
-    streak, rates = tally.streak, describe_rates(tally)
-    answer, coaching = fold.telling.answer, describe_coaching(fold)
+    plan, standing, answer = fold.plan, Standing.of(fold), fold.telling.answer
+    coaching = coaching_of(fold)
 
     def build(audience: Audience) -> Message | None:
+        score, streak = standing.score, standing.streak
         match audience:
             case Audience.PATIENT:
                 shown = patient_step(plan, context, step, score, streak, live=live, answer=answer)
-                return None if shown is None else shown | walked
+                return None if shown is None else shown | describe_walked(standing)
             case Audience.MONITOR:
-                totals = {"score": score, "streak": streak, **rates, **walked}
-                return _monitor_step(step, live=live) | totals | coaching
+                totals = {"score": score, "streak": streak, **describe_rates(standing)}
+                totals |= describe_walked(standing)
+                return _monitor_step(step, live=live) | totals | coaching()
             case Audience.ROBOT:
                 return _robot_step(context.phase, step, live=live)
             case Audience.SOURCE:

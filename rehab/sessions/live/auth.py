@@ -139,10 +139,10 @@ def find_unauthorized(
 
     def is_allowed(actor: Actor, scope: Mapping[str, Any]) -> bool:
         if isinstance(actor, Device):
-            session_id = _session_id(scope)
-            shown = TrainingSession.objects.visible_to(actor).filter(pk=session_id)
-            is_shown = session_id not in ended_ids or shown.exists()
-            return is_shown and hashes.get(actor.pk) == actor.token_hash
+            if hashes.get(actor.pk) != actor.token_hash:
+                return False
+            shown = _session_id(scope)
+            return shown not in ended_ids or _is_visible(actor, shown)
         if actor is None:
             return True
         account, data = accounts.get(actor.pk), signed_in.get(browser_session_digest(scope))
@@ -167,6 +167,10 @@ def extend_sign_ins(scopes: Sequence[Mapping[str, Any]], now: datetime) -> None:
 @database_sync_to_async
 def may_open(actor: Actor, session_id: int) -> bool:
     """Return whether the actor may see the session."""
+    return _is_visible(actor, session_id)
+
+
+def _is_visible(actor: Actor, session_id: int) -> bool:
     return TrainingSession.objects.visible_to(actor).filter(pk=session_id).exists()
 
 

@@ -31,7 +31,7 @@ from robot.wire.limits import MAX_FRAME_BYTES
 
 log = logging.getLogger(__name__)
 
-PING_S = 10.0  # a half-open socket is noticed within twice this
+PING_S = 6.0  # a half-open socket is noticed within three times this
 CLOSE_S = 5  # how long requests under way have to end
 
 
@@ -67,7 +67,7 @@ class DirectProtocol(WebSocketsSansIOProtocol):
     """Reads and writes text frames past the layers between the transport and the application.
 
     Reading pauses once much waits for the application, not with each message: that takes two calls
-    of the system.
+    of the system. A client that was just heard is not asked whether it is there.
     """
 
     _take: Callable[[str], bool] | None = None
@@ -76,6 +76,7 @@ class DirectProtocol(WebSocketsSansIOProtocol):
         super().__init__(*args, **options)
         self.waiting_bytes = 0
         self._edges = FrameEdges()
+        self._was_heard = False  # since its last ping was due
 
     def read_now(self, take: Callable[[str], bool]) -> None:
         """Let a function handle texts at once; what it does not is queued for the application."""
@@ -83,6 +84,7 @@ class DirectProtocol(WebSocketsSansIOProtocol):
 
     def data_received(self, data: bytes) -> None:
         """Take bytes from the transport: a whole text message at once, all else as usual."""
+        self._was_heard = True
         if self.conn.state is not OPEN or not self._take_text(data):
             if self.conn.state is OPEN:
                 self._edges.pass_by(data)
@@ -97,6 +99,14 @@ class DirectProtocol(WebSocketsSansIOProtocol):
             return text is not None and self._take(text.decode())
         except UnicodeDecodeError:  # websockets closes the socket for that
             return False
+
+    def send_keepalive_ping(self) -> None:
+        """Ask whether the client is there, unless it was heard."""
+        was_heard, self._was_heard = self._was_heard, False
+        if was_heard:
+            self.schedule_ping()
+        else:
+            super().send_keepalive_ping()
 
     def write_now(self, text: str) -> bool:
         """Send a text message; return False where the client is behind and it has to wait."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from rehab.training.adaptation import (
@@ -42,10 +43,10 @@ class GoalFollowing:
         wanted = self.plan.target.hit_rate
         return DEFAULT_HIT_RATE if wanted is None else wanted
 
-    def suggest(self, gain: float) -> float | None:
-        """Return the goal that the latest strides would have reached as often as is wanted."""
-        shown = [gain * value for value in self.latest]
-        return suggest_goal(self.plan.measure, shown, self.wanted_hit_rate)
+    def suggestion(self, gain: float) -> Callable[[], float | None]:
+        """Return what computes the goal that the latest strides would have reached as wanted."""
+        measure, latest, wanted = self.plan.measure, tuple(self.latest), self.wanted_hit_rate
+        return lambda: suggest_goal(measure, [gain * value for value in latest], wanted)
 
     def move(self, step: ScoredStep) -> float | None:
         """Return the goal from the next step on, if the staircase moves it after this one."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from rehab.training.adaptation import AdaptationMode
@@ -40,6 +41,10 @@ from rehab.training.valences import Valence
 # (docs/reference/gait.md#protocol).
 MAX_GAP_S = 10.0
 ASKS_FOR_GOAL = gettext_noop("The baseline is walked. Go to the next phase to accept its goal.")
+
+
+def _suggest_nothing() -> None:
+    """Return None: goals may not follow."""
 
 
 class SessionFold:
@@ -115,9 +120,13 @@ class SessionFold:
 
         Nothing while goals may not follow: in a phase without feedback, and while the mode is off.
         """
+        return self.suggestion()()
+
+    def suggestion(self) -> Callable[[], float | None]:
+        """Return what computes, later, the goal that is suggested now."""
         if self.adaptation_mode is AdaptationMode.OFF or not self.phase.adapts:
-            return None
-        return self.following.suggest(self.gain)
+            return _suggest_nothing
+        return self.following.suggestion(self.gain)
 
     @property
     def score(self) -> int | None:

@@ -49,8 +49,9 @@ class ValenceCourse:
     @property
     def have_points(self) -> bool:
         """Whether any that was in force had points."""
-        walked = (self.plan.valence.slug, *self.changed_to)
-        return any(self.known[slug].has_points for slug in walked)
+        return self.plan.valence.has_points or any(
+            self.known[slug].has_points for slug in self.changed_to
+        )
 
     def begin_phase(self, after_number: int) -> None:
         """Put what is scheduled into force, with a phase that has feedback."""

@@ -130,3 +130,25 @@ async def test_whole_texts_are_taken_past_the_queue():
     assert taken == TEXTS
     protocol.connection_lost(None)
     await turns()
+
+
+async def test_who_was_heard_is_not_asked_whether_he_is_there():
+    sent: list[bytes] = []
+
+    async def application(scope: Any, receive: Any, send: Any) -> None:
+        scope["extensions"][READ_NOW](partial(keep, []))
+        await receive()
+        await send({"type": "websocket.accept"})
+        await receive()
+
+    protocol = await shake_hands(application)
+    vars(protocol.transport)["write"] = sent.append
+    protocol.data_received(Frame(Opcode.TEXT, b"one").serialize(mask=True))
+    protocol.send_keepalive_ping()
+    assert sent == []
+    assert protocol.ping_timer is not None  # but soon
+    protocol.send_keepalive_ping()
+    assert sent[0][0] & 0xF == Opcode.PING
+    assert protocol.pong_timer is not None
+    protocol.connection_lost(None)
+    await turns()

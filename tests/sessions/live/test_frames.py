@@ -80,6 +80,7 @@ def test_the_libraries_still_have_what_is_overridden():
     ).keys()
     assert "onMessage" in vars(DaphneProtocol)
     ours = {"send_receive_event_to_app", "receive", "run_asgi", "data_received"}
+    ours |= {"send_keepalive_ping", "schedule_ping"}
     assert ours <= vars(WebSocketsSansIOProtocol).keys()
     assert {"current_size"} <= vars(ServerProtocol()).keys()
 

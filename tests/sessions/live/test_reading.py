@@ -14,6 +14,7 @@ from rehab.sessions.events.event import to_text
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers.source import SourceConsumer
 from rehab.sessions.live.protocol.messages import read_frame
+from rehab.sessions.live.protocol.step_frames import read_single_step, read_steps
 from rehab.sessions.log import Step
 from robot.wire.frames import BadFrame, read_object
 from tests.support.callers import turns
@@ -47,6 +48,36 @@ def outcome(read: Any, text: str) -> str:
 @example(" " * 65_537)
 def test_msgspec_reads_what_python_reads(text):
     assert outcome(read_frame, text) == outcome(read_object, text)
+
+
+STEP = {"type": "step", "number": 3, "time_s": 1.5, "side": "left", "value": 2.5}
+STEP_VALUES = ANYTHING | st.integers() | st.floats() | st.just({"step_length_m": 0.57, "n": 3})
+NAMED = st.dictionaries(st.sampled_from(["a.b", "c", "é", "", "x" * 99]), ANYTHING, max_size=3)
+
+
+@given(
+    st.dictionaries(st.sampled_from([*STEP, "reasons", "extra", "kind"]), STEP_VALUES, max_size=2),
+    NAMED | st.none(),
+)
+@example({"number": 2**31}, None)
+@example({"value": 2**70, "time_s": 2**70}, {"n": 2**63})
+@example({"value": True}, {"n": -(2**63)})
+@example({"reasons": ["flagged"]}, {})
+@example({}, {f"n{index}": 1.0 for index in range(100)})
+def test_a_step_is_read_at_once_as_it_is_in_its_turn(changed, extra):
+    text = json.dumps(STEP | ({} if extra is None else {"extra": extra}) | changed)
+    at_once = read_single_step(text)
+    if at_once is None:
+        return
+    assert repr(at_once) == outcome(lambda text: read_steps(read_frame(text))[0], text)
+
+
+def test_a_usual_step_is_read_at_once():
+    extra = {"step_length_m": 0.57, "n": 1_760_000_000_123_456_789}
+    step = read_single_step(json.dumps(STEP | {"reasons": [], "extra": extra}))
+    assert step is not None
+    assert step.extra == extra
+    assert read_single_step(json.dumps({"type": "steps", "steps": [STEP]})) is None
 
 
 def test_binary_frames_are_refused():

@@ -11,7 +11,7 @@ from django.utils import timezone
 
 from rehab.people.models import Clinic
 from rehab.people.sign_in.browser_sessions import SIGNED_IN_AT, SessionStore, digest_of
-from rehab.sessions.live import routines
+from rehab.sessions.live import auth, routines
 from rehab.sessions.live import runtime as runtimes
 from tests.support.callers import sign_in
 
@@ -65,6 +65,19 @@ def _signed_in_since(key: str, hours: float, settings) -> str:
     store[SIGNED_IN_AT] = int((timezone.now() - timedelta(hours=hours)).timestamp())
     store.save()
     return key
+
+
+async def test_tablets_of_open_sessions_are_asked_for_together(place, begun, monkeypatch):
+    """A query for each of a thousand took 0.4 s every 5 s only to be built."""
+
+    def ask(*_: object) -> bool:
+        raise AssertionError("The session is open, and its tablet may show it.")
+
+    await place.tablet(await begun(place)).watch()
+    monkeypatch.setattr(auth, "_is_visible", ask)
+    clients = [(one.actor, one.scope) for one in runtimes.current().sockets]
+    assert len(clients) == 1
+    assert await auth.find_unauthorized(clients, timezone.now()) == []
 
 
 async def test_a_new_password_ends_open_sockets(place, begun):

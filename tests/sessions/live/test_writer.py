@@ -207,26 +207,24 @@ async def test_a_session_that_was_taken_over_is_fenced(bench, aggregates):
     assert await Step.everywhere.filter(session=lost.session).acount() == 0
 
 
-async def test_commits_keep_a_distance_only_while_several_steps_come_at_once(
+async def test_commits_keep_a_distance_only_while_several_sessions_walk(
     bench, aggregates, monkeypatch
 ):
-    bench.walk(aggregates[0])  # the sessions' starts came at once
-    await until_done(bench, 4)
+    await until_done(bench, 3)  # the sessions' starts
+    for count in range(4, 6):
+        bench.walk(aggregates[0])
+        await until_done(bench, count)
     waited: list[float] = []
     monkeypatch.setattr("rehab.sessions.live.session.writer.time.sleep", waited.append)
     monkeypatch.setattr(writers, "SPACING_S", 1000.0)
-    for count in range(5, 7):  # each alone
+    for count in range(6, 8):  # one session's, one after the other
         bench.walk(aggregates[0])
         await until_done(bench, count)
     assert waited == []
-    bench.stall.begin()
-    for aggregate in (aggregates[0], *aggregates):
+    for count, aggregate in enumerate(aggregates[1:] * 2, 8):  # by turns
         bench.walk(aggregate)
-    bench.stall.end()
-    await until_done(bench, 10)
-    bench.walk(aggregates[0])
-    await until_done(bench, 11)
-    assert len(waited) >= 1
+        await until_done(bench, count)
+    assert len(waited) == 3  # after the first commit of another session
     assert all(0 < seconds <= 1000 for seconds in waited)
 
 

@@ -55,6 +55,7 @@ class Outbox:
         send: Callable[[str], Awaitable[None]],
         write: Callable[[str], bool] = lambda _: False,
     ) -> None:
+        self._loop = asyncio.get_running_loop()
         self._send = send
         self._write = write
         self._texts: list[str] = []
@@ -80,7 +81,7 @@ class Outbox:
     def _wake(self) -> None:
         if not self._is_due:
             self._is_due = True
-            asyncio.get_running_loop().call_soon(self._flush)
+            self._loop.call_soon(self._flush)
 
     def _flush(self) -> None:
         """Write what there is; wake the task for what has to wait."""

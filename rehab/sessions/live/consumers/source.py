@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from datetime import datetime
+from datetime import UTC, datetime
 
 from django.utils import timezone
 
@@ -13,12 +13,10 @@ from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.sessions.live.protocol.backlog import is_duplicate
 from rehab.sessions.live.protocol.messages import (
     Hello,
-    read_frame,
     read_hello,
     read_plain,
-    read_step,
-    read_steps,
 )
+from rehab.sessions.live.protocol.step_frames import read_single_step, read_steps
 from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message, describe_source_phase
@@ -53,13 +51,12 @@ class SourceConsumer(DeviceSocket):
         live = self.live
         if live is None or not self.hello_received or not live.gate.is_open:
             return False
-        message = read_frame(text)
-        if message.get("type") != "step":
+        step = read_single_step(text)
+        if step is None or step.number != live.next_number:
             return False
-        step = read_step(message)
-        if step.number != live.next_number or live.aggregate.fold.state not in STEPPING:
+        if live.aggregate.fold.state not in STEPPING:
             return False
-        self._record(live, step, timezone.now())
+        self._record(live, step, datetime.now(UTC))
         return True
 
     def _record(self, live: LiveSession, step: Measurement, received_at: datetime) -> None:

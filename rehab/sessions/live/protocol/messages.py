@@ -17,7 +17,6 @@ import msgspec
 
 from rehab.sessions.log import REMARK_RANGES, Remark
 from rehab.training.controls import CONTROLS, ValueKind, requestable_kinds
-from rehab.training.steps import InvalidMeasurement, Measurement, Side
 from robot.wire.frames import (
     BadFrame,
     check_values,
@@ -27,7 +26,7 @@ from robot.wire.frames import (
     read_whole,
 )
 from robot.wire.incident import MAX_TEXT_CHARS
-from robot.wire.limits import MAX_EXTRA, MAX_FRAME_BYTES, MAX_REASONS, MAX_STEPS, PROTOCOL_VERSION
+from robot.wire.limits import MAX_FRAME_BYTES, PROTOCOL_VERSION
 
 T = TypeVar("T")
 Message = Mapping[str, Any]
@@ -88,36 +87,6 @@ def read_hello(message: Message) -> Hello:
         speed=_read_speed(message),
         clock_pauses=_flag_if_there(message, "clock_pauses"),
     )
-
-
-def read_steps(message: Message) -> list[Measurement]:
-    """Return the steps of a `step` or `steps` frame. Raises BadFrame."""
-    if message["type"] == "step":
-        return [read_step(message)]
-    steps = message.get("steps")
-    if not isinstance(steps, list) or not 1 <= len(steps) <= MAX_STEPS:
-        raise BadFrame(f'"steps" is a list of 1 to {MAX_STEPS} steps.')
-    return [read_step(step) for step in steps]
-
-
-def read_step(step: Any) -> Measurement:
-    """Return one step. Raises BadFrame."""
-    if not isinstance(step, dict):
-        raise BadFrame("A step is a JSON object.")
-    side = step.get("side")
-    if side not in ("left", "right"):
-        raise BadFrame('A step\'s "side" is "left" or "right".')
-    try:
-        return Measurement(
-            number=read_whole(step, "number", low=1),
-            time_s=read_number(step, "time_s"),
-            side=Side(side),
-            value=_optional_number(step, "value"),
-            reasons=_read_reasons(step.get("reasons", [])),
-            extra=_read_extra(step.get("extra", {})),
-        )
-    except InvalidMeasurement as problem:
-        raise BadFrame(str(problem)) from None
 
 
 def read_plain(text: str) -> tuple[float | None, float | None] | None:
@@ -281,27 +250,3 @@ def _read_speed(message: Message) -> float | None:
     if speed is not None and speed <= 0:
         raise BadFrame('"speed" is above 0, or null for as fast as possible.')
     return speed
-
-
-def _read_reasons(reasons: Any) -> tuple[str, ...]:
-    if not isinstance(reasons, list) or len(reasons) > MAX_REASONS:
-        raise BadFrame(f'"reasons" is a list of up to {MAX_REASONS} codes.')
-    return tuple(read_name({"reasons": reason}, "reasons") for reason in reasons)
-
-
-def _read_extra(extra: Any) -> dict[str, float]:
-    if not isinstance(extra, dict) or len(extra) > MAX_EXTRA:
-        raise BadFrame(f'"extra" is an object of up to {MAX_EXTRA} named numbers.')
-    for name in extra:
-        read_name({"extra": name}, "extra")
-    return {name: _read_exactly(extra, name) for name in extra}
-
-
-def _read_exactly(message: Message, name: str) -> float:
-    """Return a number; a whole one with all its digits, which a float may not have."""
-    value = message[name]
-    if isinstance(value, int) and not isinstance(value, bool):
-        if -(2**63) <= value < 2**63:
-            return value
-        raise BadFrame(f'"{name}" has too many digits: send it as a decimal, or leave it out.')
-    return read_number(message, name)

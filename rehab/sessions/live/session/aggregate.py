@@ -51,6 +51,7 @@ class SessionAggregate:
 
     def __init__(self, session: TrainingSession) -> None:
         self.session = session
+        self.id: int = session.pk
         self.fold = SessionFold(session.to_plan())
         if session.legacy_id is not None:
             self.fold.state = State.FINISHED  # imported, without a log
@@ -101,7 +102,7 @@ class SessionAggregate:
 
     def record_step(self, measurement: Measurement, received_at: datetime) -> StepRow:
         """Score one stride and return its row. Raises what ``SessionFold.step`` raises."""
-        return StepRow(self.session.pk, self.fold.step(measurement), received_at)
+        return StepRow(self.id, self.fold.step(measurement), received_at)
 
     def change(self, change: Change, by: User | None, at: datetime) -> list[Row]:
         """Apply a change from the next step on and return the rows that record it.

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 from django.db import connection, transaction
@@ -102,8 +101,7 @@ class EarlierWriteFailed(RuntimeError):
     """An earlier write of the session failed, so this one would leave a gap."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Job:
+class Job(NamedTuple):
     """Rows of one session, committed together.
 
     ``owner``: the object whose rows these are; after a failed job none of its later ones is

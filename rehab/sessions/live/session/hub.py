@@ -88,6 +88,7 @@ class Subscriber:
         self.feed = feed
         self.audience = audience
         self.frame = 0
+        self._loop = asyncio.get_running_loop()
         self._send = send
         self._write = write
         self._is_due = False  # to be flushed at the end of this turn
@@ -104,7 +105,7 @@ class Subscriber:
         """Send what there is at the end of the event loop's turn, all of it at once."""
         if not self._is_due:
             self._is_due = True
-            asyncio.get_running_loop().call_soon(self._flush)
+            self._loop.call_soon(self._flush)
 
     def queue_heartbeat(self, text: str) -> None:
         """Queue a heartbeat, which is sent before anything else."""
@@ -115,17 +116,17 @@ class Subscriber:
         """Note that the page has processed the frames up to this one."""
         if self._confirmed_frame < frame <= self.frame:
             self._confirmed_frame = frame
-            self._unconfirmed_since_s = asyncio.get_running_loop().time()
+            self._unconfirmed_since_s = self._loop.time()
             self._confirmed.set()
 
     def was_sent_something(self, within_s: float) -> bool:
         """Whether a frame went out lately: it is a sign of life, too."""
-        return asyncio.get_running_loop().time() - self._sent_s < within_s
+        return self._loop.time() - self._sent_s < within_s
 
     @property
     def is_attentive(self) -> bool:
         """Whether the page processes what it is sent."""
-        waited_s = asyncio.get_running_loop().time() - self._unconfirmed_since_s
+        waited_s = self._loop.time() - self._unconfirmed_since_s
         return self._confirmed_frame == self.frame or waited_s < INATTENTIVE_S
 
     async def send_frame(self, kind: str, texts: list[str]) -> None:
@@ -134,7 +135,7 @@ class Subscriber:
         await self._send(_to_frame(kind, self.frame, texts))
 
     def _count_frame(self) -> None:
-        self._sent_s = asyncio.get_running_loop().time()
+        self._sent_s = self._loop.time()
         if self._confirmed_frame == self.frame:
             self._unconfirmed_since_s = self._sent_s
         self.frame += 1

@@ -2,9 +2,9 @@
 
 One thread writes for all sessions of the process. As soon as a commit is done it commits all that
 is queued by then: no timer, so that a fast disk answers at once and a slow one gets larger batches
-(measured against a timer: docs/reference/stack.md#durability). Only while several steps come at a
-time, commits begin at least ``SPACING_S`` apart: each costs as much as ten rows do, and a turn of
-the event loop (docs/performance.md).
+(measured against a timer: docs/reference/stack.md#durability). Only while several sessions walk,
+commits begin at least ``SPACING_S`` apart: each costs as much as twenty rows do, and a turn of the
+event loop (docs/performance.md). A session that walks alone may wait for each ack.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from rehab.sessions.live.session.commits import EarlierWriteFailed, Job, commit
 log = logging.getLogger(__name__)
 
 MAX_ROWS = 5000  # rows a transaction
-SPACING_S = 0.004  # between the beginnings of commits under load
+SPACING_S = 0.008  # between the beginnings of commits while several sessions walk
 LATE_S = 1.0  # a commit that takes longer is told to people and robots
 CLOSE_S = 20.0  # how long a stop waits for a database that does not answer
 # Of the writer's own connection to PostgreSQL: what waits longer has failed, and is said.
@@ -48,6 +48,7 @@ class Writer:
         self._closed = False
         self._busy_since_s: float | None = None
         self._next_commit_s = 0.0  # not before
+        self._last_session: int | None = None  # of the last commit, if it was one session's
         self._failure = Trouble.NONE  # of the last batch
         # A daemon: a database that never answers must not keep the process from ending.
         self._thread = threading.Thread(target=self._run, name="garry-writer", daemon=True)
@@ -94,7 +95,7 @@ class Writer:
                     self._busy_since_s = began_s = time.monotonic()
                     self._write(jobs)
                     self._busy_since_s = None
-                    self._next_commit_s = began_s + SPACING_S if len(jobs) > 1 else 0.0
+                    self._next_commit_s = 0.0 if self._is_alone(jobs) else began_s + SPACING_S
         finally:
             connection.close()
 
@@ -116,6 +117,12 @@ class Writer:
             except Empty:
                 return jobs, True
         return jobs, False
+
+    def _is_alone(self, jobs: list[Job]) -> bool:
+        """Return whether the last two commits were of one and the same session."""
+        before, first = self._last_session, jobs[0].session_id
+        self._last_session = first if all(job.session_id == first for job in jobs) else None
+        return self._last_session is not None and self._last_session == before
 
     def _write(self, jobs: list[Job]) -> None:
         results: list[tuple[Job, Exception | None]]
