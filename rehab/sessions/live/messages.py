@@ -100,6 +100,12 @@ def read_steps(message: Message) -> list[Measurement]:
     return [read_step(step) for step in steps]
 
 
+def read_late_marks(message: Message) -> list[bool]:
+    """Return which steps of a frame that was read the source itself calls late. Raises BadFrame."""
+    steps = [message] if message["type"] == "step" else message["steps"]
+    return [_flag_if_there(step, "late") for step in steps]
+
+
 def read_step(step: Any) -> Measurement:
     """Return one step. Raises BadFrame."""
     if not isinstance(step, dict):

@@ -16,6 +16,7 @@ from rehab.sessions.live.messages import (
     Hello,
     read_frame,
     read_hello,
+    read_late_marks,
     read_plain,
     read_step,
     read_steps,
@@ -59,12 +60,15 @@ class SourceConsumer(DeviceSocket):
         step = read_step(message)
         if step.number != live.next_number or live.aggregate.fold.state not in STEPPING:
             return False
-        self._record(live, step, timezone.now())
+        self._record(live, step, timezone.now(), *read_late_marks(message))
         return True
 
-    def _record(self, live: LiveSession, step: Measurement, received_at: datetime) -> None:
+    def _record(
+        self, live: LiveSession, step: Measurement, received_at: datetime, is_marked: bool
+    ) -> None:
         _check_open_steps(live)
-        late = self.lateness.is_late(step.time_s, time.monotonic())
+        # What a source calls late tells nothing of its clock, which may be another one by now.
+        late = is_marked or self.lateness.is_late(step.time_s, time.monotonic())
         live.record_step(step, received_at, late=late)
 
     async def on_message(self, message: Message, text: str) -> None:
@@ -73,7 +77,7 @@ class SourceConsumer(DeviceSocket):
         if kind == "hello":
             await self._handle_hello(read_hello(message))
         elif kind in ("step", "steps"):
-            await self._handle_steps(read_steps(message))
+            await self._handle_steps(read_steps(message), read_late_marks(message))
         elif kind is not None or "token" not in message:
             raise BadFrame('A source sends "hello", "step" and "steps".')
 
@@ -110,7 +114,7 @@ class SourceConsumer(DeviceSocket):
         if live.committed:
             self.acknowledge(live.committed)
 
-    async def _handle_steps(self, measurements: list[Measurement]) -> None:
+    async def _handle_steps(self, measurements: list[Measurement], marks: list[bool]) -> None:
         if not self.hello_received:
             raise BadFrame("Say hello first.", "no_hello")
         live = self.live
@@ -121,7 +125,7 @@ class SourceConsumer(DeviceSocket):
             return
         await live.wait_for_subscriptions()
         received_at = timezone.now()
-        for measurement in measurements:
+        for measurement, is_marked in zip(measurements, marks, strict=True):
             if measurement.number < live.next_number:
                 await self._check_same(live, measurement)
             elif measurement.number > live.next_number:
@@ -138,7 +142,7 @@ class SourceConsumer(DeviceSocket):
                 )
                 return
             else:
-                self._record(live, measurement, received_at)
+                self._record(live, measurement, received_at, is_marked)
 
     async def _check_same(self, live: LiveSession, measurement: Measurement) -> None:
         """Acknowledge a step that is stored already; refuse other content under its number."""
