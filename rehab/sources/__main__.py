@@ -37,6 +37,7 @@ from robot.connection_args import (
     BadConnectionArgs,
     add_connection_arguments,
     find_token,
+    find_token_store,
     websocket_url,
 )
 from robot.link import Link, LinkRefused
@@ -259,7 +260,7 @@ def run(name: str, options: Namespace, stack: ExitStack) -> int:
 
     def make_client(feed: StridePlayback | LiveFeed) -> SourceClient:
         return SourceClient(
-            partial(Link, url, token),
+            partial(Link, url, token, keep_token=find_token_store(options, print_status)),
             feed,
             session=options.session,
             stay=options.stay,

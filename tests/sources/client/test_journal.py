@@ -58,7 +58,7 @@ def test_what_was_not_acknowledged_is_there_again(tmp_path):
         queue = walk(journal, range(1, 11))
         queue.acknowledge(4)
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
-    said = []
+    said: list[str] = []
     with opened(path, said) as journal:
         assert (journal.kept.session, journal.kept.side, journal.kept.state) == (
             (7, "left", "running")
@@ -88,7 +88,8 @@ def test_a_torn_end_costs_nothing_that_was_whole(tmp_path_factory, cut, is_blank
 
 
 def test_a_failing_disk_is_said_and_what_it_holds_is_put_aside(tmp_path):
-    path, said = tmp_path / "journal", []
+    path = tmp_path / "journal"
+    said: list[str] = []
     with opened(path) as journal:
         walk(journal, range(1, 11))
     damaged = path.read_bytes().replace(b'"value":0.3', b'"value":9.3')
@@ -144,7 +145,8 @@ def test_the_file_stays_small_while_all_is_stored(tmp_path, monkeypatch):
 
 
 def test_without_room_the_oldest_stay_and_it_is_said(tmp_path):
-    path, said, now = tmp_path / "journal", [], [0.0]
+    path, now = tmp_path / "journal", [0.0]
+    said: list[str] = []
     with opened(path, said, size=2000, monotonic=lambda: now[0]) as journal:
         queue = walk(journal, range(1, 101))
         assert path.stat().st_size <= 2000
@@ -163,7 +165,8 @@ def test_without_room_the_oldest_stay_and_it_is_said(tmp_path):
 
 
 def test_a_full_disk_is_said_and_tried_again(tmp_path, monkeypatch):
-    path, said, now = tmp_path / "journal", [], [0.0]
+    path, now = tmp_path / "journal", [0.0]
+    said: list[str] = []
     with opened(path, said, monotonic=lambda: now[0]) as journal:
         queue = walk(journal, [1, 2])
         write = os.write
@@ -174,7 +177,7 @@ def test_a_full_disk_is_said_and_tried_again(tmp_path, monkeypatch):
                     raise OSError(errno.ENOSPC, "No space left on device")
                 return write(file, data[:19])  # torn, as a full disk does
 
-            full.setattr(journal_module.os, "write", write_some)
+            full.setattr(os, "write", write_some)
             for number in range(3, 10):
                 queue.add(stride(number))
                 now[0] += 3.0
