@@ -37,6 +37,7 @@ from robot.connection_args import (
     BadConnectionArgs,
     add_connection_arguments,
     find_token,
+    find_token_store,
     websocket_url,
 )
 from robot.link import Link, LinkRefused
@@ -77,11 +78,11 @@ def make_parser() -> ArgumentParser:
     return parser
 
 
-def find_black_box(named: str, token: str) -> Path | None:
+def find_black_box(named: str, own: str) -> Path | None:
     """Return a robot's own folder in that of the option; None where it is off."""
     if named in ("", "off"):
         return None
-    return Path(named).expanduser() / sha256(token.encode()).hexdigest()[:12]
+    return Path(named).expanduser() / sha256(own.encode()).hexdigest()[:12]
 
 
 def print_notice(text: str) -> None:
@@ -137,14 +138,16 @@ def run(options: Namespace) -> int:
     base, originals = make_base(options, time.monotonic), None
     if options.original_topics is not None:
         originals = OriginalTopics(options.ros_url, options.original_topics or TOPICS)
-    folder = find_black_box(options.black_box, token)
+    # By what stays the same: the token of a file is replaced now and then.
+    own = token if options.token_file is None else str(options.token_file.resolve())
+    folder = find_black_box(options.black_box, own)
     box = None if folder is None else BlackBox(folder)
     with base, originals or contextlib.nullcontext(), box or contextlib.nullcontext():
         if apply_calibration(base):
             print_notice(f"{base.identity} answers as it was measured to.")
         make_worker = partial(
             Worker,
-            partial(Link, url, token),
+            partial(Link, url, token, keep_token=find_token_store(options, print_notice)),
             base,
             originals=originals,
             black_box=box,

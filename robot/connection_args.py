@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 from argparse import ArgumentParser, Namespace, _ArgumentGroup
+from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import urlsplit, urlunsplit
+
+from robot.token_file import TokenFile
 
 
 class BadConnectionArgs(ValueError):
@@ -61,10 +64,26 @@ def add_connection_arguments(parser: ArgumentParser | _ArgumentGroup) -> None:
     )
     token = parser.add_mutually_exclusive_group()
     token.add_argument("--token", help="the device's token; others may see it in a process list")
-    token.add_argument("--token-file", type=Path, metavar="FILE", help="or a file that holds it")
+    token.add_argument(
+        "--token-file",
+        type=Path,
+        metavar="FILE",
+        help="or a file that holds it; the server replaces the token in it each month, where this "
+        "account may write it",
+    )
     parser.add_argument(
         "--child", action="store_true", help="end when standard input closes, as the server's child"
     )
+
+
+def find_token_store(
+    options: Namespace, notify: Callable[[str], None]
+) -> Callable[[str], bool] | None:
+    """Return what stores the next token in the command line's file; None where there is none."""
+    if options.token_file is None:
+        return None
+    file = TokenFile(options.token_file, notify)
+    return file.keep if file.is_writable else None
 
 
 def find_token(options: Namespace, variable: str, whose: str) -> str:

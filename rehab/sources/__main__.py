@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from rehab.sources import SOURCES, load_source
 from rehab.sources.client import (
+    Journal,
     LiveFeed,
     SourceClient,
     StepsLost,
@@ -36,6 +37,7 @@ from robot.connection_args import (
     BadConnectionArgs,
     add_connection_arguments,
     find_token,
+    find_token_store,
     websocket_url,
 )
 from robot.link import Link, LinkRefused
@@ -96,6 +98,19 @@ def make_parser(name: str, source: type[Source]) -> ArgumentParser:
         "--log", type=Path, metavar="FILE", help="append a JSON line for every acknowledgment"
     )
     if issubclass(source, LiveSource):
+        server.add_argument(
+            "--journal",
+            type=Path,
+            metavar="FILE",
+            help="keep what the server has not stored in this file, over restarts and power cuts",
+        )
+        server.add_argument(
+            "--journal-mb",
+            type=parse_count,
+            default=64,
+            metavar="N",
+            help="how large the journal may become (default: 64)",
+        )
         parser.add_argument(
             "--check",
             action="store_true",
@@ -237,12 +252,19 @@ def run(name: str, options: Namespace, stack: ExitStack) -> int:
             log.write(json.dumps(line) + "\n")
             log.flush()
 
+    journal = None
+    if getattr(options, "journal", None) is not None:
+        size = 1_000_000 * options.journal_mb
+        journal = Journal(options.journal, url, size, print_status)
+        stack.callback(journal.close)
+
     def make_client(feed: StridePlayback | LiveFeed) -> SourceClient:
         return SourceClient(
-            partial(Link, url, token),
+            partial(Link, url, token, keep_token=find_token_store(options, print_status)),
             feed,
             session=options.session,
             stay=options.stay,
+            journal=journal,
             on_ack=on_ack,
             notify=print_status,
         )

@@ -10,7 +10,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Clinic
 from rehab.people.scope import ClinicModel, Scope, ScopedModel
-from rehab.people.sign_in.tokens import TokenModel, find_by_token
+from rehab.people.sign_in.tokens import TokenModel
 
 
 class Station(ClinicModel):
@@ -62,6 +62,14 @@ class Device(TokenModel):
     builtin = models.BooleanField(
         _("built in"), default=False, editable=False, help_text=_("The server runs it itself.")
     )
+    # What it gets in place of its token, and what it had before (``tokens``).
+    successor_hash = models.CharField(max_length=64, blank=True, editable=False, db_index=True)
+    retired_hash = models.CharField(max_length=64, blank=True, editable=False, db_index=True)
+    rotated_at = models.DateTimeField(_("token changed by itself"), null=True, editable=False)
+    token_expires_at = models.DateTimeField(_("valid until"), null=True, editable=False)
+    copy_seen_at = models.DateTimeField(_("old token seen"), null=True, editable=False)
+
+    given_hash = ""  # of the successor that this object's holder was given
 
     class Meta(TokenModel.Meta):
         verbose_name = _("device")
@@ -70,6 +78,16 @@ class Device(TokenModel):
 
     def __str__(self) -> str:
         return f"{self.name} ({self.get_kind_display()})"
+
+    def has_expired(self, now: datetime) -> bool:
+        """Return whether its token was valid until then."""
+        return self.token_expires_at is not None and self.token_expires_at <= now
+
+    def new_token(self) -> str:
+        """Set and return a new token, as if there had been none before."""
+        self.successor_hash = self.retired_hash = self.given_hash = ""
+        self.rotated_at = self.token_expires_at = self.copy_seen_at = None
+        return super().new_token()
 
 
 class Pairing(ScopedModel):
@@ -110,8 +128,3 @@ class PinAttempts(ScopedModel):
 
     def __str__(self) -> str:
         return "PIN attempts"
-
-
-def find_device(token: str, now: datetime) -> Device | None:
-    """Return the device that this token belongs to; None for an unknown or revoked one."""
-    return find_by_token(Device, token, now)

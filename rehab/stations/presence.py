@@ -36,9 +36,15 @@ def format_last_seen(moment: datetime | None, now: datetime) -> str:
 
 
 def format_device_state(device: Device, now: datetime) -> str:
-    """Return that a device is revoked, or when it last connected."""
+    """Return what is wrong with a device's token, else when it last connected."""
     if device.is_revoked:
         return gettext("revoked")
+    if device.has_expired(now):
+        return gettext("its token has expired: give it a new one")
+    if device.copy_seen_at is not None:
+        return gettext("somebody used its old token on %(day)s: give it a new one") % {
+            "day": format_date(device.copy_seen_at.astimezone(now.tzinfo), "M j, Y")
+        }
     return format_last_seen(device.last_seen_at, now)
 
 

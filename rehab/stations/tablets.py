@@ -9,7 +9,8 @@ from django.conf import settings
 from django.http import HttpRequest, HttpResponseBase
 from django.utils import timezone
 
-from rehab.stations.models import Device, find_device
+from rehab.stations.models import Device
+from rehab.stations.tokens import find_device
 
 COOKIE = "garry_tablet"
 COOKIE_AGE_S = 400 * 24 * 3600  # the longest that browsers keep a cookie; each visit renews it

@@ -72,6 +72,9 @@ class Link:
     on_lost
         Called with a reason and the pause before the next attempt [s], each time a connection is
         lost or cannot be made. A robot stops here.
+    keep_token
+        Stores another token that the server gives in place of this one, in a thread of its own, and
+        returns whether the disk has it; None where there is no place for one.
     timing, jitter, sleep
         How long to wait; where chance comes from, in [0, 1); how to pause between attempts.
 
@@ -86,6 +89,7 @@ class Link:
         greet: Callable[[], Message],
         *,
         on_lost: Callable[[str, float], None] = _ignore_loss,
+        keep_token: Callable[[str], bool] | None = None,
         timing: Timing = Timing(),
         jitter: Callable[[], float] = random.random,
         sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
@@ -94,6 +98,7 @@ class Link:
         self._token = token
         self._greet = greet
         self._on_lost = on_lost
+        self._keep_token = keep_token
         self._timing = timing
         self._sleep = sleep
         self._back_off = BackOff(timing.retry_first_s, timing.retry_longest_s, jitter)
@@ -134,7 +139,10 @@ class Link:
                 if self._socket is None:
                     await self._connect()
                 else:
-                    return self._read(await self._socket.recv())
+                    message = self._read(await self._socket.recv())
+                    if message["type"] != "token":
+                        return message
+                    await self._replace_token(message)
             except ConnectionClosed as closed:
                 self._socket = None
                 if not self._is_closed:
@@ -213,7 +221,8 @@ class Link:
         self._error, self._was_heard = "", False
         # A server that refuses us may have closed already; iterating then reads its reason.
         with suppress(ConnectionClosed):
-            await socket.send(json.dumps(self._greet(), allow_nan=False))
+            greeting = self._greet() | ({"rotates": True} if self._keep_token else {})
+            await socket.send(json.dumps(greeting, allow_nan=False))
         if self._is_closed:
             await socket.close()
         else:
@@ -239,6 +248,15 @@ class Link:
             self._was_welcome = self._was_heard = True
             self._error = ""
         return dict(message)
+
+    async def _replace_token(self, message: Message) -> None:
+        """Store the token that the server gives, and only then say it back."""
+        token = message.get("token")
+        if self._keep_token is None or not isinstance(token, str) or not token.isascii():
+            return
+        if await asyncio.to_thread(self._keep_token, token):
+            self._token = token
+            await self.send({"type": "token", "token": token})
 
     def _explain(self, closed: ConnectionClosed) -> str:
         """Return why a connection ended. Raises LinkRefused where trying again is useless."""

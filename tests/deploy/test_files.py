@@ -18,6 +18,8 @@ from prometheus_client import generate_latest
 from rehab.sessions.live import instruments, runtime
 from rehab.sessions.live.database.trouble import Trouble
 from rehab.sessions.live.process import STOP_S
+from rehab.sources import load_source
+from rehab.sources.__main__ import make_parser as make_source_parser
 from robot.__main__ import make_parser
 from tests.support.servers import ROOT
 
@@ -44,6 +46,32 @@ def test_a_unit_starts_a_command_that_exists(unit: Path) -> None:
         make_parser().parse_args(arguments[2:])
     else:
         assert arguments[:2] == ["-m", "rehab.sources"]
+        parse_source([one for one in arguments[3:] if one != "$OPTIONS"])
+    written = [one for one in arguments if one.startswith("/var/lib/")]
+    assert all(one.startswith(f"/var/lib/{read['Service']['StateDirectory']}/") for one in written)
+
+
+def parse_source(arguments: list[str]) -> None:
+    """Parse a source's options as its command does."""
+    options = ["--listen", "tcp://127.0.0.1:9101", "--mass", "75"]
+    make_source_parser("rows", load_source("rows")).parse_args([*arguments, *options])
+
+
+def read_words(text: str, program: str) -> list[str]:
+    """Return a command's arguments behind its program, as the script writes them."""
+    assert text.startswith(program)
+    plain = text.replace("$Options", "").replace("`", "").replace("\\", "/")
+    return shlex.split(plain.removeprefix(program))
+
+
+def test_the_script_for_windows_starts_commands_that_exist() -> None:
+    """It was never run there: this reads what it would run."""
+    script = (DEPLOY / "windows" / "garry.ps1").read_text()
+    source, robot = re.findall(r'^    "(-m .*)"$', script, re.MULTILINE)
+    parse_source(read_words(source, "-m rehab.sources $Name "))
+    make_parser().parse_args(read_words(robot.replace("$Name", "avatar"), "-m robot "))
+    assert script.count("{") == script.count("}")
+    assert script.count("(") == script.count(")")
 
 
 def test_the_server_has_longer_to_stop_than_it_takes() -> None:
@@ -59,7 +87,7 @@ def test_settings_that_are_named_exist() -> None:
     for file in (*DEPLOY.rglob("*"), ROOT / "docs" / "hosting.md"):
         if file.is_file() and file.suffix != ".pyc":
             named |= set(re.findall(r"\bGARRY_[A-Z_]+\b", file.read_text()))
-    clients = {"GARRY_SERVER", "GARRY_ROBOT_TOKEN", "GARRY_SOURCE_TOKEN", "GARRY_TEST_ALL"}
+    clients = {"GARRY_SERVER", "GARRY_TOKEN", "GARRY_TEST_ALL"}
     assert named - clients <= set(settings.VARIABLES)
 
 

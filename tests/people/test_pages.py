@@ -8,7 +8,8 @@ from django.utils.formats import date_format
 
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
-from rehab.stations.models import Device, Station, find_device
+from rehab.stations.models import Device, Station
+from rehab.stations.tokens import find_device
 from tests.support.clock import HERE
 from tests.support.world import NOW, build_world, client_of, signed_in
 

@@ -23,7 +23,8 @@ from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
-from rehab.stations.models import Device, Station, find_device
+from rehab.stations.models import Device, Station
+from rehab.stations.tokens import find_device
 from tests.support.walks import strides, walk
 from tests.support.world import NOW, World, build_world, client_of
 

@@ -254,9 +254,9 @@ class RobotCaller(Caller):
     def __init__(self, token: str | None = None, **options: Any) -> None:
         super().__init__("/ws/robot/", token=token, origin=None, **options)
 
-    async def hello(self) -> Message:
+    async def hello(self, **extra: Any) -> Message:
         """Say hello; return the welcome."""
-        await self.say({"type": "hello", "version": 1, "base": "null"})
+        await self.say({"type": "hello", "version": 1, "base": "null"} | extra)
         return await self.hear("welcome")
 
 

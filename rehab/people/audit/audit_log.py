@@ -92,6 +92,7 @@ class Act(models.TextChoices):
     TOKEN_USE = "token_use", _("Used a token from a new network")
     REFUSED = "refused", _("Was refused")
     TOKEN = "token", _("Gave a new token")
+    TOKEN_COPY = "token_copy", _("Used a token that was replaced")
     UNBLIND = "unblind", _("Revealed a study's arm")
     ROBOT_STOP = "robot_stop", _("Stopped the robot")
     ROBOT_ARM = "robot_arm", _("Armed the robot")

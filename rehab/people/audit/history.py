@@ -35,6 +35,11 @@ UNTRACKED_FIELDS = {
     "last_seen_at",
     "sign_in_generation",
     "token_hash",
+    "successor_hash",
+    "retired_hash",
+    "rotated_at",
+    "token_expires_at",
+    "copy_seen_at",
     "epoch",
     "owner",
 }

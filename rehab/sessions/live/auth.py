@@ -25,8 +25,9 @@ from rehab.people.sign_in import browser_sessions
 from rehab.people.sign_in.flow import is_session_valid
 from rehab.sessions.models import TrainingSession, find_newest
 from rehab.stations import tablets
-from rehab.stations.models import Device, find_device
+from rehab.stations.models import Device
 from rehab.stations.tablets import find_tablet
+from rehab.stations.tokens import adopt_successor, find_device, give_successor, is_successor_due
 from rehab.training.changes import ENDED_STATES, OPEN_STATES
 
 Actor = User | Device | None
@@ -74,7 +75,7 @@ def authenticate(scope: Mapping[str, Any]) -> Actor:
     """Return the device or person that a socket belongs to; None for a stranger."""
     token = bearer_token(scope)
     if token is not None:
-        return find_device(token, timezone.now())
+        return find_device(token, timezone.now(), socket_address(scope))
     if not is_own_origin(scope):
         return None
     return _signed_in(scope) or find_tablet(
@@ -83,9 +84,23 @@ def authenticate(scope: Mapping[str, Any]) -> Actor:
 
 
 @database_sync_to_async
-def authenticate_token(token: str) -> Device | None:
+def authenticate_token(token: str, scope: Mapping[str, Any]) -> Device | None:
     """Return the device of a token from a first frame; None for an unknown one."""
-    return find_device(token, timezone.now()) if token.isascii() else None
+    if not token.isascii():
+        return None
+    return find_device(token, timezone.now(), socket_address(scope))
+
+
+@database_sync_to_async
+def offer_successor(device: Device, now: datetime) -> str | None:
+    """Return a device's next token; None where it is not time for another one."""
+    return give_successor(device, now) if is_successor_due(device, now) else None
+
+
+@database_sync_to_async
+def take_successor(device: Device, token: str, scope: Mapping[str, Any], now: datetime) -> bool:
+    """Make the token that a device has stored its own; return whether it was given that one."""
+    return token.isascii() and adopt_successor(device, token, socket_address(scope), now)
 
 
 def socket_cookies(scope: Mapping[str, Any]) -> dict[str, str]:
@@ -139,7 +154,8 @@ def find_unauthorized(
 
     def is_allowed(actor: Actor, scope: Mapping[str, Any]) -> bool:
         if isinstance(actor, Device):
-            if hashes.get(actor.pk) != actor.token_hash:
+            # The one that this client was given may just have become its device's own.
+            if hashes.get(actor.pk) not in {actor.token_hash, actor.given_hash}:
                 return False
             shown = _session_id(scope)
             return shown not in ended_ids or _is_visible(actor, shown)

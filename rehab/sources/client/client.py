@@ -9,8 +9,9 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from rehab.sources.client.follower import SessionFollower
+from rehab.sources.client.journal import Journal
 from rehab.sources.client.live import LiveFeed
-from rehab.sources.client.playback import StridePlayback
+from rehab.sources.client.playback import KEPT_MAX, StridePlayback
 from rehab.sources.client.step_queue import StepQueue
 from rehab.training.steps import Measurement
 from robot.link import Link, LinkRefused, Message
@@ -36,6 +37,8 @@ class SourceClient:
         Which session to join; the station's open one by default.
     stay
         Whether to go on with the station's later sessions.
+    journal
+        Where a live source's strides are kept over the end of this program.
     on_ack
         Called with session and number of each acknowledgment.
     notify
@@ -52,6 +55,7 @@ class SourceClient:
         run: str = "",
         session: int | None = None,
         stay: bool = False,
+        journal: Journal | None = None,
         on_ack: Callable[[int, int], None] = lambda _session, _number: None,
         notify: Callable[[str], None] = lambda _text: None,
         sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
@@ -63,11 +67,13 @@ class SourceClient:
         self._notify = notify
         self._sleep = sleep
         self._feed = feed
-        self._queue = StepQueue()
+        self._journal = journal
+        self._queue = StepQueue(journal, marks_late=isinstance(feed, LiveFeed))
         self._follower = SessionFollower(feed, self._queue, stay=stay, on_ack=on_ack, notify=notify)
         self._changed = asyncio.Event()
         if isinstance(feed, LiveFeed):
             feed.on_change = self._wake_waiters
+        self._follower.restore()
         self._strides = self._unusable = 0
 
     @property
@@ -97,6 +103,8 @@ class SourceClient:
             self._send(),
             self._until(lambda: self._follower.is_done),
         ]
+        if self._journal is not None:
+            doing.append(self._sync(self._journal))
         tasks = [asyncio.create_task(work) for work in doing]
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -118,8 +126,16 @@ class SourceClient:
         away = "" if follower.is_welcome else ", server out of reach"
         return (
             f"Session {session} {follower.state}{away}: {self._strides} strides, "
-            f"{self.unacknowledged} not acknowledged, {share:.0%} unusable{goal}"
+            f"{self.unacknowledged} not acknowledged, {share:.0%} unusable{goal}{self._losses()}"
         )
+
+    def _losses(self) -> str:
+        """Return what of the strides is lost, or would be with this program."""
+        refused = self._feed.refused if isinstance(self._feed, LiveFeed) else 0
+        words = f"; {refused} strides LOST: {KEPT_MAX} were waiting already" if refused else ""
+        if self._journal is not None and self._journal.trouble:
+            words += f"; the journal {self._journal.trouble}, the latest are in memory only"
+        return words
 
     # --- Connecting ---
 
@@ -184,6 +200,11 @@ class SourceClient:
             frame = self._queue.next_frame()
             if frame is not None:
                 await self._link.send(frame)
+
+    async def _sync(self, journal: Journal) -> None:
+        while True:
+            await self._until(lambda: journal.is_dirty)
+            await asyncio.to_thread(journal.sync)
 
     # --- Waiting ---
 

@@ -61,6 +61,12 @@ class SessionFollower:
         self._feed, self._queue = feed, queue
         self._stay, self._on_ack, self._notify = stay, on_ack, notify
 
+    def restore(self) -> None:
+        """Go on in the session that the queue's journal has, before the server is heard."""
+        if self._queue.session is not None:
+            self._feed.start_session(Side(self._queue.side), self._queue.last)
+            self._enter(self._queue.state)
+
     @property
     def may_send(self) -> bool:
         """Whether the server accepts the next stride now."""
@@ -112,21 +118,15 @@ class SessionFollower:
             self._notify("No session is open at this station. Waiting for one.")
             return
         is_new = session != self._queue.session
-        self._queue.join(_read(message, "session", int), _read(message, "next", int))
+        side, next_number = _read_side(message), _read(message, "next", int)
+        self._queue.join(_read(message, "session", int), next_number, side)
         self.goal = _read_goal(message)
         self.unit = str(message.get("unit", ""))
         self._feed.phase = self._read_phase(message)
         if is_new:
-            self._begin_walk(message)
+            self._feed.start_session(side, next_number - 1)
+            self._notify(f"Joined session {self._queue.session}.")
         self._enter(_read(message, "state", str))
-
-    def _begin_walk(self, message: Message) -> None:
-        try:
-            side = Side(message.get("trained_side", Side.LEFT))
-        except ValueError:
-            raise _unknown_message(message) from None
-        self._feed.start_session(side, _read(message, "next", int) - 1)
-        self._notify(f"Joined session {self._queue.session}.")
 
     def _enter(self, state: str) -> None:
         if self._queue.session is None:
@@ -134,6 +134,7 @@ class SessionFollower:
         if state != self.state:
             self._notify(f"Session {self._queue.session} is {state}.")
         self.state = state
+        self._queue.note_state(state)
         if state == State.RUNNING:
             self._feed.resume()
         else:
@@ -180,6 +181,14 @@ def _read(message: Message, name: str, kind: type[Any]) -> Any:
     if not isinstance(value, kind):
         raise _unknown_message(message)
     return value
+
+
+def _read_side(message: Message) -> Side:
+    """Return the leg that the session trains."""
+    try:
+        return Side(message.get("trained_side", Side.LEFT))
+    except ValueError:
+        raise _unknown_message(message) from None
 
 
 def _read_goal(message: Message) -> float | None:

@@ -30,6 +30,8 @@ class LiveFeed:
         The leg that the session trains, None before there was a session.
     excluded
         How many strides belonged to no session.
+    refused
+        How many were not kept because as many waited as can be kept.
     on_change
         Called when there is something to send, or nothing more will come.
     """
@@ -40,7 +42,7 @@ class LiveFeed:
     def __init__(self, monotonic: Callable[[], float] = time.monotonic) -> None:
         self.phase = make_phase("training")
         self.trained_side: Side | None = None
-        self.excluded = 0
+        self.excluded = self.refused = 0
         self.on_change: Callable[[], None] = lambda: None
         self._monotonic = monotonic
         self._waiting: deque[Measurement] = deque()
@@ -90,8 +92,11 @@ class LiveFeed:
     def put(self, stride: Measurement) -> None:
         """Add a stride that was measured just now."""
         self._clock.observe(stride.time_s, self._monotonic())
-        if not (self._is_open and self._has_started) or len(self._waiting) >= KEPT_MAX:
+        if not (self._is_open and self._has_started):
             self.excluded += 1
+            return
+        if len(self._waiting) >= KEPT_MAX:
+            self.refused += 1
             return
         if not self._is_running:
             stride = replace(stride, reasons=add_own_reason(stride.reasons, InvalidReason.PAUSED))

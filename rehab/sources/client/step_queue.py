@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from collections import deque
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from rehab.sources.client.journal import Journal
+from rehab.sources.client.kept import Kept
+from rehab.training.clocks import LATE_S
 from rehab.training.steps import InvalidReason, Measurement
 from robot.wire.frames import NAME
 from robot.wire.limits import MAX_EXTRA, MAX_FRAME_BYTES, MAX_REASONS, MAX_STEPS
@@ -14,6 +19,7 @@ from robot.wire.limits import MAX_EXTRA, MAX_FRAME_BYTES, MAX_REASONS, MAX_STEPS
 Message = dict[str, Any]
 
 FRAME_BYTES = MAX_FRAME_BYTES - 4 * 1024  # leaves room for the frame around the steps
+LATE_BYTES = len(', "late": true')
 OWN_REASONS = (InvalidReason.PAUSED, InvalidReason.NOT_FINITE)  # reasons that are added here
 
 
@@ -29,6 +35,10 @@ class _QueuedStep(NamedTuple):
     number: int
     step: Message
     size: int  # [bytes]
+    since_s: float  # when it was added, by our clock
+
+    def is_late(self, now_s: float) -> bool:
+        return now_s - self.since_s > LATE_S
 
 
 def add_own_reason(reasons: tuple[str, ...], reason: str) -> tuple[str, ...]:
@@ -79,14 +89,44 @@ class StepQueue:
 
     It numbers strides as the current session needs it, decides which steps to send next and never
     lets more than ``MAX_STEPS`` be in flight. It sends nothing itself.
+
+    Parameters
+    ----------
+    journal
+        Where steps are kept over the end of this program; only in memory by default.
+    marks_late
+        Whether to tell the server which steps come long after they were measured, as one knows here
+        whatever the server has learned of the source's clock.
+    monotonic
+        Our clock [s].
+
+    Attributes
+    ----------
+    side, state
+        Of the session, for the journal.
     """
 
-    def __init__(self) -> None:
+    def __init__(
+        self,
+        journal: Journal | None = None,
+        *,
+        marks_late: bool = False,
+        monotonic: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.side = self.state = ""
+        self._journal, self._marks_late, self._monotonic = journal, marks_late, monotonic
         self.session: int | None = None
         self.last = 0  # the last number given in this session; 0 for none
         self._next = 1
         self._kept: deque[_QueuedStep] = deque()
         self._sent = 0  # how many of the kept, from the oldest on, are in flight
+        self._unsent_from: int | None = None
+        if journal is not None and journal.kept.session is not None:
+            kept = journal.kept
+            self.session, self.side, self.state = kept.session, kept.side, kept.state
+            self.last, self._next = kept.last, kept.last + 1
+            self._unsent_from = kept.unsent_from or self._next
+            self._keep(kept.steps, -math.inf)
 
     @property
     def unacknowledged(self) -> int:
@@ -109,16 +149,21 @@ class StepQueue:
         waiting = self._kept[self._sent] if self._sent < len(self._kept) else None
         return waiting is not None and InvalidReason.PAUSED in waiting.step.get("reasons", ())
 
-    def join(self, session: int, next_number: int) -> None:
-        """Apply a welcome: the session to go on in, and the number to go on from.
+    def join(self, session: int, next_number: int, side: str = "") -> None:
+        """Apply a welcome: the session, its trained leg, and the number to go on from.
 
         Steps below ``next_number`` stay kept until an acknowledgment covers them: the server has
         received them, which is not yet stored. The last of them is sent once more, to be
-        acknowledged again. Raises StepsLost where steps are wanted that were acknowledged.
+        acknowledged again. Steps that were measured after a restart and before this welcome get
+        numbers anew where the server has more than is known here: it had stored what the journal
+        lost with the power. Raises StepsLost where steps are wanted that were acknowledged.
         """
         if session != self.session:
             self.leave()
-            self.session = session
+            self.session, self.side = session, side
+        unsent_from, self._unsent_from = self._unsent_from, None
+        if unsent_from is not None and unsent_from < next_number:
+            self._number_anew(unsent_from, next_number)
         if self.last:
             first = self._kept[0].number if self._kept else self.last + 1
             if next_number < first:
@@ -130,29 +175,64 @@ class StepQueue:
             again_from = min(next_number - 1, self.last)
             self._sent = sum(kept.number < again_from for kept in self._kept)
         self._next = max(next_number, self.last + 1)
+        if self._journal is not None:
+            self._journal.renew(self._all())
+
+    def _number_anew(self, old: int, new: int) -> None:
+        """Set the numbers of the steps from ``old`` on to those from ``new`` on."""
+        kept = list(self._kept)
+        self._kept.clear()
+        for one in kept:
+            by = new - old if one.number >= old else 0
+            self._keep([one.step | {"number": one.number + by}], one.since_s)
+        self.last = self._kept[-1].number if self._kept else new - 1
+
+    def note_state(self, state: str) -> None:
+        """Note the session's state, in which a source that starts again goes on."""
+        if state != self.state:
+            self.state = state
+            self._note({"state": state})
+
+    def _note(self, entry: Message) -> None:
+        if self._journal is not None:
+            self._journal.note(entry, self._all)
+
+    def _all(self) -> Kept:
+        steps = [kept.step for kept in self._kept]
+        return Kept(self.session, self.side, self.state, self.last, self._unsent_from, steps)
+
+    def _keep(self, steps: list[Message], since_s: float) -> None:
+        for step in steps:
+            size = len(json.dumps(step)) + LATE_BYTES
+            self._kept.append(_QueuedStep(step["number"], step, size, since_s))
 
     def leave(self) -> int:
         """Leave the session; return how many of its steps were not acknowledged and are dropped."""
         lost = len(self._kept)
         self._kept.clear()
         self.session, self.last, self._next, self._sent = None, 0, 1, 0
+        self.side, self.state, self._unsent_from = "", "", None
+        if self._journal is not None:
+            self._journal.renew(self._all())
         return lost
 
     def add(self, measurement: Measurement) -> int:
         """Keep a stride to be sent and return its number. Raises UnsendableStride."""
         number = self._next
         step = write_step(measurement, number)
-        self._kept.append(_QueuedStep(number, step, len(json.dumps(step))))
+        self._keep([step], self._monotonic())
         self.last = number
         self._next = number + 1
+        self._note({"step": step})
         return number
 
     def next_frame(self) -> Message | None:
         """Return the next frame to send, None for nothing; its steps are in flight then."""
         steps: list[Message] = []
-        room = FRAME_BYTES
+        room, now_s = FRAME_BYTES, self._monotonic()
         while self.can_send and room >= (kept := self._kept[self._sent]).size:
-            steps.append(kept.step)
+            late = self._marks_late and kept.is_late(now_s)
+            steps.append(kept.step | {"late": True} if late else kept.step)
             room -= kept.size
             self._sent += 1
         if not steps:
@@ -164,6 +244,7 @@ class StepQueue:
         while self._kept and self._kept[0].number <= number:
             self._kept.popleft()
             self._sent = max(0, self._sent - 1)
+        self._note({"ack": number})
 
     def rewind(self) -> None:
         """Mark all steps as not sent: they were refused and have to be sent again."""

@@ -151,3 +151,29 @@ async def test_after_a_pause_steps_of_before_are_late_unless_the_clock_stood(
     assert [event["number"] for event in steps if event["live"]] == fresh
     await robot.overhear()
     assert [m["number"] for m in robot.heard if m["type"] == "step"] == fresh
+
+
+async def test_what_a_source_calls_late_is_never_live_and_tells_nothing_of_its_clock(place, begun):
+    """A source that started again sends what its journal kept, by a clock that is gone."""
+    session = await begun(place)
+    tablet, robot = place.tablet(session), place.robot()
+    await tablet.watch()
+    await (await robot.dial()).hello()
+    source = await place.source().dial()
+    await source.hello()
+    kept = [a_step(n, 4.0, time_s=5000.0 + n) | {"late": True} for n in range(1, 4)]
+    await source.say({"type": "steps", "steps": kept})
+    await source.say({"type": "step"} | a_step(4, 4.0, time_s=5004.0) | {"late": True})
+    await source.acked(4)
+    source.number = 4
+    await source.walk(4.0, time_s=5600.0)  # another clock, which shows less than that would now
+    await tablet.until_step(5)
+    steps = [event for event in tablet.events if event["kind"] == "step"]
+    assert [event["live"] for event in steps] == [False] * 4 + [True]
+    await robot.overhear()
+    assert [m["number"] for m in robot.heard if m["type"] == "step"] == [5]
+    assert await Step.everywhere.filter(session=session, hit=True).acount() == 5
+    await source.say({"type": "step"} | a_step(6, 4.0, time_s=5601.0) | {"late": 1})
+    code, error = await source.sent_away()
+    assert code == 4400
+    assert '"late"' in error["message"]

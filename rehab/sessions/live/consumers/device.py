@@ -13,6 +13,8 @@ from rehab.sessions.live.auth import (
     bearer_token,
     find_open_session,
     may_open,
+    offer_successor,
+    take_successor,
 )
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
 from rehab.sessions.live.database.owners import OwnedElsewhere
@@ -37,6 +39,7 @@ class DeviceSocket(Socket):
     slot: ClassVar[str]
     device: Device | None = None
     hello_received = False
+    rotates = False  # it can store another token
 
     @property
     def device_id(self) -> int | None:
@@ -54,9 +57,29 @@ class DeviceSocket(Socket):
         message = read_frame(text)
         if self.device is None:
             token = message.get("token")
-            self._authorize(await authenticate_token(token) if isinstance(token, str) else None)
+            known = isinstance(token, str) and await authenticate_token(token, self.scope)
+            self._authorize(known or None)
         self._first_frame_timer.cancel()
+        if message.get("type") == "token":
+            await self._take_token(message.get("token"))
+            return
         await self.on_message(message, text or "")
+        if message.get("type") == "hello" and message.get("rotates") is True:
+            self.rotates = True
+            await self._offer_token()
+
+    async def _offer_token(self) -> None:
+        """Send the device its next token, if it is time and the device can store one."""
+        if self.rotates and self.device is not None and not self.device.given_hash:
+            token = await offer_successor(self.device, timezone.now())
+            if token is not None:
+                await self.send_message({"type": "token", "token": token})
+
+    async def _take_token(self, token: object) -> None:
+        device = self._authorize(self.device)
+        now = timezone.now()
+        if not isinstance(token, str) or not await take_successor(device, token, self.scope, now):
+            raise BadFrame("That is not the token that this device was given.", "token")
 
     def _authorize(self, actor: object) -> Device:
         if not isinstance(actor, Device) or actor.kind != self.kind:
@@ -108,6 +131,7 @@ class DeviceSocket(Socket):
         """Attach the device to a session that was just created for its station."""
         if self.live is None or self.live.aggregate.fold.state in ENDED_STATES:
             self.start(self._attach(session_id))
+            self.start(self._offer_token())
 
     async def _attach(self, session_id: int) -> None:
         try:

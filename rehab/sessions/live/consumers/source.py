@@ -16,7 +16,7 @@ from rehab.sessions.live.protocol.messages import (
     read_hello,
     read_plain,
 )
-from rehab.sessions.live.protocol.step_frames import read_single_step, read_steps
+from rehab.sessions.live.protocol.step_frames import read_late_marks, read_single_step, read_steps
 from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message, describe_source_phase
@@ -56,12 +56,15 @@ class SourceConsumer(DeviceSocket):
             return False
         if live.aggregate.fold.state not in STEPPING:
             return False
-        self._record(live, step, datetime.now(UTC))
+        self._record(live, step, datetime.now(UTC), is_marked=False)
         return True
 
-    def _record(self, live: LiveSession, step: Measurement, received_at: datetime) -> None:
+    def _record(
+        self, live: LiveSession, step: Measurement, received_at: datetime, *, is_marked: bool
+    ) -> None:
         _check_open_steps(live)
-        late = self.lateness.is_late(step.time_s, time.monotonic())
+        # What a source calls late tells nothing of its clock, which may be another one by now.
+        late = is_marked or self.lateness.is_late(step.time_s, time.monotonic())
         live.record_step(step, received_at, late=late)
 
     async def on_message(self, message: Message, text: str) -> None:
@@ -70,7 +73,7 @@ class SourceConsumer(DeviceSocket):
         if kind == "hello":
             await self._handle_hello(read_hello(message))
         elif kind in ("step", "steps"):
-            await self._handle_steps(read_steps(message))
+            await self._handle_steps(read_steps(message), read_late_marks(message))
         elif kind is not None or "token" not in message:
             raise BadFrame('A source sends "hello", "step" and "steps".')
 
@@ -107,7 +110,7 @@ class SourceConsumer(DeviceSocket):
         if live.committed:
             self.acknowledge(live.committed)
 
-    async def _handle_steps(self, measurements: list[Measurement]) -> None:
+    async def _handle_steps(self, measurements: list[Measurement], marks: list[bool]) -> None:
         if not self.hello_received:
             raise BadFrame("Say hello first.", "no_hello")
         live = self.live
@@ -118,7 +121,7 @@ class SourceConsumer(DeviceSocket):
             return
         await live.gate.wait()
         received_at = timezone.now()
-        for measurement in measurements:
+        for measurement, is_marked in zip(measurements, marks, strict=True):
             if measurement.number < live.next_number:
                 await self._check_same(live, measurement)
             elif measurement.number > live.next_number:
@@ -135,7 +138,7 @@ class SourceConsumer(DeviceSocket):
                 )
                 return
             else:
-                self._record(live, measurement, received_at)
+                self._record(live, measurement, received_at, is_marked=is_marked)
 
     async def _check_same(self, live: LiveSession, measurement: Measurement) -> None:
         """Acknowledge a step that is stored already; refuse other content under its number."""

@@ -85,7 +85,7 @@ def read_hello(message: Message) -> Hello:
         session=read_whole(message, "session", low=1) if message.get("session") else None,
         clock_s=_optional_number(message, "clock_s"),
         speed=_read_speed(message),
-        clock_pauses=_flag_if_there(message, "clock_pauses"),
+        clock_pauses=read_flag_if_there(message, "clock_pauses"),
     )
 
 
@@ -182,7 +182,8 @@ def _flag(message: Message, name: str) -> bool:
     return value
 
 
-def _flag_if_there(message: Message, name: str) -> bool:
+def read_flag_if_there(message: Message, name: str) -> bool:
+    """Return a flag; False where the message has none. Raises BadFrame."""
     return name in message and _flag(message, name)
 
 
@@ -216,10 +217,10 @@ REPORTS: dict[str, dict[str, Check[Any]]] = {
         "pose": _pose,
         "battery_v": _optional_number,
         "battery_share": _optional_number,
-        "battery_low": _flag_if_there,
-        "simulated": _flag_if_there,
-        "open_loop": _flag_if_there,
-        "bumpers": _flag_if_there,
+        "battery_low": read_flag_if_there,
+        "simulated": read_flag_if_there,
+        "open_loop": read_flag_if_there,
+        "bumpers": read_flag_if_there,
         "lights": _lights_if_there,
         "mood": _optional(_one_of("calm", "glad", "sad")),
     },
@@ -240,7 +241,7 @@ REPORTS: dict[str, dict[str, Check[Any]]] = {
         "name": read_name,
         "phase": _one_of("started", "ended"),
         "outcome": _code,
-        "open_loop": _flag_if_there,
+        "open_loop": read_flag_if_there,
     },
 }
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
+from rehab.sessions.live.protocol.messages import read_flag_if_there
 from rehab.training.steps import InvalidMeasurement, Measurement, Side
 from robot.wire.frames import NAME, BadFrame, read_name, read_number, read_whole
 from robot.wire.limits import MAX_EXTRA, MAX_FRAME_BYTES, MAX_REASONS, MAX_STEPS
@@ -24,6 +25,7 @@ class _StepFrame(msgspec.Struct):
     value: float | None = None
     reasons: tuple[()] = ()
     extra: dict[str, int | float] = {}
+    late: bool = False
 
 
 _decode_step = msgspec.json.Decoder(_StepFrame).decode
@@ -32,7 +34,8 @@ _decode_step = msgspec.json.Decoder(_StepFrame).decode
 def read_single_step(text: str) -> Measurement | None:
     """Return a frame's step, the same as ``read_steps`` does.
 
-    None for any other frame, also for one of a step with a fault: ``read_steps`` says which.
+    None for any other frame, also for one of a step with a fault (``read_steps`` says which), and
+    for one that its source calls late.
     """
     if len(text) > MAX_FRAME_BYTES:
         return None
@@ -41,7 +44,7 @@ def read_single_step(text: str) -> Measurement | None:
     except (msgspec.MsgspecError, RecursionError, UnicodeError):
         return None
     extra = step.extra
-    if len(extra) > MAX_EXTRA or not all(map(NAME.fullmatch, extra)):
+    if step.late or len(extra) > MAX_EXTRA or not all(map(NAME.fullmatch, extra)):
         return None
     if any(type(value) is int and not -(2**63) <= value < 2**63 for value in extra.values()):
         return None
@@ -59,6 +62,12 @@ def read_steps(message: Message) -> list[Measurement]:
     if not isinstance(steps, list) or not 1 <= len(steps) <= MAX_STEPS:
         raise BadFrame(f'"steps" is a list of 1 to {MAX_STEPS} steps.')
     return [read_step(step) for step in steps]
+
+
+def read_late_marks(message: Message) -> list[bool]:
+    """Return which steps of a frame that was read the source itself calls late. Raises BadFrame."""
+    steps = [message] if message["type"] == "step" else message["steps"]
+    return [read_flag_if_there(step, "late") for step in steps]
 
 
 def read_step(step: Any) -> Measurement:
