@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 import pytest
 from django.test import Client
 from django.urls import reverse
 
+from rehab.feedback.models import FeedbackType
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
@@ -17,9 +19,10 @@ from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.models import Station
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.blinding import Task, give_mark
+from rehab.studies.document import digest_of
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment
-from rehab.studies.registration import close, digest_of
+from rehab.studies.registration import close
 from rehab.studies.sealing import unseal
 from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
 from tests.support.world import NOW, World, client_of, signed_in
@@ -157,6 +160,11 @@ def test_a_running_study_is_changed_by_a_version_with_its_reason(world):
 
 
 def test_the_registered_study_is_a_pdf_with_its_seals_and_the_same_bytes_again(world):
+    Protocol.everywhere.get(clinic=None, name="Baseline, training, washout").phases.filter(
+        kind="training"
+    ).update(goal_percent=110, robot=False, rest_s=90)
+    own, _is_new = FeedbackType.everywhere.get_or_create(clinic=world.clinic, slug="negative")
+    own.bands.update_or_create(from_percent=0, defaults={"words": {"en": "Push, please."}})
     study = running_study(world, factors=[["severity", ["mild", "severe"]]])
     lead, url = client_of(world, Role.LEAD), reverse("study-protocol-pdf", args=[study.pk])
     answer = lead.get(url)
@@ -170,6 +178,9 @@ def test_the_registered_study_is_a_pdf_with_its_seals_and_the_same_bytes_again(w
     assert SEED not in told
     for words in ("negative", "severity: mild, severe", "Retention in washout", "Baseline"):
         assert words in told
+    lines = " ".join(re.findall(r"\((.*?)\) Tj", told))
+    for words in ("goal at 110 %", "without the robot", "then a rest of 90 s", "Push, please."):
+        assert words in lines
     assert hide_from(study, world).get(url).status_code == 403
 
 
