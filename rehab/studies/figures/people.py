@@ -27,6 +27,8 @@ def draw_people(
     everything = [value for of_arm in values.values() for value in of_arm.values()]
     if not everything:
         return canvas.to_text()
+    means = [figure.mean for figure in finding.arms if figure.mean is not None]
+    everything += [end for mean in means for end in (mean.low, mean.high) if end is not None]
     levels = ticks(min(*everything, 0.0), max(*everything, 0.0))
     bottom = HEIGHT - BOTTOM
 
