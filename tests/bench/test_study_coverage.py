@@ -41,7 +41,8 @@ def simulated(seed: int) -> list[Interval]:
 
 def complaints(found: list[Interval]) -> Iterator[str]:
     """Yield what shows that the intervals do not cover as often as they say."""
-    studies, covered = Counter(), Counter()
+    studies: Counter[str] = Counter()
+    covered: Counter[str] = Counter()
     for pair, low, high, true in found:
         studies[pair] += 1
         covered[pair] += low <= true <= high
