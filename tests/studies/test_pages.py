@@ -112,12 +112,21 @@ def test_a_study_is_planned_registered_started_and_closed_by_clicks(world):
         (("positive", "negative"), {"code": "val"}, "capital letters"),
     ],
 )
-def test_a_plan_that_cannot_be_run_is_told_how_to_mend(world, arms, change, words):
+def test_a_plan_that_cannot_be_run_is_told_how_to_mend(world, arms, change, words, caplog):
     before = Study.everywhere.count()
     answer = client_of(world, Role.LEAD).post(reverse("new-study"), plan(*arms, **change))
     assert answer.status_code == 200
     assert words in text_of(answer)
     assert Study.everywhere.count() == before
+    lead = world.people[Role.LEAD]
+    [logged] = refusals(caplog)
+    assert logged == f"Refused to account {lead.pk}: {reverse('new-study')}"
+
+
+def refusals(caplog) -> list[str]:
+    return [
+        one.getMessage() for one in caplog.records if one.name.endswith("studies.pages.refusals")
+    ]
 
 
 def test_a_pasted_list_is_sealed_and_followed(world):
@@ -193,7 +202,7 @@ def start_visit(client: Client, enrollment: Enrollment) -> Any:
     return client.post(reverse("start-visit", args=[enrollment.pk]), where)
 
 
-def test_a_patient_is_enrolled_and_walks_the_arm_without_it_being_named(world):
+def test_a_patient_is_enrolled_and_walks_the_arm_without_it_being_named(world, caplog):
     study = running_study(world)
     patient = new_patient(world)
     pt = client_of(world)
@@ -211,6 +220,7 @@ def test_a_patient_is_enrolled_and_walks_the_arm_without_it_being_named(world):
     assert "One study a patient" in text_of(
         pt.post(url, {"patient": patient.pk, "keep_data": "no"})
     )
+    assert refusals(caplog) == [f"Refused to account {world.people[Role.PT].pk}: {url}"]
 
 
 def test_an_arm_is_revealed_with_a_reason_and_the_lead_can_read_who_asked(world):

@@ -62,7 +62,8 @@ def draw_people(
                 canvas.line(aside, y(figure.mean.low), aside, y(figure.mean.high), color, 3)
             canvas.mark(aside, y(figure.mean.estimate), index, 8)
             told = number(round(figure.mean.estimate, 1))
-            canvas.words(aside + 14, y(figure.mean.estimate) + 5, told, color=INK, weight="700")
+            place = y(figure.mean.estimate) + 5
+            canvas.words(aside + 14, place, told, color=INK, weight="700", halo=True)
     return canvas.to_text()
 
 
