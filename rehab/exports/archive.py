@@ -5,8 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 from collections.abc import AsyncIterator, Iterable, Iterator, Sequence
 from itertools import islice
+from pathlib import Path
 from typing import Any
 from zipfile import ZIP_DEFLATED
 
@@ -43,6 +45,15 @@ def _join(chunks: Iterable[bytes]) -> Iterator[bytes]:
             yield b"".join(parts)
             parts, size = [], 0
     yield b"".join(parts)
+
+
+def save_zip(files: Files, file: Path) -> None:
+    """Write a ZIP into a file that only the owner of this process may read."""
+    descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    with os.fdopen(descriptor, "wb") as out:
+        os.fchmod(descriptor, 0o600)  # also a file that was there with other rights
+        for part in write_zip(files):
+            out.write(part)
 
 
 def write_csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Iterator[str]:

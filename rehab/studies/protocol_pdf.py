@@ -75,6 +75,11 @@ def _version_parts(version: StudyVersion) -> Iterator[Flowable]:
                 "phases": "; ".join(map(_phase_text, arm["phases"])),
             }
         )
+        if "feedback" in arm:
+            edited = {"arm": arm["code"], "feedback": _feedback_text(arm["feedback"])}
+            yield _text(
+                gettext("Feedback of %(arm)s, as the clinic edited it: %(feedback)s") % edited
+            )
         for asked in arm.get("questionnaires", ()):
             told_of = {"arm": arm["code"], "questionnaire": asked["title"]}
             yield _text(gettext("Asked after sessions of %(arm)s: %(questionnaire)s") % told_of)
@@ -112,7 +117,7 @@ def _comes(arm: dict[str, Any]) -> str:
 
 
 def _phase_text(phase: dict[str, Any]) -> str:
-    """Return a phase in a few words: its name, lengths, gain, whether it gives feedback."""
+    """Return a phase in a few words: its name, lengths, gain, and what else it does."""
     strides, seconds = phase["strides"], phase["seconds"]
     parts = [phase["name"]]
     if strides:
@@ -121,7 +126,24 @@ def _phase_text(phase: dict[str, Any]) -> str:
         parts.append(f"{seconds:g} s")
     if phase["feedback"]:
         parts.append(gettext("feedback, gain %(gain)g") % {"gain": phase["gain"]})
+    if phase.get("goal_percent"):
+        percent = f"{phase['goal_percent']:g} %"
+        parts.append(gettext("goal at %(percent)s of baseline") % {"percent": percent})
+    if not phase.get("robot", True):
+        parts.append(gettext("without the robot"))
+    if phase.get("rest_s"):
+        parts.append(gettext("then a rest of %(seconds)g s") % {"seconds": phase["rest_s"]})
     return ", ".join(parts)
+
+
+def _feedback_text(feedback: dict[str, Any]) -> str:
+    """Return points and words of a feedback type that the clinic edited."""
+    points = " / ".join(f"{feedback[name]}" for name in ("hit_points", "miss_points"))
+    bands = (
+        f"{band['from_percent']} %: {' / '.join(band['words'].values()) or '–'}"
+        for band in feedback["bands"]
+    )
+    return "; ".join((points.replace("None", "–"), *bands))
 
 
 def _plan_rows(told: dict[str, Any]) -> list[tuple[object, ...]]:

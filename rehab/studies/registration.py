@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict
 from datetime import datetime
-from hashlib import sha256
 from typing import Any
 
 from django.db import transaction
 from django.utils.translation import gettext
 
 from rehab.people.models import Patient, User
-from rehab.questionnaires.instrument import Instrument
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.questionnaires import find_instrument
 from rehab.studies.allocation.scheme import Secret
+from rehab.studies.document import describe, digest_of
 from rehab.studies.models import Study, StudyState, StudyVersion
 from rehab.studies.participants import StudyEvent
 from rehab.studies.sealing import unseal
 from rehab.training.changes import OPEN_STATES
-from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
-from rehab.training.plans import SessionPlan
-from rehab.training.scoring import RULES_VERSION
-from rehab.training.steps import Side
-from rehab.training.valences import find_valence
 
 Kind = StudyEvent.Kind
 # What a version may change of a study; of its arms, their names and conditions.
@@ -38,92 +29,6 @@ REVISABLE = (
 def lock(study: Study) -> None:
     """Reload a study and lock its row until the end of the transaction."""
     study.refresh_from_db(from_queryset=Study.everywhere.select_for_update(no_key=True))
-
-
-def describe(study: Study) -> dict[str, Any]:
-    """Return the study as it is registered: all that decides what participants walk.
-
-    Raises InvalidSetting for a study that could not be run.
-    """
-    scheme = study.scheme()
-    plan = study.visit_plan
-    document = {
-        "code": study.code,
-        "title": study.title,
-        "clinic": study.clinic.name,
-        "question": study.question,
-        "participants": study.participants,
-        "months_since_stroke_at_least": study.months_since_stroke,
-        "design": "crossover" if study.crossover else "parallel",
-        "arms": [_describe_arm(study, arm) for arm in study.arms.select_related("measure")],
-        "allocation": scheme.to_json() | {"commitment_sha256": study.commitment},
-        "visits": {
-            "in_each_period": plan.visits,
-            "days_between": plan.days_between,
-            "days_between_periods": plan.washout_days,
-        },
-        "goal_percent_of_baseline": study.goal_percent,
-        "primary_outcome": study.primary_outcome,
-        "secondary_outcomes": study.secondary_outcomes,
-        "scoring_rules_version": RULES_VERSION,
-    }
-    stored: dict[str, Any] = json.loads(json.dumps(document))  # so that tuples are lists
-    return stored
-
-
-def _describe_arm(study: Study, arm: Any) -> dict[str, Any]:
-    phases, schedule = arm.phases(), arm.to_rule().condition.schedule
-    SessionPlan(  # raises InvalidSetting for one that could not be walked
-        measure=arm.measure.to_rule(),
-        valence=find_valence(arm.valence),
-        phases=phases,
-        trained_side=Side.LEFT,
-        goal=GoalRule(percent_of_baseline=study.goal_percent),
-        schedule=schedule,
-    )
-    # Studies that were registered before there were questionnaires keep their digest.
-    asked = [
-        _describe_questionnaire(find_instrument(slug, study.clinic_id, "en"))
-        for slug in arm.protocol.questionnaires
-    ]
-    return ({"questionnaires": asked} if asked else {}) | {
-        "code": arm.code,
-        "name": arm.name,
-        "weight": arm.weight,
-        "feedback_type": arm.valence,
-        "gain": arm.gain,
-        "robot_intensity": arm.robot_intensity,
-        # Studies that were registered before arms had schedules keep their digest.
-        **({} if schedule.tells_all else {"schedule": asdict(schedule)}),
-        "measure": arm.measure.slug,
-        "protocol": arm.protocol.name,
-        **(
-            {}
-            if arm.protocol.close_percent is None
-            else {"close_percent": arm.protocol.close_percent}
-        ),
-        "phases": [
-            {
-                "kind": phase.kind,
-                "name": phase.name,
-                "feedback": phase.feedback,
-                "gain": phase.gain,
-                "strides": phase.strides,
-                "seconds": phase.seconds,
-            }
-            for phase in phases
-        ],
-    }
-
-
-def _describe_questionnaire(instrument: Instrument) -> dict[str, Any]:
-    return {"title": instrument.title, "items": [item.text for item in instrument.items]}
-
-
-def digest_of(document: dict[str, Any]) -> str:
-    """Return the SHA-256 of a document, as JSON with sorted keys and without blanks."""
-    text = json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    return sha256(text.encode()).hexdigest()
 
 
 def note(study: Study, kind: Kind, by: User | None, now: datetime, **details: Any) -> StudyEvent:

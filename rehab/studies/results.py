@@ -1,4 +1,4 @@
-"""A study's results, read from the logs of its sessions, and who may look at them when."""
+"""A study's results, and who may look at them when."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from django.utils.translation import gettext
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
-from rehab.sessions.log import Step
-from rehab.sessions.models import TrainingSession
 from rehab.studies.analysis.curves import Point
 from rehab.studies.analysis.outcomes import OUTCOMES
 from rehab.studies.analysis.participants import (
@@ -23,20 +21,13 @@ from rehab.studies.analysis.participants import (
     ArmFlow,
     Finding,
     Participant,
-    Visit,
-    Walked,
-    curves_by_arm,
-    find,
     flow,
-    make_participant,
 )
-from rehab.studies.analysis.walks import COLUMNS, read_walk
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
-from rehab.studies.participants import Enrollment, StudyEvent, StudyVisit
+from rehab.studies.participants import StudyEvent
+from rehab.studies.reading import Analysis, analyze
 from rehab.studies.registration import note
 from rehab.studies.sealing import unseal
-from rehab.training.changes import State
-from rehab.training.plans import SessionPlan
 
 
 def may_look(study: Study, user: User) -> bool:
@@ -66,15 +57,20 @@ class Results:
 
     Attributes
     ----------
-    study, participants
-        The study, and everybody who was ever taken in.
+    study, analysis
+        The study, and what was computed of everybody who was ever taken in.
     arms
         The arms' codes with the labels by which they are told, in the order in which they are told.
     """
 
     study: Study
-    participants: tuple[Participant, ...]
+    analysis: Analysis
     arms: dict[str, str]
+
+    @property
+    def participants(self) -> tuple[Participant, ...]:
+        """Everybody who was ever taken in."""
+        return self.analysis.participants
 
     @property
     def registered(self) -> tuple[str, ...]:
@@ -89,21 +85,14 @@ class Results:
         rest = [slug for slug in OUTCOMES if slug in found and slug not in self.registered]
         return (*rest, *sorted(slug for slug in found if slug.startswith(CHANNEL)))
 
-    @cached_property
-    def _findings(self) -> dict[str, Finding]:
-        return {}
-
     def find(self, slug: str) -> Finding:
         """Return what was found of an outcome."""
-        if slug not in self._findings:
-            arms, crossed = list(self.arms), self.study.crossover
-            self._findings[slug] = find(self.participants, arms, slug, crossover=crossed)
-        return self._findings[slug]
+        return self.analysis.find(slug)
 
-    @cached_property
+    @property
     def curves(self) -> dict[str, list[Point]]:
         """The mean curve of each arm, by its code."""
-        return curves_by_arm(self.participants, list(self.arms))
+        return self.analysis.curves
 
     @cached_property
     def flow(self) -> tuple[ArmFlow, ...]:
@@ -130,59 +119,10 @@ def label_arms(study: Study) -> dict[str, str]:
 
 def read_results(study: Study, now: datetime) -> Results:
     """Return a study's results. ``now`` says which visits are due."""
-    enrollments = study.enrollments.select_related("allocation", "clinic", "patient").order_by("pk")
     is_closed = study.state == StudyState.CLOSED  # then whatever was planned was due
     until = date.max if is_closed else clinic_time(now, study.clinic).date()
-    participants = tuple(_read(one, until) for one in enrollments)
-    return Results(study, participants, label_arms(study))
-
-
-def _read(enrollment: Enrollment, until: date) -> Participant:
-    group = enrollment.allocation.group.split("-")
-    planned = [
-        (
-            Visit(
-                visit.number, group[visit.period], visit.session is not None or visit.day <= until
-            ),
-            _walked(enrollment, visit),
-        )
-        for visit in latest_attempts(enrollment)
-    ]
-    return make_participant(
-        enrollment.code,
-        planned,
-        has_left=enrollment.withdrawn_at is not None,
-        is_analyzed=enrollment.is_analyzed,
-    )
-
-
-def latest_attempts(enrollment: Enrollment) -> list[StudyVisit]:
-    """Return the last attempt at each planned visit, in their order."""
-    visits = enrollment.visits.select_related("session").order_by("number", "attempt")
-    return list({visit.number: visit for visit in visits}.values())
-
-
-def _walked(enrollment: Enrollment, visit: StudyVisit) -> Walked | None:
-    """Return what a visit gave; None of one that does not count, or was corrected away."""
-    session = visit.session
-    if session is None or session.state != State.FINISHED or session.excluded:
-        return None
-    if session.patient_id != enrollment.patient_id or not enrollment.is_analyzed:
-        return None
-    return read_walked(session)
-
-
-def read_walked(session: TrainingSession) -> Walked:
-    """Return a finished session's strides and metrics."""
-    plan = SessionPlan.from_json(session.plan)
-    metrics = dict(session.metrics.values_list("slug", "value"))
-    rows = Step.everywhere.filter(session=session, side=session.trained_side).order_by("number")
-    walk = read_walk(
-        plan.phases,
-        rows.values_list(*COLUMNS).iterator(),
-        higher_is_better=plan.measure.higher_is_better,
-    )
-    return Walked(walk, metrics)
+    arms = label_arms(study)
+    return Results(study, analyze(study, tuple(arms), until), arms)
 
 
 def outcome_rows(results: Results) -> Iterator[dict[str, Any]]:

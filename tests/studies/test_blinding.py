@@ -5,7 +5,8 @@ from __future__ import annotations
 from datetime import timedelta
 
 import pytest
-from django.urls import reverse
+from django.test import Client
+from django.urls import get_resolver, reverse
 
 from rehab.patients.erasure import erase
 from rehab.patients.visits import Visit
@@ -30,6 +31,7 @@ from rehab.studies.visits import Place, next_visit, start_session
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from tests.support.studies import enrolled, new_patient, running_study
+from tests.support.tenancy import walk_patterns
 from tests.support.world import NOW, World, build_world, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -195,6 +197,33 @@ def test_an_assessor_is_refused_by_every_page_call_and_export_of_a_session(world
         assert signed_in(assessor).get(url).status_code == 404, url
     listed = signed_in(assessor).get(reverse("api:list_sessions")).json()
     assert session.pk not in [row["id"] for row in listed.get("items", listed)]
+
+
+def ask(client: Client, url: str) -> int:
+    """Return the answer's status, also where only changes are taken."""
+    status = int(client.get(url).status_code)
+    pause = {"data": {"kind": "pause"}, "content_type": "application/json"}
+    return int(client.post(url, **pause).status_code) if status == 405 else status
+
+
+@pytest.mark.parametrize("ended", [False, True])
+def test_no_address_of_a_session_answers_an_assessor_whatever_it_is_for(world, ended):
+    study = running_study(world)
+    give_mark(study, new_pt(world), Task.ASSESSOR, None, NOW)
+    assessor, colleague = (
+        signed_in(person) for person in (study.marks.get().user, new_pt(world, "colleague"))
+    )
+    enrollment = enrolled(study, new_patient(world))
+    session = walked(enrollment) if ended else start_session(enrollment, Place(), None, NOW)
+    addresses = [
+        reverse(name, kwargs={"session_id": session.pk})
+        for name, _route, pattern in walk_patterns(get_resolver())
+        if set(pattern.pattern.converters) == {"session_id"}
+    ]
+    assert len(addresses) > 15
+    answers = {url: ask(assessor, url) for url in addresses}
+    assert {url: status for url, status in answers.items() if status != 404} == {}
+    assert any(colleague.get(url).status_code == 200 for url in addresses)
 
 
 def test_an_assessor_cannot_set_up_a_session_and_so_learn_of_it(world):

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 import pytest
 from django.test import Client
 from django.urls import reverse
 
+from rehab.feedback.models import FeedbackType
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
@@ -17,9 +19,10 @@ from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.stations.models import Station
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.blinding import Task, give_mark
+from rehab.studies.document import digest_of
 from rehab.studies.models import Study
 from rehab.studies.participants import Enrollment
-from rehab.studies.registration import close, digest_of
+from rehab.studies.registration import close
 from rehab.studies.sealing import unseal
 from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
 from tests.support.world import NOW, World, client_of, signed_in
@@ -109,12 +112,21 @@ def test_a_study_is_planned_registered_started_and_closed_by_clicks(world):
         (("positive", "negative"), {"code": "val"}, "capital letters"),
     ],
 )
-def test_a_plan_that_cannot_be_run_is_told_how_to_mend(world, arms, change, words):
+def test_a_plan_that_cannot_be_run_is_told_how_to_mend(world, arms, change, words, caplog):
     before = Study.everywhere.count()
     answer = client_of(world, Role.LEAD).post(reverse("new-study"), plan(*arms, **change))
     assert answer.status_code == 200
     assert words in text_of(answer)
     assert Study.everywhere.count() == before
+    lead = world.people[Role.LEAD]
+    [logged] = refusals(caplog)
+    assert logged == f"Refused to account {lead.pk}: {reverse('new-study')}"
+
+
+def refusals(caplog) -> list[str]:
+    return [
+        one.getMessage() for one in caplog.records if one.name.endswith("studies.pages.refusals")
+    ]
 
 
 def test_a_pasted_list_is_sealed_and_followed(world):
@@ -157,6 +169,11 @@ def test_a_running_study_is_changed_by_a_version_with_its_reason(world):
 
 
 def test_the_registered_study_is_a_pdf_with_its_seals_and_the_same_bytes_again(world):
+    Protocol.everywhere.get(clinic=None, name="Baseline, training, washout").phases.filter(
+        kind="training"
+    ).update(goal_percent=110, robot=False, rest_s=90)
+    own, _is_new = FeedbackType.everywhere.get_or_create(clinic=world.clinic, slug="negative")
+    own.bands.update_or_create(from_percent=0, defaults={"words": {"en": "Push, please."}})
     study = running_study(world, factors=[["severity", ["mild", "severe"]]])
     lead, url = client_of(world, Role.LEAD), reverse("study-protocol-pdf", args=[study.pk])
     answer = lead.get(url)
@@ -170,6 +187,9 @@ def test_the_registered_study_is_a_pdf_with_its_seals_and_the_same_bytes_again(w
     assert SEED not in told
     for words in ("negative", "severity: mild, severe", "Retention in washout", "Baseline"):
         assert words in told
+    lines = " ".join(re.findall(r"\((.*?)\) Tj", told))
+    for words in ("goal at 110 %", "without the robot", "then a rest of 90 s", "Push, please."):
+        assert words in lines
     assert hide_from(study, world).get(url).status_code == 403
 
 
@@ -182,7 +202,7 @@ def start_visit(client: Client, enrollment: Enrollment) -> Any:
     return client.post(reverse("start-visit", args=[enrollment.pk]), where)
 
 
-def test_a_patient_is_enrolled_and_walks_the_arm_without_it_being_named(world):
+def test_a_patient_is_enrolled_and_walks_the_arm_without_it_being_named(world, caplog):
     study = running_study(world)
     patient = new_patient(world)
     pt = client_of(world)
@@ -200,6 +220,7 @@ def test_a_patient_is_enrolled_and_walks_the_arm_without_it_being_named(world):
     assert "One study a patient" in text_of(
         pt.post(url, {"patient": patient.pk, "keep_data": "no"})
     )
+    assert refusals(caplog) == [f"Refused to account {world.people[Role.PT].pk}: {url}"]
 
 
 def test_an_arm_is_revealed_with_a_reason_and_the_lead_can_read_who_asked(world):

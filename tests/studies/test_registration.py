@@ -6,14 +6,16 @@ from dataclasses import replace
 
 import pytest
 
+from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.people.roles import Role
 from rehab.sessions.questionnaires import Questionnaire
-from rehab.sessions.setup.protocols import Protocol, ProtocolPhase
+from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.append_only import AppendOnlyRow
+from rehab.studies.document import describe, digest_of
 from rehab.studies.models import StudyState
 from rehab.studies.participants import StudyEvent
-from rehab.studies.registration import close, current_version, digest_of, register, revise, start
+from rehab.studies.registration import close, current_version, register, revise, start
 from rehab.studies.sealing import seal, unseal
 from rehab.studies.visits import Place, start_session
 from rehab.training.measures import InvalidSetting
@@ -131,6 +133,70 @@ def test_a_protocol_that_is_changed_after_the_start_needs_a_new_version(world):
     assert phases == [60, 90]
     with pytest.raises(InvalidSetting, match="Nothing is different"):
         revise(study, "again", None, NOW)
+
+
+def edit_feedback(world: World, slug: str) -> None:
+    FeedbackType.everywhere.filter(clinic=world.clinic).delete()
+    edited = FeedbackType.everywhere.create(clinic=world.clinic, slug=slug)
+    for percent in (0, 100):
+        edited.bands.create(from_percent=percent, words={"en": f"from {percent}"})
+
+
+def edit_phase(**changes):
+    return lambda study, phase: ProtocolPhase.everywhere.filter(pk=phase.pk).update(**changes)
+
+
+def edit_measure(study, _phase) -> None:
+    Measure.everywhere.filter(clinic=study.clinic).update(value_max=9.0)
+
+
+def edit_words(study, _phase) -> None:
+    FeedbackBand.everywhere.filter(feedback_type__clinic=study.clinic).update(words={"de": "Toll"})
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        edit_phase(goal_percent=110),
+        edit_phase(robot=False),
+        edit_phase(rest_s=60),
+        edit_phase(gain=0.85),
+        edit_measure,
+        edit_words,
+    ],
+    ids=("goal", "robot", "rest", "gain", "measure", "words"),
+)
+def test_nothing_that_decides_what_is_walked_changes_unseen(world, edit):
+    study = draft_study(world)
+    training = own_protocol(world, study)
+    own = Measure.everywhere.create(
+        clinic=world.clinic,
+        slug="speed",
+        unit="m/s",
+        value_min=0,
+        value_max=10,
+        goal_min=0,
+        goal_max=5,
+    )
+    study.arms.all().update(measure=own)
+    edit_feedback(world, "positive")
+    register(study, None, NOW)
+    assert current_version(study).number == 1
+    edit(study, training)
+    with pytest.raises(InvalidSetting, match="has been changed since"):
+        current_version(study)
+
+
+def test_a_study_without_what_came_later_has_the_document_that_it_always_had(world):
+    FeedbackType.everywhere.filter(clinic=world.clinic).delete()
+    [arm, _other] = describe(draft_study(world))["arms"]
+    assert set(arm) == {
+        *("code", "name", "weight", "feedback_type", "gain", "robot_intensity"),
+        *("measure", "protocol", "phases"),
+    }
+    assert {frozenset(phase) for phase in arm["phases"]} == {
+        frozenset(("kind", "name", "feedback", "gain", "strides", "seconds"))
+    }
 
 
 def test_what_was_allocated_cannot_be_allocated_otherwise(world):

@@ -5,26 +5,32 @@ from __future__ import annotations
 from datetime import timedelta
 
 import pytest
+from django.db import connection
+from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import Clinic
 from rehab.people.roles import Role
+from rehab.sessions.log import SessionMetric
+from rehab.sessions.models import TrainingSession
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.blinding import Task, give_mark
 from rehab.studies.drawing import FIGURES, TABLES, write_table
-from rehab.studies.models import Arm
+from rehab.studies.models import Arm, Study
 from rehab.studies.registration import close, register, start
 from rehab.studies.results import label_arms, read_results
 from rehab.studies.sealing import seal
 from rehab.studies.simulation.example import example_trial
-from rehab.studies.simulation.study import find_or_plan, finish_study, walk_study
+from rehab.studies.simulation.study import find_or_plan
+from rehab.studies.simulation.study import walk_study as study_walks
 from rehab.studies.simulation.trial import simulate
 from rehab.studies.simulation.walkers import Population
 from rehab.studies.visits import Place, start_session
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import SessionPlan
 from rehab.training.schedules import Schedule, ScheduleKind
+from tests.support.simulated_studies import figures_of, walk_study
 from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study
 from tests.support.world import NOW, client_of
 
@@ -35,27 +41,11 @@ def text_of(response) -> str:
     return str(response.content.decode())
 
 
-def walk(trial, seed, clinic="Simulated studies"):
-    clinic, _is_new = Clinic.everywhere.get_or_create(name=clinic)
-    study = find_or_plan(clinic, trial, seed, NOW)
-    for _done in walk_study(study, trial, seed, NOW):
-        pass
-    return finish_study(study, NOW)
-
-
-def figures_of(participants):
-    """Return all that is analyzed of participants, without what they are called."""
-    return [
-        ([(v.number, v.arm, v.outcomes, v.phases) for v in one.visits], one.curves, one.has_left)
-        for one in participants
-    ]
-
-
 @pytest.mark.django_db(transaction=True)  # the writer has its own connection
 def test_three_seeds_by_the_real_path_agree_with_the_fold_to_the_last_digit():
     trial = example_trial(4, visits=2, population=Population(dropout=0.2))
     for seed in (1, 2, 3):
-        results = walk(trial, seed)
+        results = walk_study(trial, seed)
         assert figures_of(results.participants) == figures_of(simulate(trial, seed))
 
 
@@ -64,8 +54,8 @@ def test_a_simulated_study_goes_on_where_it_was_broken_off_and_writes_the_same_f
     trial = example_trial(4)
     one, other = (Clinic.everywhere.create(name=name) for name in ("one", "other"))
     study = find_or_plan(one, trial, 5, NOW)
-    next(walk_study(study, trial, 5, NOW))  # the first participant, then the power fails
-    broken, whole = walk(trial, 5, one.name), walk(trial, 5, other.name)
+    next(study_walks(study, trial, 5, NOW))  # the first participant, then the power fails
+    broken, whole = walk_study(trial, 5, one.name), walk_study(trial, 5, other.name)
     assert broken.study.enrollments.count() == 4
     for name, draw in FIGURES.items():
         assert draw(broken) == draw(whole), name
@@ -73,6 +63,34 @@ def test_a_simulated_study_goes_on_where_it_was_broken_off_and_writes_the_same_f
         assert write_table(rows(broken)) == write_table(rows(whole)), name
     with pytest.raises(InvalidSetting, match="has 4 participants"):
         find_or_plan(one, example_trial(8), 5, NOW)
+
+
+@pytest.mark.django_db(transaction=True)
+def test_only_who_changed_is_read_again():
+    first = walk_study(example_trial(4), 6)
+    study = first.study
+
+    def read():
+        return read_results(Study.everywhere.get(pk=study.pk), NOW)
+
+    with CaptureQueriesContext(connection) as asked:
+        again = read()
+    assert again.analysis is first.analysis
+    assert not [query for query in asked if "rehab_step" in query["sql"]]
+    one, *others = study.enrollments.order_by("pk")
+    TrainingSession.everywhere.filter(study_visit__enrollment=one).update(excluded=True)
+    corrected = read()
+    assert not corrected.participants[0].visits[0].is_walked
+    for before, now in zip(first.participants[1:], corrected.participants[1:], strict=True):
+        assert before is now
+    TrainingSession.everywhere.filter(study_visit__enrollment=one).update(excluded=False)
+    assert figures_of(read().participants) == figures_of(first.participants)
+    type(one).everywhere.filter(pk=others[0].pk).update(withdrawn_at=NOW, keep_data=False)
+    left = read().participants[1]
+    assert (left.has_left, left.is_analyzed, left.visits[0].is_walked) == (True, False, False)
+    SessionMetric.everywhere.filter(session__study_visit__enrollment=others[1]).update(value=0.5)
+    [visit] = read().participants[2].visits
+    assert visit.outcomes["hit_rate"] == 0.5
 
 
 # --- who may look ---------------------------------------------------------------------------------

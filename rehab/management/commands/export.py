@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 from django.core.management.base import BaseCommand, CommandError
 from django.utils import timezone
 
-from rehab.exports.archive import Files, write_zip
+from rehab.exports.archive import Files, save_zip
 from rehab.exports.patient_data import patient_files, session_files
 from rehab.exports.research.package import Package
 from rehab.people.audit import audit_log
@@ -74,11 +73,7 @@ class Command(BaseCommand):
         if package is not None:
             self._prepare(package)
         try:
-            descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-            with os.fdopen(descriptor, "wb") as out:
-                os.fchmod(descriptor, 0o600)  # also a file that was there with other rights
-                for part in write_zip(files):
-                    out.write(part)
+            save_zip(files, file)
         except OSError as problem:
             raise CommandError(
                 f"{file} cannot be written ({problem.strerror}). Choose another place."

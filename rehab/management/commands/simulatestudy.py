@@ -1,19 +1,28 @@
-"""`manage.py simulatestudy`: a whole study of simulated patients, from the plan to the figures."""
+"""`manage.py simulatestudy`: a whole study of simulated patients, from the plan to the export."""
 
 from __future__ import annotations
 
+import math
 import time
 from argparse import ArgumentParser
+from datetime import datetime
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from django.contrib.auth.hashers import make_password
 from django.core.management import BaseCommand, CommandError
 from django.utils import timezone, translation
 
-from rehab.people.models import Clinic
+from rehab.exports.archive import save_zip
+from rehab.exports.research.package import Package
+from rehab.people.audit import audit_log
+from rehab.people.audit.audit_log import Act
+from rehab.people.models import Clinic, User
+from rehab.people.roles import Role
 from rehab.people.sign_in.first_start import prepare_database
 from rehab.studies.drawing import FIGURES, TABLES, name_pair, write_table
+from rehab.studies.models import Study
 from rehab.studies.results import Results
 from rehab.studies.simulation.example import example_trial
 from rehab.studies.simulation.study import find_or_plan, finish_study, walk_study
@@ -21,14 +30,15 @@ from rehab.studies.simulation.walkers import Population
 from rehab.training.measures import InvalidSetting
 
 CLINIC = "Simulated studies"
+EXPORT = "export.zip"
 
 
 class Command(BaseCommand):
-    """Plans, randomizes, walks and analyzes a study; the same seed gives the same files."""
+    """Plans, randomizes, walks, analyzes and exports a study; a seed gives the same files."""
 
     help = (
-        "Simulate a study of four feedback types through the real path, and write its tables (CSV) "
-        "and figures (SVG). One that was broken off goes on."
+        "Simulate a study of four feedback types through the real path, and write tables (CSV), "
+        "figures (SVG) and the export for analysis (ZIP). One that was broken off goes on."
     )
 
     def add_arguments(self, parser: ArgumentParser) -> None:
@@ -59,8 +69,7 @@ class Command(BaseCommand):
             clinic, _is_new = Clinic.everywhere.get_or_create(name=options["clinic"])
             study = find_or_plan(clinic, trial, seed, now)
             for done in walk_study(study, trial, seed, now):
-                self.stderr.write(f"\r{done} of {trial.participants} participants", ending="")
-                self.stderr.flush()
+                self._tell(f"{done} of {trial.participants} participants")
             results = finish_study(study, now)
         except InvalidSetting as problem:
             raise CommandError(str(problem)) from problem
@@ -68,9 +77,30 @@ class Command(BaseCommand):
         with translation.override("en"):
             digest = write_files(results, options["to"])
             self.stdout.write(describe(results, trial.effects))
+        self._export(study, options["to"] / EXPORT, now)
         self.stdout.write(
-            f"{options['to']}: SHA-256 of all files {digest}\n{time.perf_counter() - began:.0f} s"
+            f"{options['to']}: SHA-256 of all tables and figures {digest}, and {EXPORT}\n"
+            f"{time.perf_counter() - began:.0f} s"
         )
+
+    def _tell(self, progress: str) -> None:
+        self.stderr.write(f"\r{progress}", ending="")
+        self.stderr.flush()
+
+    def _export(self, study: Study, file: Path, now: datetime) -> None:
+        """Write the study's export for analysis, by an account with which nobody can sign in."""
+        name = f"simulated-study-{study.clinic.pk}"
+        given = {"role": Role.LEAD, "clinic": study.clinic, "password": make_password(None)}
+        user, _is_new = User.everywhere.get_or_create(username=name, defaults=given)
+        about = "manage.py simulatestudy"
+        audit_log.record(Act.EXPORT, None, clinic_id=study.clinic.pk, about=about, now=now)
+        folder = file.with_name(file.name + ".parts")
+        package = Package.create(folder, user, study, shift_dates=False, now=now)
+        for done, total in package.advance(math.inf):
+            self._tell(f"{done} of {total} sessions exported")
+        self.stderr.write("")
+        save_zip(package.files(), file)
+        package.discard()
 
 
 def write_files(results: Results, folder: Path) -> str:

@@ -22,6 +22,9 @@ CONFIDENCE = 0.95
 RESAMPLES = 1000
 SEED = 1908  # of the bootstrap: the same data give the same interval
 MIN_PARTICIPANTS = 3  # of an arm that an interval is told of
+# Of an arm that is resampled: of fewer, resamples are too few different ones, and some have hardly
+# any spread to divide by.
+MIN_RESAMPLED = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +134,9 @@ def _effect(a: Floats, b: Floats, *, paired: bool) -> Interval | None:
         apart = x.mean(axis=axis) - y.mean(axis=axis)
         return np.asarray(correction * np.divide(apart, np.where(spread > 0, spread, np.inf)))
 
+    estimate = float(g(a, b))
+    if min(len(a), len(b)) < MIN_RESAMPLED:
+        return Interval(estimate)
     resampled = stats.bootstrap(
         (a, b),
         g,
@@ -143,4 +149,4 @@ def _effect(a: Floats, b: Floats, *, paired: bool) -> Interval | None:
     ).confidence_interval
     low, high = float(resampled.low), float(resampled.high)
     found = np.isfinite([low, high]).all()
-    return Interval(float(g(a, b)), *((low, high) if found else (None, None)))
+    return Interval(estimate, *((low, high) if found else (None, None)))

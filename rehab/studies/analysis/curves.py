@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehab.studies.analysis.comparison import CONFIDENCE, MIN_PARTICIPANTS, RESAMPLES, SEED
-from rehab.studies.analysis.walks import Floats, Walk
+from rehab.studies.analysis.comparison import mean_of
+from rehab.studies.analysis.walks import Walk
 
 BIN = 10  # strides of a point
 
@@ -57,38 +57,15 @@ def curve_of(walks: Sequence[Walk | None]) -> Curve:
 
 
 def average(curves: Sequence[Curve]) -> list[Point]:
-    """Return the mean curve of an arm's participants, with the band of a bootstrap over them.
+    """Return the mean curve of an arm's participants, with Student's interval at each place.
 
     Places that fewer than half of them reached are left out: they would show who was slow.
     """
     everywhere = {place for curve in curves for place in curve}
-    places = sorted(everywhere, key=lambda place: (place.visit, place.phase, place.bin))
-    table = np.array([[curve.get(place, np.nan) for place in places] for curve in curves])
-    if not table.size:
-        return []
-    known = np.isfinite(table)
-    lows, highs = _band(table, known)
     points = []
-    for column, place in enumerate(places):
-        count = int(known[:, column].sum())
-        if 2 * count < len(curves):
-            continue
-        mean = float(table[known[:, column], column].mean())
-        told = count >= MIN_PARTICIPANTS
-        low, high = (float(lows[column]), float(highs[column])) if told else (None, None)
-        points.append(Point(place, count, mean, low, high))
+    for place in sorted(everywhere, key=lambda place: (place.visit, place.phase, place.bin)):
+        values = [curve[place] for curve in curves if place in curve]
+        if 2 * len(values) >= len(curves):
+            mean = mean_of(values)
+            points.append(Point(place, len(values), mean.estimate, mean.low, mean.high))
     return points
-
-
-def _band(table: Floats, known: Floats) -> tuple[Floats, Floats]:
-    """Return the percentiles of the resampled means, shape (places,) each."""
-    drawn = np.random.default_rng(SEED).integers(0, len(table), (RESAMPLES, len(table)))
-    means = np.empty((RESAMPLES, table.shape[1]))
-    filled = np.where(known, table, 0.0)
-    for row, chosen in enumerate(drawn):
-        counts = known[chosen].sum(axis=0)
-        means[row] = filled[chosen].sum(axis=0) / np.maximum(counts, 1)
-        means[row][counts == 0] = np.nan
-    tail = (1 - CONFIDENCE) / 2
-    low, high = np.nanquantile(means, [tail, 1 - tail], axis=0)
-    return low, high

@@ -52,8 +52,10 @@ class Canvas:
         anchor: str = "start",
         color: str = INK,
         weight: str = "",
+        halo: bool = False,
     ) -> None:
-        """Write a line of text whose foot is at y."""
+        """Write a line of text whose foot is at y. ``halo``: white about it, over other lines."""
+        about = {"stroke": "#fff", "stroke_width": 4, "paint_order": "stroke"} if halo else {}
         self.add(
             "text",
             escape(text),
@@ -63,6 +65,7 @@ class Canvas:
             text_anchor=anchor,
             fill=color,
             font_weight=weight,
+            **about,
         )
 
     def mark(self, x: float, y: float, arm: int, size: float = 5.0, opacity: float = 1.0) -> None:

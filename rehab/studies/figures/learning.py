@@ -45,7 +45,7 @@ def draw_curves(
         return canvas.to_text()
     seen = [value for point in everything for value in (point.mean, point.low, point.high) if value]
     levels = ticks(min(*seen, 95.0), max(*seen, 105.0))
-    top, bottom = foot + 52, HEIGHT - BOTTOM
+    top, bottom = foot + 62, HEIGHT - BOTTOM
     places = _lay_out(everything, words)
 
     def y(value: float) -> float:

@@ -27,6 +27,8 @@ def draw_people(
     everything = [value for of_arm in values.values() for value in of_arm.values()]
     if not everything:
         return canvas.to_text()
+    means = [figure.mean for figure in finding.arms if figure.mean is not None]
+    everything += [end for mean in means for end in (mean.low, mean.high) if end is not None]
     levels = ticks(min(*everything, 0.0), max(*everything, 0.0))
     bottom = HEIGHT - BOTTOM
 
@@ -60,7 +62,8 @@ def draw_people(
                 canvas.line(aside, y(figure.mean.low), aside, y(figure.mean.high), color, 3)
             canvas.mark(aside, y(figure.mean.estimate), index, 8)
             told = number(round(figure.mean.estimate, 1))
-            canvas.words(aside + 14, y(figure.mean.estimate) + 5, told, color=INK, weight="700")
+            place = y(figure.mean.estimate) + 5
+            canvas.words(aside + 14, place, told, color=INK, weight="700", halo=True)
     return canvas.to_text()
 
 

@@ -13,12 +13,12 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 from rehab.people.access import for_roles, user_of
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.web.refusals import format_refusal
 from rehab.stations.builtin import first_station
 from rehab.studies.blinding import reveal_arms
 from rehab.studies.enrolling import enroll, withdraw
 from rehab.studies.forms import EnrollmentForm, PlaceForm
 from rehab.studies.pages.planning import get_study, is_assessor
+from rehab.studies.pages.refusals import refuse
 from rehab.studies.participants import Enrollment
 from rehab.studies.visits import next_visit, start_session
 from rehab.training.measures import InvalidSetting
@@ -44,7 +44,7 @@ def enroll_patient(request: HttpRequest, study_id: int) -> HttpResponse:
                 study, patient, form.levels, keep_data=keep_data, by=user, now=timezone.now()
             )
         except InvalidSetting as problem:
-            form.add_error(None, format_refusal(problem))
+            form.add_error(None, refuse(request, problem))
         else:
             return redirect("participant", enrollment_id=enrollment.pk)
     return render(request, "studies/enroll.html", {"study": study, "form": form})
@@ -88,7 +88,7 @@ def start_visit(request: HttpRequest, enrollment_id: int) -> HttpResponse:
         try:
             session = start_session(enrollment, form.place, user, timezone.now())
         except InvalidSetting as problem:
-            form.add_error(None, format_refusal(problem))
+            form.add_error(None, refuse(request, problem))
         else:
             return redirect("monitor", session_id=session.pk)
     return render_participant(request, enrollment, place=form)
@@ -115,5 +115,5 @@ def reveal(request: HttpRequest, enrollment_id: int) -> HttpResponse:
     try:
         arms = reveal_arms(enrollment, reason, emergency=emergency, by=user, now=timezone.now())
     except InvalidSetting as problem:
-        return render_participant(request, enrollment, 403, refused=format_refusal(problem))
+        return render_participant(request, enrollment, 403, refused=refuse(request, problem))
     return render_participant(request, enrollment, revealed=arms, told=_("The arm is revealed."))

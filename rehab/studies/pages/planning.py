@@ -29,6 +29,7 @@ from rehab.people.web.refusals import format_refusal
 from rehab.studies.blinding import MARKABLE, Task, give_mark, take_mark
 from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draft
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
+from rehab.studies.pages.refusals import log_refusal, refuse
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent
 from rehab.studies.protocol_pdf import write_pdf
 from rehab.studies.registration import close, register, revise, start
@@ -90,6 +91,8 @@ def plan_study(request: HttpRequest, study_id: int | None = None) -> HttpRespons
                 study.pk = None
         else:
             return redirect("study", study_id=study.pk)
+    if data is not None:
+        log_refusal(request)
     context = {"form": form, "arms": arms, "study": study if study_id else None}
     return render(request, "studies/form.html", context)
 
@@ -146,9 +149,13 @@ def _events(study: Study, user: User) -> QuerySet[StudyEvent]:
 def _markable(study: Study) -> list[tuple[str, Any, list[User]]]:
     """Return the marks that a lead can give, and whom each could be given to."""
     people = User.everywhere.filter(clinic=study.clinic_id, is_active=True).order_by("username")
-    return [
-        (task.value, task.label, list(people.filter(role=role))) for task, role in MARKABLE.items()
-    ]
+    found = []
+    for task, role in MARKABLE.items():
+        marked = study.marks.filter(task=task, ended_at=None).values("user")
+        found.append(
+            (task.value, task.label, list(people.filter(role=role).exclude(pk__in=marked)))
+        )
+    return found
 
 
 @for_roles(Role.LEAD, patients=False)
@@ -229,4 +236,4 @@ def _try(request: HttpRequest, act: Callable[[], Any]) -> None:
     try:
         act()
     except InvalidSetting as problem:
-        messages.error(request, format_refusal(problem))
+        messages.error(request, refuse(request, problem))

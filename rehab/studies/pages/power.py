@@ -17,12 +17,12 @@ from django.views.decorators.http import require_http_methods, require_POST
 from rehab.people.access import for_roles, user_of
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.web.refusals import format_refusal
 from rehab.sessions.forms.answers import NumberField
 from rehab.sessions.live import runtime
 from rehab.studies.drawing import outcome_label, outcome_unit
 from rehab.studies.models import Study
 from rehab.studies.pages.planning import get_study
+from rehab.studies.pages.refusals import refuse
 from rehab.studies.power_runs import SIMULATIONS_MAX, PowerRun, plan_run
 from rehab.studies.simulation.walkers import Population
 from rehab.training.measures import InvalidSetting
@@ -91,7 +91,7 @@ def show_power(request: HttpRequest, study_id: int) -> HttpResponse:
         try:
             run = plan_run(study, form.to_settings(), form.cleaned_data["simulations"], user, now)
         except InvalidSetting as problem:
-            form.add_error(None, format_refusal(problem))
+            form.add_error(None, refuse(request, problem))
         else:
             begin(run)
             return redirect("study-power", study_id=study.pk)

@@ -1,0 +1,117 @@
+"""The document of a study that is registered: all that decides what participants walk.
+
+What was added to GARRY later stands in it only where a study uses it, so that studies that were
+registered before keep their digest.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from hashlib import sha256
+from typing import Any
+
+from rehab.feedback.models import FeedbackType
+from rehab.questionnaires.instrument import Instrument
+from rehab.sessions.questionnaires import find_instrument
+from rehab.studies.models import Arm, Study
+from rehab.training.goals import GoalRule
+from rehab.training.measures import A2
+from rehab.training.phases import Phase
+from rehab.training.plans import SessionPlan
+from rehab.training.scoring import RULES_VERSION
+from rehab.training.steps import Side
+from rehab.training.valences import find_valence
+
+USUAL_PHASE = {"goal_percent": None, "robot": True, "rest_s": None}
+
+
+def describe(study: Study) -> dict[str, Any]:
+    """Return the study as it is registered. Raises InvalidSetting for one that could not be run."""
+    scheme = study.scheme()
+    plan = study.visit_plan
+    document = {
+        "code": study.code,
+        "title": study.title,
+        "clinic": study.clinic.name,
+        "question": study.question,
+        "participants": study.participants,
+        "months_since_stroke_at_least": study.months_since_stroke,
+        "design": "crossover" if study.crossover else "parallel",
+        "arms": [_describe_arm(study, arm) for arm in study.arms.select_related("measure")],
+        "allocation": scheme.to_json() | {"commitment_sha256": study.commitment},
+        "visits": {
+            "in_each_period": plan.visits,
+            "days_between": plan.days_between,
+            "days_between_periods": plan.washout_days,
+        },
+        "goal_percent_of_baseline": study.goal_percent,
+        "primary_outcome": study.primary_outcome,
+        "secondary_outcomes": study.secondary_outcomes,
+        "scoring_rules_version": RULES_VERSION,
+    }
+    stored: dict[str, Any] = json.loads(json.dumps(document))  # so that tuples are lists
+    return stored
+
+
+def digest_of(document: dict[str, Any]) -> str:
+    """Return the SHA-256 of a document, as JSON with sorted keys and without blanks."""
+    text = json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return sha256(text.encode()).hexdigest()
+
+
+def _describe_arm(study: Study, arm: Arm) -> dict[str, Any]:
+    phases, schedule = arm.phases(), arm.to_rule().condition.schedule
+    measure, protocol = arm.measure.to_rule(), arm.protocol
+    assert protocol is not None  # noqa: S101 - phases() refuses an arm without one
+    SessionPlan(  # raises InvalidSetting for one that could not be walked
+        measure=measure,
+        valence=find_valence(arm.valence),
+        phases=phases,
+        trained_side=Side.LEFT,
+        goal=GoalRule(percent_of_baseline=study.goal_percent),
+        schedule=schedule,
+    )
+    told: dict[str, Any] = {
+        "code": arm.code,
+        "name": arm.name,
+        "weight": arm.weight,
+        "feedback_type": arm.valence,
+        "gain": arm.gain,
+        "robot_intensity": arm.robot_intensity,
+        "measure": arm.measure.slug,
+        "protocol": protocol.name,
+        "phases": [_describe_phase(phase) for phase in phases],
+    }
+    if measure != A2:
+        told["measure_rule"] = asdict(measure)
+    if not schedule.tells_all:
+        told["schedule"] = asdict(schedule)
+    if protocol.close_percent is not None:
+        told["close_percent"] = protocol.close_percent
+    asked = [find_instrument(slug, study.clinic_id, "en") for slug in protocol.questionnaires]
+    if asked:
+        told["questionnaires"] = [_describe_questionnaire(one) for one in asked]
+    edited = FeedbackType.everywhere.filter(clinic=study.clinic_id, slug=arm.valence).first()
+    if edited is not None:
+        told["feedback"] = _describe_feedback(edited)
+    return told
+
+
+def _describe_phase(phase: Phase) -> dict[str, Any]:
+    told = asdict(phase)
+    return {name: told[name] for name in told if told[name] != USUAL_PHASE.get(name, ...)}
+
+
+def _describe_questionnaire(instrument: Instrument) -> dict[str, Any]:
+    return {"title": instrument.title, "items": [item.text for item in instrument.items]}
+
+
+def _describe_feedback(edited: FeedbackType) -> dict[str, Any]:
+    """Return what the clinic made of a feedback type, with its words in all languages."""
+    fields = ("hit_points", "miss_points", "cue_above", "cue_below")
+    return {name: getattr(edited, name) for name in fields} | {
+        "bands": list(
+            edited.bands.order_by("from_percent").values("from_percent", "words", "confetti")
+        )
+    }

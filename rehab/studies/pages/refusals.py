@@ -1,0 +1,24 @@
+"""What a study's pages refuse: told with the cure, and logged without a name."""
+
+from __future__ import annotations
+
+import logging
+
+from django.http import HttpRequest
+
+from rehab.people.access import user_of
+from rehab.people.web.refusals import format_refusal
+from rehab.training.measures import InvalidSetting
+
+log = logging.getLogger(__name__)
+
+
+def refuse(request: HttpRequest, problem: InvalidSetting) -> str:
+    """Return why something cannot be done, in the reader's language, and log that it was asked."""
+    log_refusal(request)
+    return format_refusal(problem)
+
+
+def log_refusal(request: HttpRequest) -> None:
+    """Log who was refused what. The words may name a patient or an arm, and stay out of it."""
+    log.warning("Refused to account %s: %s", user_of(request).pk, request.path)

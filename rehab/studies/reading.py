@@ -1,0 +1,188 @@
+"""A study's participants, read from the logs of their sessions: once, until something changes.
+
+The log of a session that has ended stays as it is. So a participant is read again only where a row
+differs that decides which sessions count; the process keeps what it read for its latest studies.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import date
+from functools import cached_property
+from typing import Any
+
+from django.db.models import Count, Sum
+
+from rehab.sessions.log import SessionMetric, Step
+from rehab.sessions.models import TrainingSession
+from rehab.studies.analysis.curves import Point
+from rehab.studies.analysis.participants import (
+    Finding,
+    Participant,
+    Visit,
+    Walked,
+    curves_by_arm,
+    find,
+    make_participant,
+)
+from rehab.studies.analysis.walks import COLUMNS, read_walk
+from rehab.studies.models import Study
+from rehab.studies.participants import Enrollment, StudyVisit
+from rehab.training.changes import State
+from rehab.training.plans import SessionPlan
+
+KEPT_STUDIES = 8
+UNREAD = ("session__plan", "session__checkpoint", "session__legacy_row")  # large, and seldom needed
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What was computed of participants, nothing of it twice."""
+
+    participants: tuple[Participant, ...]
+    arms: tuple[str, ...]
+    crossover: bool
+
+    @cached_property
+    def _findings(self) -> dict[str, Finding]:
+        return {}
+
+    def find(self, slug: str) -> Finding:
+        """Return what was found of an outcome."""
+        if slug not in self._findings:
+            found = find(self.participants, self.arms, slug, crossover=self.crossover)
+            self._findings[slug] = found
+        return self._findings[slug]
+
+    @cached_property
+    def curves(self) -> dict[str, list[Point]]:
+        """The mean curve of each arm, by its code."""
+        return curves_by_arm(self.participants, self.arms)
+
+
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    people: Mapping[int, tuple[Any, Participant]]  # by enrollment: what it was read from
+    analysis: Analysis
+
+
+# By the study's key and its seal, which no other one has, also after a restore.
+_kept: OrderedDict[tuple[int, str], _Kept] = OrderedDict()
+
+
+def analyze(study: Study, arms: tuple[str, ...], until: date) -> Analysis:
+    """Return what a study's participants gave. ``until``: visits up to this day are due."""
+    place = study.pk, study.sealed
+    known = _kept.get(place)
+    people = _read_people(study, until, {} if known is None else known.people)
+    analysis = Analysis(tuple(one for _key, one in people.values()), arms, study.crossover)
+    if known is not None and _is_same(known.analysis, analysis):
+        analysis = known.analysis
+    _kept[place] = _Kept(people, analysis)
+    _kept.move_to_end(place)
+    while len(_kept) > KEPT_STUDIES:
+        _kept.popitem(last=False)
+    return analysis
+
+
+def _is_same(one: Analysis, other: Analysis) -> bool:
+    return (
+        (one.arms, one.crossover) == (other.arms, other.crossover)
+        and len(one.participants) == len(other.participants)
+        and all(a is b for a, b in zip(one.participants, other.participants, strict=True))
+    )
+
+
+def _read_people(
+    study: Study, until: date, known: Mapping[int, tuple[Any, Participant]]
+) -> dict[int, tuple[Any, Participant]]:
+    """Return everybody who was ever taken in, by enrollment; as known where nothing differs."""
+    metrics = _sum_metrics(study)
+    people = {}
+    for enrollment in study.enrollments.select_related("allocation").order_by("pk"):
+        visits = latest_attempts(enrollment)
+        key = (_key(enrollment, visits, until), metrics.get(enrollment.pk))
+        earlier = known.get(enrollment.pk)
+        if earlier is None or earlier[0] != key:
+            earlier = (key, _read(enrollment, visits, until))
+        people[enrollment.pk] = earlier
+    return people
+
+
+def _sum_metrics(study: Study) -> dict[int, tuple[int, float]]:
+    """Return count and sum of what the sessions of each enrollment store of themselves."""
+    of_whom = "session__study_visit__enrollment"
+    rows = SessionMetric.everywhere.filter(**{f"{of_whom}__study": study}).order_by()
+    sums = rows.values_list(of_whom).annotate(Count("pk"), Sum("value"))
+    return {enrollment: (count, total) for enrollment, count, total in sums}
+
+
+def _key(enrollment: Enrollment, visits: list[StudyVisit], until: date) -> tuple[Any, ...]:
+    """Return all that decides what is read of a participant, beside the logs."""
+    return (
+        *(enrollment.code, enrollment.patient_id, enrollment.allocation.group),
+        *(enrollment.withdrawn_at, enrollment.is_analyzed),
+        *((visit.number, visit.period, _is_due(visit, until), _told(visit)) for visit in visits),
+    )
+
+
+def _told(visit: StudyVisit) -> tuple[Any, ...] | None:
+    session = visit.session
+    if session is None:
+        return None
+    return (
+        *(session.pk, session.state, session.excluded, session.patient_id, session.trained_side),
+        *(session.created_at, session.ended_at, session.last_number),
+    )
+
+
+def _is_due(visit: StudyVisit, until: date) -> bool:
+    return visit.session_id is not None or visit.day <= until
+
+
+def _read(enrollment: Enrollment, visits: list[StudyVisit], until: date) -> Participant:
+    group = enrollment.allocation.group.split("-")
+    planned = [
+        (
+            Visit(visit.number, group[visit.period], _is_due(visit, until)),
+            _walked(enrollment, visit),
+        )
+        for visit in visits
+    ]
+    return make_participant(
+        enrollment.code,
+        planned,
+        has_left=enrollment.withdrawn_at is not None,
+        is_analyzed=enrollment.is_analyzed,
+    )
+
+
+def latest_attempts(enrollment: Enrollment) -> list[StudyVisit]:
+    """Return the last attempt at each planned visit, in their order."""
+    visits = enrollment.visits.select_related("session").defer(*UNREAD)
+    return list({visit.number: visit for visit in visits.order_by("number", "attempt")}.values())
+
+
+def _walked(enrollment: Enrollment, visit: StudyVisit) -> Walked | None:
+    """Return what a visit gave; None of one that does not count, or was corrected away."""
+    session = visit.session
+    if session is None or session.state != State.FINISHED or session.excluded:
+        return None
+    if session.patient_id != enrollment.patient_id or not enrollment.is_analyzed:
+        return None
+    return read_walked(session)
+
+
+def read_walked(session: TrainingSession) -> Walked:
+    """Return a finished session's strides and metrics."""
+    plan = SessionPlan.from_json(session.plan)
+    metrics = dict(session.metrics.values_list("slug", "value"))
+    rows = Step.everywhere.filter(session=session, side=session.trained_side).order_by("number")
+    walk = read_walk(
+        plan.phases,
+        rows.values_list(*COLUMNS).iterator(),
+        higher_is_better=plan.measure.higher_is_better,
+    )
+    return Walked(walk, metrics)
