@@ -2,90 +2,101 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from rehab.gait.signals.filters import Floats, find_upper_median
 
-# A foot that leaves unloads by 1 N/ms and more below that; dragging, the force stays as it is.
-DRAG_S = 0.08
-ELBOW_S = 0.02
-ELBOW_N = 8.0  # by which less is unloaded in ``ELBOW_S``
-# A foot that is dragged once it has left bears less by so much when it leaves; how soon before, and
-# over what the plate's noise is averaged.
-DIP_N, DIP_S, QUIET_S = 12.0, 0.06, 0.005
-LOADING_S = 0.06  # before the force of a contact is certain, a drag is over
+# A foot that leaves unloads by 1 N/ms and more, and one that lands is loaded as fast; dragged, its
+# force rests.
+REST_S = 0.06  # both halves of which are the same
+REST_N = 8.0
+LEVEL_S = 0.06  # over which the force of a drag is taken
+# A foot that is dragged only while it swings bears less when it leaves and when it lands; how long
+# it falls below the drag, by how much, and over what the plate's noise is averaged.
+DIP_N, DIP_S, QUIET_S = 16.0, 0.06, 0.005
+SLOPE_N = 30.0  # over which the slope before the drag is taken
+BEYOND_S = 0.03  # at most that it is continued
+HIDDEN = 0.4  # of the drag, above which a foot's own force is taken to end
 
 
-def find_elbow(force_n: Floats, rate_hz: float, release_n: float) -> tuple[int, float] | None:
-    """Return the sample at which a foot leaves that is dragged on, and the force there [N].
+def find_edge(
+    force_n: Floats, rate_hz: float, zero_n: float, release_n: float, least_n: float
+) -> float | None:
+    """Return where a foot leaves that is dragged on, None where nothing drags it.
+
+    Where the force dips below the drag, that is where it crosses the release threshold, or would
+    soon. Else the drag hides the end of unloading, and may have begun before it or after it: the
+    slope is continued to between both (docs/reference/gait.md#contacts).
 
     Parameters
     ----------
     force_n
-        From when it is too small for a contact, and ``ELBOW_S`` before, shape (n,).
-    rate_hz, release_n
-        Of the samples; and by how much the force exceeds the drag where the foot leaves.
+        From when it is too small for a contact, shape (n,). Of a foot that lands, in reverse.
+    rate_hz
+        Of the samples.
+    zero_n, release_n
+        The plate's zero, and the threshold above it [N].
+    least_n
+        The least force above the zero that is taken for a drag [N].
 
     Returns
     -------
-    None where the force falls on.
+    In samples from the first one.
     """
-    width = max(2, round(ELBOW_S * rate_hz))
-    if not np.isfinite(force_n).all() or len(force_n) < 3 * width:
+    width = max(2, round(REST_S / 2 * rate_hz))
+    if len(force_n) < 2 * width or not np.isfinite(force_n).all():
         return None
-    mean = np.convolve(force_n, np.full(width, 1 / width), "valid")
-    flat = np.flatnonzero(np.abs(mean[:-width] - mean[width:]) < ELBOW_N)
-    if not len(flat):
+    mean = average(force_n, width)
+    rests = np.abs(mean[:-width] - mean[width:]) < REST_N
+    first = int(rests.argmax())
+    if not rests[first]:
         return None
-    level = find_upper_median(force_n[flat[0] :]) + release_n
-    above = np.flatnonzero(force_n > level)
-    if not len(above):
-        return int(flat[0]), level
-    falls = min(int(above[-1]) + 1, len(force_n) - 1)
-    dip = _find_dip(force_n[falls : falls + round(DIP_S * rate_hz)], rate_hz, level - release_n)
-    return (falls, level) if dip is None else (falls + dip, float(force_n[falls + dip]))
+    level_n = find_upper_median(force_n[first : first + round(LEVEL_S * rate_hz)])
+    if level_n - zero_n < least_n:
+        return None
+    quiet = average(force_n, max(1, round(QUIET_S * rate_hz)))
+    middle = (len(force_n) - len(quiet)) / 2
+    fallen = int((quiet <= level_n + REST_N).argmax())
+    last = max(0, fallen - 1)
+    slope = _find_slope(quiet[: last + 1])
+    if not slope:  # of few samples
+        last, slope = fallen, _find_slope(quiet[: fallen + 1])
+    free_n, apart = zero_n + release_n, max(1.0, QUIET_S * rate_hz)
+    # It falls on as steeply, or half as steeply.
+    reach = 2 * max(0.0, level_n - free_n) / slope + apart if slope > 0 else 0.0
+    dip = fallen + _find_dip(quiet[fallen : fallen + 1 + round(min(reach, DIP_S * rate_hz))])
+    if quiet[dip] < level_n - DIP_N:
+        last = _find_last_above(quiet[: dip + 1], free_n)
+        slope = _find_slope(quiet[: last + 1])
+    else:
+        apart = BEYOND_S * rate_hz
+        free_n += HIDDEN * (level_n - zero_n)
+    further = float(quiet[last] - free_n) / slope if slope > 0 else 0.0
+    place = last + max(-apart, min(apart, further)) + middle
+    return min(max(0.0, place), len(force_n) - 1.0)
 
 
-def _find_dip(force_n: Floats, rate_hz: float, drag_n: float) -> int | None:
-    """Return where a foot bears least before it is dragged, None where it bears no less."""
-    least, least_n = find_least(force_n, rate_hz)
-    return least if least_n < drag_n - DIP_N else None
+def _find_slope(falling: Floats) -> float:
+    """Return by how much values fall each time at the end, 0 where they do not."""
+    last = len(falling) - 1
+    before = _find_last_above(falling, float(falling[last]) + SLOPE_N)
+    return float(falling[before] - falling[last]) / (last - before) if before < last else 0.0
 
 
-def find_least(force_n: Floats, rate_hz: float) -> tuple[int, float]:
-    """Return where a falling force is least before it rises again, and what it is there [N].
-
-    The plate's noise is averaged.
-    """
-    width = max(1, round(QUIET_S * rate_hz))
-    if len(force_n) < width:
-        return 0, math.inf
-    mean = np.convolve(force_n, np.full(width, 1 / width), "valid")
-    risen = mean > np.minimum.accumulate(mean) + ELBOW_N
+def _find_dip(values: Floats) -> int:
+    """Return where values are least before they rise again."""
+    risen = values > np.minimum.accumulate(values) + REST_N
     again = int(risen.argmax())
-    least = int(mean[: again if risen[again] else None].argmin())
-    return least + width // 2, float(mean[least])
+    return int(values[: again if risen[again] else None].argmin())
 
 
-def find_drag(before_n: Floats, rate_hz: float, offset_n: float) -> float | None:
-    """Return the force that drags a foot before it is loaded [N], None where nothing does.
+def _find_last_above(values: Floats, level: float) -> int:
+    """Return the index of the last value above a level, 0 without one."""
+    above = np.flatnonzero(values > level)
+    return int(above[-1]) if len(above) else 0
 
-    A foot that is loaded slowly is loaded more and more; one that is dragged rests on the way.
 
-    Parameters
-    ----------
-    before_n
-        Before the contact is certain, shape (n,).
-    rate_hz, offset_n
-        Of the samples, and the plate's zero [N].
-    """
-    loading, dragged = max(2, int(LOADING_S * rate_hz)), max(3, round(DRAG_S * rate_hz))
-    held = before_n[-loading - dragged : -loading]
-    if len(held) < dragged or not math.isfinite(held.sum()):
-        return None
-    half = len(held) // 2
-    rise = find_upper_median(held[half:]) - find_upper_median(held[:half])
-    drag = find_upper_median(held)
-    return drag if drag > offset_n + ELBOW_N and abs(rise) < 2 * ELBOW_N else None
+def average(values: Floats, width: int) -> Floats:
+    """Return the means of each ``width`` neighbors, of which there are as many or more."""
+    means: Floats = np.convolve(values, np.full(width, 1 / width), "valid")
+    return means

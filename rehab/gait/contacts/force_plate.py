@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehab.gait.contacts.drag import DIP_S, DRAG_S, ELBOW_S, find_drag, find_elbow, find_least
+from rehab.gait.contacts.drag import QUIET_S, REST_N, average, find_edge
 from rehab.gait.contacts.zero import PlateZero, find_finite_median
 from rehab.gait.signals.buffer import LegBuffer
-from rehab.gait.signals.filters import Floats, find_maximum
+from rehab.gait.signals.filters import Floats, find_maximum, find_minimum
 from rehab.gait.signals.samples import FORCE, TIME
 
 # Force is not filtered here: 20 Hz of causal filter would move both events by 10 ms
@@ -25,9 +25,10 @@ BOUNCE_S = 0.15  # no foot swings faster; a contact sooner than that goes on wit
 # where it leaves the level of the drag.
 CERTAIN = 0.15  # of body weight
 LOOK_BACK_S = 0.25  # from there to the release threshold, for a foot that is loaded slowly
+DRAG_S, LOOK_EVERY_S = 0.08, 0.02  # after so long of an uncertain contact a drag is looked for
 STUCK_S = 4.5  # in contact for longer: standing, or the plate's zero has moved above the threshold
 BLOCK_S = 0.1
-BEFORE_END_S = 0.03  # where a plate is looked at that bears least when a foot leaves
+AROUND_S = 0.015  # around both ends of a swing, where a plate bears least if the foot is dragged
 
 
 @dataclass(slots=True, eq=False)
@@ -98,9 +99,11 @@ class ContactFinder:
         self._last: Contact | None = None  # the last step
         self._zero_index = 0  # swing samples before this belong to another zero
         self._stuck_index = 0
+        self._end_index = 0  # of the newest contact
         self._low_index: int | None = None  # since when the force of a contact is not certain
+        self._look_index = 0  # when a drag is looked for in a contact that is not certain
         self._dragged = max(3, round(DRAG_S * rate_hz))
-        self._elbow = max(2, round(ELBOW_S * rate_hz))
+        self._look_every = max(2, round(LOOK_EVERY_S * rate_hz))
 
     @property
     def offset_n(self) -> float:
@@ -165,26 +168,26 @@ class ContactFinder:
                     return None
                 done += step
                 self._low_index = start + done
+                self._look_index = start + done + self._dragged
             again = int((~low[done:]).argmax())
             stop = len(rest) if low[done + again] else done + again
-            due = self._low_index + self._dragged - start
+            due = self._look_index - start
             part = rest[done : min(stop, due + 1)]
             free = part < self.offset_n + self._release_n
             step = int(free.argmax()) if len(free) else 0
             if len(free) and free[step]:
                 at = start + done + step
-                elbow = None
+                found = None
                 if at - self._low_index >= self._dragged // 2:
-                    elbow = self._find_drag_end(self._low_index, at)
-                index, level = elbow or (at, self.offset_n + self._release_n)
-                self._end(index, at, level, ended)
+                    found = self._find_drag_end(self._low_index, at, self._release_n + REST_N)
+                self._end(*(found or self._find_crossing(at)), at, ended)
                 return at
             if due < stop:
-                elbow = self._find_drag_end(self._low_index, start + due)
-                if elbow is not None:
-                    self._end(elbow[0], start + due, elbow[1], ended)
+                found = self._find_drag_end(self._low_index, start + due, 0.0)
+                if found is not None:
+                    self._end(*found, start + due, ended)
                     return start + due
-                self._low_index += self._elbow  # looked at anew a little later
+                self._look_index += self._look_every
                 done = max(done, due)
                 continue
             done = stop
@@ -192,16 +195,26 @@ class ContactFinder:
                 self._low_index = None
         return None
 
-    def _find_drag_end(self, low: int, last: int) -> tuple[int, float] | None:
-        """Return where, and at which force [N], a stance ended whose foot drags on, if it did."""
+    def _find_drag_end(self, low: int, last: int, least_n: float) -> tuple[int, float] | None:
+        """Return at which sample and when [s] a stance ended whose foot drags on, if it did."""
         contact = self._current
         assert contact is not None  # noqa: S101 (for mypy)
         if not self._is_step(contact, low):
             return None
-        first = max(contact.begin_index, low - self._elbow)
+        first = max(contact.begin_index, low - self._look_every)
         force = self._buffer.channel(FORCE, first, last + 1)
-        elbow = find_elbow(force, self._rate_hz, self._release_n)
-        return None if elbow is None else (first + elbow[0], elbow[1])
+        edge = find_edge(force, self._rate_hz, self.offset_n, self._release_n, least_n)
+        return None if edge is None else self._find_place(first + edge)
+
+    def _find_place(self, place: float) -> tuple[int, float]:
+        """Return the first sample behind a place between samples, and the time of the place [s]."""
+        index = max(1, math.ceil(place))
+        t0, t1 = self._buffer.channel(TIME, index - 1, index + 1).tolist()
+        return index, t0 + (place - index + 1) * (t1 - t0)
+
+    def _find_crossing(self, index: int) -> tuple[int, float]:
+        """Return a sample, and when the force crossed the release threshold before it [s]."""
+        return index, self._interpolate_crossing(index, self.offset_n + self._release_n)
 
     def truncate(self) -> Contact | None:
         """Return the step under way, as if it ended with the last sample, if there is one."""
@@ -215,18 +228,19 @@ class ContactFinder:
 
     def _begin(self, index: int) -> None:
         buffer = self._buffer
-        first = max(0, buffer.samples.first, index - max(2, int(LOOK_BACK_S * self._rate_hz)))
+        back = max(2, int(LOOK_BACK_S * self._rate_hz))
+        first = max(self._end_index, buffer.samples.first, index - back)
         before = buffer.channel(FORCE, first, index)
-        drag_n = find_drag(before, self._rate_hz, self.offset_n)
-        level = (self.offset_n if drag_n is None else drag_n) + self._release_n
-        below = np.flatnonzero(before <= level)
-        seen = len(below) > 0
-        at = first + int(below[-1]) + 1 if seen else index
-        time_s = (
-            self._interpolate_crossing(at, level)
-            if seen
-            else float(buffer.channel(TIME, at, at + 1)[0])
-        )
+        loading = buffer.channel(FORCE, first, index + 1)[::-1]
+        edge = find_edge(loading, self._rate_hz, self.offset_n, self._release_n, REST_N)
+        below = np.flatnonzero(before <= self.offset_n + self._release_n)
+        seen = edge is not None or len(below) > 0
+        if edge is not None:
+            at, time_s = self._find_place(max(index - edge, first))
+        elif seen:
+            at, time_s = self._find_crossing(first + int(below[-1]) + 1)
+        else:
+            at, time_s = index, float(buffer.channel(TIME, index, index + 1)[0])
         last = self._last
         bounce = last is not None and last.end_s is not None and 0 <= time_s - last.end_s < BOUNCE_S
         if seen and not bounce:
@@ -242,12 +256,12 @@ class ContactFinder:
         while len(recent) > 1 and (end := recent[1].end_index) is not None and end < index:
             recent.popleft()
 
-    def _end(self, index: int, known: int, level: float, ended: list[Contact]) -> None:
-        """End the contact at a sample, known at another one, where the force crosses a level."""
+    def _end(self, index: int, time_s: float, known: int, ended: list[Contact]) -> None:
+        """End the contact at a sample and time [s], known at another sample."""
         contact = self._current
         assert contact is not None  # noqa: S101 (for mypy)
         contact.end_index, contact.known_index = index, known
-        contact.end_s = self._interpolate_crossing(index, level)
+        contact.end_s, self._end_index = time_s, index
         self._current = self._low_index = None
         if not self._is_step(contact, index):
             self.recent.pop()  # it is the newest
@@ -279,10 +293,17 @@ class ContactFinder:
         swing = self._buffer.channel(FORCE, begin + margin, index - margin)
         least_n = math.inf
         if last is not None and last.end_index == begin:
-            first = max(begin - round(BEFORE_END_S * self._rate_hz), self._buffer.samples.first)
-            stop = min(begin + round(DIP_S * self._rate_hz) + 1, index)
-            least_n = find_least(self._buffer.channel(FORCE, first, stop), self._rate_hz)[1]
+            least_n = min(
+                self._find_least_around(begin, index), self._find_least_around(index, index)
+            )
         self._zero.learn(swing, least_n)
+
+    def _find_least_around(self, middle: int, stop: int) -> float:
+        """Return the least force around a contact, its noise averaged, before sample ``stop``."""
+        around = math.ceil(AROUND_S * self._rate_hz)
+        first = max(middle - around, self._buffer.samples.first)
+        force = self._buffer.channel(FORCE, first, min(middle + around, stop) + 1)
+        return find_minimum(average(force, max(1, min(len(force), round(QUIET_S * self._rate_hz)))))
 
     def _recover_from_drift(self, index: int) -> None:
         """Reset the plate's zero where it has drifted so far that a contact does not end.

@@ -7,14 +7,14 @@ from collections import deque
 
 import numpy as np
 
-from rehab.gait.contacts.drag import DIP_N
 from rehab.gait.signals.filters import Floats, find_upper_median
 
 OFFSET_MAX = 0.15  # of body weight; a plate that reads more in swing needs its own zero button
 OFFSET_SWINGS = 10
 # A zero drifts by less from swing to swing; one that was set anew is the same in each, a drag not.
 ZERO_STEP_N = 15.0
-ZERO_SWINGS, ZERO_SPREAD_N = 3, 5.0
+ZERO_SWINGS, ZERO_SPREAD_N = 3, 4.0
+LEAST_N = 10.0  # by which a plate that bears nothing all through a swing reads less at its ends
 QUIET_N = 8.0  # by which the parts of a swing differ that nothing loads
 
 
@@ -47,13 +47,14 @@ class PlateZero:
         swing
             Its middle, shape (n,).
         least_n
-            The least force around the end of the stance before: a plate reads no less than its zero
-            there, so that a swing that reads more is one of a foot that is dragged all through it.
+            The least force around both ends of the swing: no plate reads less than its zero there,
+            so that a swing that reads more is one of a foot that is dragged all through it.
         """
         if len(swing) < self._least:
             return
         zero = _find_zero(swing)
-        if zero - max(least_n, self.offset_n) > DIP_N:
+        if zero - least_n > LEAST_N:
+            self._zeros.clear()
             return
         self._zeros.append(zero)
         is_near = abs(zero - self.offset_n) <= ZERO_STEP_N

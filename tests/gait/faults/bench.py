@@ -67,8 +67,10 @@ FAULTS: dict[str, Callable[..., Walk]] = {
     **{
         f"drag {force} N, {name}": partial(drag, force_n=force, low=low, high=high)
         for name, low, high in (
+            ("first third", 0.0, 0.3),
             ("first half", 0.0, 0.5),
             ("second half", 0.5, 1.0),
+            ("last third", 0.7, 1.0),
             ("whole swing", 0.0, 1.0),
         )
         for force in (25, 40, 50, 60)
@@ -77,6 +79,7 @@ FAULTS: dict[str, Callable[..., Walk]] = {
     "straddle": straddle,
     **{f"clonus {share:g}": partial(shake, share=share) for share in (0.5, 1.0)},
 }
+CERTAIN_DRAGS = [name for name in FAULTS if name.startswith(("drag 40", "drag 50", "drag 60"))]
 SLOW_STRIDES_S = (2.2, 2.8, 3.4, 4.0)
 
 
@@ -87,8 +90,8 @@ def open_walk(name):
     return walk, walk.both_legs()
 
 
-def try_fault(name: str, fault: str) -> Tally:
-    """Return what a fault does to a recording."""
+def try_fault(name: str, fault: str, side: str = "left") -> Tally:
+    """Return what a fault does to a leg's strides of a recording."""
     walk, clean = open_walk(name)
     with np.errstate(all="ignore"):
-        return count(FAULTS[fault](walk, clean).both_legs(), clean)
+        return count(FAULTS[fault](walk, clean).both_legs(), clean, side)

@@ -10,24 +10,24 @@ NEAR_S = 0.1
 
 @dataclass(frozen=True)
 class Tally:
-    """Counts of the left leg's strides.
+    """Counts of a leg's strides.
 
     ``strides`` are valid without the fault; ``lost`` of them are not valid with it, and ``wrong``
     are shown with an A2 that is off by more than a tenth. ``worst`` is the largest error shown,
-    ``contact_s`` the largest of a valid stride's contacts.
+    ``contacts_s`` are the errors of the valid strides' contacts.
     """
 
     strides: int
     lost: int
     wrong: int
     worst: float
-    contact_s: float
+    contacts_s: tuple[float, ...]
 
 
-def count(found, clean) -> Tally:
-    """Return the tally of the left strides that were found against those of the same walk."""
-    own = [s for s in clean if s.side in (None, "left") and s.valid]
-    shown = [s for s in found if s.side in (None, "left") and s.valid]
+def count(found, clean, side="left") -> Tally:
+    """Return the tally of one leg's strides that were found against those of the same walk."""
+    own = [s for s in clean if s.side in (None, side) and s.valid]
+    shown = [s for s in found if s.side in (None, side) and s.valid]
     pairs = pair_up(shown, [s.initial_contact_s for s in own])
     errors = [
         abs(one.a2_w_kg / other.a2_w_kg - 1)
@@ -35,23 +35,21 @@ def count(found, clean) -> Tally:
         if one is not None
     ]
     known = {id(one) for one in pairs if one is not None}
-    others = [s.initial_contact_s for s in clean if s.side in (None, "left")]
+    others = [s.initial_contact_s for s in clean if s.side in (None, side)]
     strangers = sum(
         id(one) not in known and min(abs(one.initial_contact_s - o) for o in others) > NEAR_S
         for one in shown
     )
     contacts = [
-        max(
-            abs(one.initial_contact_s - other.initial_contact_s),
-            abs(one.terminal_contact_s - other.terminal_contact_s),
-        )
+        abs(getattr(one, name) - getattr(other, name))
         for one, other in zip(pairs, own, strict=True)
         if one is not None
+        for name in ("initial_contact_s", "terminal_contact_s")
     ]
     return Tally(
         strides=len(own),
         lost=sum(one is None for one in pairs),
         wrong=sum(error > WRONG for error in errors) + strangers,
         worst=max(errors, default=0.0),
-        contact_s=max(contacts, default=0.0),
+        contacts_s=tuple(sorted(contacts)),
     )

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from rehab.gait import Flag
-from tests.gait.faults.bench import FAULTS, RECORDINGS, SLOW_STRIDES_S, open_walk, try_fault
+from rehab.gait.contacts.drag import find_edge
+from tests.gait.faults.bench import (
+    CERTAIN_DRAGS,
+    FAULTS,
+    RECORDINGS,
+    SLOW_STRIDES_S,
+    open_walk,
+    try_fault,
+)
 from tests.gait.faults.spoil import lose, shake, stall
 from tests.gait.faults.tally import count
 from tests.gait.walks import make_walk, pair_up
@@ -69,15 +77,34 @@ def test_a_foot_that_drags(name, fault):
     tally = try_fault(name, fault)
 
     assert tally.wrong == 0
-    # moore2013 unloads so slowly that 60 N hide its last 45 ms.
-    assert tally.lost <= (0.3 if name == "moore" else 0.1) * tally.strides
+    assert tally.lost <= 0.1 * tally.strides
 
 
-@pytest.mark.parametrize("name", ["100 Hz", "1 kHz", "fast 100 Hz"])
-@pytest.mark.parametrize("force", [40, 50, 60])
-@pytest.mark.parametrize("part", ["", ", first half", ", second half", ", whole swing"])
-def test_contacts_of_a_foot_that_drags(name, force, part):
-    assert try_fault(name, f"drag {force} N{part}").contact_s < 0.02
+@pytest.mark.parametrize("name", RECORDINGS)
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("fault", CERTAIN_DRAGS)
+def test_contacts_of_a_foot_that_drags(name, side, fault):
+    """Of moore2013 99 % are within 20 ms, of the others all but one of 8500."""
+    tally = try_fault(name, fault, side)
+
+    assert np.mean(np.array(tally.contacts_s) < 0.02) > 0.92
+    assert tally.contacts_s[-1] < 0.045
+
+
+def test_a_drag_that_may_begin_before_the_foot_leaves_is_taken_in_the_middle():
+    """Two walks of the same force: its foot leaves when 20 N are left, and drags by 45 N.
+
+    Dragged all along it leaves 20 N before the force rests, at 0.080 s; dragged by what it does not
+    bear any more, it would have shed the rest after that, at 0.125 s.
+    """
+    time_s = np.arange(0.02, 0.3, 0.001)
+    dragged_all_along = np.maximum(100 - 1000 * time_s, 0) + 45
+    dragged_at_the_end = np.maximum(145 - 1000 * time_s, 45)
+    edge = find_edge(dragged_at_the_end, 1000, 0.0, 20.0, 8.0)
+
+    assert (dragged_all_along == dragged_at_the_end).all()
+    assert abs(time_s[0] + edge / 1000 - 0.080) < 0.03
+    assert abs(time_s[0] + edge / 1000 - 0.125) < 0.03
 
 
 @pytest.mark.parametrize("name", RECORDINGS)
