@@ -75,6 +75,11 @@ def test_a_simulated_study_goes_on_where_it_was_broken_off_and_writes_the_same_f
         find_or_plan(one, example_trial(8), 5, NOW)
 
 
+def test_a_name_of_an_arm_is_no_formula_in_a_table():
+    told = write_table([{"arm": "A: =1+1", "why": "x;=1+1"}, {"arm": "\r＝1", "why": None}])
+    assert told == "arm,why\r\nA: =1+1,x;'=1+1\r\n\"'\r'＝1\",\r\n"
+
+
 # --- who may look ---------------------------------------------------------------------------------
 
 

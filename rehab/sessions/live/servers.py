@@ -25,7 +25,7 @@ from rehab.sessions.live.following import (
     load_followed,
     read_new_rows,
 )
-from rehab.sessions.live.intercom import Data, Intercom, Unheard
+from rehab.sessions.live.intercom import HEARD_S, Data, Intercom, Unheard
 from rehab.sessions.live.own_connection import DatabaseThread
 from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.session import LiveSession, NotStored
@@ -143,7 +143,8 @@ class Servers:
 
     def drive_robot(self, owner: str, session_id: int, drive: Mapping[str, float]) -> None:
         """Pass on that a person drives the robot; what is lost is as if the button was let go."""
-        self.intercom.tell(owner, "drive", {"session": session_id, "drive": dict(drive)})
+        asked = {"session": session_id, "drive": dict(drive)}
+        self.intercom.tell(owner, "drive", asked, within_s=HEARD_S)
 
     def announce(self, session_id: int, station_id: int) -> None:
         """Tell devices that wait at other servers of a session."""
