@@ -24,8 +24,10 @@ from rehab.boards.ranking.eligibility import find_group
 from rehab.boards.ranking.results import Result, read_results
 from rehab.people.access import user_of
 from rehab.people.models import BoardsConsent, Patient
+from rehab.people.models.blinding import hidden_patients
 from rehab.people.roles import Role
 from rehab.people.web.admin_preview import PreviewAdmin, iter_form_errors
+from rehab.people.web.row_keys import read_key
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import State
 
@@ -154,9 +156,9 @@ class LeaderboardAdmin(PreviewAdmin):
             state=State.FINISHED.value
         )
         newest = finished.order_by("simulated", "-started_at")
-        chosen = request.GET.get("seen_as", "")
+        chosen = read_key(request.GET.get("seen_as", ""))
         walkers = self._patients_who_walked(request)
-        if chosen.isdecimal():
+        if chosen:
             patient = walkers.filter(pk=chosen).first()
         else:  # a patient who sees the board itself, where there is one
             typical = replace(anybody, session=newest.first()).find_typical()
@@ -178,10 +180,13 @@ class LeaderboardAdmin(PreviewAdmin):
         return [] if board.is_own else list(read_results(board, now))
 
     def _patients_who_walked(self, request: HttpRequest) -> QuerySet[Patient]:
-        """Return the patients who have walked, those who agreed to boards first."""
-        walked = Patient.objects.visible_to(request.user).filter(
-            sessions__state=State.FINISHED.value
-        )
+        """Return the patients who have walked, those who agreed to boards first.
+
+        A preview shows their own sessions, so those are left out whose sessions a study hides.
+        """
+        user = user_of(request)
+        walked = Patient.objects.visible_to(user).filter(sessions__state=State.FINISHED.value)
+        walked = walked.exclude(pk__in=hidden_patients(user))
         return walked.annotate(
             alone=Q(boards=BoardsConsent.OWN), last_here=Max("sessions__started_at")
         ).order_by("alone", "-last_here")

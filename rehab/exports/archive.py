@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import os
@@ -17,7 +16,7 @@ from django.core.serializers.json import DjangoJSONEncoder
 from django.http import StreamingHttpResponse
 from zipstream import ZipStream
 
-from rehab.exports.tables import format_cells
+from rehab.people.web.csv_tables import CsvWriter
 
 CHUNK_BYTES = 64 * 1024
 CSV_LINES = 500  # a chunk
@@ -58,13 +57,13 @@ def save_zip(files: Files, file: Path) -> None:
 
 def write_csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Iterator[str]:
     """Yield a table as CSV text, some lines at a time."""
-    cells = format_cells(rows)
+    remaining = iter(rows)
     lines: Iterable[Sequence[Any]] = [header]
     while lines:
         text = io.StringIO()
-        csv.writer(text, lineterminator="\r\n").writerows(lines)
+        CsvWriter(text).write(lines)
         yield text.getvalue()
-        lines = list(islice(cells, CSV_LINES))
+        lines = list(islice(remaining, CSV_LINES))
 
 
 def write_json(data: Any) -> Iterator[str]:

@@ -1,12 +1,9 @@
-"""The tables of exports: the meaning of each column, and the format of values."""
+"""The tables of exports, and the meaning of each column."""
 
 from __future__ import annotations
 
-import json
-import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import date
 from enum import StrEnum
 from typing import Any, NamedTuple
 
@@ -266,29 +263,3 @@ def codebook_rows() -> Iterator[tuple[Any, ...]]:
     """Yield `CODEBOOK` of every column: with the rules that this version of GARRY judges by."""
     for table in TABLES:
         yield from ((table.file, *column, RULES_VERSION) for column in table.columns)
-
-
-# Where a cell may begin for a spreadsheet, before what begins a formula (also in East Asian width).
-FORMULA_START = re.compile(r"(?:^|(?<=[;\t\r\n]))(?=[=+\-@＝＋－＠\t\r\n'])")
-
-
-def format_cell(value: Any) -> Any:
-    """Return a value as it is written to a file: floats exactly, text never as a formula.
-
-    A text that a spreadsheet could take for a formula gets a ' before it, at its beginning and,
-    since some split lines there, behind each semicolon, tab and line end; so does a '. Taking these
-    off gives back the original.
-    """
-    if value is None or (isinstance(value, (int, float)) and not isinstance(value, bool)):
-        return value  # csv writes a float by repr: read back, it is the same
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, date):  # or a moment
-        return value.isoformat()
-    text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
-    return FORMULA_START.sub("'", text)
-
-
-def format_cells(rows: Iterable[Sequence[Any]]) -> Iterator[list[Any]]:
-    """Return rows as they are written to a file."""
-    return ([format_cell(value) for value in row] for row in rows)

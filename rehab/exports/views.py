@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,6 @@ from rehab.exports.archive import ZipResponse
 from rehab.exports.forms import ResearchExportForm
 from rehab.exports.patient_data import patient_files, session_files
 from rehab.exports.research.package import Package, discard_old
-from rehab.exports.tables import format_cells
 from rehab.patients.pages.records import get_patient
 from rehab.people.access import for_roles, user_of
 from rehab.people.audit import audit_log
@@ -27,6 +25,7 @@ from rehab.people.models import Patient, User
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.sign_in import step_up
+from rehab.people.web.csv_tables import CsvWriter
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.insight import read_view, to_table
 
@@ -138,7 +137,7 @@ def download_insight(request: HttpRequest) -> HttpResponse:
     name = f"garry-insight-{now:%Y-%m-%d}.csv"
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
     response = HttpResponse(content_type="text/csv; charset=utf-8", headers=headers)
-    csv.writer(response, lineterminator="\r\n").writerows(format_cells(to_table(view.shown)))
+    CsvWriter(response).write(to_table(view.shown))
     return response
 
 

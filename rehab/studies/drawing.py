@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Callable, Iterable
 from typing import Any
 
 from django.utils.translation import gettext, ngettext
 
+from rehab.people.web.csv_tables import CsvWriter
 from rehab.studies.analysis.outcomes import OUTCOMES
 from rehab.studies.analysis.participants import CHANNEL, by_arm
 from rehab.studies.figures.flow import Box, draw_flow
@@ -154,17 +154,8 @@ TABLES: dict[str, Callable[[Results], Iterable[dict[str, Any]]]] = {
 def write_table(rows: Iterable[dict[str, Any]]) -> str:
     """Return rows as CSV with a heading; numbers with a point, what is missing empty."""
     text = io.StringIO()
-    writer: csv.DictWriter[str] | None = None
+    writer, is_first = CsvWriter(text), True
     for row in rows:
-        if writer is None:
-            writer = csv.DictWriter(text, list(row), lineterminator="\n")
-            writer.writeheader()
-        writer.writerow({name: _cell(value) for name, value in row.items()})
+        writer.write([list(row), list(row.values())] if is_first else [list(row.values())])
+        is_first = False
     return text.getvalue()
-
-
-def _cell(value: Any) -> Any:
-    """Return a cell; text that a spreadsheet would take for a formula gets a quote before it."""
-    if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t"):
-        return f"'{value}"
-    return value

@@ -162,11 +162,15 @@ def check_no_open_session(study: Study, patient: Patient | None = None) -> None:
 
 
 def set_blinded(patient: Patient) -> None:
-    """Let a patient's boards and scores follow the enrollments: none during a study."""
+    """Let a patient's boards and scores follow the enrollments: none during a study.
+
+    It is saved where it stays the same, too: boards follow who saves it, and have those again who
+    left the study before its end.
+    """
     patient.lock()
     blinded = patient.enrollments.filter(
         study__state=StudyState.RUNNING, withdrawn_at=None
     ).exists()
-    if patient.blinded != blinded and patient.erased_at is None:
+    if patient.erased_at is None:
         patient.blinded = blinded
         patient.save_fields("blinded")

@@ -9,6 +9,7 @@ import re
 import secrets
 import tracemalloc
 from datetime import date, datetime, time
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -24,13 +25,15 @@ from hypothesis import strategies as st
 from rehab.boards.models import BoardEntry, Leaderboard
 from rehab.exports.archive import ZipResponse, write_csv, write_zip
 from rehab.exports.selection import PAGE_ROWS, Selection
-from rehab.exports.tables import STEPS, TABLES, format_cell
+from rehab.exports.tables import STEPS, TABLES
 from rehab.patients.visits import plan_visit
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import withdraw_consent
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
+from rehab.people.web import csv_tables
+from rehab.people.web.csv_tables import format_cell
 from rehab.sessions.corrections import CorrectedField, correct_session
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
@@ -308,6 +311,14 @@ def test_any_value_is_read_back_as_it_was(value):
         assert cell == {True: "true", False: "false", None: ""}[value]
     else:
         assert type(value)(cell) == value
+
+
+def test_every_table_for_spreadsheets_is_written_in_one_place():
+    """So that no new export can forget the quotes. Other modules read CSV, or write no text."""
+    root = Path(csv_tables.__file__).parents[2]
+    writers = re.compile(r"csv\.writer|DictWriter")
+    writing = [file.name for file in root.rglob("*.py") if writers.search(file.read_text())]
+    assert writing == ["csv_tables.py"]
 
 
 def test_a_nickname_that_is_a_formula_stays_text(world):

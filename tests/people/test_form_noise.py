@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from urllib.parse import urlencode
+
 import pytest
 from django.urls import reverse
 
@@ -19,6 +21,25 @@ def test_noise_to_every_form_fails_nowhere_and_leaks_nothing(capsys, requests):
     told = run_noise(requests)
     with capsys.disabled():
         print(f"\nForm noise: {told}")
+
+
+HUGE = "9" * 5000  # Python reads no number of so many digits
+
+
+@pytest.mark.django_db
+@pytest.mark.parametrize(
+    ("page", "query", "form", "status"),
+    [
+        ("add-recording-part", {"ending": ".csv", "at": HUGE}, {}, 400),
+        ("remove-authenticator", {"which": HUGE}, {}, 302),
+        ("confirm-reset", {}, {"which": HUGE}, 302),
+        ("pair", {}, {"station": HUGE, "code": "ABCD"}, 200),
+        ("leave", {}, {"station": HUGE}, 404),
+    ],
+)
+def test_a_number_that_is_longer_than_any_key_is_no_failure(world, page, query, form, status):
+    address = f"{reverse(page)}?{urlencode(query)}"
+    assert client_of(world, Role.LEAD).post(address, form).status_code == status
 
 
 @pytest.mark.django_db

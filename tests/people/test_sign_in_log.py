@@ -125,6 +125,23 @@ def test_new_recovery_codes_and_a_rejected_passkey_are_traced(pt, client):
     assert "Made new recovery codes" in browser.get(reverse("own-sign-ins")).content.decode()
 
 
+@pytest.mark.parametrize(
+    ("page", "form"),
+    [("add-passkey", {"passkey": "{}"}), ("add-passkey", {}), ("add-app", {"code": "000000"})],
+)
+def test_a_factor_that_is_not_accepted_is_traced(pt, page, form):
+    browser = Client(headers={"host": "localhost"})  # passkeys need a name
+    browser.force_login(pt)
+    browser.get(reverse(page))
+    assert browser.post(reverse(page), form).status_code == 200
+    assert not factors.authenticators_of(pt).exists()
+    entry = AuditEntry.everywhere.filter(act=Act.REFUSED).get()
+    assert (entry.by, entry.about, entry.count) == (pt, reverse(page), 1)
+    browser.post(reverse(page), form)
+    entry.refresh_from_db()
+    assert entry.count == 2  # repeats are counted
+
+
 def test_wrong_passkeys_lock_out_passkeys_alone(pt, client):
     secret = totp.generate_secret()
     code = totp.generate_code(secret, int(NOW.timestamp()) // totp.TIME_STEP_S - 100)

@@ -12,6 +12,7 @@ from rehab.people.roles import Right, rights_of
 from rehab.people.scope import CrossClinicReference, Scope, ScopedManager, UnscopedQuery
 from rehab.people.web.admin_base import ScopedOptions
 from rehab.stations.models import Device, Station
+from tests.support.foreign_writes import find_foreign_writes
 from tests.support.tenancy import (
     find_leaks,
     find_offers,
@@ -120,6 +121,23 @@ def test_no_route_shows_a_clinic_to_others(worlds, who):
     leaks, counts = find_leaks(worlds, some_actors(worlds, who))
     assert leaks == []
     assert counts[who] > 100  # the matrix is not empty
+
+
+@pytest.mark.parametrize(
+    "who",
+    [
+        "pt of amber",
+        *(
+            pytest.param(f"{role} of amber", marks=pytest.mark.long)
+            for role in ("lead", "researcher", "device")
+        ),
+    ],
+)
+def test_no_form_changes_rows_of_another_clinic(worlds, who):
+    (actor,) = some_actors(worlds, who)
+    leaks, count = find_foreign_writes(worlds, actor)
+    assert leaks == []
+    assert count > 100
 
 
 def test_every_view_says_who_may_open_it():

@@ -10,6 +10,7 @@ from django.contrib.admin.views.autocomplete import AutocompleteJsonView
 from django.db.models import Q
 from django.http import HttpRequest, HttpResponse
 from django.urls import URLPattern, path, reverse
+from django.views.decorators.http import require_POST
 
 from garry_site import urls as site_urls
 from rehab.boards.admin import LeaderboardAdmin
@@ -27,6 +28,7 @@ from rehab.people.web import admin_base
 from rehab.people.web.admin_base import ScopedOptions
 from rehab.sessions import api as sessions_api
 from rehab.sessions import corrections
+from tests.support.foreign_writes import find_foreign_writes
 from tests.support.tenancy import (
     all_routes,
     find_leaks,
@@ -236,6 +238,40 @@ def test_a_page_that_declares_nothing_is_closed_and_caught(worlds, settings, mon
     client = signed_in(worlds[0].people[Role.LEAD])
     assert client.get("/silent").status_code == 403
     assert undeclared_views() == ["silent"]
+
+
+def test_forms_that_act_on_any_clinics_rows_are_caught(worlds, settings, monkeypatch):
+    """By a key in the address, which a page for forms alone never shows when it is opened."""
+
+    @for_roles(Role.PT)
+    @require_POST
+    def rename(request: HttpRequest, patient_id: int) -> HttpResponse:
+        Patient.everywhere.filter(pk=patient_id).update(end_reason="moved")
+        return HttpResponse(status=404)
+
+    @for_roles(Role.PT)
+    @require_POST
+    def accept(request: HttpRequest, patient_id: int) -> HttpResponse:
+        return HttpResponse(status=204)
+
+    @for_roles(Role.PT)
+    @require_POST
+    def move(request: HttpRequest) -> HttpResponse:
+        Patient.everywhere.filter(pk=request.POST["patient"]).update(end_reason="moved")
+        return HttpResponse(status=204)
+
+    with_patterns(
+        *(settings, monkeypatch, path("leaky/move", move, name="move")),
+        path("leaky/<int:patient_id>/rename", rename, name="rename"),
+        path("leaky/<int:patient_id>/accept", accept, name="accept"),
+    )
+    (actor,) = some_actors(worlds, "pt of amber")
+    assert find_leaks(worlds, [actor], under="/leaky")[0] == []  # opened, they show nothing
+    leaks, _ = find_foreign_writes(worlds, actor, under="/leaky")
+    key = worlds[1].patient.pk
+    assert f"pt of amber: /leaky/{key}/rename changes Patient of birch" in leaks
+    assert f"pt of amber: /leaky/{key}/accept answers 204" in leaks
+    assert "pt of amber: /leaky/move changes Patient of birch" in leaks
 
 
 def test_an_address_with_an_unknown_parameter_is_caught(worlds, settings, monkeypatch):

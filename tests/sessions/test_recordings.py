@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import pytest
 
+from rehab.gait.recordings.limits import NICENESS
 from rehab.sessions.setup import recordings
 from rehab.sessions.setup.recordings import (
     UploadRefused,
     add_part,
+    check_upload,
     name_recording,
     uploaded_file,
     write_columns,
@@ -75,3 +81,28 @@ def test_columns_as_they_are_chosen():
     ]
     with pytest.raises(ValueError, match="one"):
         write_columns(chosen, {"column": "t", "factor": "one"})
+
+
+def test_one_file_is_checked_at_a_time_and_after_everything_else(monkeypatch):
+    """So a person who sends many files takes no processor from a training."""
+    began: list[list[str]] = []
+
+    def run(arguments: list[str], **options: object) -> subprocess.CompletedProcess[str]:
+        began.append(arguments)
+        other = check_upload(uploaded_file(8, ".csv"), None)
+        assert other.wrong == ["Other files are being checked. Try again in a minute."]
+        return subprocess.CompletedProcess(arguments, 0, "{}", "")
+
+    monkeypatch.setattr(recordings, "WAIT_S", 0.01)
+    monkeypatch.setattr(subprocess, "run", run)
+    for _again in range(2):
+        assert check_upload(uploaded_file(7, ".csv"), None).found == {}
+    assert len(began) == 2
+    assert all("--bounded" in arguments for arguments in began)
+
+
+def test_a_process_that_reads_files_of_strangers_goes_last_and_is_bounded():
+    told = "import os, resource; from rehab.gait.recordings.limits import *; limit_resources(); "
+    told += "print(os.nice(0), resource.getrlimit(resource.RLIMIT_AS)[0] <= MEMORY_BYTES)"
+    done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == [str(min(19, os.nice(0) + NICENESS)), "True"]

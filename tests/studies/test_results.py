@@ -93,6 +93,11 @@ def test_only_who_changed_is_read_again():
     assert visit.outcomes["hit_rate"] == 0.5
 
 
+def test_a_name_of_an_arm_is_no_formula_in_a_table():
+    told = write_table([{"arm": "A: =1+1", "why": "x;=1+1"}, {"arm": "\r＝1", "why": None}])
+    assert told == "arm,why\r\nA: =1+1,x;'=1+1\r\n\"'\r'＝1\",\r\n"
+
+
 # --- who may look ---------------------------------------------------------------------------------
 
 

@@ -8,11 +8,16 @@ from rehab.boards.choices import Participants
 from rehab.boards.models import Leaderboard
 from rehab.people.consent.models import Purpose, has_consented
 from rehab.people.models import Patient
+from rehab.people.models.blinding import RUNNING
 
 
 def eligible_patients(board: Leaderboard) -> QuerySet[Patient]:
-    """Return the patients who have agreed to be on a board and are in no blinded study."""
+    """Return the patients who have agreed to be on a board and are in no blinded study.
+
+    Who has left one stays away until it is closed: a board of one feedback type tells the arm.
+    """
     patients = Patient.everywhere.filter(boards__in=board.accepted_levels, blinded=False)
+    patients = patients.exclude(enrollments__study__state=RUNNING)
     patients = patients.filter(Q(simulated=True) | has_consented(Purpose.BOARDS))
     if board.among == Participants.ACROSS:
         return patients.filter(clinic__boards_across=True)

@@ -15,6 +15,7 @@ from typing import Any
 
 from rehab.exports.research.recordings import PLACES
 from rehab.exports.research.sinks import Rows
+from rehab.people.web.csv_tables import format_cell
 
 BIDS_VERSION = "1.10.0"
 TASK, SYSTEM = "walking", "strides"
@@ -96,9 +97,10 @@ class MotionSink:
             "MissingValues": MISSING,
         }
         self._path("motion.json").write_text(json.dumps(sidecar, indent=2) + "\n", "utf-8")
+        own_unit = format_cell(" ".join(self._unit.split()))  # a clinic's own words
         lines = ["name\tcomponent\ttype\ttracked_point\tunits"]
         for name, kind, unit in CHANNELS:
-            lines.append(f"{name}\t{MISSING}\t{kind}\t{MISSING}\t{unit or self._unit or MISSING}")
+            lines.append(f"{name}\t{MISSING}\t{kind}\t{MISSING}\t{unit or own_unit or MISSING}")
         self._path("channels.tsv").write_text("\n".join(lines) + "\n", "utf-8")
 
 

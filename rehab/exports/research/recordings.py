@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from rehab.exports.research.sinks import Rows
-from rehab.exports.tables import STEPS, format_cell
+from rehab.exports.tables import STEPS
+from rehab.people.web.csv_tables import CsvWriter
 from rehab.sources.recording.plain import PLAIN
 
 # Column of the recording: column of the table.
@@ -39,11 +39,11 @@ class RecordingSink:
 
     def __init__(self, file: Path, extras: Sequence[str], *, has_goal: bool) -> None:
         self._file = file.open("w", encoding="utf-8", newline="")
-        self._writer = csv.writer(self._file, lineterminator="\r\n")
+        self._writer = CsvWriter(self._file)
         self._columns = {a: b for a, b in COLUMNS.items() if has_goal or a != PLAIN.goal}
         used = {*COLUMNS, *PLAIN.required, *PLAIN.other}
         self._extras = [name for name in extras if name not in used]
-        self._writer.writerow([*self._columns, *self._extras])
+        self._writer.write([[*self._columns, *self._extras]])
 
     def write(self, rows: Rows) -> None:
         """Write some strides."""
@@ -51,9 +51,7 @@ class RecordingSink:
         for row in rows:
             extra: dict[str, Any] = row[at_extra] or {}
             more = (extra.get(name) for name in self._extras)
-            self._writer.writerow(
-                [format_cell(cell) for cell in (*(row[p] for p in places), *more)]
-            )
+            self._writer.write([(*(row[p] for p in places), *more)])
 
     def close(self) -> None:
         """Close the file."""

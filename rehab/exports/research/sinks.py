@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
@@ -11,7 +10,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol
 
-from rehab.exports.tables import Table, Type, format_cells
+from rehab.exports.tables import Table, Type
+from rehab.people.web.csv_tables import CsvWriter
 
 BATCH_ROWS = 1000  # held in memory
 Rows = list[Sequence[Any]]
@@ -45,11 +45,11 @@ class CsvSink:
 
     def __init__(self, file: Path) -> None:
         self._file = file.open("w", encoding="utf-8", newline="")
-        self._writer = csv.writer(self._file, lineterminator="\r\n")
+        self._writer = CsvWriter(self._file)
 
     def write(self, rows: Rows) -> None:
         """Write some rows."""
-        self._writer.writerows(format_cells(rows))
+        self._writer.write(rows)
 
     def close(self) -> None:
         """Close the file."""

@@ -17,6 +17,7 @@ from rehab.patients.visits import QUICK_VISIT_DAYS, Visit, plan_visit, suggested
 from rehab.people.access import for_roles, user_of
 from rehab.people.models import Patient
 from rehab.people.roles import Role
+from rehab.people.web.row_keys import read_key
 from rehab.sessions.formatting import clinic_time
 
 MAX_AHEAD = timedelta(days=366)
@@ -36,8 +37,8 @@ def change_visits(request: HttpRequest, patient_id: int) -> HttpResponse:
     )
     visits = Visit.objects.visible_to(user).filter(patient=patient)
     given = request.POST
-    if (removed := given.get("remove", "")).isdecimal():
-        visits.filter(pk=int(removed)).delete()
+    if removed := read_key(given.get("remove", "")):
+        visits.filter(pk=removed).delete()
         return redirect("patient", patient_id=patient.pk)
     now = clinic_time(timezone.now(), patient.clinic)
     try:

@@ -53,6 +53,11 @@ def record_lockout(username: Any, request: HttpRequest) -> None:
         _record(Act.LOCK_OUT, user, request)
 
 
+def record_refused_factor(user: User, request: HttpRequest) -> None:
+    """Record that a second factor was not added: its first code, or its passkey, was wrong."""
+    _record(Act.REFUSED, user, request, about=request.path)
+
+
 def _record(act: Act, user: User, request: HttpRequest | None, about: str = "") -> None:
     """Record what an account did, or what was tried with its name."""
     address = client_address(request) if request is not None else ""

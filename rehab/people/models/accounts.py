@@ -90,7 +90,8 @@ class User(AbstractUser):
 
     def get_session_auth_hash(self) -> str:
         """Return what a browser session keeps of this account; when it changes, that ends."""
-        what = f"{self.sign_in_generation} {self.password}"
+        may = f"{self.role} {self.clinic_id}"  # open sockets act by the rights that they began with
+        what = f"{self.sign_in_generation} {may} {self.password}"
         return salted_hmac("garry.sign_in", what, algorithm="sha256").hexdigest()
 
     def end_sign_ins(self) -> None:

@@ -19,6 +19,7 @@ from rehab.people.networks import client_address
 from rehab.people.roles import Role
 from rehab.people.sign_in import factors, passkeys, resets, step_up
 from rehab.people.sign_in.forms import NewPasswordForm
+from rehab.people.web.row_keys import read_key
 
 
 @for_roles(*Role, patients=False)
@@ -45,8 +46,7 @@ def show_account(request: HttpRequest) -> HttpResponse:
 def confirm_reset(request: HttpRequest) -> HttpResponse:
     """Confirm that a host may reset how an account signs in."""
     user, now = user_of(request), timezone.now()
-    which = request.POST.get("which", "")
-    confirmed = resets.confirm_request(user, int(which) if which.isdecimal() else 0, now)
+    confirmed = resets.confirm_request(user, read_key(request.POST.get("which", "")), now)
     if confirmed is not None:
         address = client_address(request)
         record_security_change(Act.RESET, user, confirmed.account, address, now)

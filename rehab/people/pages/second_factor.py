@@ -16,7 +16,7 @@ from django.views.decorators.debug import sensitive_post_parameters
 from django.views.decorators.http import require_http_methods, require_safe
 
 from rehab.people.access import for_roles, user_of
-from rehab.people.audit import audit_log
+from rehab.people.audit import audit_log, sign_in_log
 from rehab.people.audit.audit_log import Act
 from rehab.people.models import User
 from rehab.people.networks import client_address
@@ -24,6 +24,7 @@ from rehab.people.pages.confirm import ask_again
 from rehab.people.roles import Role
 from rehab.people.sign_in import factors, flow, passkeys, step_up, totp
 from rehab.people.sign_in.forms import WRONG_FIRST_CODE, AppForm
+from rehab.people.web.row_keys import read_key
 
 SECRET = "app_secret"  # noqa: S105 (key of the browser session, until the app has shown a code)
 
@@ -69,6 +70,7 @@ def add_app(request: HttpRequest) -> HttpResponse:
             del request.session[SECRET]
             return _finish_enrollment(request, user, new)
         form.add_error("code", WRONG_FIRST_CODE)
+        sign_in_log.record_refused_factor(user, request)
     drawing = segno.make(totp.provisioning_uri(secret, user.username), micro=False)
     spaced = " ".join(secret[start : start + 4] for start in range(0, len(secret), 4))
     context = {"form": form, "qr": drawing.svg_inline(omitsize=True, border=2), "secret": spaced}
@@ -93,6 +95,7 @@ def add_passkey(request: HttpRequest) -> HttpResponse:
             )
         except (KeyError, passkeys.PasskeyRejected):
             problem = _("This passkey was not accepted. Try again.")
+            sign_in_log.record_refused_factor(user, request)
     context = {"problem": problem, "passkey": passkeys.registration_options(request, user)}
     return render(request, "people/sign_in/add_passkey.html", context)
 
@@ -145,8 +148,8 @@ def _show_recovery_codes(request: HttpRequest, new: list[str], next_url: str) ->
 def remove_authenticator(request: HttpRequest) -> HttpResponse:
     """Remove one of the own authenticators, after asking who it is."""
     user = user_of(request)
-    which = request.GET.get("which", "")
-    own = factors.authenticators_of(user).filter(pk=int(which) if which.isdecimal() else 0).first()
+    which = read_key(request.GET.get("which", ""))
+    own = factors.authenticators_of(user).filter(pk=which).first()
     if own is None:
         return redirect("account")
     asked = ask_again(

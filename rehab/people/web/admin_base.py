@@ -22,6 +22,7 @@ from rehab.people.audit.history_text import changes_of
 from rehab.people.roles import Right, Role, is_hidden_beside, rights_of
 from rehab.people.scope import ScopedModel, visible_rows
 from rehab.people.web.row_forms import ClinicForm
+from rehab.people.web.row_keys import read_key
 
 
 def rights_for(request: HttpRequest, model: type[models.Model]) -> Right:
@@ -221,10 +222,10 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
     ) -> HttpResponse | None:
         """Run an action; one from a row's own page returns there."""
         response = super().response_action(request, queryset, *args)
-        key = request.POST.get("stay", "")
-        if key.isdecimal() and getattr(response, "url", "") == request.get_full_path():
+        key = read_key(request.POST.get("stay", ""))
+        if key and getattr(response, "url", "") == request.get_full_path():
             meta = self.opts
-            return redirect(f"admin:{meta.app_label}_{meta.model_name}_change", int(key))
+            return redirect(f"admin:{meta.app_label}_{meta.model_name}_change", key)
         return response
 
     def get_deleted_objects(self, objs: Any, request: HttpRequest) -> Any:

@@ -13,6 +13,7 @@ from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import Patient, User
+from rehab.people.web.row_keys import read_key
 from rehab.sessions.corrections import (
     CorrectedField,
     Values,
@@ -110,8 +111,8 @@ class CorrectionForm(forms.Form):
         """Return the values when the page was opened; empty where the page did not send them."""
         sent = {field: self._initial_value(field) for field in CorrectedField}
         patients: Any = self.fields["patient"]
-        key = sent[CorrectedField.PATIENT]
-        patient = patients.queryset.filter(pk=key).first() if key.isdecimal() else None
+        key = read_key(sent[CorrectedField.PATIENT])
+        patient = patients.queryset.filter(pk=key).first()
         return sent | {CorrectedField.PATIENT: patient.pseudonym if patient else ""}
 
     def _initial_value(self, field: CorrectedField) -> str:

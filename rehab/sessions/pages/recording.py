@@ -40,7 +40,7 @@ def add_recording_part(request: HttpRequest) -> HttpResponse:
     at = request.GET.get("at", "")
     try:
         file = uploaded_file(user_of(request).pk, request.GET.get("ending", "").lower())
-        if not at.isdecimal():
+        if not at.isdecimal() or len(at) > len(str(BYTES_MAX)):
             raise UploadRefused
         add_part(file, request.body, int(at))
     except UploadRefused:

@@ -10,18 +10,21 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from django.conf import settings
 from django.utils.text import slugify
+from django.utils.translation import gettext
 
 from robot.wire.limits import TIME_MAX_S
 
 BYTES_MAX = 64 * 1024 * 1024  # five minutes of 1 kHz as CSV; half a minute is enough
 PART_BYTES = 1024 * 1024
 WAIT_S = 90.0
+_one_at_a_time = threading.Lock()  # a check takes a processor and gigabytes
 # What `rehab.gait.recordings.tables` reads; it is not imported, as servers do without numpy.
 ENDINGS = (".c3d", ".csv", ".mot", ".sto", ".txt")
 SIDES, CHANNELS = ("left", "right"), ("force", "moment", "angle")
@@ -89,8 +92,19 @@ def check_upload(
 ) -> Checked:
     """Return what the columns of an upload are, compared with those given; store it if asked.
 
-    It is stored in SI units, and only where nothing is wrong.
+    It is stored in SI units, and only where nothing is wrong. A server checks one file at a time.
     """
+    if not _one_at_a_time.acquire(timeout=WAIT_S):
+        return Checked(None, [gettext("Other files are being checked. Try again in a minute.")])
+    try:
+        return _check(file, mass_kg, columns, save)
+    finally:
+        _one_at_a_time.release()
+
+
+def _check(
+    file: Path, mass_kg: float | None, columns: list[str] | None, save: Path | None
+) -> Checked:
     arguments = [sys.executable, "-m", "rehab.gait", "check", str(file), "--json", "--bounded"]
     arguments += ["--mass", f"{mass_kg:g}"] if mass_kg else []
     arguments += ["--save", str(save)] if save else []

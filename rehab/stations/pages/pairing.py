@@ -14,6 +14,7 @@ from django.views.decorators.http import require_http_methods, require_POST
 
 from rehab.people.access import actor_of, clinic_of, for_roles, tablet_of, user_of
 from rehab.people.roles import Role
+from rehab.people.web.row_keys import read_key
 from rehab.stations.addresses import reachable_host
 from rehab.stations.builtin import first_station
 from rehab.stations.models import Station
@@ -43,9 +44,9 @@ def pair(request: HttpRequest) -> HttpResponse:
 
 def let_in(request: HttpRequest) -> str:
     """Approve the tablet that shows the code that was sent; return why not, "" where it worked."""
-    user, chosen = user_of(request), request.POST.get("station", "")
+    user = user_of(request)
     stations = Station.objects.visible_to(user)
-    station = stations.filter(pk=int(chosen)).first() if chosen.isdecimal() else None
+    station = stations.filter(pk=read_key(request.POST.get("station", ""))).first()
     if station is None:
         return _("Choose a station.")
     try:
@@ -75,9 +76,8 @@ def leave(request: HttpRequest) -> HttpResponse:
 
     A session that runs there goes on in any case.
     """
-    chosen = request.POST.get("station", "")
     stations = Station.objects.visible_to(actor_of(request))
-    station = get_object_or_404(stations, pk=int(chosen) if chosen.isdecimal() else None)
+    station = get_object_or_404(stations, pk=read_key(request.POST.get("station", "")))
     tablet = None if request.user.is_authenticated else tablet_of(request)
     screen = f"tablet {tablet.pk}" if tablet else f"person {request.user.pk}"
     try:

@@ -26,6 +26,7 @@ from rehab.people.access import clinic_of, for_roles, user_of
 from rehab.people.models import User
 from rehab.people.roles import Role, may_see_names
 from rehab.people.web.refusals import format_refusal
+from rehab.people.web.row_keys import read_key
 from rehab.studies.blinding import MARKABLE, Task, give_mark, take_mark
 from rehab.studies.forms import StudyForm, build_arm_forms, save_arms, save_draft
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
@@ -177,11 +178,11 @@ def change_marks(request: HttpRequest, study_id: int) -> HttpResponse:
     user, now = user_of(request), timezone.now()
     study = get_study(user, study_id)
     if "take" in request.POST:
-        mark = get_object_or_404(StudyMark, study=study, pk=_number(request.POST["take"]))
+        mark = get_object_or_404(StudyMark, study=study, pk=read_key(request.POST["take"]))
         take_mark(mark, user, now)
     else:
         people = User.objects.visible_to(user)
-        person = get_object_or_404(people, pk=_number(request.POST.get("user", "")))
+        person = get_object_or_404(people, pk=read_key(request.POST.get("user", "")))
         task = request.POST.get("task", "")
         if task in Task.values:
             _try(request, lambda: give_mark(study, person, Task(task), user, now))
@@ -225,10 +226,6 @@ def write_json(study: Study) -> str:
 
 def _plain(value: datetime) -> str:
     return value.isoformat()
-
-
-def _number(text: str) -> int:
-    return int(text) if text.isdecimal() and len(text) < 19 else 0
 
 
 def _try(request: HttpRequest, act: Callable[[], Any]) -> None:

@@ -10,6 +10,7 @@ from django.contrib.sessions.models import Session
 from django.utils import timezone
 
 from rehab.people.models import Clinic
+from rehab.people.roles import Role
 from rehab.people.sign_in.browser_sessions import SIGNED_IN_AT, SessionStore, digest_of
 from rehab.sessions.live import auth, routines
 from rehab.sessions.live import runtime as runtimes
@@ -84,6 +85,18 @@ async def test_a_new_password_ends_open_sockets(place, begun):
     monitor = place.monitor(await begun(place))
     await monitor.watch()
     place.pt.set_password("walk well again 2026")
+    await place.pt.asave()
+    assert (await monitor.sent_away())[0] == 4001
+
+
+@pytest.mark.parametrize("change", ["role", "clinic"])
+async def test_other_rights_end_open_sockets(place, begun, change):
+    monitor = place.monitor(await begun(place))
+    await monitor.watch()
+    if change == "role":
+        place.pt.role = Role.RESEARCHER
+    else:
+        place.pt.clinic = await Clinic.everywhere.acreate(name="another one")
     await place.pt.asave()
     assert (await monitor.sent_away())[0] == 4001
 

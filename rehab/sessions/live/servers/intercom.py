@@ -2,6 +2,9 @@
 
 Each server has one channel, named by its lease. A message may be lost, and nothing depends on it
 but how soon something is known; a question waits for its answer, and says so where none comes.
+
+The layer encrypts, so that a neighbor at Redis can neither read nor write. Each message also says
+whom it is for, and has a number that only grows: one that was recorded is not heard again.
 """
 
 from __future__ import annotations
@@ -11,10 +14,11 @@ import contextlib
 import contextvars
 import itertools
 import logging
+import math
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from channels.layers import get_channel_layer
 
@@ -35,6 +39,14 @@ class Unheard(RuntimeError):
     """The other server did not say that it heard; what was asked may not have happened."""
 
 
+class Queued(NamedTuple):
+    """A message that waits to be sent, until when by the monotonic clock."""
+
+    server: str
+    message: Data
+    until_s: float
+
+
 class Intercom:
     """This server's channel.
 
@@ -52,7 +64,9 @@ class Intercom:
         self.echoed_s = time.monotonic()  # when a message to ourselves came back last
         self._handlers = handlers
         self._layer: Any = get_channel_layer()
-        self._outgoing: deque[tuple[str, Data]] = deque(maxlen=WAITING)
+        self._outgoing: deque[Queued] = deque(maxlen=WAITING)
+        self._sent = itertools.count(1)
+        self._heard: dict[str, int] = {}  # by server: the number of its latest message
         self._awake = asyncio.Event()
         self._questions: dict[int, asyncio.Queue[Data]] = {}
         self._numbers = itertools.count(1)
@@ -60,9 +74,10 @@ class Intercom:
         self._start(self._send())
         self._start(self._receive())
 
-    def tell(self, server: str, kind: str, data: Data) -> tuple[str, Data]:
-        """Queue a message to another server, and return what was queued."""
-        queued = (server, {"type": kind, "from": self.own, **data})
+    def tell(self, server: str, kind: str, data: Data, *, within_s: float = math.inf) -> Queued:
+        """Queue a message to another server, to be dropped where it waits longer; return it."""
+        way = {"from": self.own, "for": server, "sent": next(self._sent)}
+        queued = Queued(server, {"type": kind, **way, **data}, time.monotonic() + within_s)
         self._outgoing.append(queued)
         self._awake.set()
         return queued
@@ -108,7 +123,9 @@ class Intercom:
             await self._awake.wait()
             self._awake.clear()
             while self._outgoing:
-                server, message = self._outgoing.popleft()
+                server, message, until_s = self._outgoing.popleft()
+                if time.monotonic() > until_s:
+                    continue
                 try:
                     await self._layer.send(_channel(server), message)
                     failing = False
@@ -130,7 +147,9 @@ class Intercom:
                 await asyncio.sleep(PAUSE_S)
                 continue
             kind, sender = message.pop("type", ""), message.pop("from", "")
-            if kind == "echo":
+            if not self._is_new(sender, message.pop("for", ""), message.pop("sent", 0)):
+                log.error("A message of another server came again: who writes to its Redis?")
+            elif kind == "echo":
                 self.echoed_s = time.monotonic()
             elif kind in (HEARD, ANSWER):
                 waiting = self._questions.get(message.pop("to", 0))
@@ -138,6 +157,13 @@ class Intercom:
                     waiting.put_nowait({**message, "type": kind})
             elif kind in self._handlers:
                 self._start(self._handle(kind, sender, message))
+
+    def _is_new(self, sender: str, server: str, number: int) -> bool:
+        """Return whether a message is for this server and was not heard before."""
+        is_new = server == self.own and number > self._heard.get(sender, 0)
+        if is_new:
+            self._heard[sender] = number
+        return is_new
 
     async def _handle(self, kind: str, sender: str, data: Data) -> None:
         question = data.pop("question", None)

@@ -27,7 +27,7 @@ from rehab.sessions.live.servers.answers import pack, raise_refusal
 from rehab.sessions.live.servers.followed_sessions import FollowedSessions
 from rehab.sessions.live.servers.following import FollowedSession, Follower
 from rehab.sessions.live.servers.handover import Handover
-from rehab.sessions.live.servers.intercom import Data, Intercom, Unheard
+from rehab.sessions.live.servers.intercom import HEARD_S, Data, Intercom, Unheard
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.station_robots import StationRobots
 from rehab.sessions.log import Remark
@@ -126,7 +126,8 @@ class Servers:
 
     def drive_robot(self, owner: str, session_id: int, drive: Mapping[str, float]) -> None:
         """Pass on that a person drives the robot; what is lost is as if the button was let go."""
-        self.intercom.tell(owner, "drive", {"session": session_id, "drive": dict(drive)})
+        asked = {"session": session_id, "drive": dict(drive)}
+        self.intercom.tell(owner, "drive", asked, within_s=HEARD_S)
 
     def announce(self, session_id: int, station_id: int) -> None:
         """Tell devices that wait at other servers of a session."""

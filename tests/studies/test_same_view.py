@@ -1,0 +1,188 @@
+"""Who must not know an arm sees the same whichever it is: every address, opened twice."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import urlencode
+
+import pytest
+from django.urls import reverse
+
+from rehab.boards.building import entries
+from rehab.boards.choices import Participants
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import record_consent
+from rehab.people.models import Patient, User
+from rehab.people.roles import Role
+from rehab.sessions.live.session.aggregate import SessionAggregate
+from rehab.sessions.log import SessionEvent, SessionMetric, Step
+from rehab.sessions.models import TrainingSession
+from rehab.studies.allocation.scheme import Secret
+from rehab.studies.blinding import Task, give_mark
+from rehab.studies.enrolling import withdraw
+from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
+from rehab.studies.sealing import seal
+from rehab.studies.visits import Place, start_session
+from rehab.training.changes import Change, ChangeKind
+from rehab.training.steps import Measurement, Side
+from rehab.training.valences import VALENCES
+from tests.support.archives import words_of
+from tests.support.studies import SEED, enrolled, new_patient, running_study
+from tests.support.tenancy import all_routes
+from tests.support.world import NOW, World, build_world, fill_board, signed_in, store
+
+pytestmark = pytest.mark.django_db
+ARMS = ("positive", "negative")
+# They have a new secret, code or animal each time, or tell of this very look.
+OTHERWISE_EACH_TIME = ("admin:logout", "admin:rehab_patient_add", "api:openapi-view", "add-app")
+OTHERWISE_EACH_TIME += ("own-sign-ins", "tablet")
+# What differs each time, whatever a patient walks.
+VARYING = re.compile(
+    r'csrfmiddlewaretoken" value="\w+"|nonce="[^"]+"|"data-csrf": "\w+"|\d{1,2}:\d\d(:\d\d)?|'
+    r'"?\d{4}-\d\d-\d\d[T ][^"<]*'
+)
+
+
+def walk_visit(enrollment: Enrollment) -> TrainingSession:
+    """Let a participant walk the next visit's session to its end."""
+    session = start_session(enrollment, Place(), None, NOW)
+    aggregate = SessionAggregate(session)
+    store(aggregate, aggregate.change(Change(ChangeKind.START), None, NOW))
+    for phase in range(3):
+        for number in range(60 * phase + 1, 60 * phase + 61):
+            stride = Measurement(number, number * 1.1, Side.LEFT, 1.0 + number % 5 / 10)
+            store(aggregate, [aggregate.record_step(stride, NOW)])
+        if phase < 2:
+            store(aggregate, aggregate.change(Change(ChangeKind.PHASE, phase + 1), None, NOW))
+    store(aggregate, aggregate.change(Change(ChangeKind.FINISH), None, NOW))
+    session.refresh_from_db()
+    return session
+
+
+def addresses(world: World, patients: list[Patient]) -> Iterator[str]:
+    """Return every address of the site, and previews of boards that single a condition out."""
+    yield from dict.fromkeys(route.url for route in all_routes((world,)))
+    preview = reverse("admin:rehab_leaderboard_preview")
+    everybody = Patient.everywhere.filter(clinic=world.clinic).order_by("pk")
+    group = list(everybody.values_list("pk", flat=True))
+    for among in (Participants.SELF, Participants.GROUP, Participants.CLINIC):
+        for valence in VALENCES:
+            asked: dict[str, Any] = {
+                "name": "b",
+                "among": among,
+                "group": group,
+                "metric": "score",
+                "types": "chosen",
+                "valences": valence,
+                "aggregation": "each",
+                "period": "all",
+                "display": "top",
+                "top_n": 10,
+                "names": "code",
+                "min_participants": 5,
+                "ties": "standard",
+                "occasion": "after_session",
+                "min_valid_strides": 1,
+                "mean_of": 3,
+                "show_ranks": "on",
+                "active": "on",
+            }
+            for patient in patients:
+                yield f"{preview}?{urlencode(asked | {'seen_as': patient.pk}, doseq=True)}"
+    for patient in patients:
+        yield f"{reverse('api:list_sessions')}?patient={patient.pk}"
+    yield f"{reverse('insight')}?by=patient"
+    yield reverse("insight-file")
+
+
+def see_everything(world: World, who: User, patients: list[Patient]) -> dict[str, str]:
+    """Return what every address answers somebody, without what differs each time."""
+    browser = signed_in(who, raise_request_exception=False)
+    left_out = {reverse(name) for name in OTHERWISE_EACH_TIME}
+    seen = {}
+    for url in addresses(world, patients):
+        if url not in left_out:
+            answer = browser.get(url)
+            assert answer.status_code < 500 or "readyz" in url, url
+            seen[url] = f"{answer.status_code} {VARYING.sub('', words_of(answer))}"
+    return seen
+
+
+class Trial:
+    """A running study with a participant of each arm, who have walked the same steps."""
+
+    def __init__(self, *, withdrawn: bool) -> None:
+        self.world = world = build_world("amber")
+        fill_board(world)
+        self.study = running_study(world, *ARMS, sealed=seal(Secret(SEED, (2,))))
+        self.assessor = User.everywhere.create_user("zz", role=Role.PT, clinic=world.clinic)
+        give_mark(self.study, self.assessor, Task.ASSESSOR, None, NOW)
+        self.patients = [new_patient(world, number) for number in (1, 2)]
+        self.sessions = []
+        for patient in self.patients:
+            record_consent(patient, Purpose.BOARDS, None, NOW, "clinic")
+            enrollment = enrolled(self.study, patient)
+            self.sessions.append(walk_visit(enrollment))
+            if withdrawn:
+                withdraw(enrollment, None, NOW)
+            world.more += [patient, enrollment, self.sessions[-1]]
+        assert {session.valence for session in self.sessions} == set(ARMS)
+        world.more.append(self.study)
+        for model in (Allocation, StudyVisit, StudyEvent, Step, SessionEvent, SessionMetric):
+            world.more.append(model.everywhere.order_by("-pk").first())
+
+    def exchange(self) -> None:
+        """Let each participant have walked what the other one has."""
+        one, other = self.sessions
+        exchange([one], [other], {"patient_id", "created_at"})
+        for model in (Step, SessionEvent, SessionMetric):
+            rows = [list(model.everywhere.filter(session=x).order_by("pk")) for x in self.sessions]
+            exchange(*rows, {"session_id"})
+        allocations = Allocation.everywhere.filter(enrollment__study=self.study).order_by("pk")
+        exchange(list(allocations[:1]), list(allocations[1:]), {"enrollment_id"})
+        entries.refresh_patients([patient.pk for patient in self.patients], now=NOW)
+
+
+def exchange(some: list[Any], others: list[Any], kept: set[str]) -> None:
+    """Exchange all columns but the keys and those that tell whose a row is."""
+    for one, other in zip(some, others, strict=True):
+        names = {f.attname for f in one._meta.concrete_fields if not f.primary_key} - kept
+        for row, values in ((one, vars(other).copy()), (other, vars(one).copy())):
+            found = type(row).everywhere.filter(pk=row.pk)
+            found.update(**{name: values[name] for name in names})
+
+
+def find_differences(trial: Trial, who: User) -> list[str]:
+    """Return the addresses that answer somebody otherwise once the arms are exchanged."""
+    before = see_everything(trial.world, who, trial.patients)
+    trial.exchange()
+    after = see_everything(trial.world, who, trial.patients)
+    assert before.keys() == after.keys()
+    return [url for url, answer in before.items() if after[url] != answer]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("withdrawn", [False, True])
+def test_an_assessor_sees_the_same_whichever_arm_is_walked(withdrawn):
+    trial = Trial(withdrawn=withdrawn)
+    assert find_differences(trial, trial.assessor) == []
+
+
+def test_an_assessors_previews_of_boards_are_the_same(monkeypatch):
+    monkeypatch.setitem(globals(), "all_routes", lambda worlds: [])
+    for withdrawn in (False, True):
+        trial = Trial(withdrawn=withdrawn)
+        assert find_differences(trial, trial.assessor) == []
+
+
+@pytest.mark.long
+def test_who_treats_sees_which_arm_is_walked(monkeypatch):
+    """So the search finds what there is."""
+    trial = Trial(withdrawn=False)
+    found = find_differences(trial, trial.world.people[Role.PT])
+    session = trial.sessions[0].pk
+    for url in (reverse("session", args=[session]), reverse("api:show_session", args=[session])):
+        assert url in found
+    assert any("leaderboard/preview" in url for url in found)
