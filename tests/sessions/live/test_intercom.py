@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from channels.layers import InMemoryChannelLayer, channel_layers
 
-from rehab.sessions.live import intercom as intercoms
+from rehab.sessions.live.servers import intercom as intercoms
 from rehab.sessions.live.servers.intercom import Intercom, Unheard
 
 
