@@ -1,6 +1,7 @@
 """The models of all rooms, and the list of those with a change history."""
 
-from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
+from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.patients.visits import Visit

@@ -11,7 +11,8 @@ from django.core.exceptions import ValidationError
 from django.urls import reverse
 
 from rehab.boards.building import entries
-from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
+from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.patients.erasure import erase
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent

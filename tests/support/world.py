@@ -10,7 +10,8 @@ from django.contrib.auth.models import AnonymousUser
 from django.db.models import Model
 from django.test import Client
 
-from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
+from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.patients.visits import Visit
