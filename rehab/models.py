@@ -1,6 +1,7 @@
 """The models of all rooms, and the list of those with a change history."""
 
-from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
+from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.patients.visits import Visit
@@ -11,7 +12,7 @@ from rehab.people.consent.models import Consent, ConsentText
 from rehab.people.consent.tombstones import ImportTombstone
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.sign_in.attempts import SignInAttempts
-from rehab.people.sign_in.factors import Authenticator, RecoveryCode
+from rehab.people.sign_in.factors.factors import Authenticator, RecoveryCode
 from rehab.people.sign_in.resets import ResetRequest
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.corrections import SessionCorrection

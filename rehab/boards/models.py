@@ -1,4 +1,4 @@
-"""Leaderboards as PTs build them, and the rows that groups of patients have on them."""
+"""Leaderboards as PTs build them."""
 
 from __future__ import annotations
 
@@ -24,8 +24,7 @@ from rehab.boards.choices import (
 )
 from rehab.boards.validation import find_invalid_settings
 from rehab.people.models import BoardsConsent, Clinic, Patient
-from rehab.people.scope import ClinicModel, Scope, ScopedModel
-from rehab.training.valences import VALENCES
+from rehab.people.scope import ClinicModel, Scope
 
 # How rows are shown, and when. All other fields decide what a board's rows are.
 DISPLAY_FIELDS = frozenset(
@@ -259,64 +258,3 @@ class Leaderboard(ClinicModel):
     def list_key(self, valence: str) -> str:
         """Return the list that sessions of a valence are ranked in: its own, or "" for all."""
         return valence if self.types == CountedTypes.SAME else ""
-
-
-class BoardEntry(ScopedModel):
-    """A patient's stored row on a board of several patients.
-
-    It is computed from the sessions that count (`building/entries.py`) and stored so that rows are
-    found by index. ``key`` orders the rows: the greater, the better.
-    """
-
-    scope = Scope(clinic="patient__clinic")
-
-    # No index for these columns alone: the composite ones below begin with them.
-    board = models.ForeignKey(
-        Leaderboard, on_delete=models.CASCADE, related_name="entries", db_index=False
-    )
-    patient = models.ForeignKey(Patient, on_delete=models.CASCADE, related_name="+", db_index=False)
-    valence = models.CharField(
-        max_length=16, blank=True, choices=[(v.slug, _(v.label)) for v in VALENCES.values()]
-    )
-    figure = models.IntegerField(help_text="As it is shown: a whole number.")
-    points_at_stake = models.IntegerField(
-        null=True, help_text="The points that could be kept, where points can only be lost."
-    )
-    key = models.CharField(max_length=48)
-    stale_on = models.DateField(null=True, help_text="The day from which it is out of date.")
-
-    class Meta(ScopedModel.Meta):
-        constraints: ClassVar = [
-            models.UniqueConstraint(fields=["patient", "board", "valence"], name="board_entry_once")
-        ]
-        indexes: ClassVar = [
-            models.Index(fields=["board", "valence", "key"], name="entry_by_place"),
-            models.Index(fields=["board", "stale_on"], name="entry_by_staleness"),
-        ]
-
-    def __str__(self) -> str:
-        return f"{self.figure}"
-
-
-class BoardCount(ScopedModel):
-    """How many rows of a board have one figure.
-
-    Ranks are sums of these, so that no page counts the rows of a board.
-    """
-
-    scope = Scope(clinic="board__clinic")
-
-    board = models.ForeignKey(
-        Leaderboard, on_delete=models.CASCADE, related_name="counts", db_index=False
-    )
-    valence = models.CharField(max_length=16, blank=True)
-    figure = models.IntegerField()
-    rows = models.PositiveIntegerField()
-
-    class Meta(ScopedModel.Meta):
-        constraints: ClassVar = [
-            models.UniqueConstraint(fields=["board", "valence", "figure"], name="board_count_once")
-        ]
-
-    def __str__(self) -> str:
-        return f"{self.figure}: {self.rows}"

@@ -10,7 +10,8 @@ from typing import Any
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.boards.models import BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
+from rehab.boards.rows import BoardEntry
 from rehab.exports.archive import write_csv, write_json
 from rehab.exports.selection import Selection
 from rehab.exports.tables import CODEBOOK, TABLES, codebook_rows

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from rehab.training.figures.metrics import METRICS
 from rehab.training.scoring import RULES_VERSION
+from rehab.training.summary.metrics import METRICS
 
 
 class Type(StrEnum):

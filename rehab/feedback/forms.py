@@ -14,8 +14,9 @@ from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.people.models import LANGUAGES
 from rehab.people.web.refusals import format_refusal
 from rehab.people.web.row_forms import ClinicForm
+from rehab.training.bands import TEXT_MAX, Band
 from rehab.training.measures import InvalidSetting
-from rehab.training.valences import TEXT_MAX, VALENCES, Band
+from rehab.training.valences import VALENCES
 
 
 def word_fields() -> dict[str, str]:

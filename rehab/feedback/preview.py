@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
-from rehab.training.valences import Band, Confetti, Valence
+from rehab.training.bands import Band, Confetti
+from rehab.training.valences import Valence
 
 SCALE = 1.5  # the thermometer's end
 TOP_Y, BOTTOM_Y = 30, 210  # where the scale ends and begins in the drawing; the goal lies at 90

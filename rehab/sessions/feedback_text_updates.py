@@ -19,9 +19,10 @@ from rehab.sessions.live import runtime
 from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.models import TrainingSession
+from rehab.training.bands import bands_to_json
 from rehab.training.changes import OPEN_STATES, ChangeKind
 from rehab.training.measures import InvalidSetting
-from rehab.training.valences import Valence, bands_to_json
+from rehab.training.valences import Valence
 
 
 def connect_signals() -> None:

@@ -7,6 +7,7 @@ from enum import StrEnum
 from typing import Any
 
 from rehab.training.adaptation import AdaptationMode, GoalAdaptation, check_adaptation_mode
+from rehab.training.bands import bands_from_json
 from rehab.training.closeness import CloseSteps
 from rehab.training.cueing import (
     DEFAULT_ACTIVATION_THRESHOLD,
@@ -19,7 +20,7 @@ from rehab.training.measures import InvalidSetting, Measure
 from rehab.training.phases import Phase
 from rehab.training.schedules import Schedule, check_schedule_kind
 from rehab.training.steps import Side
-from rehab.training.valences import CueGestures, Valence, bands_from_json
+from rehab.training.valences import CueGestures, Valence
 
 # How lively the robot is: the share of a gesture's size. The robot itself makes half of it gentle
 # (no sounds, half the speed).

@@ -6,19 +6,17 @@ All of it is data. Pages and robots know no valence; they follow this data.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
-from typing import Any
 
+from rehab.training.bands import BANDS_MAX, TEXT_MAX, Band, Confetti
 from rehab.training.marking import Marked, gettext_noop
 from rehab.training.measures import InvalidSetting
 
 # Larger numbers tell a patient nothing more, and overflow where points are stored.
 POINTS_MAX = 1000
-BANDS_MAX = 12
-TEXT_MAX = 60  # characters; longer texts do not fit a tablet at a size that is read from afar
 
 
 class Emblem(StrEnum):
@@ -27,34 +25,6 @@ class Emblem(StrEnum):
     GAIN = "gain"
     LOSS = "loss"
     NEUTRAL = "neutral"
-
-
-class Confetti(StrEnum):
-    """How much confetti a band releases."""
-
-    NONE = "none"
-    LITTLE = "little"
-    MUCH = "much"
-    MOST = "most"
-
-
-@dataclass(frozen=True, slots=True)
-class Band:
-    """Words and confetti from this performance upwards, until the next band.
-
-    Attributes
-    ----------
-    from_performance
-        Where it begins (ratio to the goal).
-    words
-        For the patient, at most TEXT_MAX characters.
-    confetti
-        How much of it is released.
-    """
-
-    from_performance: float
-    words: str
-    confetti: Confetti = Confetti.NONE
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,29 +244,3 @@ def edit_valence(
     return replace(
         usual, hit_points=hit_points, miss_points=miss_points, bands=tuple(bands), cue=cue
     )
-
-
-def bands_to_json(bands: Sequence[Band]) -> list[dict[str, Any]]:
-    """Return bands as plain JSON data."""
-    return [
-        {"from_performance": b.from_performance, "words": b.words, "confetti": b.confetti.value}
-        for b in bands
-    ]
-
-
-def bands_from_json(data: Any) -> tuple[Band, ...]:
-    """Return the bands of ``bands_to_json``'s data. Raises InvalidSetting for anything else."""
-    try:
-        return tuple(_band_from_json(entry) for entry in data)
-    except (KeyError, TypeError, ValueError):
-        raise InvalidSetting(
-            "A band has from_performance (a number), words (a text) and confetti ({known}).",
-            known=", ".join(Confetti),
-        ) from None
-
-
-def _band_from_json(entry: Mapping[str, Any]) -> Band:
-    start, words = entry["from_performance"], entry["words"]
-    if not isinstance(words, str) or isinstance(start, bool) or not isinstance(start, int | float):
-        raise TypeError
-    return Band(start, words, Confetti(entry["confetti"]))

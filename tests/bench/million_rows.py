@@ -99,9 +99,10 @@ def measure(count: int) -> dict[str, float]:
     from django.utils import timezone
 
     from rehab.boards.building import entries
-    from rehab.boards.models import BoardEntry, Leaderboard
+    from rehab.boards.models import Leaderboard
     from rehab.boards.panels.viewer import BoardViewer
     from rehab.boards.ranking.standings import StoredStandings
+    from rehab.boards.rows import BoardEntry
     from rehab.people.models import Patient
 
     began = time.perf_counter()
@@ -155,7 +156,8 @@ def walk_while_one_is_built(patients: int) -> dict[str, float]:
 
     from rehab.boards.building import entries
     from rehab.boards.building.scheduler import BoardBuilder
-    from rehab.boards.models import BoardEntry, Leaderboard
+    from rehab.boards.models import Leaderboard
+    from rehab.boards.rows import BoardEntry
     from rehab.people.models import Clinic, Patient
     from rehab.sessions.live.session.aggregate import SessionAggregate
     from rehab.sessions.models import TrainingSession

@@ -13,8 +13,9 @@ from django.urls import reverse
 
 from rehab.boards.building import entries, scheduler
 from rehab.boards.building.scheduler import BoardBuilder
-from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
 from rehab.boards.panels.viewer import make_session_panels, make_waiting_panels
+from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession

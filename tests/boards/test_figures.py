@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rehab.boards.models import BoardEntry
+from rehab.boards.rows import BoardEntry
 from rehab.training.changes import ChangeKind
 from rehab.training.phases import make_phase
 from tests.support.boards import (

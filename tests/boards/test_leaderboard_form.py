@@ -9,8 +9,9 @@ from django.core.exceptions import ValidationError
 from django.urls import reverse, reverse_lazy
 
 from rehab.boards import admin
-from rehab.boards.models import BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
 from rehab.boards.ranking import results
+from rehab.boards.rows import BoardEntry
 from rehab.boards.validation import FIRST_DAY, LAST_DAY
 from rehab.people.aliases import MANNERS, draw_alias, split_list
 from rehab.people.models import Clinic, Patient, User

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from django.urls import reverse
 
-from rehab.boards.models import BoardEntry
 from rehab.boards.panels.viewer import make_session_panels
+from rehab.boards.rows import BoardEntry
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Station

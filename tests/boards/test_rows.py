@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 
 from rehab.boards.building import entries
 from rehab.boards.choices import DisplayMode, TieRule
-from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
 from rehab.boards.panels.viewer import make_session_panels
 from rehab.boards.ranking.standings import ComputedStandings, StoredStandings
 from rehab.boards.ranking.visibility import cutoff_rank, find_visible_rows
+from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession

@@ -9,8 +9,9 @@ from django.core.management import call_command
 from django.utils import timezone
 
 from rehab.boards.building import entries
-from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
 from rehab.boards.panels.viewer import make_session_panels
+from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession

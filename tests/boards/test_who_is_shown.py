@@ -10,9 +10,10 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.boards.building import entries
-from rehab.boards.models import BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
 from rehab.boards.panels.viewer import BoardViewer, make_waiting_panels
 from rehab.boards.ranking.results import read_results
+from rehab.boards.rows import BoardEntry
 from rehab.people.models import Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession

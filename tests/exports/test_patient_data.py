@@ -22,7 +22,8 @@ from django.urls import reverse
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rehab.boards.models import BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
+from rehab.boards.rows import BoardEntry
 from rehab.exports.archive import ZipResponse, write_csv, write_zip
 from rehab.exports.selection import PAGE_ROWS, Selection
 from rehab.exports.tables import STEPS, TABLES

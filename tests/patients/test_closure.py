@@ -13,7 +13,7 @@ from django.core.serializers import serialize
 from django.test import Client
 from django.urls import reverse
 
-from rehab.boards.models import BoardEntry
+from rehab.boards.rows import BoardEntry
 from rehab.patients.closure import SessionStillOpen, end_program, reopen_program
 from rehab.patients.erasure import erase, months_before, patients_past_retention
 from rehab.patients.visits import Visit

@@ -7,7 +7,7 @@ from django.core.exceptions import ValidationError
 from django.test import Client
 from django.urls import reverse
 
-from rehab.boards.models import BoardEntry
+from rehab.boards.rows import BoardEntry
 from rehab.people.consent.models import Consent, ConsentText, ImmutableConsentText, Purpose
 from rehab.people.consent.services import (
     active_consents,

@@ -12,7 +12,7 @@ from django.test import Client
 from django.urls import reverse
 
 from rehab.boards.building import entries
-from rehab.boards.models import BoardEntry
+from rehab.boards.rows import BoardEntry
 from rehab.patients.erasure import erase
 from rehab.people.consent.models import Consent, Purpose
 from rehab.people.consent.services import (

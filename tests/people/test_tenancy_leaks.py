@@ -14,9 +14,10 @@ from django.views.decorators.http import require_POST
 
 from garry_site import urls as site_urls
 from rehab.boards.admin import LeaderboardAdmin
-from rehab.boards.models import BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
 from rehab.boards.panels import rows, viewer
 from rehab.boards.ranking.standings import StoredStandings
+from rehab.boards.rows import BoardEntry
 from rehab.people import api as people_api
 from rehab.people.access import for_roles, public
 from rehab.people.audit import history_text

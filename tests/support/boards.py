@@ -5,8 +5,9 @@ from __future__ import annotations
 from django.test import Client
 from django.urls import reverse
 
-from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
 from rehab.boards.panels.viewer import make_session_panels
+from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device, Station

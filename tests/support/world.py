@@ -10,7 +10,8 @@ from django.contrib.auth.models import AnonymousUser
 from django.db.models import Model
 from django.test import Client
 
-from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
+from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.patients.visits import Visit
@@ -23,7 +24,7 @@ from rehab.people.consent.tombstones import ImportTombstone
 from rehab.people.models import BoardsConsent, Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.attempts import SignInAttempts
-from rehab.people.sign_in.factors import Authenticator, RecoveryCode
+from rehab.people.sign_in.factors.factors import Authenticator, RecoveryCode
 from rehab.people.sign_in.resets import ResetRequest
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.questionnaires.instrument import Instrument, Item

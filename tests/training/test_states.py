@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from rehab.training.bands import bands_to_json
 from rehab.training.changes import (
     Change,
     ChangeKind,
@@ -20,7 +21,7 @@ from rehab.training.controls import CONTROLS
 from rehab.training.fold import SessionFold
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import make_phase
-from rehab.training.valences import BINARY, NEGATIVE, bands_to_json
+from rehab.training.valences import BINARY, NEGATIVE
 from tests.support.folds import fold_log
 from tests.training.sessions import make_plan, step_at, walk
 

@@ -10,18 +10,15 @@ import re
 
 import pytest
 
+from rehab.training.bands import Band, Confetti, bands_from_json, bands_to_json
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import (
     POINTS_MAX,
     POSITIVE,
     VALENCES,
-    Band,
-    Confetti,
     CueGestures,
     Emblem,
     Valence,
-    bands_from_json,
-    bands_to_json,
     edit_valence,
     find_valence,
 )

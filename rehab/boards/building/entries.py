@@ -21,10 +21,11 @@ from django.db import connection, transaction
 from django.db.models import Count, Q, QuerySet
 
 from rehab.boards.choices import Participants
-from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
 from rehab.boards.ranking.eligibility import eligible_patients
 from rehab.boards.ranking.periods import is_over, last_day_of
 from rehab.boards.ranking.results import Result, read_results
+from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.people.models import Patient
 
 BATCH = 2_000  # patients a transaction, where nothing else waits for the database

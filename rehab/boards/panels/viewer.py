@@ -13,7 +13,7 @@ from django.utils.translation import gettext_noop, ngettext
 
 from rehab.boards.building.scheduler import board_builder, catch_up
 from rehab.boards.choices import Aggregation, DisplayMode, Occasion, Participants
-from rehab.boards.models import BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
 from rehab.boards.panels.panel import BoardPanel, Total
 from rehab.boards.panels.rows import (
     PanelRow,
@@ -34,6 +34,7 @@ from rehab.boards.ranking.standings import (
     StoredStandings,
 )
 from rehab.boards.ranking.visibility import find_visible_rows
+from rehab.boards.rows import BoardEntry
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.log import SessionMetric

@@ -14,8 +14,9 @@ from django.db import connection
 from django.db.models import F, QuerySet, Sum
 
 from rehab.boards.choices import TieRule
-from rehab.boards.models import BoardCount, BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
 from rehab.boards.ranking.results import Result
+from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.people.models import Patient
 
 Columns = tuple[int, int, int | None, str]

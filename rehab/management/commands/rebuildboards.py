@@ -16,7 +16,8 @@ from rehab.boards.building.entries import (
     is_snapshot,
     refresh,
 )
-from rehab.boards.models import BoardEntry, Leaderboard
+from rehab.boards.models import Leaderboard
+from rehab.boards.rows import BoardEntry
 
 
 class Command(BaseCommand):

@@ -13,13 +13,14 @@ from rehab.sessions.payloads import (
     describe_rates,
     describe_walked,
 )
+from rehab.training.bands import Band
 from rehab.training.controls import Audience
 from rehab.training.fold import SessionFold
 from rehab.training.phases import Phase
 from rehab.training.plans import SessionPlan
 from rehab.training.schedules import ScheduleKind, Untold
 from rehab.training.steps import ScoredStep
-from rehab.training.valences import Band, Emblem, Valence
+from rehab.training.valences import Emblem, Valence
 
 
 class StoredStep(Protocol):

@@ -21,9 +21,10 @@ from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import change_session
+from rehab.training.bands import TEXT_MAX, bands_to_json
 from rehab.training.changes import OPEN_STATES, ChangeKind
 from rehab.training.measures import InvalidSetting
-from rehab.training.valences import TEXT_MAX, Valence, bands_to_json
+from rehab.training.valences import Valence
 
 
 class WordsForm(forms.Form):

@@ -8,6 +8,7 @@ from enum import Enum
 from typing import Any
 
 from rehab.training.adaptation import Staircase
+from rehab.training.bands import bands_from_json, bands_to_json
 from rehab.training.changes import PauseReason, State
 from rehab.training.controls import CONTROLS
 from rehab.training.fold import SessionFold
@@ -15,7 +16,6 @@ from rehab.training.fold.tallies import Block, Tally
 from rehab.training.plans import SessionPlan
 from rehab.training.schedules import Untold
 from rehab.training.steps import Side
-from rehab.training.valences import bands_from_json, bands_to_json
 
 # Rises with every change of the fold that an older checkpoint would not fit; such a one is ignored.
 CHECKPOINT_VERSION = 2

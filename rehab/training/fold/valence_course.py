@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from rehab.training.bands import bands_from_json
 from rehab.training.changes import NotAllowed
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import SessionPlan
-from rehab.training.valences import Valence, bands_from_json
+from rehab.training.valences import Valence
 
 
 @dataclass(slots=True)

@@ -11,7 +11,7 @@ from asgiref.sync import sync_to_async
 from django.utils import timezone
 
 from rehab.boards.building import entries, scheduler
-from rehab.boards.models import BoardEntry
+from rehab.boards.rows import BoardEntry
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent
 from rehab.sessions.models import TrainingSession
