@@ -120,8 +120,11 @@ class LegDetector:
 
     def advance(self, start: int, stop: int) -> list[OneLegStride]:
         """Process samples ``start:stop``, a second at most; return the strides they complete."""
-        self._pending.extend(self.contacts.advance(start, stop))
+        found = self.contacts.advance(start, stop)
         strides: list[OneLegStride] = []
+        if not found and not self._pending:
+            return strides
+        self._pending.extend(found)
         while self._pending:
             ended = self._pending[0]
             due = max((ended.end_index or 0) + self._wait, ended.known_index or 0)
