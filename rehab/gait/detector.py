@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rehab.gait.contacts.force_plate import CONTACT_N, RELEASE_N
-from rehab.gait.one_leg import KEEP_S, LegDetector
+from rehab.gait.one_leg import KEEP_S, LONGEST_CHUNK_S, LegDetector
 from rehab.gait.settings import DetectorSettings
 from rehab.gait.signals.buffer import SampleBuffer
 from rehab.gait.signals.clock import SampleClock
@@ -82,6 +82,7 @@ class Detector:
         self._samples = SampleBuffer(int(KEEP_S * rate_hz), legs=len(sides))
         self._layout = self._samples.layout
         self._rows = 0  # of the last table
+        self._longest_chunk = int(LONGEST_CHUNK_S * rate_hz)
         self._legs = [
             LegDetector(buffer, settings, side)
             for buffer, side in zip(self._samples.legs, sides, strict=True)
@@ -107,11 +108,14 @@ class Detector:
         return self._advance(*clock.add(table, layout.time_rows[len(table)]))
 
     def _advance(self, table: Floats, late_s: Floats | None) -> list[Stride]:
-        samples, longest = self._samples, self._legs[0].longest_chunk
+        samples, longest = self._samples, self._longest_chunk
         first, count = samples.end, table.shape[1]
         if count <= longest:
             samples.append(table, late_s)
-            return self._detect(first, first + count)
+            for leg in self._legs:
+                if leg.pending or not leg.contacts.is_quiet(first, samples.end):
+                    return self._detect(first, samples.end)
+            return []
         strides: list[Stride] = []
         for done in range(0, count, longest):
             part = slice(done, done + longest)

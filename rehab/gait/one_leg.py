@@ -112,7 +112,7 @@ class LegDetector:
             settings.is_velocity,
         )
         self._wait = math.ceil(settings.look_ahead_s * rate_hz - 1e-9)
-        self._pending: deque[Contact] = deque()
+        self.pending: deque[Contact] = deque()
         self._previous: Contact | None = None  # the stance before, with its bounces
         self._last_terminal: tuple[int, float] | None = None  # where it really ended
         self._stances: deque[float] = deque(maxlen=USUAL_STANCES)
@@ -120,14 +120,14 @@ class LegDetector:
 
     def advance(self, start: int, stop: int) -> list[OneLegStride]:
         """Process samples ``start:stop``, a second at most; return the strides they complete."""
-        self._pending.extend(self.contacts.advance(start, stop))
+        self.pending.extend(self.contacts.advance(start, stop))
         strides: list[OneLegStride] = []
-        while self._pending:
-            ended = self._pending[0]
+        while self.pending:
+            ended = self.pending[0]
             due = max((ended.end_index or 0) + self._wait, ended.known_index or 0)
             if due >= stop:
                 break
-            contact = self._pending.popleft()
+            contact = self.pending.popleft()
             if self._is_measurable(contact):
                 strides.append(self._measure(contact, due))
         return strides
@@ -135,8 +135,8 @@ class LegDetector:
     def finish(self) -> list[OneLegStride]:
         """Return the strides that still wait, and the one that the record's end cuts off."""
         last = self._samples.end - 1
-        strides = [self._measure(one, last) for one in self._pending if self._is_measurable(one)]
-        self._pending.clear()
+        strides = [self._measure(one, last) for one in self.pending if self._is_measurable(one)]
+        self.pending.clear()
         current = self.contacts.truncate()
         if current is not None and (current.end_s or 0.0) - current.begin_s <= STANCE_MAX_S:
             cycle = self._find_cycle(current)

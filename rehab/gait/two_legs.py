@@ -66,7 +66,9 @@ class TwoLegDetector(Detector):
         GaitInputError
             For channels of different lengths.
         """
-        return self._feed(CHUNK_NAMES, (t_s, *_pad_channels(left), *_pad_channels(right)))
+        if not len(left) == len(right) == len(CHANNEL_NAMES):
+            left, right = LegSamples(*left), LegSamples(*right)
+        return self._feed(CHUNK_NAMES, (t_s, *left, *right))
 
     def _detect(self, start: int, stop: int) -> list[Stride]:
         left, right = self._left.advance(start, stop), self._right.advance(start, stop)
@@ -144,10 +146,6 @@ class TwoLegDetector(Detector):
             second_double_support_s=_find_time(second.begin_s, this.end_s) if second else None,
             weight_ratio=ratio,
         )
-
-
-def _pad_channels(leg: LegSamples | Sequence[ArrayLike]) -> Sequence[ArrayLike | None]:
-    return leg if len(leg) == len(CHANNEL_NAMES) else LegSamples(*leg)
 
 
 def _find_weight_ratio(

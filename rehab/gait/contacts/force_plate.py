@@ -110,20 +110,24 @@ class ContactFinder:
         """The plate's zero [N]."""
         return self._zero.offset_n
 
-    def advance(self, start: int, stop: int) -> list[Contact]:
-        """Process new samples ``start:stop`` and return the steps that ended in them."""
+    def is_quiet(self, start: int, stop: int) -> bool:
+        """Return whether new samples ``start:stop`` are of swing or of stance whole, as most."""
         if start == stop:
-            return []
+            return True
         force = self._buffer.channel(FORCE, start, stop)
         limit = self._zero.offset_n + self._contact_n
-        # Most chunks are of swing or of stance whole.
         if self._current is None:
-            if force[force.argmax()] <= limit:  # false for NaN, too
-                return []
-        elif stop < self._stuck_index and force[force.argmin()] >= limit:
+            return force.item(force.argmax()) <= limit  # false for NaN, too
+        if stop < self._stuck_index and force.item(force.argmin()) >= limit:
             self._low_index = None
+            return True
+        return False
+
+    def advance(self, start: int, stop: int) -> list[Contact]:
+        """Process new samples ``start:stop`` and return the steps that ended in them."""
+        if self.is_quiet(start, stop):
             return []
-        return self._search(force, start)
+        return self._search(self._buffer.channel(FORCE, start, stop), start)
 
     def _search(self, force: Floats, start: int) -> list[Contact]:
         """Return the steps that ended in samples from ``start`` on."""

@@ -73,7 +73,7 @@ class LegBuffer:
     def __init__(self, samples: SampleBuffer, table: Floats) -> None:
         self.samples = samples
         self._table: Floats = table
-        self._rows = list(table)
+        self._rows: list[Floats] = list(table)
 
     def view(self, start: int, stop: int) -> Floats:
         """Return samples ``start:stop`` of all channels, shape (6, samples), without copying."""
@@ -84,5 +84,4 @@ class LegBuffer:
     def channel(self, row: int, start: int, stop: int) -> Floats:
         """Return samples ``start:stop`` of one channel, shape (samples,), without copying."""
         first = self.samples.first
-        part: Floats = self._rows[row][start - first : stop - first]
-        return part
+        return self._rows[row][start - first : stop - first]

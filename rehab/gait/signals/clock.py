@@ -63,12 +63,12 @@ class SampleClock:
             table, self._held = np.concatenate((self._held, table), axis=1), None
         stamps = table[row]
         count = len(stamps)
-        done = self._pass_even(stamps) if count else 0
+        done = self._pass_even(stamps, count) if count else 0
         if done == count:
             return table, None
         late = None
         while done < count:
-            if even := self._pass_even(stamps[done:]):
+            if even := self._pass_even(stamps[done:], count - done):
                 done += even
                 continue
             settled = self._settle(stamps[done:])
@@ -91,9 +91,8 @@ class SampleClock:
         held, self._held = self._held, None
         return held
 
-    def _pass_even(self, stamps: Floats) -> int:
+    def _pass_even(self, stamps: Floats, count: int) -> int:
         """Return how many samples come evenly, and follow them with the line; 0 for a gap."""
-        count = len(stamps)
         if self._period_s is None:
             count = min(count, FIRST_SAMPLES - self._count)
             self._extend(stamps[:count], float(stamps[count - 1]))

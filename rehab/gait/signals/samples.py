@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -46,6 +47,7 @@ class Layout:
             n for n in self.order if n == 0 or (n - 1) % len(CHANNEL_NAMES) < ANGLE
         )
         self._seldom = tuple(n for n in self.order if n not in self._narrow)
+        self._pick = itemgetter(*self._narrow)
         first = self.order.index(self._narrow[0])
         self.rows = {
             len(self.order): slice(0, len(self.order)),
@@ -77,7 +79,7 @@ class Layout:
                 break
         else:
             try:
-                table: Floats = np.array([channels[place] for place in self._narrow], np.float64)
+                table: Floats = np.array(self._pick(channels), np.float64)
             except (TypeError, ValueError):  # of different lengths, as a rule
                 pass
             else:

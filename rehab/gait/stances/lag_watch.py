@@ -7,6 +7,7 @@ set-up finds it (``selfcheck.delays``).
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from statistics import median
 
@@ -139,8 +140,8 @@ class BrakingFinder:
         end_s
             The terminal contact.
         """
-        known = np.isfinite(angle_rad)
-        if not known.all():
+        if not math.isfinite(angle_rad.dot(angle_rad)):
+            known = np.isfinite(angle_rad)
             time_s, angle_rad = time_s[known], angle_rad[known]
         first_s, last_s = (end_s + at_s for at_s in self._search_s)
         first_s, last_s = first_s - SETTLE_S, last_s + SETTLE_S

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehab.gait.signals.filters import Floats, find_maximum, find_minimum
+from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import FORCE, TIME
 
 MIN_STANCE_SAMPLES = 8  # 0.16 s at 50 Hz
@@ -58,8 +58,7 @@ class Resampler:
 
     def __init__(self, rate_hz: float, longest_s: float) -> None:
         self._rate_hz = rate_hz
-        self._places = np.arange(int(longest_s * rate_hz) + 2)
-        self._behind_s = self._places[::-1] / rate_hz
+        self._behind_s = np.arange(int(longest_s * rate_hz) + 1, -1, -1) / rate_hz
 
     def resample(
         self, window: Floats, begin_s: float, end_s: float, kinetics_s: Floats | None = None
@@ -83,38 +82,13 @@ class Resampler:
         first, last = time_s.item(0), time_s.item(-1)
         count = int((last - first) * rate_hz + 1e-6) + 1
         grid = last - self._behind_s[-count:]
-        signals = self._interpolate_beside(grid, window) if kinetics_s is None else None
-        if signals is None:
-            signals = np.empty((3, count))
-            times = (time_s, *(2 * (time_s if kinetics_s is None else kinetics_s,)))
-            for row, values, taken_s in zip(signals, window[FORCE:], times, strict=True):
-                row[:] = np.interp(grid, taken_s, values)
+        signals = np.empty((3, count))
+        times = (time_s, *(2 * (time_s if kinetics_s is None else kinetics_s,)))
+        for row, values, taken_s in zip(signals, window[FORCE:], times, strict=True):
+            row[:] = np.interp(grid, taken_s, values)
         first = grid.item(0)
         begin = max(0, math.ceil((begin_s - first) * rate_hz))
         end = min(count - 1, int((end_s - first) * rate_hz + 1e-6))
         if end - begin < MIN_STANCE_SAMPLES:
             return None
         return ResampledStance(signals, rate_hz, first, begin_s, end_s, begin, end)
-
-    def _interpolate_beside(self, grid: Floats, window: Floats) -> Floats | None:
-        """Return the signals where each time of the grid lies beside its own sample, else None.
-
-        As ``np.interp``, which looks for each time's neighbors, for each channel anew.
-        """
-        count = len(grid)
-        more = window.shape[1] - count
-        if not 0 <= more <= 1 or count < MIN_STANCE_SAMPLES:
-            return None
-        steps = np.empty(window.shape)
-        flat = window.ravel()
-        np.subtract(flat[1:], flat[:-1], out=steps.ravel()[:-1])  # in one run over all rows
-        ahead = grid - window[TIME, more:]
-        if max(find_maximum(ahead), -find_minimum(ahead)) > find_minimum(steps[TIME, :-1]):
-            return None
-        # The last column stands for what lies beyond both ends, where the signals are level.
-        steps[TIME, -1], steps[FORCE:, -1] = 1.0, 0.0
-        slopes = steps[FORCE:] / steps[TIME]
-        signals: Floats = slopes.take(self._places[more : more + count] - (ahead < 0), axis=1)
-        signals *= ahead
-        signals += window[FORCE:, more:]
-        return signals
