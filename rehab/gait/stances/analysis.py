@@ -11,7 +11,7 @@ from rehab.gait.contacts.force_plate import Contact
 from rehab.gait.signals.buffer import LegBuffer
 from rehab.gait.signals.filters import Floats, ZeroPhaseFilter, find_maximum, find_minimum
 from rehab.gait.signals.samples import ANGLE, FORCE, FORWARD, MOMENT, POSITION, TIME
-from rehab.gait.stances.continuity import check_samples, check_steps
+from rehab.gait.stances.continuity import check_fills, check_samples, check_steps
 from rehab.gait.stances.kinetics import PushOff, PushOffAnalyzer
 from rehab.gait.stances.lag_watch import (
     ANGLE_LAG_MAX_S,
@@ -132,6 +132,9 @@ class StanceAnalyzer:
         reasons += check_samples(
             window, before, clock, self._rate_hz, self._mass_kg, self._is_velocity
         )
+        if not self._is_velocity:
+            late = window[MOMENT : ANGLE + 1, critical : before + end - begin + 1]
+            reasons += check_fills(late, self._rate_hz)
         if end_s - begin_s < STANCE_MIN_S:
             reasons.append(RejectionReason.SHORT_STANCE)
         elif end_s - begin_s > STANCE_MAX_S:
