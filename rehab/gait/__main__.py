@@ -28,6 +28,7 @@ from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.setup.check import check_setup, compare_with_setup
 from rehab.gait.setup.report import describe_setup, setup_to_json
 from rehab.gait.signals.clock import estimate_rate
+from rehab.gait.signals.frames import find_frame_problem
 from rehab.gait.strides import GaitInputError, Stride
 
 LOOK_AHEAD_S = 0.05
@@ -83,14 +84,14 @@ def _read_options(arguments: Sequence[str]) -> argparse.Namespace:
         nargs="+",
         metavar="CHANNEL=COLUMN",
         help="time=… and {left,right}.{" + ",".join(CHANNELS) + "}=…; COLUMN*FACTOR changes "
-        "unit or sign, COLUMN@DELAY takes out a delay [s]",
+        "unit or sign, COLUMN@DELAY takes out a delay [s]; frame=… counts samples",
     )
     parser.add_argument("--plot", type=Path, metavar="out.png", help="draw it (needs matplotlib)")
     return parser.parse_args(arguments)
 
 
 def _measure_file(path: Path, options: argparse.Namespace) -> None:
-    time, legs = read_signals(path, options.columns)
+    time, legs, frames = read_signals(path, options.columns)
     rate_hz = estimate_rate(time) if options.rate is None else options.rate
     mass_kg = read_mass(path) if options.mass is None else options.mass
     if len(legs) == 2:
@@ -102,6 +103,7 @@ def _measure_file(path: Path, options: argparse.Namespace) -> None:
             mass_kg=mass_kg,
             look_ahead_s=options.look_ahead,
             is_overground=options.overground,
+            frame=frames,
         )
     else:
         ((side, leg),) = legs.items()
@@ -113,6 +115,7 @@ def _measure_file(path: Path, options: argparse.Namespace) -> None:
             look_ahead_s=options.look_ahead,
             is_overground=options.overground,
             side=side,
+            frame=frames,
         )
     check = check_signals(
         time, legs.get("left"), legs.get("right"), rate_hz=rate_hz, mass_kg=mass_kg
@@ -128,7 +131,8 @@ def _measure_file(path: Path, options: argparse.Namespace) -> None:
         }
         print(json.dumps(found, allow_nan=False))
     else:
-        _print_summary(path, strides, [finding.message for finding in check.findings])
+        problem = find_frame_problem(time, frames)
+        _print_summary(path, strides, [problem, *(finding.message for finding in check.findings)])
     if options.plot:
         plot_strides(options.plot, time, legs, strides, rate_hz=rate_hz, mass_kg=mass_kg)
 
@@ -146,7 +150,7 @@ def _print_summary(path: Path, strides: list[Stride], messages: list[str]) -> No
     valid = [s.a2_w_kg for s in strides if s.valid and s.a2_w_kg is not None]
     mean = f", mean A2 {np.mean(valid):.3f} W/kg" if valid else ""
     print(f"{len(strides)} strides, {len(valid)} valid{mean}")
-    for message in messages:
+    for message in filter(None, messages):
         print(f"! {message}")
 
 

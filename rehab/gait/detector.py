@@ -13,6 +13,7 @@ from rehab.gait.settings import DetectorSettings
 from rehab.gait.signals.buffer import SampleBuffer
 from rehab.gait.signals.clock import SampleClock
 from rehab.gait.signals.filters import Floats
+from rehab.gait.signals.frames import FrameClock, read_frames
 from rehab.gait.stances.kinetics import CUTOFF_HZ
 from rehab.gait.strides import Stride
 
@@ -78,7 +79,7 @@ class Detector:
             is_overground=is_overground,
         )
         self._is_overground = is_overground
-        self._clock = SampleClock()
+        self._clock: SampleClock | FrameClock = SampleClock()
         self._samples = SampleBuffer(int(KEEP_S * rate_hz), legs=len(sides))
         self._layout = self._samples.layout
         self._rows = 0  # of the last table
@@ -97,15 +98,32 @@ class Detector:
         strides = [] if held is None else self._advance(held, None)
         return strides + self._complete_last()
 
-    def _feed(self, names: Sequence[str], channels: Sequence[ArrayLike | None]) -> list[Stride]:
+    @property
+    def frame_problem(self) -> str:
+        """Why frame numbers are ignored, with the cure; empty where they are used, or not fed."""
+        return self._clock.problem if isinstance(self._clock, FrameClock) else ""
+
+    def _feed(
+        self,
+        names: Sequence[str],
+        channels: Sequence[ArrayLike | None],
+        frame: ArrayLike | None = None,
+    ) -> list[Stride]:
         """Add samples of the named channels, the first of which is the time."""
+        if frame is not None and not self._samples.end and not isinstance(self._clock, FrameClock):
+            self._clock = FrameClock()
         layout, clock = self._layout, self._clock
         table = layout.read(names, channels)
+        given = table.shape[1]
+        row = layout.time_rows[len(table)]
         if len(table) != self._rows:  # other channels are sent than were before
             self._rows, held = len(table), clock.finish()
             if held is not None:
                 table = np.concatenate((layout.widen(held), layout.widen(table)), axis=1)
-        return self._advance(*clock.add(table, layout.time_rows[len(table)]))
+                row = layout.time_rows[len(table)]
+        if isinstance(clock, FrameClock):
+            return self._advance(*clock.add(table, row, read_frames(frame, given)))
+        return self._advance(*clock.add(table, row))
 
     def _advance(self, table: Floats, late_s: Floats | None) -> list[Stride]:
         samples, longest = self._samples, self._longest_chunk

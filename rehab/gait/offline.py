@@ -24,6 +24,7 @@ def measure_strides(
     is_velocity: bool = False,
     is_overground: bool = False,
     side: str | None = None,
+    frame: ArrayLike | None = None,
 ) -> list[Stride]:
     """Return the strides of one leg of a recording.
 
@@ -33,6 +34,8 @@ def measure_strides(
         Channels of shape (n,), as in ``StrideDetector.feed``.
     rate_hz, mass_kg, look_ahead_s, is_velocity, is_overground, side
         As in ``StrideDetector``.
+    frame
+        The samples' numbers, as in ``StrideDetector.feed``.
 
     Returns
     -------
@@ -51,7 +54,7 @@ def measure_strides(
         is_overground=is_overground,
         side=side,
     )
-    found = detector.feed(t_s, force_n, moment_nm, angle_rad, forward_n, position_m)
+    found = detector.feed(t_s, force_n, moment_nm, angle_rad, forward_n, position_m, frame=frame)
     return found + detector.finish()
 
 
@@ -65,6 +68,7 @@ def measure_both_legs(
     look_ahead_s: float = 0.05,
     is_velocity: bool = False,
     is_overground: bool = False,
+    frame: ArrayLike | None = None,
 ) -> list[Stride]:
     """Return the strides of both legs of a recording.
 
@@ -72,7 +76,7 @@ def measure_both_legs(
     ----------
     t_s, left, right
         Times [s], shape (n,), and the channels of each leg, as in ``TwoLegDetector.feed``.
-    rate_hz, mass_kg, look_ahead_s, is_velocity, is_overground
+    rate_hz, mass_kg, look_ahead_s, is_velocity, is_overground, frame
         As in ``TwoLegDetector``.
 
     Returns
@@ -91,4 +95,4 @@ def measure_both_legs(
         is_velocity=is_velocity,
         is_overground=is_overground,
     )
-    return detector.feed(t_s, left, right) + detector.finish()
+    return detector.feed(t_s, left, right, frame=frame) + detector.finish()

@@ -38,6 +38,8 @@ class StrideDetector(Detector):
         angle_rad: ArrayLike,
         forward_n: ArrayLike | None = None,
         position_m: ArrayLike | None = None,
+        *,
+        frame: ArrayLike | None = None,
     ) -> list[Stride]:
         """Add the next samples and return the strides that they complete.
 
@@ -53,6 +55,9 @@ class StrideDetector(Detector):
         forward_n, position_m
             Forward force on the foot [N] and forward position of the foot [m], shape (n,), if there
             are any.
+        frame
+            The samples' numbers by the device's own count, shape (n,), if it has one: from the
+            first samples on or never (``signals.frames``).
 
         Raises
         ------
@@ -60,7 +65,7 @@ class StrideDetector(Detector):
             For channels of different lengths.
         """
         channels = (t_s, force_n, moment_nm, angle_rad, forward_n, position_m)
-        return self._feed(("t_s", *CHANNEL_NAMES), channels)
+        return self._feed(("t_s", *CHANNEL_NAMES), channels, frame)
 
     def _detect(self, start: int, stop: int) -> list[Stride]:
         return [self._complete(stride) for stride in self._leg.advance(start, stop)]

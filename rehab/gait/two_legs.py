@@ -51,6 +51,8 @@ class TwoLegDetector(Detector):
         t_s: ArrayLike,
         left: LegSamples | Sequence[ArrayLike],
         right: LegSamples | Sequence[ArrayLike],
+        *,
+        frame: ArrayLike | None = None,
     ) -> list[Stride]:
         """Add the next samples of both legs and return the strides that they complete.
 
@@ -60,6 +62,8 @@ class TwoLegDetector(Detector):
             Times [s] of the sensors' clock, shape (n,).
         left, right
             The channels of each leg, shape (n,) each, as in ``StrideDetector.feed``.
+        frame
+            As there.
 
         Raises
         ------
@@ -68,7 +72,7 @@ class TwoLegDetector(Detector):
         """
         if not len(left) == len(right) == len(CHANNEL_NAMES):
             left, right = LegSamples(*left), LegSamples(*right)
-        return self._feed(CHUNK_NAMES, (t_s, *left, *right))
+        return self._feed(CHUNK_NAMES, (t_s, *left, *right), frame)
 
     def _detect(self, start: int, stop: int) -> list[Stride]:
         left, right = self._left.advance(start, stop), self._right.advance(start, stop)

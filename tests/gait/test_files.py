@@ -80,7 +80,7 @@ def test_the_same_strides_from_each_kind_of_file(walk, tmp_path, name):
     write, pairs = WRITERS[name]
     path = tmp_path / name
     write(path, walk)
-    time_s, legs = read_signals(path, pairs)
+    time_s, legs, _ = read_signals(path, pairs)
 
     assert time_s == pytest.approx(walk.t_s[: len(time_s)], abs=1e-6)
     for found, given, size in zip(legs["left"][:3], walk.left, (700, 100, 0.5), strict=True):
@@ -106,7 +106,9 @@ def test_gzipped_csv(walk, tmp_path):
     with gzip.open(path, "wt") as file:
         np.savetxt(file, np.column_stack([walk.t_s, *walk.left]), "%.9g", ",", header="t,F,M,A",
                    comments="")  # fmt: skip
-    time_s, legs = read_signals(path, ["time=t", "left.force=F", "left.moment=M", "left.angle=A"])
+    time_s, legs, _ = read_signals(
+        path, ["time=t", "left.force=F", "left.moment=M", "left.angle=A"]
+    )
 
     assert time_s == pytest.approx(walk.t_s, abs=1e-6)
     assert legs["left"].moment_nm == pytest.approx(walk.left[1], abs=1e-3)

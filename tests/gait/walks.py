@@ -24,6 +24,7 @@ class Walk:
     right: np.ndarray
     rate_hz: float
     mass_kg: float
+    frames: np.ndarray | None = None
 
     def one_leg(self, **settings):
         return measure_strides(
@@ -37,6 +38,7 @@ class Walk:
             LegSamples(*self.right),
             rate_hz=self.rate_hz,
             mass_kg=self.mass_kg,
+            frame=self.frames,
             **settings,
         )
 

@@ -269,10 +269,85 @@ def test_what_is_kept_is_measured_alike(made, table, tmp_path):
     harness.intake.finish()
     harness.intake.close()
 
-    t_s, legs = read_signals(path)
+    t_s, legs, _ = read_signals(path)
     again = measure_both_legs(t_s, legs["left"], legs["right"], rate_hz=200, mass_kg=MASS)
     live = [m.value for m in harness.strides() if not m.reasons]
     assert [s.a2_w_kg for s in again if s.valid] == pytest.approx(live, rel=1e-4)
+
+
+def spoil_stamps(table):
+    """Return rows of which 20 ms are lost in a stall of 80 ms each second, with their numbers."""
+    stamps, kept = table[:, 0].copy(), np.ones(len(table), dtype=bool)
+    for at in range(300, len(table) - 20, 210):
+        stamps[at : at + 16] = table[at + 16, 0] + 0.0005 * np.arange(-16, 0)
+        kept[at + 4 : at + 8] = False
+    rows = rows_of(np.column_stack((stamps, table[:, 1:])))
+    numbered = [row | {"frame": 7000.0 + n} for n, row in enumerate(rows)]
+    return [row for row, one in zip(numbered, kept, strict=True) if one]
+
+
+def test_frame_numbers_tell_what_is_late_and_what_is_lost(made, table):
+    expected = [s.a2_w_kg for s in measure(made) if s.valid]
+    rows = spoil_stamps(table)
+    numbered, stamped = IntakeHarness(), IntakeHarness()
+    numbered.send(rows)
+    stamped.send([{name: cell for name, cell in row.items() if name != "frame"} for row in rows])
+    for harness in (numbered, stamped):
+        harness.intake.finish()
+    line = numbered.intake.describe()
+    shown = [m.value for m in numbered.strides() if not m.reasons]
+
+    assert len(shown) >= 0.95 * len(expected)
+    assert len([m for m in stamped.strides() if not m.reasons]) < 0.9 * len(expected)
+    assert not any("frame" in text for text in numbered.said)
+    assert "late by up to 7" in line
+    assert "times lost for up to 25 ms" in line
+
+
+def test_frame_numbers_of_channels_in_rows_of_their_own(made, table):
+    """Those of the forces count; the cameras' are another count."""
+    harness = IntakeHarness()
+    rows = []
+    for n, row in enumerate(rows_of(table)):
+        forces = {name: row[name] for name in row if name == "time_s" or "force" in name}
+        rows.append(forces | {"frame": 100.0 + n})
+        if n % 2 == 0:
+            others = {name: row[name] for name in row if "force" not in name}
+            rows.append(others | {"frame": float(n // 2)})
+    harness.send(rows)
+    harness.intake.finish()
+    shown = [m.value for m in harness.strides() if not m.reasons]
+    expected = [s.a2_w_kg for s in measure(made) if s.valid]
+
+    assert len(shown) >= len(expected) - 2
+    assert harness.said[-1].startswith("Signals of") or "frame" not in " ".join(harness.said)
+
+
+def test_wrong_frame_numbers_are_told_once(table):
+    harness = IntakeHarness()
+    harness.send([row | {"frame": 3.0} for row in rows_of(table)])
+    told = [text for text in harness.said if "frame numbers are ignored" in text]
+
+    assert len(told) == 1
+    assert "they stay as they are" in told[0]
+    assert [m for m in harness.strides() if not m.reasons]
+
+
+def test_frame_numbers_are_kept(table, tmp_path):
+    path = tmp_path / "kept.csv"
+    harness = IntakeHarness(keep=path)
+    harness.send(spoil_stamps(table))
+    harness.intake.finish()
+    harness.intake.close()
+    t_s, legs, frames = read_signals(path)
+    again = measure_both_legs(
+        t_s, legs["left"], legs["right"], rate_hz=200, mass_kg=MASS, frame=frames
+    )
+
+    assert frames[0] == 7000
+    assert [s.a2_w_kg for s in again if s.valid] == pytest.approx(
+        [m.value for m in harness.strides() if not m.reasons], rel=1e-4
+    )
 
 
 def test_the_quality_line(table):

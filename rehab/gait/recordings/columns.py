@@ -34,27 +34,31 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class ColumnMap:
-    """The time column [s], and for each measured side the columns of its channels."""
+    """The time column [s], for each measured side the columns of its channels, the frame number."""
 
     time: Column
     legs: dict[str, dict[str, Column]] = field(default_factory=dict)
+    frame: Column | None = None
 
     @property
     def columns(self) -> list[Column]:
         """All columns that a recording needs to have."""
-        return [self.time, *(column for leg in self.legs.values() for column in leg.values())]
+        frame = [] if self.frame is None else [self.frame]
+        legs = (column for leg in self.legs.values() for column in leg.values())
+        return [self.time, *frame, *legs]
 
     def find_in(self, header: Sequence[str]) -> ColumnMap | None:
         """Return the part of this map that a header has: the time and whole legs, or None.
 
-        A leg is whole without forward force and position.
+        A leg is whole without forward force and position; the frame number may be missing.
         """
         legs = {}
         for side, leg in self.legs.items():
             there = {channel: column for channel, column in leg.items() if column.name in header}
             if there.keys() >= set(REQUIRED):
                 legs[side] = there
-        return ColumnMap(self.time, legs) if legs and self.time.name in header else None
+        frame = self.frame if self.frame is not None and self.frame.name in header else None
+        return ColumnMap(self.time, legs, frame) if legs and self.time.name in header else None
 
 
 def _moore_leg(side: str) -> dict[str, Column]:
@@ -76,7 +80,7 @@ def _own_leg(side: str) -> dict[str, Column]:
 
 SIGNAL_LAYOUTS = {
     # As our sources send and store them.
-    "garry": ColumnMap(Column("time_s"), {side: _own_leg(side) for side in SIDES}),
+    "garry": ColumnMap(Column("time_s"), {side: _own_leg(side) for side in SIDES}, Column("frame")),
     # Moore, Hnat, van den Bogert 2015 (PeerJ 3:e918), as written by their GaitAnalysisToolKit.
     "moore2013": ColumnMap(
         Column("time"), {"left": _moore_leg("Left"), "right": _moore_leg("Right")}
@@ -91,7 +95,8 @@ def read_column_map(pairs: Sequence[str]) -> ColumnMap:
     ----------
     pairs
         ``time=COLUMN`` and ``SIDE.CHANNEL=COLUMN``; ``COLUMN*FACTOR`` changes unit or sign,
-        ``COLUMN@DELAY`` takes out a delay [s]; both: ``COLUMN*FACTOR@DELAY``.
+        ``COLUMN@DELAY`` takes out a delay [s]; both: ``COLUMN*FACTOR@DELAY``. ``frame=COLUMN`` is
+        the device's own count of samples.
 
     Raises
     ------
@@ -99,18 +104,22 @@ def read_column_map(pairs: Sequence[str]) -> ColumnMap:
         With the cure, for pairs of another form and for too few to measure a leg with.
     """
     time: Column | None = None
+    frame: Column | None = None
     legs: dict[str, dict[str, Column]] = {}
     for pair in pairs:
         channel, _, text = pair.partition("=")
         side, _, what = channel.partition(".")
         if channel == "time" and text:
             time = read_column(text)
+        elif channel == "frame" and text:
+            frame = Column(text)
         elif side in SIDES and what in CHANNELS and text:
             legs.setdefault(side, {})[what] = read_column(text)
         else:
             raise GaitInputError(
                 f"'{pair}' maps no column. Write time=COLUMN and SIDE.CHANNEL=COLUMN with SIDE "
-                f"{' or '.join(SIDES)} and CHANNEL one of {', '.join(CHANNELS)}."
+                f"{' or '.join(SIDES)} and CHANNEL one of {', '.join(CHANNELS)}; frame=COLUMN if "
+                "the device counts its samples."
             )
     if time is None or not legs:
         raise GaitInputError("Map the time and at least one leg: time=t left.force=Fz …")
@@ -122,7 +131,7 @@ def read_column_map(pairs: Sequence[str]) -> ColumnMap:
                 + " ".join(f"{side}.{channel}=COLUMN" for channel in missing)
                 + "."
             )
-    return ColumnMap(time, legs)
+    return ColumnMap(time, legs, frame)
 
 
 def find_layout(header: Sequence[str]) -> ColumnMap:

@@ -51,8 +51,8 @@ def read_any_table(path: Path) -> dict[str, Floats]:
 
 def read_signals(
     path: Path, pairs: Sequence[str] | None = None
-) -> tuple[Floats, dict[str, LegSamples]]:
-    """Return times [s] and each leg's channels of a recording.
+) -> tuple[Floats, dict[str, LegSamples], Floats | None]:
+    """Return times [s], each leg's channels and the frame numbers of a recording.
 
     Parameters
     ----------
@@ -63,7 +63,8 @@ def read_signals(
 
     Returns
     -------
-    Times, shape (n,), and ``LegSamples`` of shape (n,) by side, in SI units with our signs.
+    Times, shape (n,), ``LegSamples`` of shape (n,) by side, in SI units with our signs, and numbers
+    of shape (n,), None where no column has them.
 
     Raises
     ------
@@ -83,4 +84,5 @@ def read_signals(
     empty = [name for name in names if np.isnan(table[name]).all()]
     if empty:
         raise GaitInputError(f"{path.name}: column {', '.join(empty)} holds no numbers.")
-    return apply_columns(table, columns)
+    frames = None if columns.frame is None else table[columns.frame.name]
+    return (*apply_columns(table, columns), frames)

@@ -17,7 +17,12 @@ from rehab.gait.signals.filters import (
     find_minimum,
 )
 from rehab.gait.signals.samples import ANGLE, FORCE, FORWARD, MOMENT, POSITION, TIME
-from rehab.gait.stances.continuity import check_samples, check_steps, read_channel
+from rehab.gait.stances.continuity import (
+    check_fills,
+    check_samples,
+    check_steps,
+    read_channel,
+)
 from rehab.gait.stances.kinetics import PushOff, PushOffAnalyzer
 from rehab.gait.stances.lag_watch import (
     ANGLE_LAG_MAX_S,
@@ -145,6 +150,9 @@ class StanceAnalyzer:
             self._mass_kg,
             self._is_velocity,
         )
+        if not self._is_velocity:
+            late = window[MOMENT : ANGLE + 1, critical : before + end - begin + 1]
+            reasons += check_fills(late, self._rate_hz)
         if end_s - begin_s < STANCE_MIN_S:
             reasons.append(RejectionReason.SHORT_STANCE)
         elif end_s - begin_s > STANCE_MAX_S:

@@ -23,6 +23,10 @@ RATE_TOLERANCE = 0.2
 # One value repeated for this long is no measurement. The moment changes all through stance; the
 # angle rests where the ankle turns, but not to the last digit.
 MOMENT_FROZEN_S, ANGLE_FROZEN_S = 0.02, 0.04
+# A gap that was filled with a straight line before it was sent: 60 ms without a bend of so much a
+# second squared, in late stance [Nm, rad]; noise, and walkers, bend by a hundred times that.
+STRAIGHT_S = 0.06
+STRAIGHT_TO = np.array([[4.0], [0.02]])
 MOMENT_JUMP = (0.15, 40.0)  # Nm/kg at once, and Nm/kg/s; walking reaches 20
 ANGLE_JUMP = (0.05, 15.0)  # rad at once, and rad/s; walking reaches 8
 VELOCITY_JUMP = (5.0, 400.0)  # rad/s, where velocities are sent
@@ -119,6 +123,33 @@ def check_samples(
         if _is_frozen(values, moved, frozen_s * rate_hz):
             reasons.append(reason)
     return reasons
+
+
+def check_fills(late: Floats, rate_hz: float) -> list[RejectionReason]:
+    """Return in which channels of a late stance a straight line stands for the walker's curve.
+
+    Parameters
+    ----------
+    late
+        Moment and angle from where a fault harms A2 until terminal contact, shape (2, n).
+    rate_hz
+        Of the samples.
+    """
+    least = max(3, round(STRAIGHT_S * rate_hz) - 1)
+    bends = late[:, 2:] - 2 * late[:, 1:-1] + late[:, :-2]
+    straight = np.abs(bends) <= STRAIGHT_TO / rate_hz**2
+    reasons = (RejectionReason.MOMENT_LOST, RejectionReason.ANGLE_LOST)
+    return [
+        reason
+        for reason, row in zip(reasons, straight, strict=True)
+        if row.sum() >= least and _find_longest_run(row) >= least
+    ]
+
+
+def _find_longest_run(found: NDArray[np.bool_]) -> int:
+    """Return how many true values follow each other at most."""
+    others = np.flatnonzero(~np.concatenate(([False], found, [False])))
+    return int(np.diff(others).max()) - 1
 
 
 def check_steps(

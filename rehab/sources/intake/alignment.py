@@ -13,6 +13,7 @@ Floats = NDArray[np.float64]
 Channel = tuple[str, str]  # side, and one of rehab.gait.recordings.columns.CHANNELS
 Samples = tuple[Floats, dict[Channel, Floats]]  # times, and as many values of each channel
 
+FRAME: Channel = ("", "frame")  # the device's count of samples, of no leg
 HOLD_S = 0.05  # the longest gap that is interpolated (docs/reference/gait.md#time-base)
 WAIT_S = 0.3  # by our clock, for a channel that has fallen silent
 KEEP_S = 60.0  # how long samples wait for those of other channels
@@ -56,7 +57,7 @@ class Alignment:
             if sent.any():
                 self._append(channel, t_s[sent], column[sent])
                 self._heard_s[channel] = now_s
-        for side in {side for side, _ in self._tracks}:
+        for side in {side for side, _ in self._tracks.keys() - {FRAME}}:
             for name in REQUIRED:
                 self._tracks.setdefault((side, name), (np.empty(0), np.empty(0)))
                 self._heard_s.setdefault((side, name), now_s)
@@ -129,5 +130,5 @@ def _interpolate(at_s: Floats, times: Floats, known: Floats) -> Floats:
 
 
 def _is_whole(values: Mapping[Channel, Floats]) -> bool:
-    sides = {side for side, _ in values}
+    sides = {side for side, _ in values.keys() - {FRAME}}
     return all((side, name) in values for side in sides for name in REQUIRED)

@@ -12,7 +12,7 @@ from rehab.gait import GyroscopeStride, Stride
 from rehab.gait.recordings.columns import Column
 from rehab.gait.selfcheck.cures import CURES
 from rehab.sources.client import LiveFeed
-from rehab.sources.intake.alignment import Alignment, Channel, Floats, Samples
+from rehab.sources.intake.alignment import FRAME, Alignment, Channel, Floats, Samples
 from rehab.sources.intake.gyroscopes import GyroscopePipeline
 from rehab.sources.intake.measurements import to_measurement, to_timed_measurement
 from rehab.sources.intake.pipeline import SignalPipeline
@@ -73,6 +73,8 @@ class Intake:
             for side, leg in settings.columns.legs.items()
             for channel, column in leg.items()
         }
+        self._frame = settings.columns.frame
+        self._counted: str | None = None  # the stream whose frame numbers are used
         self._rate_hz = settings.rate_hz
         self._gyroscopes = GyroscopePipeline(settings.gyroscopes, settings.rate_hz, notify)
         if settings.gyroscopes:
@@ -185,7 +187,10 @@ class Intake:
 
     def _add_samples(self, rows: list[Mapping[str, Cell]]) -> None:
         """Add rows that have the same cells."""
-        names = [n for n in rows[0] if n in self._columns or n in self._gyroscopes.names]
+        frame = None if self._frame is None else self._frame.name
+        names = [
+            n for n in rows[0] if n in self._columns or n in self._gyroscopes.names or n == frame
+        ]
         time = self._settings.columns.time
         times, cells = [], []
         for row in rows:
@@ -230,7 +235,13 @@ class Intake:
         """
         if not len(t_s):
             return
-        self.quality.count_samples(stream, t_s)
+        frame = self._frame.name if self._frame is not None and self._frame.name in names else None
+        frames = None if frame is None else table[:, list(names).index(frame)]
+        self.quality.count_samples(stream, t_s, frames)
+        problem = self.quality.frame_problem
+        if problem and problem not in self._reported_reasons:
+            self._reported_reasons.add(problem)
+            self._notify(problem)
         if self._settings.gyroscopes:
             rates = {n: table[:, p] for p, n in enumerate(names) if n in self._gyroscopes.names}
             self._put_steps(self._gyroscopes.add(t_s, rates))
@@ -240,9 +251,19 @@ class Intake:
         for place in known:
             channel, column = self._columns[names[place]]
             values[channel] = table[:, place] * column.factor
+        columns = [self._columns[names[place]][1] for place in known]
+        if frames is not None and self._frame is not None and self._is_counted(stream, values):
+            values[FRAME] = frames
+            known, columns = [*known, list(names).index(self._frame.name)], [*columns, self._frame]
         sent = np.ones((len(t_s), len(known))) if there is None else there[:, known]
-        for samples in self._align(t_s, values, sent, [self._columns[names[p]][1] for p in known]):
+        for samples in self._align(t_s, values, sent, columns):
             self._measure(*samples)
+
+    def _is_counted(self, stream: str, values: Mapping[Channel, Floats]) -> bool:
+        """Return whether a stream's numbers are used: those of the first one with a force."""
+        if self._counted is None and any(channel == "force" for _, channel in values):
+            self._counted = stream
+        return stream == self._counted
 
     def _align(
         self, t_s: Floats, values: dict[Channel, Floats], sent: Floats, columns: Sequence[Column]

@@ -18,7 +18,7 @@ from rehab.gait import (
 from rehab.gait.recordings.columns import REQUIRED, SIDES
 from rehab.gait.settings import check_rate
 from rehab.gait.signals.clock import estimate_rate
-from rehab.sources.intake.alignment import Channel, Floats, Samples
+from rehab.sources.intake.alignment import FRAME, Channel, Floats, Samples
 from rehab.sources.reporting import Notify
 
 FIRST_SAMPLES = 100  # from which legs and rate are detected
@@ -103,7 +103,7 @@ class SignalPipeline:
     def _begin(self) -> list[Stride]:
         """Set up the detectors for the samples that were held, and feed these to them."""
         held, self._held = self._held, []
-        channels = {channel for _, values in held for channel in values}
+        channels = {channel for _, values in held for channel in values} - {FRAME}
         sides = tuple(s for s in SIDES if all((s, name) in channels for name in REQUIRED))
         if not sides:
             missing = sorted({f"{s}.{n}" for s, _ in channels for n in REQUIRED} - {
@@ -131,17 +131,18 @@ class SignalPipeline:
         return [stride for t, values in held for stride in self._feed(t, values)]
 
     def _feed(self, t_s: Floats, values: dict[Channel, Floats]) -> list[Stride]:
-        late = {side for side, _ in values} - set(self._sides) - self._others
+        late = {side for side, _ in values.keys() - {FRAME}} - set(self._sides) - self._others
         if late:
             self._others |= late
             self._notify(
                 f"Signals of the {' and '.join(sorted(late))} leg came too late to be measured. "
                 "Start this source again while both legs send."
             )
+        frames = values.get(FRAME)
         if isinstance(self._detector, TwoLegDetector):
-            return self._detector.feed(t_s, *(_leg(values, side, t_s) for side in SIDES))
+            return self._detector.feed(t_s, *(_leg(values, s, t_s) for s in SIDES), frame=frames)
         assert self._detector is not None  # noqa: S101 (set by _begin)
-        return self._detector.feed(t_s, *_leg(values, self._sides[0], t_s))
+        return self._detector.feed(t_s, *_leg(values, self._sides[0], t_s), frame=frames)
 
 
 def _values(values: dict[Channel, Floats], channel: Channel, count: int) -> Floats:

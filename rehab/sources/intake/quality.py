@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rehab.gait.signals.clock import SampleClock
+from rehab.gait.signals.frames import FrameClock, read_frames
 from rehab.gait.stances.timing import GAP_S, LATE_S
 from rehab.sources.intake.alignment import Floats
 from rehab.training.steps import Measurement
@@ -29,11 +30,12 @@ class SignalQuality:
         self.late = self.lost = 0
         self.clock_jumps = 0
         self.bad_rows = 0
+        self.frame_problem = ""  # why frame numbers are ignored, with the cure
         self._monotonic = monotonic
         self._since_s = monotonic()
         self._samples = 0
         self._last_s: dict[str, float] = {}  # of each stream, by its own clock
-        self._clocks: dict[str, SampleClock] = {}
+        self._clocks: dict[str, SampleClock | FrameClock] = {}
         self._times_s: dict[str, float] = {}  # the newest one that the clock has released
         self._latest_s = self._longest_s = 0.0
         self._first: tuple[float, float] | None = None  # our time, and how far the sender is ahead
@@ -43,27 +45,35 @@ class SignalQuality:
         self._stride: Measurement | None = None
         self._stride_at_s = 0.0
 
-    def count_samples(self, stream: str, t_s: Floats) -> None:
-        """Count samples of a stream."""
+    def count_samples(self, stream: str, t_s: Floats, frames: Floats | None = None) -> None:
+        """Count samples of a stream, which may be numbered."""
         self._samples += len(t_s)
         last_s = self._last_s.get(stream)
         went_back = bool((np.diff(t_s, prepend=t_s[0] if last_s is None else last_s) < 0).any())
         self.clock_jumps += went_back
-        self._judge(stream, t_s)
+        self._judge(stream, t_s, frames)
         self._last_s[stream] = float(t_s[-1])
         self._update_lag(float(t_s[-1]), went_back)
 
-    def _judge(self, stream: str, t_s: Floats) -> None:
+    def _judge(self, stream: str, t_s: Floats, frames: Floats | None) -> None:
         """Count what comes late and what is lost."""
-        clock = self._clocks.setdefault(stream, SampleClock())
-        (times,), late_s = clock.add(np.array([t_s]))
+        clock = self._clocks.get(stream)
+        if clock is None:
+            clock = self._clocks[stream] = SampleClock() if frames is None else FrameClock()
+        usual_s = GAP_S
+        if isinstance(clock, FrameClock):
+            (times,), late_s = clock.add(np.array([t_s]), 0, read_frames(frames, len(t_s)))
+            self.frame_problem = self.frame_problem or clock.problem
+            usual_s = GAP_S if clock.problem else clock.usual_s
+        else:
+            (times,), late_s = clock.add(np.array([t_s]))
         if not len(times):
             return
         if late_s is not None:
             self.late += int((late_s > LATE_S).sum())
             self._latest_s = max(self._latest_s, float(late_s.max()))
         steps = np.diff(times, prepend=self._times_s.get(stream, times[0]))
-        gaps = steps[steps > GAP_S]
+        gaps = steps[steps > usual_s]
         if len(gaps):
             self.lost += len(gaps)
             self._longest_s = max(self._longest_s, float(gaps.max()))

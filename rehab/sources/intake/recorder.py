@@ -8,7 +8,7 @@ from typing import TextIO
 import numpy as np
 
 from rehab.gait.recordings.columns import SIGNAL_LAYOUTS
-from rehab.sources.intake.alignment import Channel, Floats
+from rehab.sources.intake.alignment import FRAME, Channel, Floats
 from rehab.sources.reporting import Notify, SourceError
 
 
@@ -40,8 +40,10 @@ class SignalRecorder:
         try:
             if not self._channels:
                 self._channels = sorted(values)
+                layout = SIGNAL_LAYOUTS["garry"]
                 names = [
-                    SIGNAL_LAYOUTS["garry"].legs[side][name].name for side, name in self._channels
+                    name if (side, name) == FRAME else layout.legs[side][name].name
+                    for side, name in self._channels
                 ]
                 self._file.write(",".join(["time_s", *names]) + "\n")
             columns = [t_s, *(values.get(channel, nothing) for channel in self._channels)]

@@ -9,6 +9,7 @@ from rehab.gait import check_signals, measure_both_legs, measure_strides
 from rehab.gait.recordings.csv_files import read_mass
 from rehab.gait.recordings.tables import read_signals
 from rehab.gait.signals.clock import estimate_rate
+from rehab.gait.signals.frames import find_frame_problem
 from rehab.sources.intake.measurements import to_measurement
 from rehab.sources.recording.table import RecordingError
 from rehab.training.steps import Measurement, Side
@@ -28,7 +29,7 @@ def measure_file(
     and GaitInputError for signals that nothing can be measured from.
     """
     try:
-        t_s, legs = read_signals(path, columns)
+        t_s, legs, frames = read_signals(path, columns)
     except OSError as problem:
         raise RecordingError(f"{path} cannot be read: {problem.strerror}.") from None
     rate_hz = estimate_rate(t_s) if rate_hz is None else rate_hz
@@ -41,11 +42,18 @@ def measure_file(
             rate_hz=rate_hz,
             mass_kg=mass_kg,
             look_ahead_s=look_ahead_s,
+            frame=frames,
         )
     else:
         ((only, leg),) = legs.items()
         found = measure_strides(
-            t_s, *leg, rate_hz=rate_hz, mass_kg=mass_kg, look_ahead_s=look_ahead_s, side=only
+            t_s,
+            *leg,
+            rate_hz=rate_hz,
+            mass_kg=mass_kg,
+            look_ahead_s=look_ahead_s,
+            side=only,
+            frame=frames,
         )
     check = check_signals(
         t_s, legs.get("left"), legs.get("right"), rate_hz=rate_hz, mass_kg=mass_kg
@@ -55,4 +63,5 @@ def measure_file(
         named = to_measurement(stride, len(strides) + 1, side or Side.LEFT)
         if named is not None and side in {None, named.side}:
             strides.append(named)
-    return strides, [finding.message for finding in check.findings]
+    messages = [find_frame_problem(t_s, frames), *(finding.message for finding in check.findings)]
+    return strides, [message for message in messages if message]

@@ -9,6 +9,7 @@ from tests.gait.faults.spoil import (
     drag,
     drift,
     even_out,
+    fill,
     lag,
     lose,
     scale,
@@ -59,6 +60,11 @@ FAULTS: dict[str, Callable[..., Walk]] = {
     },
     **{f"mass × {factor:g}": partial(weigh, factor=factor) for factor in (0.7, 0.9, 1.1, 1.3)},
     **{f"even grid, {ms} ms": partial(even_out, width_s=ms / 1000) for ms in (30, 82)},
+    **{
+        f"gaps of {ms} ms filled {name}": partial(fill, width_s=ms / 1000, order=order)
+        for name, order in (("straight", 1), ("by a curve", 3))
+        for ms in (100, 200)
+    },
     "swap force": partial(swap, rows=[FORCE]),
     "swap moment": partial(swap, rows=[MOMENT]),
     "swap angle": partial(swap, rows=[ANGLE]),

@@ -50,9 +50,10 @@ HIDDEN = {
         ("mass ×",),
     ),
     5: Hidden(
-        "an even grid has no stalls: nothing is left of the stamps that told them",
-        "nothing: the lab has to send the device's own stamps",
-        ("even grid",),
+        "samples made up before sending are like others: an even grid has no stalls, as nothing is "
+        "left of the stamps that told them, and a curve drawn through a gap bends as an ankle does",
+        "nothing: the lab has to send the device's own stamps, and to leave gaps open",
+        ("even grid", "gaps of 100 ms filled by", "gaps of 200 ms filled by"),
     ),
 }
 

@@ -92,6 +92,24 @@ def even_out(walk, clean, width_s):
     return replace(stalled, t_s=grid)
 
 
+def fill(walk, clean, width_s, *, order):
+    """Fill gaps of the angle before it is sent, once in two strides, with a curve of an order."""
+    legs = legs_of(walk)
+    rng = np.random.default_rng(0)
+    for stride in [s for s in clean if s.side == "left"][::2]:
+        at_s = stride.initial_contact_s + rng.uniform(0.3, 0.9) * stride.stance_s
+        rows = find_rows(walk, at_s, at_s + width_s)
+        around = np.concatenate((np.arange(rows.start - 3, rows.start), rows.stop + np.arange(3)))
+        if around[-1] >= len(walk.t_s):
+            continue
+        for leg in legs.values():
+            known = leg[ANGLE, around if order > 1 else around[2:4]]
+            at = around if order > 1 else around[2:4]
+            curve = np.polynomial.Polynomial.fit(at, known, order)
+            leg[ANGLE, rows] = curve(np.arange(rows.start, rows.stop))
+    return replace(walk, **legs)
+
+
 def swap(walk, _clean, rows):
     """Take channels of the left leg for those of the right one, and vice versa."""
     legs = legs_of(walk)

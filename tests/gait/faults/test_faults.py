@@ -108,6 +108,16 @@ def test_a_drag_that_may_begin_before_the_foot_leaves_is_taken_in_the_middle():
 
 
 @pytest.mark.parametrize("name", RECORDINGS)
+@pytest.mark.parametrize("width_ms", [100, 200])
+def test_gaps_that_were_filled_with_a_straight_line(name, width_ms):
+    """Of each second stride's two thirds are in late stance; what is filled before does no harm."""
+    tally = try_fault(name, f"gaps of {width_ms} ms filled straight")
+
+    assert tally.wrong == 0
+    assert 0.2 * tally.strides < tally.lost <= 0.5 * tally.strides
+
+
+@pytest.mark.parametrize("name", RECORDINGS)
 def test_clonus_is_kept_and_flagged(name):
     walk, clean = open_walk(name)
     found = [s for s in shake(walk, clean, 1.0).both_legs() if s.side == "left"]
