@@ -6,48 +6,20 @@ and not by a check, which only Django's own commands run.
 """
 
 import os
-import secrets
 from pathlib import Path
 from zoneinfo import available_timezones
 
-import dj_database_url
 from csp.constants import NONCE, NONE, SELF
 from django.core.exceptions import ImproperlyConfigured
 
+from garry_site import environment
+from garry_site.data_folder import close_data_folder, read_secret_key
+from garry_site.databases import parse_database
+from garry_site.environment import flag, number, string_list, text
+
 os.umask(0o077)
 BASE_DIR = Path(__file__).resolve().parent.parent
-
-# --- typed readers: a wrong value stops the start with an error that names valid ones -----------
-
-VARIABLES: dict[str, str] = {}  # every variable that is read, and what it is for
-
-
-def text(name: str, default: str, about: str) -> str:
-    """Read a variable as text."""
-    VARIABLES[name] = about
-    return os.environ.get(name, "") or default
-
-
-def flag(name: str, default: bool, about: str) -> bool:
-    """Read a variable as yes or no."""
-    value = text(name, "yes" if default else "no", about).lower()
-    if value not in {"1", "true", "yes", "on", "0", "false", "no", "off"}:
-        raise ImproperlyConfigured(f"{name}={value!r} is neither yes nor no. Set it to 1 or 0.")
-    return value in {"1", "true", "yes", "on"}
-
-
-def number(name: str, default: int, about: str, *, low: int, high: int) -> int:
-    """Read a variable as a whole number within bounds."""
-    value = text(name, str(default), about)
-    if not (value.isascii() and value.isdigit() and low <= int(value) <= high):
-        raise ImproperlyConfigured(f"{name}={value!r} must be a whole number from {low} to {high}.")
-    return int(value)
-
-
-def string_list(name: str, default: str, about: str) -> list[str]:
-    """Read a variable as a comma-separated list."""
-    return [word.strip() for word in text(name, default, about).split(",") if word.strip()]
-
+VARIABLES = environment.VARIABLES  # every GARRY_* variable, once all below are read
 
 # --- where and how it runs ----------------------------------------------------------------------
 
@@ -75,41 +47,14 @@ if HOSTED and (not ALLOWED_HOSTS or "*" in ALLOWED_HOSTS):
     )
 
 
-def _close_data_folder() -> None:
-    """Close an existing data folder to other accounts of the machine, if it is ours."""
-    try:
-        folder = DATA_DIR.stat()
-        if folder.st_uid == os.geteuid() and folder.st_mode & 0o077:
-            DATA_DIR.chmod(0o700)
-    except (AttributeError, OSError):  # Windows; no folder yet; a disk without permissions
-        pass  # check garry.E011 names a folder that stays open
-
-
-_close_data_folder()
-
-
-def _secret_key() -> str:
-    """Return the key; without one, generate it into the data folder (one machine only)."""
-    given = text("GARRY_SECRET_KEY", "", "secret that signs cookies and tokens")
-    if HOSTED and len(given) < SECRET_KEY_LENGTH:
-        raise ImproperlyConfigured(
-            "A hosted server needs a secret key of its own. Set GARRY_SECRET_KEY to "
-            f"{SECRET_KEY_LENGTH} or more random characters."
-        )
-    if given:
-        return given
-    file = DATA_DIR / "secret_key"
-    if not file.exists():
-        DATA_DIR.mkdir(parents=True, exist_ok=True)
-        try:
-            with os.fdopen(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w") as out:
-                out.write(secrets.token_urlsafe(50))
-        except FileExistsError:
-            pass  # another process was faster; its key counts
-    return file.read_text().strip()
-
-
-SECRET_KEY = _secret_key()
+close_data_folder(DATA_DIR)
+SECRET_KEY = text("GARRY_SECRET_KEY", "", "secret that signs cookies and tokens")
+if HOSTED and len(SECRET_KEY) < SECRET_KEY_LENGTH:
+    raise ImproperlyConfigured(
+        "A hosted server needs a secret key of its own. Set GARRY_SECRET_KEY to "
+        f"{SECRET_KEY_LENGTH} or more random characters."
+    )
+SECRET_KEY = SECRET_KEY or read_secret_key(DATA_DIR)
 
 # --- applications -------------------------------------------------------------------------------
 
@@ -170,42 +115,9 @@ DATABASE_URL = text(
     f"sqlite:///{DATA_DIR / 'garry.sqlite3'}",
     "database; SQLite on one machine, postgres://… when hosted",
 )
-try:
-    DATABASES = {"default": dj_database_url.parse(DATABASE_URL)}
-except ValueError as problem:
-    raise ImproperlyConfigured(
-        "GARRY_DATABASE_URL is no database address. Give sqlite:////path/to/file or "
-        "postgres://user:password@host/name."
-    ) from problem
+DATABASES = {"default": parse_database(DATABASE_URL)}
 if DATABASES["default"]["ENGINE"].endswith("sqlite3"):
     DATA_DIR.mkdir(parents=True, exist_ok=True)
-    # FULL keeps acknowledged steps through a power cut, not only through a crash
-    # (docs/reference/stack.md#durability).
-    DATABASES["default"]["OPTIONS"] = {
-        "transaction_mode": "IMMEDIATE",
-        "timeout": 20,
-        "init_command": (
-            "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA journal_size_limit=67108864; "
-            "PRAGMA mmap_size=134217728; PRAGMA cache_size=-16000; "
-            # The live runtime checkpoints between commits (rehab/sessions/live/runtime.py); left
-            # to SQLite, every fiftieth commit would wait for a checkpoint.
-            "PRAGMA wal_autocheckpoint=20000;"
-        ),
-    }
-else:
-    DATABASES["default"] |= {"CONN_MAX_AGE": 0}
-    DATABASES["default"]["OPTIONS"] = {
-        # Nobody waits for ever for a lock, or for a database that is gone. The writer of steps has
-        # a connection of its own, which gives up sooner (rehab/sessions/live/writer.py).
-        "connect_timeout": 5,
-        "keepalives_idle": 10,
-        "keepalives_interval": 3,
-        "keepalives_count": 3,
-        "tcp_user_timeout": 10_000,
-        "options": "-c lock_timeout=10s -c statement_timeout=60s",
-        **DATABASES["default"].get("OPTIONS", {}),
-        "pool": {"min_size": 1, "max_size": 8, "timeout": 10},
-    }
 DEFAULT_AUTO_FIELD = "django.db.models.BigAutoField"
 
 REDIS_URL = text("GARRY_REDIS_URL", "", "Redis, by which several servers hear each other")

@@ -4,18 +4,14 @@ from rehab.boards import admin as boards
 from rehab.feedback import admin as feedback
 from rehab.gestures import admin as gestures
 from rehab.people import admin as people
-from rehab.people import audit_admin as logs
 from rehab.sessions import admin as sessions
-from rehab.sessions import setup_admin as session_setup
 from rehab.stations import admin as stations
 
 __all__ = [
     "boards",
     "feedback",
     "gestures",
-    "logs",
     "people",
-    "session_setup",
     "sessions",
     "stations",
 ]

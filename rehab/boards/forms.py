@@ -8,7 +8,7 @@ from django import forms
 from django.utils.translation import gettext_lazy as _
 
 from rehab.boards.choices import Participants
-from rehab.people.web.admin_base import ClinicForm
+from rehab.people.web.row_forms import ClinicForm
 from rehab.training.valences import VALENCES
 
 MAX_GROUP = 1_000  # the preview's URL contains each key; servers refuse URLs beyond 16 kB

@@ -36,8 +36,8 @@ from rehab.sessions.questionnaires import QuestionnaireResponse
 from rehab.sessions.replay import fold_log
 from rehab.studies.models import StudyState
 from rehab.studies.participants import StudyVisit
+from rehab.training.figures.metrics import METRICS
 from rehab.training.fold import SessionFold
-from rehab.training.metrics import METRICS
 from rehab.training.plans import SessionPlan
 
 PAGE_ROWS = 2_000  # rows held in memory
@@ -222,7 +222,7 @@ def _valence_switches(session: TrainingSession) -> list[tuple[int, str]]:
     """Return the valences in force, the last one first, each with the step that it came after."""
     if not session.changed_to:
         return [(-1, session.valence)]
-    switches = fold_log(SessionFold(session.to_plan()), session).switches
+    switches = fold_log(SessionFold(session.to_plan()), session).valences.switches
     return [*reversed(switches), (-1, session.valence)]
 
 

@@ -10,7 +10,7 @@ from datetime import date
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from rehab.training.metrics import METRICS
+from rehab.training.figures.metrics import METRICS
 from rehab.training.scoring import RULES_VERSION
 
 

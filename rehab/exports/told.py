@@ -48,7 +48,7 @@ def _fold(fold: SessionFold, entry: Any) -> tuple[Any, ...] | None:
         fold.score,
         fold.feedback.streak,
         live=True,
-        answer=fold.answer,
+        answer=fold.telling.answer,
     )
     if told is None or told["kind"] not in TOLD:
         return None

@@ -12,8 +12,8 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.people.models import LANGUAGES
-from rehab.people.web.admin_base import ClinicForm
 from rehab.people.web.refusals import format_refusal
+from rehab.people.web.row_forms import ClinicForm
 from rehab.training.measures import InvalidSetting
 from rehab.training.valences import TEXT_MAX, VALENCES, Band
 

@@ -16,8 +16,9 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.gestures.models import Gesture, GestureStep
 from rehab.gestures.tracks import read_tracks
-from rehab.people.web.admin_base import ClinicForm, LabeledFormSet, ScopedAdmin, ScopedOptions
+from rehab.people.web.admin_base import ScopedAdmin, ScopedOptions
 from rehab.people.web.refusals import format_refusal
+from rehab.people.web.row_forms import ClinicForm, LabeledFormSet
 from robot.motion.dry_run import DryRun, dry_run, validate_gesture
 from robot.motion.gesture import REACH_M, TETHER_M
 from robot.motion.gesture_errors import BadGesture

@@ -25,8 +25,8 @@ from rehab.people.web.api_base import (
 )
 from rehab.sessions.forms.initial import initial_choices
 from rehab.sessions.forms.session import SessionForm
-from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.trouble import NotStored
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.log import SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.reports.trend import with_metrics

@@ -16,8 +16,8 @@ from rehab.feedback.models import FeedbackType, feedback_text_edited
 from rehab.people.models import User
 from rehab.people.web.refusals import format_refusal
 from rehab.sessions.live import runtime
-from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.trouble import NotStored
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN_STATES, ChangeKind
 from rehab.training.measures import InvalidSetting
@@ -60,7 +60,7 @@ async def _update_session(session_id: int, valence: Valence, by: User) -> None:
     live_runtime = runtime.current()
     try:
         live = await live_runtime.viewed_session(session_id)
-        known = live.aggregate.fold.valences.get(valence.slug)
+        known = live.aggregate.fold.valences.known.get(valence.slug)
         if known is None or known.bands == valence.bands:
             return
         value = {"valence": valence.slug, "bands": bands_to_json(valence.bands)}

@@ -10,10 +10,10 @@ from django.utils.translation import gettext, override
 from rehab.training.changes import ChangeValue, State
 from rehab.training.controls import CONTROLS
 from rehab.training.fold import SessionFold
+from rehab.training.fold.tallies import Tally
 from rehab.training.goals import MIN_BASELINE_STRIDES
 from rehab.training.phases import find_phase_kind
 from rehab.training.plans import SessionPlan
-from rehab.training.tallies import Tally
 from rehab.training.valences import VALENCES, Valence
 
 Message = dict[str, Any]
@@ -113,10 +113,10 @@ def describe_types(fold: SessionFold) -> Message:
     """Return which feedback type is in force and which comes next, and which it may be."""
     return {
         "began": fold.plan.valence.slug,
-        "changed_to": list(fold.changed_to),
+        "changed_to": list(fold.valences.changed_to),
         "valence": fold.valence.slug,
-        "next_valence": fold.next_valence,
-        "types": [{"slug": one.slug, "label": one.label} for one in fold.valences.values()],
+        "next_valence": fold.valences.next_slug,
+        "types": [{"slug": one.slug, "label": one.label} for one in fold.valences.known.values()],
     }
 
 
@@ -157,7 +157,7 @@ def describe_coaching(fold: SessionFold) -> Message:
 
 def coaching_of(fold: SessionFold) -> Callable[[], Message]:
     """Return what describes later how a goal can be set now: not every step has a PT's page."""
-    suggest, measure, wanted = fold.suggestion(), fold.plan.measure, fold.wanted_hit_rate
+    suggest, measure, wanted = fold.suggestion(), fold.plan.measure, fold.following.wanted_hit_rate
     baseline = _describe_baseline(fold) if fold.phase.kind == "baseline" else None
 
     def describe() -> Message:

@@ -26,7 +26,7 @@ from rehab.training.adaptation import AdaptationMode
 from rehab.training.changes import State
 from rehab.training.controls import requestable_kinds
 from rehab.training.cueing import CueRule
-from rehab.training.metrics import METRICS
+from rehab.training.figures.metrics import METRICS
 from rehab.training.schedules import ScheduleKind
 from rehab.training.steps import Side
 from rehab.training.valences import VALENCES, find_valence

@@ -14,7 +14,9 @@ from django.utils.html import format_html_join
 from django.utils.translation import gettext
 from django.utils.translation import gettext_lazy as _
 
-from rehab.people.web.admin_base import ClinicForm, ScopedAdmin, ScopedOptions, TokenAdmin
+from rehab.people.web.admin_base import ScopedAdmin, ScopedOptions
+from rehab.people.web.row_forms import ClinicForm
+from rehab.people.web.token_admin import TokenAdmin
 from rehab.stations.forms import PinForm
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import format_device_state

@@ -21,7 +21,7 @@ def fill(rows: int) -> list[int]:
     from django.db import connection, transaction
     from django.utils import timezone
 
-    from rehab.sessions.live.aggregate import SessionAggregate
+    from rehab.sessions.live.session.aggregate import SessionAggregate
     from rehab.sessions.log import Remark, SessionEvent, Step
     from rehab.sessions.models import TrainingSession
     from rehab.training.steps import Measurement, Side
@@ -78,8 +78,12 @@ def ask(keys: list[int]) -> Iterator[tuple[str, Callable[[], Any]]]:
     from django.utils import timezone
 
     from rehab.boards.building.scheduler import find_ended
-    from rehab.sessions.live import auth, backlog, following, loading, owners
-    from rehab.sessions.live.commits import Job, commit
+    from rehab.sessions.live import auth
+    from rehab.sessions.live.database import owners
+    from rehab.sessions.live.protocol import backlog
+    from rehab.sessions.live.servers import following
+    from rehab.sessions.live.session import loading
+    from rehab.sessions.live.session.commits import Job, commit
     from rehab.sessions.log import SessionEvent
     from rehab.stations.models import Device
     from rehab.training.changes import Change, ChangeKind

@@ -157,7 +157,7 @@ def walk_while_one_is_built(patients: int) -> dict[str, float]:
     from rehab.boards.building.scheduler import BoardBuilder
     from rehab.boards.models import BoardEntry, Leaderboard
     from rehab.people.models import Clinic, Patient
-    from rehab.sessions.live.aggregate import SessionAggregate
+    from rehab.sessions.live.session.aggregate import SessionAggregate
     from rehab.sessions.models import TrainingSession
     from rehab.sessions.services import SessionRequest, create_session
     from rehab.training.changes import Change, ChangeKind

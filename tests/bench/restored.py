@@ -15,11 +15,11 @@ def fill(count: int) -> None:
     from django.db import connection
     from django.utils import timezone
 
-    from rehab.sessions.live.aggregate import CHECKPOINT_STEPS, SessionAggregate
+    from rehab.sessions.live.session.aggregate import CHECKPOINT_STEPS, SessionAggregate
     from rehab.sessions.log import Step
     from rehab.sessions.models import TrainingSession
     from rehab.sources.synthetic import PROFILES, SyntheticWalker
-    from rehab.training.checkpoints import fold_to_json
+    from rehab.training.fold.checkpoints import fold_to_json
     from rehab.training.steps import Side
     from tests.support.live_seed import seed
     from tests.support.world import store

@@ -20,7 +20,7 @@ import json, os, resource, sys, tracemalloc
 import django
 django.setup()
 from rehab.management.commands.runsession import Command
-from rehab.sessions import headless
+from rehab.sessions.live import headless
 count = int(sys.argv[1])
 if sys.argv[2] == "trace":
     tracemalloc.start()

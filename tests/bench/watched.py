@@ -66,8 +66,9 @@ class Watch:
 
 def watch(path: Path) -> None:
     """Watch this process."""
-    from rehab.sessions.live import process, writer
-    from rehab.sessions.live.commits import commit
+    from rehab.sessions.live import process
+    from rehab.sessions.live.session import writer
+    from rehab.sessions.live.session.commits import commit
 
     seen, tune = Watch(), process.tune_interpreter
 

@@ -16,8 +16,8 @@ from django.core.management import get_commands, load_command_class
 from prometheus_client import generate_latest
 
 from rehab.sessions.live import instruments, runtime
+from rehab.sessions.live.database.trouble import Trouble
 from rehab.sessions.live.process import STOP_S
-from rehab.sessions.live.trouble import Trouble
 from robot.__main__ import make_parser
 from tests.support.servers import ROOT
 

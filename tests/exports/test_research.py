@@ -25,7 +25,7 @@ from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import withdraw_consent
 from rehab.people.models import ErasureReason, Patient, User
 from rehab.people.roles import Role
-from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sources.recording import read_recording

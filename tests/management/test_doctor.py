@@ -8,10 +8,10 @@ from io import StringIO
 import pytest
 from django.core.management import call_command
 
-from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
-from rehab.training.checkpoints import fold_to_json
+from rehab.training.fold.checkpoints import fold_to_json
 from tests.support.walks import walk
 from tests.support.world import build_world
 

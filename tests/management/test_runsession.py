@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from django.core.management import CommandError, call_command
 
-from rehab.sessions.headless import Pace, run_session
+from rehab.sessions.live.headless import Pace, run_session
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session

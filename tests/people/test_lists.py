@@ -13,8 +13,8 @@ from django.urls import reverse
 from django.utils.text import capfirst
 
 from rehab.people.roles import Role
+from rehab.sessions.admin.setup import PresetAdmin
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup_admin import PresetAdmin
 from tests.support.world import client_of, scoped_models
 
 pytestmark = pytest.mark.django_db

@@ -24,7 +24,7 @@ from rehab.sessions.reports.week import week_summary
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import format_last_seen
 from rehab.training.changes import ChangeKind, State
-from rehab.training.tallies import Tally
+from rehab.training.fold.tallies import Tally
 from tests.support.walks import RIGHT, strides, walk
 from tests.support.world import World, build_world, client_of, mark, signed_in
 

@@ -249,7 +249,7 @@ def test_the_chart_holds_every_stride_of_the_trained_leg(client, patient):
 
 
 def test_strides_before_the_goal_is_known_are_drawn_unjudged(client, world, patient):
-    from rehab.sessions.live.aggregate import SessionAggregate
+    from rehab.sessions.live.session.aggregate import SessionAggregate
     from rehab.sessions.services import SessionRequest, create_session
     from rehab.training.goals import GoalRule
     from rehab.training.steps import Measurement, Side

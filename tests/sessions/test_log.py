@@ -13,17 +13,17 @@ from hypothesis import strategies as st
 
 from rehab.people.models import Clinic, Patient
 from rehab.people.scope import CrossClinicReference
-from rehab.sessions.live.aggregate import SessionAggregate, StepRow
-from rehab.sessions.live.commits import STEP_COLUMNS, LogDiffers
+from rehab.sessions.live.session.aggregate import SessionAggregate, StepRow
+from rehab.sessions.live.session.commits import STEP_COLUMNS, LogDiffers
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind, NotAllowed
-from rehab.training.checkpoints import fold_to_json
+from rehab.training.figures.metrics import compute_metrics
+from rehab.training.fold.checkpoints import fold_to_json
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
-from rehab.training.metrics import compute_metrics
 from rehab.training.phases import make_phase
 from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import Measurement, Side

@@ -6,7 +6,7 @@ import pytest
 from django.urls import reverse
 
 from rehab.people.roles import Role
-from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.services import SessionRequest, change_session, create_session
 from rehab.training.changes import ChangeKind

@@ -14,7 +14,7 @@ from channels.testing import WebsocketCommunicator
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.frames import READ_NOW
+from rehab.sessions.live.protocol.frames import READ_NOW
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session

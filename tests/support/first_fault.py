@@ -8,7 +8,7 @@ from typing import Any
 
 from hypothesis.stateful import invariant
 
-from rehab.sessions.live.trouble import NotStored
+from rehab.sessions.live.database.trouble import NotStored
 from tests.support.source_machine import Sources
 
 

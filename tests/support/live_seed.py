@@ -23,7 +23,7 @@ def seed(count: int) -> list[dict[str, Any]]:
     from rehab.people.roles import Role
     from rehab.people.sign_in.first_start import first_clinic, prepare_database
     from rehab.people.sign_in.flow import BACKEND
-    from rehab.sessions.live.aggregate import SessionAggregate
+    from rehab.sessions.live.session.aggregate import SessionAggregate
     from rehab.sessions.services import SessionRequest, create_session
     from rehab.stations.models import Device, Station
     from rehab.training.changes import Change, ChangeKind

@@ -20,7 +20,7 @@ from hypothesis.stateful import (
 )
 
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import log_entries
@@ -38,6 +38,7 @@ from tests.support.callers import (
     open_session,
     turns,
 )
+from tests.support.folds import fold_log
 from tests.support.power_switch import PowerSwitch
 
 PHASES = (make_phase("training", strides=5), make_phase("catch", strides=3), make_phase("training"))
@@ -355,7 +356,7 @@ class Sources(RuleBasedStateMachine):
         assert list(numbers.values_list("number", flat=True)) == list(range(1, self.sent + 1))
         # The log in its order, but for what the server found wrong with a step.
         assert [plain(entry) for entry in log_entries(session)] == [plain(e) for e in self.log]
-        oracle = SessionFold.replay(session.to_plan(), self.log)
+        oracle = fold_log(session.to_plan(), self.log)
         rebuilt = SessionAggregate.load(session).fold
         for fold in (rebuilt, actor.fold):
             assert figures(fold) == figures(oracle)

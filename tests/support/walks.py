@@ -7,7 +7,7 @@ from datetime import datetime, timedelta
 
 from rehab.boards.building.scheduler import follow_sessions
 from rehab.people.models import Patient
-from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sources.synthetic import PROFILES, SyntheticWalker

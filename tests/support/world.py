@@ -29,8 +29,8 @@ from rehab.people.sign_in.tokens import ApiToken
 from rehab.questionnaires.instrument import Instrument, Item
 from rehab.sessions.corrections import SessionCorrection
 from rehab.sessions.incidents import RobotIncident
-from rehab.sessions.live.aggregate import Row, SessionAggregate
-from rehab.sessions.live.commits import Job, commit
+from rehab.sessions.live.session.aggregate import Row, SessionAggregate
+from rehab.sessions.live.session.commits import Job, commit
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import Questionnaire, QuestionnaireResponse

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rehab.training.checkpoints import fold_from_json, fold_to_json
 from rehab.training.closeness import COVERAGE, CloseSteps
+from rehab.training.figures.summary import summarize_session
+from rehab.training.fold.checkpoints import fold_from_json, fold_to_json
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import make_phase
 from rehab.training.plans import SessionPlan
 from rehab.training.schedules import Schedule, ScheduleKind
 from rehab.training.steps import Measurement, Side
-from rehab.training.summary import summarize_session
 from rehab.training.valences import VALENCES
 from tests.training.sessions import make_plan, start
 
@@ -117,7 +117,7 @@ def test_a_summary_tells_close_steps_apart():
     schedule = Schedule(ScheduleKind.SUMMARY, 4)
     fold = start(make_plan(schedule=schedule, close_steps=CLOSE))
     feed(fold, (4.5, 0.01), (4.01, 0.1), (3.0, 0.01), (3.99, 0.1))
-    answer = fold.answer
+    answer = fold.telling.answer
     assert (answer.steps, answer.hits, answer.misses, answer.close) == (4, 1, 1, 2)
     assert fold.feedback.points == 0  # one paid, one taken
 

@@ -13,16 +13,17 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rehab.training.changes import Change, ChangeKind, PauseReason
-from rehab.training.checkpoints import fold_from_json, fold_to_json
+from rehab.training.figures.metrics import compute_metrics
 from rehab.training.fold import SessionFold
+from rehab.training.fold.checkpoints import fold_from_json, fold_to_json
+from rehab.training.fold.tallies import Tally
 from rehab.training.measures import InvalidSetting
-from rehab.training.metrics import compute_metrics
 from rehab.training.phases import PHASE_KINDS, make_phase
 from rehab.training.plans import ChartStyle, SessionPlan
 from rehab.training.steps import InvalidMeasurement, InvalidReason, Measurement, ScoredStep, Side
-from rehab.training.tallies import Tally
 from rehab.training.valences import VALENCES, Band, Confetti, Valence, bands_to_json
 from robot.wire.limits import PERFORMANCE_MAX
+from tests.support.folds import fold_log
 from tests.training.sessions import make_plan, others_than, start
 
 Log = list[Measurement | Change]
@@ -95,7 +96,7 @@ def sessions(draw: st.DrawFn) -> tuple[SessionPlan, Log]:
     log: Log = [Change(ChangeKind.START)]
     if plan.goal.needs_baseline and draw(st.booleans()):
         log += [Measurement(n, float(n), Side.LEFT, 3.0 + n % 3) for n in range(1, 51)]
-        fold = SessionFold.replay(plan, log)
+        fold = fold_log(plan, log)
     for happening in draw(happenings):
         if isinstance(happening, Change):
             try:
@@ -137,7 +138,7 @@ def test_the_log_gives_the_session_back_wherever_it_is_cut(
     whole = SessionFold(plan)
     steps = walk_log(whole, log)
     stored_plan = SessionPlan.from_json(json.loads(json.dumps(plan.to_json())))
-    again = SessionFold.replay(stored_plan, log[:cut])
+    again = fold_log(stored_plan, log[:cut])
     assert walk_log(again, log[cut:]) == steps[count_steps(log[:cut]) :]
     assert vars(again) == vars(whole)
 
@@ -190,7 +191,7 @@ def test_every_figure_follows_from_the_scored_steps(session: tuple[SessionPlan, 
     assert fold.feedback == tally([step for step in walked if plan.phases[step.phase].feedback])
     for index, phase in enumerate(fold.phases):
         assert phase == tally([step for step in walked if step.phase == index])
-    if any(VALENCES[slug].has_points for slug in (plan.valence.slug, *fold.changed_to)):
+    if any(VALENCES[slug].has_points for slug in (plan.valence.slug, *fold.valences.changed_to)):
         assert fold.score == sum(step.points or 0 for step in steps)
     else:
         assert fold.score is None
@@ -232,7 +233,7 @@ def test_every_scored_step_keeps_its_promises(session: tuple[SessionPlan, Log]) 
 def valence_at(fold: SessionFold, step: ScoredStep) -> Valence:
     """Return the valence that was in force when a step came, by the switches alone."""
     slug = fold.plan.valence.slug
-    for after, changed_to in fold.switches:
+    for after, changed_to in fold.valences.switches:
         if step.number > after:
             slug = changed_to
     return VALENCES[slug]
@@ -245,18 +246,21 @@ def test_the_feedback_type_changes_with_a_phase_of_feedback_alone(
     plan, log = session
     fold = SessionFold(plan)
     for entry in log:
-        before = (fold.valence.slug, fold.phase_index, len(fold.switches))
+        before = (fold.valence.slug, fold.phase_index, len(fold.valences.switches))
         walk_log(fold, [entry])
-        assert fold.valence == fold.valences[fold.valence.slug]
+        assert fold.valence == fold.valences.known[fold.valence.slug]
         if fold.valence.slug == before[0]:
             continue
         assert fold.phase.feedback
         assert fold.phase_strides == 0
         by_hand = isinstance(entry, Change) and entry.kind is ChangeKind.PHASE
         assert fold.phase_index != before[1] or by_hand
-        assert len(fold.switches) == before[2] + 1
-    assert fold.next_valence != fold.valence.slug
-    assert {fold.valence.slug, *fold.changed_to} <= {plan.valence.slug, *fold.valences}
+        assert len(fold.valences.switches) == before[2] + 1
+    assert fold.valences.next_slug != fold.valence.slug
+    assert {fold.valence.slug, *fold.valences.changed_to} <= {
+        plan.valence.slug,
+        *fold.valences.known,
+    }
 
 
 @given(sessions())
@@ -271,7 +275,7 @@ def test_words_and_drawing_alter_no_score(session: tuple[SessionPlan, Log]) -> N
 
 @given(sessions())
 def test_every_figure_is_a_finite_number(session: tuple[SessionPlan, Log]) -> None:
-    fold = SessionFold.replay(*session)
+    fold = fold_log(*session)
     assert all(math.isfinite(figure) for figure in compute_metrics(fold).values())
     assert 0 <= fold.phase_s <= fold.active_s < math.inf
 
@@ -280,7 +284,7 @@ def test_every_figure_is_a_finite_number(session: tuple[SessionPlan, Log]) -> No
 def test_an_invalid_step_changes_nothing_but_counts(
     session: tuple[SessionPlan, Log], stride: tuple[float, Side, float | None, tuple[str, ...]]
 ) -> None:
-    fold = SessionFold.replay(*session)
+    fold = fold_log(*session)
     before = copy.deepcopy(fold)
     elapsed_s, side, value, _ = stride
     time_s = (fold.last_time_s or 0.0) + elapsed_s
@@ -311,7 +315,7 @@ def figures_without(total: Tally, names: set[str]) -> dict[str, float]:
 def test_a_refused_change_leaves_the_session_as_it_was(
     session: tuple[SessionPlan, Log], change: Change
 ) -> None:
-    fold = SessionFold.replay(*session)
+    fold = fold_log(*session)
     before = copy.deepcopy(vars(fold))
     changed = True
     try:
@@ -328,7 +332,7 @@ def test_a_refused_change_leaves_the_session_as_it_was(
 def test_a_number_that_does_not_follow_leaves_the_session_as_it_was(
     session: tuple[SessionPlan, Log], offset: int
 ) -> None:
-    fold = SessionFold.replay(*session)
+    fold = fold_log(*session)
     before = copy.deepcopy(vars(fold))
     number = max(1, fold.last_number + offset)
     assume(number != fold.last_number + 1)

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
+from rehab.training.figures.metrics import METRICS, compute_metrics
 from rehab.training.fold import SessionFold
 from rehab.training.goals import Target
-from rehab.training.metrics import METRICS, compute_metrics
 from rehab.training.phases import make_phase
 from tests.training.sessions import SWAY, make_plan, start, walk
 

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from rehab.training.changes import Change, ChangeKind, PauseReason, State
 from rehab.training.cueing import CueTiming
+from rehab.training.fold.tallies import Tally
 from rehab.training.goals import GoalRule
 from rehab.training.measures import A2, InvalidSetting
 from rehab.training.phases import make_phase
 from rehab.training.plans import SessionPlan
 from rehab.training.steps import Side
-from rehab.training.tallies import Tally
 from rehab.training.valences import find_valence
 from tests.training.sessions import make_plan, start, walk
 

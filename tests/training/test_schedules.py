@@ -53,12 +53,12 @@ def test_every_step_is_told_once_or_waits(schedule, values):
     fold, steps, hits = start(make_plan(schedule=schedule)), 0, 0
     for value in values:
         walk(fold, [value])
-        if fold.answer is not None:
-            assert fold.told[-1] == fold.last_number
-            steps += fold.answer.steps
-            hits += fold.answer.hits
-    assert steps + fold.untold.steps == len(values)
-    assert hits + fold.untold.hits == fold.feedback.hits
+        if fold.telling.answer is not None:
+            assert fold.telling.told[-1] == fold.last_number
+            steps += fold.telling.answer.steps
+            hits += fold.telling.answer.hits
+    assert steps + fold.telling.untold.steps == len(values)
+    assert hits + fold.telling.untold.hits == fold.feedback.hits
 
 
 @pytest.mark.parametrize(

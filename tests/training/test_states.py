@@ -21,6 +21,7 @@ from rehab.training.fold import SessionFold
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import make_phase
 from rehab.training.valences import BINARY, NEGATIVE, bands_to_json
+from tests.support.folds import fold_log
 from tests.training.sessions import make_plan, step_at, walk
 
 K, S = ChangeKind, State
@@ -65,7 +66,7 @@ VALUES: dict[ChangeKind, ChangeValue] = {
 
 def session_in(state: State) -> SessionFold:
     plan = make_plan(make_phase("baseline"), make_phase("training"), alternatives=(NEGATIVE,))
-    return SessionFold.replay(plan, [Change(kind) for kind in WAY_TO[state]])
+    return fold_log(plan, [Change(kind) for kind in WAY_TO[state]])
 
 
 @pytest.mark.parametrize("state", State)

@@ -8,10 +8,10 @@ import math
 import pytest
 
 from rehab.training.changes import Change, ChangeKind
+from rehab.training.figures.summary import summarize_phases
 from rehab.training.phases import make_phase
 from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import InvalidReason, Measurement, ScoredStep, Side
-from rehab.training.summary import summarize_phases
 from rehab.training.valences import VALENCES, CueGestures
 from tests.training.sessions import make_plan, others_than, start, walk
 
@@ -143,7 +143,7 @@ def test_after_a_change_of_type_steps_earn_what_they_earn_in_that_one(
     assert tuple(step.points for step in after) == EARNED[later]
     paid = [step.points for step in (*before, *after) if step.points is not None]
     assert fold.score == (sum(paid) if paid else None)
-    assert fold.changed_to == (() if later == valence else (later,))
+    assert fold.valences.changed_to == (() if later == valence else (later,))
     training = [phase for phase in summarize_phases(fold) if phase["feedback"]]
     assert [phase["valence"] for phase in training] == list(dict.fromkeys((valence, later)))
     if later == "explicit":

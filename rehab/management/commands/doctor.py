@@ -24,8 +24,8 @@ from django.utils import timezone
 
 from rehab.people.audit import guards, seals
 from rehab.people.audit.seals import LogSeal
-from rehab.sessions.live import owners
-from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.live.database import owners
+from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import DamagedLog, check_log
 from rehab.stations.models import Device

@@ -15,7 +15,7 @@ from django.core.management import BaseCommand, CommandError
 
 from rehab.people.models import Clinic, Patient
 from rehab.people.sign_in.first_start import first_clinic, prepare_database
-from rehab.sessions.headless import (
+from rehab.sessions.live.headless import (
     Pace,
     robot_steps,
     run_session,

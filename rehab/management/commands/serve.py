@@ -24,7 +24,7 @@ from rehab.people.sign_in.first_start import (
     first_password,
     prepare_database,
 )
-from rehab.sessions.live.lease import AnotherServer, Lease
+from rehab.sessions.live.database.lease import AnotherServer, Lease
 from rehab.sessions.live.runtime import current
 from rehab.sessions.live.sources import local_address
 from rehab.stations.builtin import first_station, issue_builtin_token

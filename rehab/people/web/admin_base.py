@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
-from django import forms
-from django.contrib import admin, messages
+from django.contrib import admin
 from django.contrib.admin.exceptions import DisallowedModelAdminLookup
 from django.contrib.admin.options import IncorrectLookupParameters
 from django.contrib.admin.views.main import ChangeList
@@ -14,19 +13,15 @@ from django.db.models import QuerySet
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import redirect
 from django.template.response import TemplateResponse
-from django.utils import timezone
 from django.utils.text import capfirst
-from django.utils.translation import gettext, ngettext
-from django.utils.translation import gettext_lazy as _
+from django.utils.translation import gettext
 
 from rehab.people.access import user_of
 from rehab.people.audit.history import clinic_id_of
 from rehab.people.audit.history_text import changes_of
-from rehab.people.networks import client_address
 from rehab.people.roles import Right, Role, is_hidden_beside, rights_of
 from rehab.people.scope import ScopedModel, visible_rows
-from rehab.people.sign_in import step_up
-from rehab.people.sign_in.tokens import TokenModel, renew_token
+from rehab.people.web.row_forms import ClinicForm
 
 
 def rights_for(request: HttpRequest, model: type[models.Model]) -> Right:
@@ -140,31 +135,6 @@ class ScopedOptions(admin.options.BaseModelAdmin):
         return not isinstance(obj, ScopedModel) or may_modify(request.user, obj)
 
 
-class LabeledFormSet(forms.BaseInlineFormSet):
-    """Rows of a tabular inline whose fields are labeled for screen readers."""
-
-    def add_fields(self, form: Any, index: int | None) -> None:
-        """Label the fields."""
-        super().add_fields(form, index)
-        for field in form.fields.values():
-            field.widget.attrs["aria-label"] = field.label
-
-
-class ClinicForm(forms.ModelForm):
-    """A form of a row whose clinic is set by the server."""
-
-    new_clinic_id: ClassVar[int | None] = None
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        if self.instance.pk is None and hasattr(self.instance, "clinic_id"):
-            self.instance.clinic_id = self.new_clinic_id
-
-    def _get_validation_exclusions(self) -> set[str]:
-        # The clinic is not in the form, but "once per clinic" must be checked all the same.
-        return super()._get_validation_exclusions() - {"clinic"}  # type: ignore[misc, no-any-return]
-
-
 class TrackedAdmin(admin.ModelAdmin):
     """A list with its model's name as title, and pages of a row with our own change history."""
 
@@ -275,71 +245,6 @@ class ScopedAdmin(ScopedOptions, TrackedAdmin):
                 }
                 deleted.append(template % values)
         return (deleted, *others)
-
-
-class TokenAdmin(ScopedAdmin):
-    """Pages of rows with a token, which is shown once, when it is issued."""
-
-    readonly_fields: ClassVar[tuple[str, ...]] = ("created_at", "last_seen_at", "revoked_at")
-    actions = row_actions = ("renew_tokens", "revoke_tokens")
-
-    def add_view(
-        self, request: HttpRequest, form_url: str = "", extra_context: Any = None
-    ) -> HttpResponse:
-        """Show the form of a new row, whose token speaks for somebody; ask for the password."""
-        if not step_up.is_confirmed(request, timezone.now()):
-            return step_up.ask(request)
-        return super().add_view(request, form_url, extra_context)
-
-    def may_issue(self, request: HttpRequest, holder: Any) -> bool:
-        """Return whether this person may be shown a new token of a row."""
-        return True
-
-    def save_model(self, request: HttpRequest, obj: Any, form: Any, change: bool) -> None:
-        """Save the row, a new one with a token."""
-        if not change:
-            obj.token = obj.new_token()
-        super().save_model(request, obj, form, change)
-
-    def response_add(self, request: HttpRequest, obj: Any, *args: Any, **kwargs: Any) -> Any:
-        """Show the token of a new row."""
-        return self._show_tokens(request, [(obj, obj.token)])
-
-    @admin.action(description=_("Give new tokens (old ones stop at once)"), permissions=["change"])
-    def renew_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> HttpResponse | None:
-        """Replace the tokens of the chosen rows, and show the new ones; ask for the password."""
-        if not step_up.is_confirmed(request, timezone.now()):
-            return step_up.ask(request)
-        if not all(self.may_issue(request, holder) for holder in holders):
-            messages.error(request, gettext("Only its own person gives a program a new token."))
-            return None
-        issued = []
-        for holder in holders:
-            by, address = user_of(request), client_address(request)
-            issued.append((holder, renew_token(holder, by, address, timezone.now())))
-        return self._show_tokens(request, issued)
-
-    @admin.action(description=_("Revoke tokens"), permissions=["change"])
-    def revoke_tokens(self, request: HttpRequest, holders: QuerySet[Any]) -> None:
-        """Revoke the tokens of the chosen rows."""
-        valid = list(holders.filter(revoked_at__isnull=True))
-        for holder in valid:  # one by one, so that the change history records each
-            holder.revoked_at = timezone.now()
-            holder.save(update_fields=["revoked_at"])
-        message = ngettext("%(count)d token revoked.", "%(count)d tokens revoked.", len(valid))
-        messages.success(request, message % {"count": len(valid)})
-
-    def _show_tokens(
-        self, request: HttpRequest, issued: list[tuple[TokenModel, str]]
-    ) -> HttpResponse:
-        """Show new tokens in the answer itself: a message would keep them in a cookie."""
-        context = {
-            **self.admin_site.each_context(request),
-            "title": gettext("New tokens"),
-            "opts": self.opts,
-            "issued": issued,
-        }
-        return TemplateResponse(request, "admin/new_tokens.html", context)
 
 
 class ReadOnlyAdmin(ScopedAdmin):

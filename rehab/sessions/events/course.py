@@ -30,7 +30,7 @@ class Before(NamedTuple):
             fold.phase_index,
             fold.goal,
             fold.obstacle,
-            len(fold.switches),
+            len(fold.valences.switches),
             fold.state is State.RUNNING,
         )
 
@@ -60,15 +60,15 @@ def events_of_step(
 ) -> list[LiveEvent]:
     """Return the events of a step that was just scored; see `step_event` for ``live``."""
     events = [step_event(fold, before.context, step, live=live)]
-    only_adapted = fold.adapted and fold.phase_index == before.phase_index
+    only_adapted = fold.following.moved and fold.phase_index == before.phase_index
     if before.has_moved(fold) and not only_adapted:
-        events.append(phase_event(fold, switched=len(fold.switches) > before.switches))
+        events.append(phase_event(fold, switched=len(fold.valences.switches) > before.switches))
     changed = before.changed_by_step(fold)
     return events + [change_event(fold, kind) for kind in changed if kind != ChangeKind.PHASE]
 
 
 def events_of_change(fold: SessionFold, before: Before, change: Change) -> list[LiveEvent]:
     """Return the events of a change that was just applied."""
-    if len(fold.switches) > before.switches:
+    if len(fold.valences.switches) > before.switches:
         return [phase_event(fold, switched=True)]
     return [change_event(fold, change.kind, change.value)]

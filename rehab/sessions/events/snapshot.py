@@ -67,7 +67,7 @@ def snapshot(
     the robot's latest status and decision; ``marks`` are changes and remarks.
     """
     plan, recent = fold.plan, list(recent)
-    entries = (history_entry(audience, plan, step, fold.told) for step in recent)
+    entries = (history_entry(audience, plan, step, fold.telling.told) for step in recent)
     message: Message = {
         "type": "snapshot",
         "number": fold.last_number,
@@ -114,10 +114,10 @@ def _controls_for(audience: Audience, fold: SessionFold) -> Message:
 def _last_step(fold: SessionFold, recent: Sequence[StoredStep]) -> Message | None:
     """Return what the patient was last shown of a step; None before the first."""
     plan, context = fold.plan, StepContext.of(fold)
-    told = fold.told
+    told = fold.telling.told
     if plan.schedule.kind is ScheduleKind.SUMMARY:
         return None  # of a summary only its last step is stored
-    switched_after = fold.switches[-1][0] if fold.switches else 0
+    switched_after = fold.valences.switches[-1][0] if fold.valences.switches else 0
     for step in reversed(recent):
         if step.number <= switched_after:
             return None  # it meant something else

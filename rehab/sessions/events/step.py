@@ -72,7 +72,8 @@ def step_event(
 
     ``live`` is False for a step that came too late to be shown as one.
     """
-    plan, standing, answer, coaching = fold.plan, Standing.of(fold), fold.answer, coaching_of(fold)
+    plan, standing, coaching = fold.plan, Standing.of(fold), coaching_of(fold)
+    answer = fold.telling.answer
 
     def build(audience: Audience) -> Message | None:
         score, streak = standing.score, standing.streak

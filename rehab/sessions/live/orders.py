@@ -10,8 +10,8 @@ from django.utils import timezone
 
 from rehab.people.models import User
 from rehab.sessions.live import sources
-from rehab.sessions.live.loading import find_newest_open
-from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live.session.live_session import LiveSession
+from rehab.sessions.live.session.loading import find_newest_open
 from rehab.sessions.live.station_robots import StationRobots
 from rehab.sessions.live.supervisor import Supervisor
 from rehab.sessions.log import Remark

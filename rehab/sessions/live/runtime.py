@@ -14,20 +14,21 @@ from django.conf import settings
 from django.db import DatabaseError
 
 from rehab.people.models import User
-from rehab.sessions.live import lease, owners, sources
+from rehab.sessions.live import sources
 from rehab.sessions.live.audit_queue import AuditQueue
+from rehab.sessions.live.database import lease, owners
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.trouble import NotStored, describe_failure
 from rehab.sessions.live.devices import Devices
-from rehab.sessions.live.handover import Handover
-from rehab.sessions.live.loading import Loader
 from rehab.sessions.live.orders import Orders
-from rehab.sessions.live.owners import OwnedElsewhere
 from rehab.sessions.live.routines import Routines
-from rehab.sessions.live.servers import Servers
-from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live.servers.handover import Handover
+from rehab.sessions.live.servers.servers import Servers
+from rehab.sessions.live.session.live_session import LiveSession
+from rehab.sessions.live.session.loading import Loader
+from rehab.sessions.live.session.writer import Writer
 from rehab.sessions.live.station_robots import StationRobots
 from rehab.sessions.live.supervisor import Supervisor
-from rehab.sessions.live.trouble import NotStored, describe_failure
-from rehab.sessions.live.writer import Writer
 from rehab.sessions.log import Remark
 from rehab.sessions.payloads import Message
 from rehab.training.changes import (

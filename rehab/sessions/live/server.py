@@ -17,7 +17,7 @@ from twisted.internet import defer, reactor
 
 from rehab.sessions.live import process
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.frames import READ_NOW, WRITE_NOW
+from rehab.sessions.live.protocol.frames import READ_NOW, WRITE_NOW
 from rehab.sessions.live.websockets import DirectProtocol, InboundQueue, sender
 from robot.wire.limits import MAX_FRAME_BYTES
 

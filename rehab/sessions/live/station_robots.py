@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from django.utils import timezone
 
 from rehab.people.models import User
-from rehab.sessions.live.robot_orders import RobotStop
-from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live.session.live_session import LiveSession
+from rehab.sessions.live.session.robot_orders import RobotStop
 from rehab.sessions.payloads import Message
 
 

@@ -18,7 +18,7 @@ from websockets.protocol import OPEN
 
 from rehab.sessions.live import process
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.frames import (
+from rehab.sessions.live.protocol.frames import (
     MAX_WAITING_BYTES,
     MESSAGE_BYTES,
     READ_NOW,

@@ -15,7 +15,7 @@ from autobahn.twisted import websocket as twisted_websocket
 from autobahn.websocket import protocol as websocket_protocol
 from daphne.ws_protocol import WebSocketFactory, WebSocketProtocol
 
-from rehab.sessions.live.frames import (
+from rehab.sessions.live.protocol.frames import (
     MAX_WAITING_BYTES,
     MESSAGE_BYTES,
     read_text_frame,

@@ -6,9 +6,9 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_safe
 
 from rehab.people.access import public
-from rehab.sessions.live import lease
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.trouble import WORDS
+from rehab.sessions.live.database import lease
+from rehab.sessions.live.database.trouble import WORDS
 
 
 @public

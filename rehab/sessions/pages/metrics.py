@@ -18,8 +18,8 @@ from prometheus_client.registry import Collector
 
 from rehab.people.access import public
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.database.trouble import Trouble
 from rehab.sessions.live.instruments import REGISTRY
-from rehab.sessions.live.trouble import Trouble
 
 
 class LiveSessions(Collector):

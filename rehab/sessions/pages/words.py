@@ -16,9 +16,9 @@ from django.views.decorators.http import require_http_methods
 from rehab.people.access import for_roles, user_of
 from rehab.people.roles import Role
 from rehab.people.web.refusals import format_refusal
-from rehab.sessions.live.aggregate import SessionAggregate
-from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.trouble import NotStored
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.trouble import NotStored
+from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import change_session
 from rehab.training.changes import OPEN_STATES, ChangeKind

@@ -22,9 +22,9 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import fold_log
 from rehab.sessions.reports.trend import metrics_by_session
 from rehab.training.controls import CONTROLS, marked_kinds
+from rehab.training.figures.summary import summarize_session
 from rehab.training.fold import SessionFold
 from rehab.training.plans import SessionPlan
-from rehab.training.summary import summarize_session
 from rehab.training.valences import VALENCES
 
 # Only counted: in a list they would hide what people did.
@@ -165,7 +165,9 @@ def _valences_by_run(fold: SessionFold, runs: Sequence[list[int]]) -> list[str]:
     ends = [0, *(run[-1] for run in runs)]
     return [
         "".join(
-            f" · {_valence_label(slug)}" for after, slug in fold.switches if end <= after < run[0]
+            f" · {_valence_label(slug)}"
+            for after, slug in fold.valences.switches
+            if end <= after < run[0]
         )
         for end, run in zip(ends, runs, strict=False)
     ]

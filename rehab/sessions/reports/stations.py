@@ -9,7 +9,7 @@ from datetime import datetime
 
 from rehab.people.models import User
 from rehab.sessions.live import runtime
-from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import format_device_state

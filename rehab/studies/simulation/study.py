@@ -8,7 +8,7 @@ from datetime import datetime
 from functools import partial
 
 from rehab.people.models import Clinic, Patient
-from rehab.sessions.headless import Pace, run_session
+from rehab.sessions.live.headless import Pace, run_session
 from rehab.sessions.setup.defaults import install_defaults
 from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
 from rehab.studies.enrolling import enroll, withdraw

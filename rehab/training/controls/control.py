@@ -72,6 +72,16 @@ class ValueFormat(StrEnum):
     PHASE = "phase"  # the name of the phase of that index
 
 
+class Valences(Protocol):
+    """A session's valences; ``ValenceCourse`` is one."""
+
+    current: Valence
+    next_slug: str
+
+    def edit_text(self, value: object) -> None:
+        """Replace the bands of a valence."""
+
+
 class ControlledSession(Protocol):
     """What controls read and alter of a session; ``SessionFold`` is one."""
 
@@ -81,8 +91,10 @@ class ControlledSession(Protocol):
     gain: float
     obstacle: str
     phase_index: int
-    valence: Valence
-    next_valence: str
+
+    @property
+    def valences(self) -> Valences:
+        """The session's feedback types."""
 
     def enter_phase(self, index: int) -> None:
         """Begin a phase."""
@@ -95,9 +107,6 @@ class ControlledSession(Protocol):
 
     def schedule_valence(self, slug: object) -> None:
         """Schedule the valence of the next phase with feedback."""
-
-    def edit_feedback_text(self, value: object) -> None:
-        """Replace the bands of a valence."""
 
 
 Choices = Mapping[float | str, str]

@@ -13,9 +13,9 @@ import pytest
 from asgiref.sync import sync_to_async
 from django.db import connections
 
-from rehab.sessions.live import commits
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live import writer as writers
+from rehab.sessions.live.session import commits
+from rehab.sessions.live.session import writer as writers
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from tests.support.callers import Caller, Place, build_place, change, open_session

@@ -9,8 +9,8 @@ import pytest
 from asgiref.sync import sync_to_async
 from django.utils import timezone
 
-from rehab.sessions.live import owners
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.database import owners
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from tests.support.callers import (

@@ -10,9 +10,10 @@ from typing import Any
 
 import pytest
 
-from rehab.sessions.live import owners, routines
+from rehab.sessions.live import routines
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live.database import owners
+from rehab.sessions.live.session.live_session import LiveSession
 from rehab.training.phases import make_phase
 from tests.support.callers import (
     change,

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from asgiref.sync import sync_to_async
 
-from rehab.sessions.live import aggregate as aggregates
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.live.session import aggregate as aggregates
+from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.training.phases import make_phase

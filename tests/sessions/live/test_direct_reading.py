@@ -11,7 +11,7 @@ from uvicorn import Config
 from uvicorn.server import ServerState
 from websockets.frames import Frame, Opcode
 
-from rehab.sessions.live.frames import READ_NOW
+from rehab.sessions.live.protocol.frames import READ_NOW
 from rehab.sessions.live.uvicorn_server import DirectProtocol
 from tests.support.callers import turns
 

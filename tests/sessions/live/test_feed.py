@@ -13,7 +13,7 @@ from rehab.sessions.events.event import LiveEvent
 from rehab.sessions.live import routines
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers.base import Outbox
-from rehab.sessions.live.hub import MAX_UNCONFIRMED, RING, EventFeed, Lagged, Subscriber
+from rehab.sessions.live.session.hub import MAX_UNCONFIRMED, RING, EventFeed, Lagged, Subscriber
 from rehab.training.controls import Audience
 
 

@@ -13,7 +13,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.frames import Frame, Opcode
 from websockets.server import ServerProtocol
 
-from rehab.sessions.live.frames import FrameEdges, read_text_frame, text_frame
+from rehab.sessions.live.protocol.frames import FrameEdges, read_text_frame, text_frame
 
 SIZES = [1, 125, 126, 127, 65_535]
 

@@ -8,7 +8,7 @@ import pytest
 
 from rehab.sessions.live import runtime as runtime_module
 from rehab.sessions.live.consumers import source as source_module
-from rehab.sessions.live.lateness import Lateness
+from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.log import Step
 from rehab.training.clocks import DRIFT_MAX, LATE_S
 from tests.support.callers import a_step, change

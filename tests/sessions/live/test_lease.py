@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from django.db import connection
 
-from rehab.sessions.live import lease, owners
-from rehab.sessions.live.lease import AnotherServer, Lease
+from rehab.sessions.live.database import lease, owners
+from rehab.sessions.live.database.lease import AnotherServer, Lease
 
 pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.postgres]
 

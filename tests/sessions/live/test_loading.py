@@ -11,14 +11,15 @@ from asgiref.sync import sync_to_async
 from django.db import DatabaseError, connection
 from django.test.utils import CaptureQueriesContext
 
-from rehab.sessions.live import loading, owners
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.live.database import owners
+from rehab.sessions.live.session import loading
+from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import Remark, RobotEntry, Step
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import DamagedLog
 from rehab.training.changes import Change, ChangeKind
-from rehab.training.checkpoints import fold_to_json
+from rehab.training.fold.checkpoints import fold_to_json
 from rehab.training.steps import Measurement, Side
 from tests.support.callers import build_place, open_session, restart
 from tests.support.world import NOW, store

@@ -18,8 +18,9 @@ import pytest
 from asgiref.sync import sync_to_async
 from django.db import DatabaseError, connection
 
-from rehab.sessions.live import loading, owners
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.database import owners
+from rehab.sessions.live.session import loading
 from rehab.sessions.log import SessionEvent, Step
 from rehab.sessions.models import TrainingSession
 from tests.support.callers import a_step, change, turns

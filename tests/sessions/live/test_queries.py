@@ -9,10 +9,10 @@ from django.db import connection
 from django.test.utils import CaptureQueriesContext
 
 from rehab.boards.building.scheduler import find_ended
-from rehab.sessions.live import owners
-from rehab.sessions.live.aggregate import SessionAggregate
-from rehab.sessions.live.backlog import PAGE_STEPS
-from rehab.sessions.live.loading import find_newest_open, load
+from rehab.sessions.live.database import owners
+from rehab.sessions.live.protocol.backlog import PAGE_STEPS
+from rehab.sessions.live.session.aggregate import SessionAggregate
+from rehab.sessions.live.session.loading import find_newest_open, load
 from rehab.sessions.log import RobotEntry, Step
 from rehab.sessions.models import TrainingSession
 from rehab.stations.models import Station

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.consumers.source import SourceConsumer
-from rehab.sessions.live.messages import read_frame
-from rehab.sessions.live.step_frames import read_single_step, read_steps
+from rehab.sessions.live.protocol.messages import read_frame
+from rehab.sessions.live.protocol.step_frames import read_single_step, read_steps
 from rehab.sessions.log import Step
 from robot.wire.frames import BadFrame, read_object
 from tests.support.callers import turns

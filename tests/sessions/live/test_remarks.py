@@ -5,7 +5,7 @@ from __future__ import annotations
 from asgiref.sync import ThreadSensitiveContext, sync_to_async
 
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import REMARK_RANGES, Remark, SessionEvent
 from rehab.sessions.services import SessionRequest, change_session, create_session
 from rehab.training.changes import ChangeKind

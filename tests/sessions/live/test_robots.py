@@ -10,9 +10,9 @@ from asgiref.sync import sync_to_async
 
 from rehab.gestures.models import Gesture
 from rehab.people.models import Clinic
-from rehab.sessions.live import hub
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.aggregate import SessionAggregate
+from rehab.sessions.live.session import hub
+from rehab.sessions.live.session.aggregate import SessionAggregate
 from rehab.sessions.log import SessionEvent
 from rehab.training.valences import CueGestures
 from robot.motion.dry_run import validate_gesture

@@ -10,7 +10,7 @@ from asgiref.sync import sync_to_async
 from rehab.people.models import Clinic, User
 from rehab.sessions.events.snapshot import snapshot
 from rehab.sessions.live import runtime
-from rehab.sessions.live import session as sessions
+from rehab.sessions.live.session import live_session as sessions
 from rehab.sessions.log import SessionEvent
 from rehab.sessions.models import TrainingSession
 from rehab.training.controls import Audience

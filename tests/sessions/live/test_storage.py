@@ -15,10 +15,10 @@ from django.test import Client
 
 from rehab.sessions.live import process, routines
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live import writer as writers
-from rehab.sessions.live.commits import Job
-from rehab.sessions.live.own_connection import own_connection
-from rehab.sessions.live.writer import LOCK_TIMEOUT_MS, STATEMENT_TIMEOUT_MS, Writer
+from rehab.sessions.live.database.own_connection import own_connection
+from rehab.sessions.live.session import writer as writers
+from rehab.sessions.live.session.commits import Job
+from rehab.sessions.live.session.writer import LOCK_TIMEOUT_MS, STATEMENT_TIMEOUT_MS, Writer
 from rehab.sessions.models import TrainingSession
 from tests.support.callers import a_step, numbers, turns
 

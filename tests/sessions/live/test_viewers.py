@@ -6,9 +6,9 @@ import random
 
 import pytest
 
-from rehab.sessions.live import hub
 from rehab.sessions.live import runtime as runtimes
-from rehab.sessions.live.backlog import PAGE_STEPS
+from rehab.sessions.live.protocol.backlog import PAGE_STEPS
+from rehab.sessions.live.session import hub
 from rehab.training.phases import make_phase
 from tests.support.callers import (
     Caller,

@@ -10,11 +10,11 @@ import pytest
 from asgiref.sync import sync_to_async
 from django.db import DatabaseError
 
-from rehab.sessions.live import commits
-from rehab.sessions.live import writer as writers
-from rehab.sessions.live.aggregate import SessionAggregate
-from rehab.sessions.live.commits import EarlierWriteFailed, Fenced, Job
-from rehab.sessions.live.writer import Writer
+from rehab.sessions.live.session import commits
+from rehab.sessions.live.session import writer as writers
+from rehab.sessions.live.session.aggregate import SessionAggregate
+from rehab.sessions.live.session.commits import EarlierWriteFailed, Fenced, Job
+from rehab.sessions.live.session.writer import Writer
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import Change, ChangeKind
@@ -215,7 +215,7 @@ async def test_commits_keep_a_distance_only_while_several_sessions_walk(
         bench.walk(aggregates[0])
         await until_done(bench, count)
     waited: list[float] = []
-    monkeypatch.setattr("rehab.sessions.live.writer.time.sleep", waited.append)
+    monkeypatch.setattr("rehab.sessions.live.session.writer.time.sleep", waited.append)
     monkeypatch.setattr(writers, "SPACING_S", 1000.0)
     for count in range(6, 8):  # one session's, one after the other
         bench.walk(aggregates[0])

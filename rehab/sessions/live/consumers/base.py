@@ -15,10 +15,10 @@ from django.db import DatabaseError
 from rehab.sessions.events.event import to_text
 from rehab.sessions.live import runtime as runtimes
 from rehab.sessions.live.auth import Actor
-from rehab.sessions.live.frames import READ_NOW, WRITE_NOW
-from rehab.sessions.live.messages import read_frame
-from rehab.sessions.live.session import LiveSession
-from rehab.sessions.live.trouble import NotStored, describe_failure
+from rehab.sessions.live.database.trouble import NotStored, describe_failure
+from rehab.sessions.live.protocol.frames import READ_NOW, WRITE_NOW
+from rehab.sessions.live.protocol.messages import read_frame
+from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message
 from robot.wire.close_codes import CloseCode
 from robot.wire.frames import BadFrame

@@ -15,10 +15,10 @@ from rehab.sessions.live.auth import (
     may_open,
 )
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
-from rehab.sessions.live.messages import read_frame
-from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.peers import Peer
-from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.protocol.messages import read_frame
+from rehab.sessions.live.session.live_session import LiveSession
+from rehab.sessions.live.session.peers import Peer
 from rehab.sessions.payloads import Message
 from rehab.sessions.replay import DamagedLog
 from rehab.stations.models import Device

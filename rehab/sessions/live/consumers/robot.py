@@ -12,9 +12,9 @@ from django.utils import timezone
 
 from rehab.sessions.incidents import store_incident
 from rehab.sessions.live.consumers.device import DeviceSocket
-from rehab.sessions.live.hub import Lagged, Subscriber
-from rehab.sessions.live.messages import Incident, read_incident, read_report
-from rehab.sessions.live.session import LiveSession
+from rehab.sessions.live.protocol.messages import Incident, read_incident, read_report
+from rehab.sessions.live.session.hub import Lagged, Subscriber
+from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message, describe_cue
 from rehab.stations.models import Device
 from rehab.training.controls import Audience

@@ -21,19 +21,19 @@ from rehab.people.web.refusals import format_refusal
 from rehab.sessions.events.event import to_text
 from rehab.sessions.events.snapshot import history_entry
 from rehab.sessions.live.auth import Actor, authenticate, may_open, may_watch
-from rehab.sessions.live.backlog import read_backlog
 from rehab.sessions.live.consumers.base import CloseSocket, Socket
-from rehab.sessions.live.following import FollowedSession
-from rehab.sessions.live.hub import Lagged, Stalled, Subscriber
-from rehab.sessions.live.messages import (
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.trouble import NotStored
+from rehab.sessions.live.protocol.backlog import read_backlog
+from rehab.sessions.live.protocol.messages import (
     read_change,
     read_frame,
     read_order,
     read_remark,
 )
-from rehab.sessions.live.owners import OwnedElsewhere
-from rehab.sessions.live.session import LiveSession
-from rehab.sessions.live.trouble import NotStored
+from rehab.sessions.live.servers.following import FollowedSession
+from rehab.sessions.live.session.hub import Lagged, Stalled, Subscriber
+from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message
 from rehab.sessions.replay import DamagedLog
 from rehab.stations.models import Device
@@ -133,7 +133,7 @@ class ScreenConsumer(Socket):
         self, live: LiveSession, subscriber: Subscriber, after: int, until: int
     ) -> None:
         """Send the steps after a number from the log, oldest first."""
-        plan, told = live.aggregate.fold.plan, tuple(live.aggregate.fold.told)
+        plan, told = live.aggregate.fold.plan, tuple(live.aggregate.fold.telling.told)
         while after < until:
             steps = await read_backlog(live.id, after, until)
             if not steps:

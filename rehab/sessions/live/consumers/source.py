@@ -8,17 +8,17 @@ from datetime import UTC, datetime
 from django.utils import timezone
 
 from rehab.sessions.events.event import source_goal_event
-from rehab.sessions.live.backlog import is_duplicate
 from rehab.sessions.live.consumers.base import CloseSocket
 from rehab.sessions.live.consumers.device import DeviceSocket
-from rehab.sessions.live.lateness import Lateness
-from rehab.sessions.live.messages import (
+from rehab.sessions.live.protocol.backlog import is_duplicate
+from rehab.sessions.live.protocol.messages import (
     Hello,
     read_hello,
     read_plain,
 )
-from rehab.sessions.live.session import LiveSession
-from rehab.sessions.live.step_frames import read_single_step, read_steps
+from rehab.sessions.live.protocol.step_frames import read_single_step, read_steps
+from rehab.sessions.live.session.lateness import Lateness
+from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.payloads import Message, describe_source_phase
 from rehab.stations.models import Device
 from rehab.training.changes import ENDED_STATES, State

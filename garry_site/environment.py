@@ -1,0 +1,36 @@
+"""Typed readers of GARRY_* variables: a wrong value stops the start with an error that names valid
+ones.
+"""
+
+import os
+
+from django.core.exceptions import ImproperlyConfigured
+
+VARIABLES: dict[str, str] = {}  # every variable that is read, and what it is for
+
+
+def text(name: str, default: str, about: str) -> str:
+    """Read a variable as text."""
+    VARIABLES[name] = about
+    return os.environ.get(name, "") or default
+
+
+def flag(name: str, default: bool, about: str) -> bool:
+    """Read a variable as yes or no."""
+    value = text(name, "yes" if default else "no", about).lower()
+    if value not in {"1", "true", "yes", "on", "0", "false", "no", "off"}:
+        raise ImproperlyConfigured(f"{name}={value!r} is neither yes nor no. Set it to 1 or 0.")
+    return value in {"1", "true", "yes", "on"}
+
+
+def number(name: str, default: int, about: str, *, low: int, high: int) -> int:
+    """Read a variable as a whole number within bounds."""
+    value = text(name, str(default), about)
+    if not (value.isascii() and value.isdigit() and low <= int(value) <= high):
+        raise ImproperlyConfigured(f"{name}={value!r} must be a whole number from {low} to {high}.")
+    return int(value)
+
+
+def string_list(name: str, default: str, about: str) -> list[str]:
+    """Read a variable as a comma-separated list."""
+    return [word.strip() for word in text(name, default, about).split(",") if word.strip()]

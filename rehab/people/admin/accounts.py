@@ -1,0 +1,168 @@
+"""Admin of accounts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.contrib import admin, messages
+from django.contrib.admin.utils import unquote
+from django.contrib.auth.admin import UserAdmin
+from django.contrib.auth.forms import AdminUserCreationForm
+from django.core.exceptions import ValidationError
+from django.db import transaction
+from django.db.models import QuerySet
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import redirect
+from django.utils import timezone
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.access import user_of
+from rehab.people.audit.audit_log import Act, record_security_change
+from rehab.people.models import User
+from rehab.people.networks import client_address
+from rehab.people.roles import Role
+from rehab.people.sign_in import attempts, factors, resets, step_up
+from rehab.people.web.admin_base import ScopedOptions, TrackedAdmin, rights_for
+
+
+class NewAccountForm(AdminUserCreationForm):
+    """Django's form for a new account; names are unique on the whole server."""
+
+    class Meta(AdminUserCreationForm.Meta):
+        model = User
+
+    def clean_username(self) -> str:
+        """Refuse a name that any account has."""
+        username: str = self.cleaned_data["username"]
+        if User.is_taken(username):
+            raise ValidationError(gettext("This name is taken. Choose another one."))
+        return username
+
+
+@admin.register(User)
+class AccountAdmin(ScopedOptions, TrackedAdmin, UserAdmin):
+    """Accounts: a lead manages those of the own clinic, a host all of them."""
+
+    list_display = (
+        "username",
+        "first_name",
+        "last_name",
+        "role",
+        "clinic",
+        "last_login",
+        "is_active",
+    )
+    list_filter = ("role", "is_active", "last_login", ("clinic", admin.RelatedOnlyFieldListFilter))
+    list_select_related = ("clinic",)
+    show_facets = admin.ShowFacets.NEVER
+    add_form = NewAccountForm
+    filter_horizontal = ()
+    ordering = ("username",)
+    actions = ("unlock", "remove_second_factors")
+
+    @admin.action(description=_("Unlock after too many wrong tries"), permissions=["change"])
+    def unlock(self, request: HttpRequest, accounts: QuerySet[User]) -> None:
+        """End the lockouts of the chosen accounts."""
+        for account in accounts:
+            with transaction.atomic():
+                by, address = user_of(request), client_address(request)
+                record_security_change(Act.UNLOCK, by, account, address, timezone.now())
+                attempts.forget_all(account)
+        message = gettext("Accounts that may try again: %(count)s.")
+        messages.success(request, message % {"count": accounts.count()})
+
+    @admin.action(
+        description=_("Remove second factors (lost phone or key)"), permissions=["change"]
+    )
+    def remove_second_factors(
+        self, request: HttpRequest, accounts: QuerySet[User]
+    ) -> HttpResponse | None:
+        """Remove all second factors of the chosen accounts, but not one's own."""
+        if not step_up.is_confirmed(request, timezone.now()):
+            return step_up.ask(request)
+        removed = 0
+        for account in accounts:
+            if not self._may_reset(request, account):
+                continue
+            removed += 1
+            with transaction.atomic():
+                by, address = user_of(request), client_address(request)
+                record_security_change(Act.FACTORS, by, account, address, timezone.now())
+                factors.remove_second_factors(account)
+        message = gettext(
+            "%(count)s account(s) sign in by password alone now, or set up a new second "
+            "factor where the clinic asks for one. If a phone was stolen, give a new password too."
+        )
+        if removed:
+            messages.warning(request, message % {"count": removed})
+        return None
+
+    def user_change_password(
+        self,
+        request: HttpRequest,
+        id: str,  # noqa: A002 (Django's name)
+        form_url: str = "",
+    ) -> HttpResponse:
+        """Change another account's password. One's own takes the old one, on its own page."""
+        account = self.get_object(request, unquote(id))
+        if account is not None and account.pk == user_of(request).pk:
+            return redirect("own-password")
+        if not step_up.is_confirmed(request, timezone.now()):
+            return step_up.ask(request)
+        sent = request.method == "POST"
+        if sent and account is not None and not self._may_reset(request, account):
+            return redirect("admin:rehab_user_change", account.pk)
+        return super().user_change_password(request, id, form_url)
+
+    def _may_reset(self, request: HttpRequest, account: User) -> bool:
+        """Return whether this person may reset how an account signs in; where not, say why."""
+        user = user_of(request)
+        if account.pk == user.pk:
+            messages.error(request, gettext("Your own you change on the page Your account."))
+            return False
+        if resets.may_reset(user, account, timezone.now()):
+            return True
+        message = gettext(
+            "First %(account)s or another host has to confirm this, on the page Your account. Then "
+            "do it again within an hour."
+        )
+        messages.error(request, message % {"account": account})
+        return False
+
+    def has_module_permission(self, request: HttpRequest) -> bool:
+        """Return whether accounts are on the front page."""
+        return bool(rights_for(request, User))
+
+    def get_fieldsets(self, request: HttpRequest, obj: Any = None) -> Any:
+        """Return the fields; only a host, who has no clinic, chooses one."""
+        role_fields = ("role", "clinic") if user_of(request).role == Role.HOST else ("role",)
+        if obj is None:
+            passwords = ("usable_password", "password1", "password2")
+            return [(None, {"fields": ("username", *passwords, *role_fields)})]
+        return [
+            (None, {"fields": ("username", "password", *role_fields, "is_active")}),
+            (_("Person"), {"fields": ("first_name", "last_name", "email")}),
+        ]
+
+    def get_form(
+        self, request: HttpRequest, obj: Any = None, change: bool = False, **kwargs: Any
+    ) -> Any:
+        """Return the form; a lead's new account belongs to the lead's own clinic."""
+        form: Any = super().get_form(request, obj, change=change, **kwargs)
+        clinic_id = user_of(request).clinic_id
+        if clinic_id is None:
+            return form
+
+        class OwnClinicForm(form):  # type: ignore[misc]
+            def __init__(self, *args: Any, **kwargs: Any) -> None:
+                super().__init__(*args, **kwargs)
+                self.instance.clinic_id = clinic_id
+
+        return OwnClinicForm
+
+    def formfield_for_choice_field(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
+        """Offer the roles that this person may assign: only a host creates hosts."""
+        if db_field.name == "role" and user_of(request).role != Role.HOST:
+            kwargs["choices"] = [choice for choice in Role.choices if choice[0] != Role.HOST]
+        return super().formfield_for_choice_field(db_field, request, **kwargs)

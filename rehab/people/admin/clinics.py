@@ -1,0 +1,21 @@
+"""Admin of clinics."""
+
+from __future__ import annotations
+
+from django.contrib import admin
+
+from rehab.people.models import Clinic
+from rehab.people.web.admin_base import ScopedAdmin
+
+
+@admin.register(Clinic)
+class ClinicAdmin(ScopedAdmin):
+    """Clinics: the host adds them, a lead edits the own one."""
+
+    list_display = ("name", "language", "time_zone", "second_factor_required", "boards_across")
+    search_fields = ("name",)
+    fields = (
+        *("name", "language", "time_zone", "boards_across", "second_factor_required"),
+        *("care_needs_consent", "research_needs_consent", "networks"),
+        *("retention_months", "log_retention_months"),
+    )

@@ -1,0 +1,287 @@
+"""Admin of measures, protocols and presets: what a session is set up from."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from django import forms
+from django.contrib import admin, messages
+from django.core.exceptions import ValidationError
+from django.db import transaction
+from django.db.models import F, QuerySet
+from django.http import HttpRequest, HttpResponseBase
+from django.shortcuts import redirect
+from django.utils.text import capfirst
+from django.utils.translation import gettext
+from django.utils.translation import gettext_lazy as _
+
+from rehab.people.access import user_of
+from rehab.people.web.admin_base import ScopedAdmin, ScopedOptions
+from rehab.people.web.row_forms import ClinicForm, LabeledFormSet
+from rehab.sessions.forms.initial import STRIDE_S, protocol_minutes
+from rehab.sessions.questionnaires import Questionnaire, questionnaire_choices
+from rehab.sessions.setup.gestures import robot_gesture_choices
+from rehab.sessions.setup.presets import Preset
+from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase, display_name
+
+TEMPORARY_OFFSET = (
+    10_000  # of positions while phases change places; no protocol has this many phases
+)
+
+
+class SharedAdmin(ScopedAdmin):
+    """Admin of rows that are the clinic's own or shared by all."""
+
+    @admin.display(description=_("name"), ordering="name")
+    def named(self, row: Measure | Protocol) -> str:
+        """Its name."""
+        return display_name(row)
+
+    @admin.display(description=_("belongs to"), ordering="clinic")
+    def whose(self, row: Measure | Protocol) -> str:
+        """Whether all clinics have it."""
+        return gettext("all clinics") if row.clinic_id is None else gettext("this clinic")
+
+
+@admin.register(Measure)
+class MeasureAdmin(SharedAdmin):
+    """Measures: the shared ones, and the clinic's own."""
+
+    list_display = ("named", "unit", "higher_is_better", "goal_max", "whose")
+    search_fields = ("name", "slug")
+
+
+class PhaseForm(forms.ModelForm):
+    """A phase as a row; its position is that of the row, which the page numbers."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.fields["position"].required = False
+        self.fields["position"].widget.attrs["class"] = "vIntegerField"
+
+    def _get_validation_exclusions(self) -> set[str]:
+        # Two rows may swap positions; `PhaseFormSet` numbers them without duplicates.
+        return super()._get_validation_exclusions() | {"position"}  # type: ignore[misc, no-any-return]
+
+
+class PhaseFormSet(LabeledFormSet):
+    """The phases of one protocol, in the order of their numbers."""
+
+    def clean(self) -> None:
+        """Number the phases from 1 on. Refuses a protocol without any."""
+        super().clean()
+        if any(self.errors):
+            return
+        kept: list[tuple[float, int, ProtocolPhase]] = []
+        for row, form in enumerate(self.forms):
+            if form in self.deleted_forms or not (form.instance.pk or form.has_changed()):
+                continue
+            given = form.cleaned_data.get("position")
+            above = kept[-1][0] if kept else 0.0  # a row without a number follows the one above
+            kept.append((above if given is None else given, row, form.instance))
+        if not kept:
+            raise ValidationError(gettext("A protocol needs at least one phase. Add one below."))
+        for position, (_given, _row, phase) in enumerate(sorted(kept, key=lambda k: k[:2]), 1):
+            phase.position = position
+
+
+class PhaseInline(ScopedOptions, admin.TabularInline):
+    """A protocol's phases on its page."""
+
+    model = ProtocolPhase
+    form = PhaseForm
+    formset = PhaseFormSet
+    ordering = ("position",)
+    fields = (
+        "position",
+        "kind",
+        "name",
+        "feedback",
+        "gain",
+        "strides",
+        "seconds",
+        "goal_percent",
+        "robot",
+        "rest_s",
+    )
+
+    def get_extra(self, request: HttpRequest, obj: Any = None, **options: Any) -> int:
+        """Return one empty row for a new protocol."""
+        return 0 if obj else 1
+
+
+class ProtocolForm(ClinicForm):
+    """A protocol; what is asked after it is chosen from what the clinic has."""
+
+    clinic_id: int | None = None
+    questionnaires = forms.MultipleChoiceField(
+        label=_("Asked after the session"), required=False, widget=forms.CheckboxSelectMultiple
+    )
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        field: Any = self.fields.get("questionnaires")
+        if field is not None:  # not in a page that can only be read
+            field.choices = questionnaire_choices(self.clinic_id)
+
+
+@admin.register(Protocol)
+class ProtocolAdmin(SharedAdmin):
+    """Protocols: the shared ones, and the clinic's own."""
+
+    form = ProtocolForm
+    change_form_template = "sessions/protocol_form.html"
+    list_display = ("named", "whose", "phase_count", "length", "about")
+    search_fields = ("name", "description", "phases__name")
+    inlines = (PhaseInline,)
+    actions = row_actions = viewer_actions = ("copy_to_clinic",)
+
+    def get_queryset(self, request: HttpRequest) -> QuerySet[Protocol]:
+        """Return the visible protocols with their phases."""
+        return super().get_queryset(request).prefetch_related("phases")
+
+    def get_form(self, request: HttpRequest, *args: Any, **options: Any) -> Any:
+        """Return the form with the questionnaires of the person's clinic."""
+        form = super().get_form(request, *args, **options)
+        form.clinic_id = user_of(request).clinic_id
+        return form
+
+    @admin.display(description=_("description"))
+    def about(self, protocol: Protocol) -> str:
+        """Its description."""
+        return protocol.description if protocol.clinic_id else gettext(protocol.description)
+
+    @admin.display(description=_("phases"))
+    def phase_count(self, protocol: Protocol) -> int:
+        """The number of phases."""
+        return len(protocol.phases.all())
+
+    @admin.display(description=_("takes"))
+    def length(self, protocol: Protocol) -> str:
+        """Its duration, where every phase ends by itself."""
+        minutes = protocol_minutes(protocol)
+        return gettext("open end") if minutes is None else f"{minutes} min"
+
+    def render_change_form(
+        self, request: HttpRequest, context: dict[str, Any], *args: Any, **kwargs: Any
+    ) -> Any:
+        """Show the form with a drawing of the stored protocol."""
+        row: Protocol | None = context.get("original")
+        context["stride_s"] = STRIDE_S
+        context["phases"] = [asdict(phase) for phase in (row.to_rules() if row else ())]
+        return super().render_change_form(request, context, *args, **kwargs)
+
+    @transaction.atomic
+    def save_formset(self, request: HttpRequest, form: Any, formset: Any, change: bool) -> None:
+        """Save the phases, all moved aside first, so that two can change places."""
+        phases = ProtocolPhase.objects.visible_to(request.user).filter(protocol=form.instance)
+        phases.update(position=F("position") + TEMPORARY_OFFSET)
+        super().save_formset(request, form, formset, change)
+        for row in formset.initial_forms:
+            if row not in formset.deleted_forms:
+                phases.filter(pk=row.instance.pk).update(position=row.instance.position)
+
+    def get_actions(self, request: HttpRequest) -> Any:
+        """Return the actions; copying needs a clinic to copy to."""
+        actions = super().get_actions(request)
+        if user_of(request).clinic_id is None or not self.has_add_permission(request):
+            actions.pop("copy_to_clinic", None)
+        return actions
+
+    @admin.action(description=_("Copy to my clinic"))
+    def copy_to_clinic(
+        self, request: HttpRequest, protocols: QuerySet[Protocol]
+    ) -> HttpResponseBase | None:
+        """Copy protocols into the clinic, which can then change them."""
+        made = [self._copy(request, protocol) for protocol in protocols]
+        message = gettext("Copied: %(names)s. The copies are your clinic's to change.")
+        messages.success(request, message % {"names": ", ".join(copy.name for copy in made)})
+        if len(made) == 1:
+            return redirect("admin:rehab_protocol_change", made[0].pk)
+        return None
+
+    @transaction.atomic
+    def _copy(self, request: HttpRequest, protocol: Protocol) -> Protocol:
+        taken = set(Protocol.objects.visible_to(request.user).values_list("name", flat=True))
+        stem = protocol.name[:50]
+        names = (f"{stem} ({gettext('copy')} {n})" for n in range(1, len(taken) + 2))
+        copy = Protocol(
+            clinic=user_of(request).clinic,
+            name=next(name for name in names if name not in taken),
+            description=protocol.description,
+            wanted_hits=protocol.wanted_hits,
+            close_percent=protocol.close_percent,
+            questionnaires=protocol.questionnaires,
+        )
+        copy.save()
+        for position, phase in enumerate(protocol.to_rules(), 1):
+            ProtocolPhase(protocol=copy, position=position, **asdict(phase)).save()
+        return copy
+
+
+@admin.register(Questionnaire)
+class QuestionnaireAdmin(ScopedAdmin):
+    """A clinic's own questions; those that GARRY brings are not changed."""
+
+    list_display = ("name", "language", "source")
+    search_fields = ("name", "items")
+
+
+@admin.register(Preset)
+class PresetAdmin(ScopedAdmin):
+    """Presets, which the set-up offers as one tap."""
+
+    list_display = ("name", "valence", "goal_label", "wanted_hits", "minutes", "protocol", "robot")
+    list_filter = ("valence", "robot")
+    list_select_related = ("protocol", "measure")
+    search_fields = ("name", "protocol__name")
+    radio_fields = {"valence": admin.HORIZONTAL, "goal_by": admin.HORIZONTAL}
+    fieldsets = (
+        (None, {"fields": ("name", "valence", "protocol")}),
+        (
+            _("Goal"),
+            {
+                "fields": (
+                    ("measure", "goal_by"),
+                    ("goal_value", "goal_percent"),
+                    ("wanted_hits", "minutes"),
+                )
+            },
+        ),
+        (
+            _("Feedback and goal"),
+            {
+                "fields": (
+                    ("schedule", "schedule_steps", "schedule_band"),
+                    ("goal_follows", "goal_asks"),
+                )
+            },
+        ),
+        (
+            _("Robot and source"),
+            {
+                "fields": (
+                    "robot",
+                    ("robot_above", "robot_below"),
+                    ("robot_threshold", "robot_answers"),
+                    ("robot_window", "robot_count", "robot_rest"),
+                    "source",
+                )
+            },
+        ),
+    )
+
+    def formfield_for_dbfield(self, db_field: Any, request: HttpRequest, **kwargs: Any) -> Any:
+        """Offer the gestures that this clinic has."""
+        if db_field.name in {"robot_above", "robot_below"}:
+            return forms.ChoiceField(
+                choices=robot_gesture_choices(user_of(request)),
+                label=capfirst(db_field.verbose_name),
+            )
+        return super().formfield_for_dbfield(db_field, request, **kwargs)
+
+    @admin.display(description=_("goal"))
+    def goal_label(self, preset: Preset) -> str:
+        """The goal as text."""
+        return preset.goal_label

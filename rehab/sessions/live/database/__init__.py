@@ -1,0 +1,1 @@
+"""What a process has of the database: a connection, a lease, its sessions; and what ails it."""

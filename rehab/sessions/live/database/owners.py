@@ -1,0 +1,137 @@
+"""Ownership of sessions: which process writes one. Each claim raises the epoch, a fencing token.
+
+Hosted servers are named by their lease; elsewhere, and for commands, the process itself is asked
+for.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+from collections.abc import Collection
+from functools import cache
+from pathlib import Path
+
+from django.conf import settings
+
+from rehab.sessions.live.database import lease
+from rehab.sessions.log import noted_end
+from rehab.sessions.models import TrainingSession
+from rehab.training.changes import State
+
+PROC_DIR = Path("/proc")
+HANDED_ON = "handed on"  # the owner of a session that runs, whose process was stopped in order
+# The previous owner may have written these since the session was read.
+WRITTEN_BY_OWNER = ("checkpoint", "last_number", "state", "started_at", "ended_at")
+
+
+class OwnedElsewhere(RuntimeError):
+    """Another process is running the session; the message says which. ``owner``: its name."""
+
+    def __init__(self, session_id: int, owner: str) -> None:
+        super().__init__(
+            f"Session {session_id} is run by another process ({owner.split('|')[1]}). Wait until "
+            "it has ended, or stop that process."
+            if "|" in owner
+            else f"Session {session_id} is run by another server. Try again in a moment."
+        )
+        self.owner = owner
+
+
+def _start_time(pid: int) -> str:
+    """Return a process's start time, which tells it from a later one with the same id."""
+    try:
+        if PROC_DIR.is_dir():
+            return (PROC_DIR / str(pid) / "stat").read_text().rpartition(")")[2].split()[19]
+        # macOS has no /proc. The output must not depend on who asks, or where.
+        variables = os.environ | {"LC_ALL": "C", "TZ": "UTC"}
+        command = ["ps", "-o", "lstart=", "-p", str(pid)]
+        said = subprocess.run(command, env=variables, capture_output=True, text=True, check=False)
+        return " ".join(said.stdout.split())
+    except (OSError, IndexError):
+        return ""
+
+
+@cache
+def _own_start_time(pid: int) -> str:
+    return _start_time(pid)
+
+
+def own_name() -> str:
+    """Return the name that this process writes as owner."""
+    if (own := lease.held()) is not None:
+        return own.id
+    return f"{socket.gethostname()}|{os.getpid()}|{_own_start_time(os.getpid())}"
+
+
+def is_alive(owner: str) -> bool:
+    """Return whether an owner's process runs, or nobody can tell."""
+    own = lease.held()
+    if owner and settings.HOSTED and owner != HANDED_ON and "|" not in owner:
+        return (own is not None and not own.may_judge) or lease.is_valid(owner)
+    try:
+        host, pid, started = owner.split("|")
+    except ValueError:
+        return False
+    if host != socket.gethostname():
+        # A hosted server's command on another machine; else the machine was renamed.
+        return settings.HOSTED and own is None
+    try:
+        os.kill(int(pid), 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        pass
+    return _start_time(int(pid)) == started
+
+
+def claim(session: TrainingSession) -> str:
+    """Make this process the session's writer; return the previous owner, if any.
+
+    Of several that try at once one succeeds. Raises OwnedElsewhere while another process runs it.
+    """
+    while True:
+        previous = session.owner
+        if previous and previous != own_name() and is_alive(previous):
+            raise OwnedElsewhere(session.pk, previous)
+        still = TrainingSession.everywhere.filter(pk=session.pk, epoch=session.epoch)
+        if still.update(epoch=session.epoch + 1, owner=own_name()):
+            session.epoch, session.owner = session.epoch + 1, own_name()
+            session.refresh_from_db(fields=WRITTEN_BY_OWNER)
+            return previous
+        session.refresh_from_db(fields=["epoch", "owner"])  # another process was faster
+
+
+def release(session_id: int, epoch: int) -> None:
+    """Release the session, so that any process can claim it."""
+    held = TrainingSession.everywhere.filter(pk=session_id, epoch=epoch)
+    held.update(owner="", last_number=noted_end())
+
+
+def hand_on(session_id: int, epoch: int) -> bool:
+    """Release a session for another process that waits for it; False where it is not ours now."""
+    held = TrainingSession.everywhere.filter(pk=session_id, epoch=epoch, owner=own_name())
+    running = held.filter(state=State.RUNNING.value)
+    end = noted_end()
+    return bool(running.update(owner=HANDED_ON, last_number=end)) or bool(
+        held.update(owner="", last_number=end)
+    )
+
+
+def release_all(held: Collection[int]) -> None:
+    """Release the sessions that this process has; hand those on that run."""
+    own = TrainingSession.everywhere.filter(pk__in=held, owner=own_name())
+    own.filter(state=State.RUNNING.value).update(owner=HANDED_ON, last_number=noted_end())
+    own.update(owner="", last_number=noted_end())
+
+
+def find_ownerless() -> tuple[list[int], list[int]]:
+    """Return the running sessions whose process died, and those that one handed on."""
+    others = TrainingSession.everywhere.exclude(owner=own_name())
+    running = others.filter(owner__gt="", state=State.RUNNING.value)
+    owners = sorted(running.order_by().values_list("pk", "owner"))  # by the owners' index
+    dead = {owner for _, owner in owners if owner != HANDED_ON}
+    dead = {owner for owner in dead if not is_alive(owner)}
+    orphaned = [key for key, owner in owners if owner in dead]
+    return orphaned, [key for key, owner in owners if owner == HANDED_ON]

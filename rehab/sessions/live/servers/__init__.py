@@ -1,0 +1,1 @@
+"""Several servers on one database: what they ask each other for, whose sessions they follow."""

@@ -1,0 +1,260 @@
+"""The other servers on the database: what this one asks them for, and does for them.
+
+An owner gives hints of its sessions to those that follow them, and does what pages elsewhere ask
+for. A server that is not the owner follows, asks, and says where no answer comes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+import logging
+import time
+from collections.abc import Awaitable, Callable, Mapping
+from functools import partial
+from typing import Protocol
+
+from django.utils import timezone
+
+from rehab.people.models import User
+from rehab.sessions.live.database import lease
+from rehab.sessions.live.database.own_connection import DatabaseThread
+from rehab.sessions.live.database.owners import OwnedElsewhere
+from rehab.sessions.live.database.trouble import NotStored
+from rehab.sessions.live.devices import Devices
+from rehab.sessions.live.orders import Orders
+from rehab.sessions.live.servers.answers import pack, raise_refusal
+from rehab.sessions.live.servers.followed_sessions import FollowedSessions
+from rehab.sessions.live.servers.following import FollowedSession, Follower
+from rehab.sessions.live.servers.handover import Handover
+from rehab.sessions.live.servers.intercom import Data, Intercom, Unheard
+from rehab.sessions.live.session.live_session import LiveSession
+from rehab.sessions.live.station_robots import StationRobots
+from rehab.sessions.log import Remark
+from rehab.sessions.payloads import Message
+from rehab.training.changes import ChangeValue
+from rehab.training.measures import InvalidSetting
+
+log = logging.getLogger(__name__)
+
+BEAT_S = 1.0  # the log is read so often where no hint comes
+READ_TIMEOUT_MS = 5_000
+
+
+class Owning(Protocol):
+    """What a runtime does for other servers with the sessions that it owns."""
+
+    sessions: dict[int, LiveSession]
+    devices: Devices
+    robots: StationRobots
+    orders: Orders
+    handover: Handover
+
+    def close_pages(self, live: LiveSession) -> None: ...
+
+
+class Servers:
+    """The other servers, by what is heard of them."""
+
+    def __init__(self, owning: Owning, own: lease.Lease) -> None:
+        self._owning = owning
+        self._own = own
+        self._entered = own.entered
+        self._addresses: dict[str, str] = {}  # of servers with a valid lease
+        self._database = DatabaseThread("garry-follower", READ_TIMEOUT_MS)
+        self.followed = FollowedSessions(self._database, self.tell_viewers, owning.close_pages)
+        self.intercom = Intercom(
+            own.id,
+            {
+                "follow": self._on_follow,
+                "hint": self._on_hint,
+                "change": self._on_change,
+                "remark": self._on_remark,
+                "order": self._on_order,
+                "drive": self._on_drive,
+                "opened": self._on_opened,
+                "stop_at": self._on_stop_at,
+                "give_up": self._on_give_up,
+            },
+        )
+        loop = asyncio.get_running_loop()
+        self._tasks = [
+            loop.create_task(work, context=contextvars.Context())
+            for work in (self._repeat(self._beat), self._repeat(self.followed.read))
+        ]
+
+    async def close(self) -> None:
+        """End: nobody is followed, and nothing is heard any more."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self.intercom.close()
+        self._database.close()
+
+    @property
+    def deaf_s(self) -> float:
+        """Seconds since a message to ourselves came back; 0 where they come."""
+        silent_s = time.monotonic() - self.intercom.echoed_s
+        return silent_s if silent_s > 3 * BEAT_S else 0.0
+
+    def address_of(self, owner: str) -> str:
+        """Return how a proxy reaches a server; empty where that is not known."""
+        return self._addresses.get(owner, "")
+
+    # --- what this server asks for -----------------------------------------------------------
+
+    async def change(
+        self, owner: str, session_id: int, kind: str, value: ChangeValue, by: User | None
+    ) -> None:
+        """Have the owner apply a change. Raises InvalidSetting and NotStored as it does."""
+        asked = {"session": session_id, "kind": str(kind), "value": value}
+        await self._ask(owner, "change", asked | {"by": by and by.pk})
+
+    async def remark(
+        self, owner: str, session_id: int, what: Remark, value: float | None, by: User
+    ) -> None:
+        """Have the owner log a remark."""
+        asked = {"session": session_id, "what": what.value, "value": value}
+        await self._ask(owner, "remark", asked | {"by": by.pk})
+
+    async def order_robot(
+        self, owner: str, session_id: int, order: str, by: User | None, device_id: int | None
+    ) -> None:
+        """Have the owner stop the robot or let it move. Raises NotStored where it does not."""
+        asked = {"session": session_id, "order": order, "device": device_id}
+        await self._ask(owner, "order", asked | {"by": by and by.pk})
+
+    def drive_robot(self, owner: str, session_id: int, drive: Mapping[str, float]) -> None:
+        """Pass on that a person drives the robot; what is lost is as if the button was let go."""
+        self.intercom.tell(owner, "drive", {"session": session_id, "drive": dict(drive)})
+
+    def announce(self, session_id: int, station_id: int) -> None:
+        """Tell devices that wait at other servers of a session."""
+        self._tell_all("opened", {"session": session_id, "station": station_id})
+
+    def tell_of_stop(self, station_id: int, by: User | None, told: Message) -> None:
+        """Tell other servers of a stop: sessions of one station share its robot."""
+        self._tell_all("stop_at", {"station": station_id, "by": by and by.pk, "told": told})
+
+    def _tell_all(self, kind: str, data: Data) -> None:
+        for server in self._addresses:
+            if server != self._own.id:
+                self.intercom.tell(server, kind, data)
+
+    async def ask_for(self, owner: str, session_id: int, slot: str) -> bool:
+        """Return whether the owner gave a session up to the device that waits here."""
+        try:
+            answer = await self.intercom.ask(
+                owner, "give_up", {"session": session_id, "slot": slot}
+            )
+        except Unheard:
+            return False
+        return bool(answer.get("given"))
+
+    async def _ask(self, owner: str, kind: str, asked: Data) -> None:
+        try:
+            raise_refusal(await self.intercom.ask(owner, kind, asked))
+        except Unheard as problem:
+            raise NotStored(f"{problem} Look whether it took effect, then try again.") from None
+
+    def tell_viewers(self, live: FollowedSession) -> None:
+        """Tell the owner at once which pages are here."""
+        self.intercom.tell(live.owner, "follow", live.viewers)
+
+    async def _beat(self) -> None:
+        """Each second: who is there, which pages are here, and the log where no hint came."""
+        self.intercom.echo()
+        self._addresses = dict(await self._database.run(lease.valid_servers))
+        self.followed.beat(self._is_gone)
+        now_s = asyncio.get_running_loop().time()
+        for own in self._owning.sessions.values():
+            gone_ones = [one for one in _followers(own) if one.is_gone(now_s)]
+            own.feed.subscribers.difference_update(gone_ones)
+            if gone_ones:
+                own.announce_presence(timezone.now())
+        if self._entered != self._own.entered:  # others may have taken sessions meanwhile
+            await self._owning.handover.drop_taken()
+            self._entered = self._own.entered
+        if self._own.may_judge:
+            await self._owning.handover.take_over_left()
+        await asyncio.sleep(BEAT_S)
+
+    def _is_gone(self, owner: str) -> bool:
+        return owner not in self._addresses and self._own.may_judge
+
+    async def _repeat(self, work: Callable[[], Awaitable[None]]) -> None:
+        while True:
+            try:
+                await work()
+            except Exception:
+                log.exception("Other servers' sessions could not be followed")
+                await asyncio.sleep(BEAT_S)
+
+    # --- what this server does for others ------------------------------------------------------
+
+    async def _on_follow(self, server: str, viewers: Data) -> None:
+        live = self._owning.sessions.get(viewers["session"])
+        if live is None:
+            return
+        follower = next((one for one in _followers(live) if one.server == server), None)
+        if follower is None:
+            follower = Follower(live, server, partial(self.intercom.tell, server, "hint"))
+            live.feed.subscribers.add(follower)
+        before = (follower.tablets, live.is_watched)
+        follower.hear(viewers, asyncio.get_running_loop().time())
+        if viewers["tablets"]:
+            live.tablet_heard_at = timezone.now()
+        if before != (follower.tablets, live.is_watched):
+            live.announce_presence(timezone.now())
+        follower.wake()
+
+    async def _on_hint(self, server: str, hint: Data) -> None:
+        live = self.followed.sessions.get(hint["session"])
+        if live is not None and live.owner == server:
+            live.take_hint(hint)
+            self.followed.read_soon(live.id)
+
+    async def _on_change(self, server: str, asked: Data) -> Data:
+        value, by = asked["value"], _account(asked["by"])
+        return await _answer(self._owning.orders.change(asked["session"], asked["kind"], value, by))
+
+    async def _on_remark(self, server: str, asked: Data) -> Data:
+        what, by = Remark(asked["what"]), User(pk=asked["by"])
+        return await _answer(self._owning.orders.remark(asked["session"], what, asked["value"], by))
+
+    async def _on_order(self, server: str, asked: Data) -> Data:
+        by, device = _account(asked["by"]), asked["device"]
+        return await _answer(
+            self._owning.orders.order_robot(asked["session"], asked["order"], by, device)
+        )
+
+    async def _on_drive(self, server: str, asked: Data) -> None:
+        self._owning.robots.drive(asked["session"], asked["drive"])
+
+    async def _on_opened(self, server: str, told: Data) -> None:
+        self._owning.devices.announce(told["session"], told["station"])
+
+    async def _on_stop_at(self, server: str, stop: Data) -> None:
+        self._owning.robots.stop_at(stop["station"], _account(stop["by"]), stop["told"])
+
+    async def _on_give_up(self, server: str, asked: Data) -> Data:
+        return {"given": await self._owning.handover.give_up(asked["session"], asked["slot"])}
+
+
+def _followers(live: LiveSession) -> list[Follower]:
+    return [one for one in live.feed.subscribers if isinstance(one, Follower)]
+
+
+def _account(key: int | None) -> User | None:
+    """Return an account as a row refers to it: a stop waits for no query."""
+    return None if key is None else User(pk=key)
+
+
+async def _answer(work: Awaitable[None]) -> Data:
+    try:
+        await work
+    except (InvalidSetting, NotStored) as problem:
+        return pack(problem)
+    except OwnedElsewhere as problem:
+        return pack(NotStored(str(problem)))
+    return {}

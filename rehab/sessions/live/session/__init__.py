@@ -1,0 +1,1 @@
+"""One live session: its fold, its rows on their way to the log, its subscribers."""

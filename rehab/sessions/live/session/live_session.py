@@ -1,0 +1,294 @@
+"""A live session: its aggregate, its subscribers, its source and its robot."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Awaitable, Callable, Sequence
+from datetime import datetime
+from typing import Protocol
+
+from rehab.people.models import User
+from rehab.sessions.events.change import source_message
+from rehab.sessions.events.course import Before, events_of_change, events_of_step
+from rehab.sessions.events.event import (
+    LiveEvent,
+    presence_event,
+    remark_event,
+    robot_state_event,
+)
+from rehab.sessions.events.snapshot import snapshot
+from rehab.sessions.live.database.trouble import WORDS, NotStored, Trouble, classify_failure
+from rehab.sessions.live.session.aggregate import Row, SessionAggregate, StepRow, Summary
+from rehab.sessions.live.session.commits import Job
+from rehab.sessions.live.session.hub import EventFeed, Subscriber
+from rehab.sessions.live.session.lateness import Lateness
+from rehab.sessions.live.session.peers import Peer
+from rehab.sessions.live.session.robot_orders import RobotOrders
+from rehab.sessions.live.session.subscription_gate import SubscriptionGate
+from rehab.sessions.log import Remark, RuleEntry, Step
+from rehab.sessions.payloads import Message, type_mark
+from rehab.training.changes import Change, ChangeKind, State
+from rehab.training.controls import Audience
+from rehab.training.steps import Measurement, ScoredStep
+
+LATE_STEPS = 256
+RECENT_STEPS = 60  # strides that a page's chart may begin with
+
+
+class Log(Protocol):
+    """Where a session's rows go: the writer of their owner."""
+
+    @property
+    def trouble(self) -> Trouble:
+        """Why nothing is stored at present, if that is so."""
+
+    def submit(self, job: Job) -> None:
+        """Queue a job without waiting."""
+
+
+class LiveSession:
+    """Applies steps and changes in order, and publishes what is committed.
+
+    All methods run on the event loop; the writer's thread does what waits for the disk.
+    """
+
+    def __init__(
+        self,
+        aggregate: SessionAggregate,
+        writer: Log,
+        recent: list[Step],
+        on_failure: Callable[[LiveSession, Exception], None],
+        *,
+        robot_stopped: bool = False,
+    ) -> None:
+        session = aggregate.session
+        self.id = session.pk
+        self.station_id = session.station_id
+        # Sessions of one location share its robot.
+        here = f"session {self.id}" if self.station_id is None else f"station {self.station_id}"
+        self.location = here
+        self.aggregate = aggregate
+        self.feed = EventFeed()
+        self.recent: deque[Step | ScoredStep] = deque(recent, maxlen=RECENT_STEPS)
+        self.source: Peer | None = None
+        self.source_clock: Lateness | None = None  # of its latest run
+        self.robot: Peer | None = None
+        self.robot_orders = RobotOrders(self, self._submit, is_stopped=robot_stopped)
+        self.tablets = 0
+        self.late: deque[int] = deque(maxlen=LATE_STEPS)  # steps that were not shown as live
+        self.tablet_heard_at: datetime | None = None
+        self.stride_at: datetime | None = recent[-1].received_at if recent else None
+        self.committed = aggregate.fold.last_number
+        self.recently_used = True  # since the last sweep of idle sessions
+        self.uncommitted = 0
+        self.gate = SubscriptionGate()
+        self.about: Message = {
+            "session": session.pk,
+            "nickname": session.patient.nickname,
+            "language": session.patient.language,
+            "code": session.patient.code,
+        }
+        self._writer = writer
+        self._on_failure = on_failure
+
+    @property
+    def next_number(self) -> int:
+        """The number that the next step must have."""
+        return self.aggregate.fold.last_number + 1
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing needs it in memory."""
+        return not (self.feed.subscribers or self.source or self.robot or self.uncommitted)
+
+    @property
+    def is_running(self) -> bool:
+        """Whether its state is running."""
+        return self.aggregate.fold.state is State.RUNNING
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether a PT's page is open: a real robot begins no gesture while none is."""
+        subscribers = self.feed.subscribers
+        return any(one.audience is Audience.MONITOR and one.is_attentive for one in subscribers)
+
+    def record_step(
+        self, measurement: Measurement, received_at: datetime, *, late: bool = False
+    ) -> None:
+        """Score a step and queue it for the log. Raises what ``SessionFold.step`` raises."""
+        fold = self.aggregate.fold
+        before = Before.of(fold)
+        row = self.aggregate.record_step(measurement, received_at)
+        rows: list[Row] = [row]
+        if late:
+            self.late.append(row.step.number)
+        events = events_of_step(fold, before, row.step, live=not late)
+        changed = before.changed_by_step(fold)
+        if fold.following.moved:
+            followed = RuleEntry.GOAL_FOLLOWED
+            old = before.goal
+            rows.append(self.aggregate.log_event(followed, None, received_at, {}, fold.goal, old))
+        if ChangeKind.PAUSE in changed:
+            rest = RuleEntry.PLANNED_REST
+            rows.append(self.aggregate.log_event(rest, None, received_at, {}, fold.rest_s))
+        summary = None
+        if before.has_moved(fold) or self.aggregate.is_checkpoint_due:
+            summary = self.aggregate.summary(with_checkpoint=True)
+        self._submit(rows, events, changed, summary, row=row)
+
+    def change(self, change: Change, by: User | None, at: datetime) -> asyncio.Future[None]:
+        """Apply a change from the next step on; the future is done when it is committed.
+
+        Raises InvalidSetting if it is refused; the session is then as it was.
+        """
+        stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        fold = self.aggregate.fold
+        before = Before.of(fold)
+        rows = self.aggregate.change(change, by, at)
+        events = events_of_change(fold, before, change)
+        changed = [change.kind]
+        if change.kind == ChangeKind.PHASE and fold.goal != before.goal:
+            changed.append(ChangeKind.GOAL)
+        self._submit(rows, events, changed, self.aggregate.summary(), stored=stored)
+        return stored
+
+    def remark(
+        self, what: Remark, value: float | None, by: User | None, at: datetime
+    ) -> asyncio.Future[None]:
+        """Log a remark; the future is done when it is committed."""
+        stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        row = self.aggregate.log_event(what, by, at, {}, value)
+        event = remark_event(self.aggregate.fold, what.value, value)
+        self._submit([row], [event], [], stored=stored)
+        return stored
+
+    def _submit(
+        self,
+        rows: list[Row],
+        events: list[LiveEvent],
+        changed: Sequence[str],
+        summary: Summary | None = None,
+        *,
+        row: StepRow | None = None,
+        stored: asyncio.Future[None] | None = None,
+        on_stored: Callable[[], None] | None = None,
+    ) -> None:
+        """Queue rows; after their commit, send the source what changed and publish the events."""
+        for_source = [
+            message
+            for kind in changed
+            if (message := source_message(self.aggregate.fold, kind)) is not None
+        ]
+
+        def done(problem: Exception | None) -> None:
+            self.uncommitted -= 1
+            if problem is not None:
+                if stored is not None and not stored.done():
+                    words = WORDS.get(classify_failure(problem))
+                    stored.set_exception(NotStored(words or "It could not be stored. Try again."))
+                self._on_failure(self, problem)
+                return
+            if on_stored is not None:
+                on_stored()
+            if self.source is not None:
+                for message in for_source:  # before the ack, which a simulated patient waits for
+                    self.source.tell(message)
+                if row is not None:
+                    self.source.acknowledge(row.step.number)
+            if row is not None:
+                self.recent.append(row.step)
+                self.committed = row.step.number
+                self.stride_at = row.received_at
+            for event in events:
+                self.feed.publish(event)
+            if stored is not None and not stored.done():
+                stored.set_result(None)
+
+        self.uncommitted += 1
+        self._writer.submit(
+            Job(
+                owner=self.aggregate,
+                session_id=self.id,
+                epoch=self.aggregate.session.epoch,
+                rows=rows,
+                summary=summary,
+                done=done,
+            )
+        )
+
+    def presence(self, now: datetime) -> Message:
+        """Return who is connected, and how long ago source and tablet were last heard."""
+        tablets = self.tablets + sum(one.tablets for one in self.feed.subscribers)
+        return {
+            "source": self.source is not None,
+            "robot": self.robot is not None,
+            "tablets": tablets,
+            "stride_ago_s": _ago_s(self.stride_at, now),
+            "tablet_ago_s": _ago_s(self.tablet_heard_at, now) if tablets else None,
+            "storage": self._writer.trouble.value,
+        }
+
+    @property
+    def state_for_robot(self) -> str:
+        """The state that its robot obeys: it stands still while nothing can be stored."""
+        state = State.PAUSED if self.is_running and self._writer.trouble else None
+        return (state or self.aggregate.fold.state).value
+
+    def announce_storage(self, now: datetime) -> None:
+        """Publish whether steps are stored; the robot stands still while they are not."""
+        self.announce_presence(now)
+        self.feed.publish(robot_state_event(self.aggregate.fold, self.state_for_robot))
+
+    def announce_presence(self, now: datetime) -> None:
+        """Publish who is connected."""
+        self.feed.publish(presence_event(self.aggregate.fold, self.presence(now)))
+
+    async def subscribe(
+        self,
+        audience: Audience,
+        send: Callable[[str], Awaitable[None]],
+        now: datetime,
+        write: Callable[[str], bool] = lambda _: False,
+    ) -> tuple[Message, Subscriber]:
+        """Add a subscriber; return it with the snapshot that its events continue.
+
+        New steps wait some milliseconds until everything queued is committed, so that a page sees
+        nothing uncommitted and nothing twice.
+        """
+        with self.gate.closed():
+            while self.uncommitted:
+                await self.wait_until_committed()
+            about = self.about if audience is Audience.MONITOR else _for_patient(self.about)
+            shown = snapshot(
+                audience,
+                self.aggregate.fold,
+                about,
+                self.presence(now),
+                self.recent,
+                robot=self.robot_orders.reports,
+                robot_stopped=self.robot_orders.is_stopped,
+                marks=self._marks(),
+            )
+            subscriber = Subscriber(self.feed, audience, send, write)
+            self.feed.subscribers.add(subscriber)
+            return shown, subscriber
+
+    def _marks(self) -> list[Message]:
+        """Return the marks of a PT's chart, in the order of the steps."""
+        switches = [type_mark(after, slug) for after, slug in self.aggregate.fold.valences.switches]
+        return sorted([*self.aggregate.marks, *switches], key=lambda mark: mark["after"])
+
+    async def wait_until_committed(self) -> None:
+        """Wait until everything queued so far is committed. Raises NotStored."""
+        stored: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._submit([], [], [], stored=stored)
+        await stored
+
+
+def _ago_s(moment: datetime | None, now: datetime) -> float | None:
+    return None if moment is None else round(max(0.0, (now - moment).total_seconds()), 1)
+
+
+def _for_patient(about: Message) -> Message:
+    return {name: about[name] for name in ("session", "nickname", "language")}

@@ -1,0 +1,67 @@
+"""How the goal of one session follows the patient: suggested to the PT, or by the staircase."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from rehab.training.adaptation import (
+    DEFAULT_HIT_RATE,
+    SUGGESTION_STRIDES,
+    Staircase,
+    suggest_goal,
+)
+from rehab.training.plans import SessionPlan
+from rehab.training.steps import ScoredStep
+
+
+@dataclass(slots=True)
+class GoalFollowing:
+    """The strides that goals may follow.
+
+    Attributes
+    ----------
+    plan
+        The session's, with its measure, its target and how goals adapt.
+    latest
+        Their values.
+    staircase
+        The rule that moves the goal by itself, with the block that is under way.
+    moved
+        Whether the last step moved the goal.
+    """
+
+    plan: SessionPlan
+    latest: deque[float] = field(default_factory=lambda: deque(maxlen=SUGGESTION_STRIDES))
+    staircase: Staircase = field(default_factory=Staircase)
+    moved: bool = False
+
+    @property
+    def wanted_hit_rate(self) -> float:
+        """The share of hits that goals are to give."""
+        wanted = self.plan.target.hit_rate
+        return DEFAULT_HIT_RATE if wanted is None else wanted
+
+    def suggestion(self, gain: float) -> Callable[[], float | None]:
+        """Return what computes, later, the goal that is suggested now.
+
+        The latest strides would have reached it as often as is wanted.
+        """
+        measure, latest, wanted = self.plan.measure, tuple(self.latest), self.wanted_hit_rate
+        return lambda: suggest_goal(measure, [gain * value for value in latest], wanted)
+
+    def move(self, step: ScoredStep) -> float | None:
+        """Return the goal from the next step on, if the staircase moves it after this one."""
+        if step.goal is None or step.hit is None:
+            return None
+        goal = self.staircase.add(
+            self.plan.adaptation,
+            self.plan.measure,
+            self.wanted_hit_rate,
+            goal=step.goal,
+            gain=step.gain,
+            hit=step.hit,
+        )
+        self.moved = goal is not None
+        return goal
