@@ -23,7 +23,7 @@ class RehabConfig(AppConfig):
         from rehab.people.models import User
         from rehab.people.sign_in import lockout, step_up
         from rehab.people.sign_in.devices import note_browser
-        from rehab.people.sign_in.factors import Authenticator
+        from rehab.people.sign_in.factors.factors import Authenticator
         from rehab.people.sign_in.tokens import revoke_with_account
         from rehab.sessions.feedback_text_updates import connect_signals
         from rehab.sessions.setup.defaults import install_defaults

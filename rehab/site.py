@@ -103,7 +103,7 @@ class GarryAdminSite(AdminSite):
         from rehab.people.access import user_of
         from rehab.people.roles import Role
         from rehab.people.server_status import server_status
-        from rehab.sessions.reports.dashboard import dashboard_context
+        from rehab.sessions.reports.day.dashboard import dashboard_context
 
         user = user_of(request)
         now = timezone.now()

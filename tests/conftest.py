@@ -112,7 +112,7 @@ def _without_durability() -> Iterator[None]:
     options = settings.DATABASES["default"].get("OPTIONS", {})
     if "init_command" in options:
         options["init_command"] += "PRAGMA synchronous=OFF;"
-    from rehab.people.sign_in import recovery_codes
+    from rehab.people.sign_in.factors import recovery_codes
 
     quick = {"PASSWORD_HASHERS": ["django.contrib.auth.hashers.MD5PasswordHasher"]}
     with override_settings(**quick), mock.patch.object(recovery_codes, "SCRYPT_N", 2):

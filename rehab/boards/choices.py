@@ -7,7 +7,7 @@ from typing import Any
 from django.db.models import TextChoices
 from django.utils.translation import gettext_lazy as _
 
-from rehab.training.figures.metrics import METRICS
+from rehab.training.summary.metrics import METRICS
 
 METRIC_LABELS = {
     "hit_rate": _("Steps at the goal (%)"),

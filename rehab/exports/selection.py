@@ -36,9 +36,9 @@ from rehab.sessions.questionnaires import QuestionnaireResponse
 from rehab.sessions.replay import fold_log
 from rehab.studies.models import StudyState
 from rehab.studies.participants import StudyVisit
-from rehab.training.figures.metrics import METRICS
 from rehab.training.fold import SessionFold
 from rehab.training.plans import SessionPlan
+from rehab.training.summary.metrics import METRICS
 
 PAGE_ROWS = 2_000  # rows held in memory
 SESSIONS_PAGE = 200

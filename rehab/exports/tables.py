@@ -10,8 +10,8 @@ from datetime import date
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from rehab.training.figures.metrics import METRICS
 from rehab.training.scoring import RULES_VERSION
+from rehab.training.summary.metrics import METRICS
 
 
 class Type(StrEnum):

@@ -15,7 +15,7 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.scope import ClinicModel, Scope
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.today import IS_OPEN, todays_sessions
+from rehab.sessions.reports.day.today import IS_OPEN, todays_sessions
 from rehab.training.changes import OPEN_STATES, State
 
 QUICK_VISIT_DAYS = (0, 1, 2, 7)  # days from today that one tap plans

@@ -16,7 +16,7 @@ from rehab.people.models import SIDES, User
 from rehab.people.scope import ScopedModel
 from rehab.sessions.models import SessionScope, TrainingSession
 from rehab.training.controls import CONTROLS
-from rehab.training.figures.metrics import METRICS
+from rehab.training.summary.metrics import METRICS
 
 
 class Step(ScopedModel):

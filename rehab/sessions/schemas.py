@@ -26,9 +26,9 @@ from rehab.training.adaptation import AdaptationMode
 from rehab.training.changes import State
 from rehab.training.controls import requestable_kinds
 from rehab.training.cueing import CueRule
-from rehab.training.figures.metrics import METRICS
 from rehab.training.schedules import ScheduleKind
 from rehab.training.steps import Side
+from rehab.training.summary.metrics import METRICS
 from rehab.training.valences import VALENCES, find_valence
 
 STEPS_MAX = 1000

@@ -3,11 +3,9 @@
 from django.urls import path
 
 from rehab.sessions.pages import (
-    health,
     history,
     incident,
     insight,
-    metrics,
     monitor,
     note,
     questions,
@@ -21,6 +19,7 @@ from rehab.sessions.pages import (
     walk,
     words,
 )
+from rehab.sessions.pages.server import health, metrics
 
 urlpatterns = [
     path("healthz", health.healthz, name="healthz"),

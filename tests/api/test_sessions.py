@@ -15,9 +15,9 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.protocols import Protocol
 from rehab.stations.models import Station
-from rehab.training.figures.metrics import METRICS
 from rehab.training.goals import GoalRule
 from rehab.training.phases import make_phase
+from rehab.training.summary.metrics import METRICS
 from tests.support.clock import HERE
 from tests.support.programs import Program, program_of
 from tests.support.world import World, build_world, client_of

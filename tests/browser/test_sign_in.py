@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from rehab.people.sign_in.totp import TIME_STEP_S, generate_code
+from rehab.people.sign_in.factors.totp import TIME_STEP_S, generate_code
 from tests.support.browsers import SIZES
 from tests.support.servers import Server, serve
 

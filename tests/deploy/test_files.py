@@ -64,7 +64,8 @@ def test_settings_that_are_named_exist() -> None:
 
 
 def test_alarms_and_the_board_ask_for_figures_that_exist(monkeypatch) -> None:
-    import_module("rehab.sessions.pages.metrics")  # registers what is counted while it is asked
+    # Registers what is counted while it is asked.
+    import_module("rehab.sessions.pages.server.metrics")
     idle = SimpleNamespace(
         sessions={},
         is_ready=True,

@@ -11,7 +11,7 @@ from urllib.parse import urlencode
 
 import pytest
 
-from rehab.people.sign_in.totp import TIME_STEP_S, generate_code
+from rehab.people.sign_in.factors.totp import TIME_STEP_S, generate_code
 from tests.support.servers import Server, serve
 
 pytestmark = pytest.mark.server

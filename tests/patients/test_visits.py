@@ -13,7 +13,7 @@ from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.formatting import clinic_time
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports import dashboard
+from rehab.sessions.reports.day import dashboard
 from tests.support.clock import HERE
 from tests.support.walks import HIT, walk
 from tests.support.world import NOW, World, build_world, client_of

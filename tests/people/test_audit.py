@@ -22,7 +22,7 @@ from rehab.people.audit.audit_log import (
 )
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
-from rehab.people.sign_in.factors import Authenticator
+from rehab.people.sign_in.factors.factors import Authenticator
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession

@@ -8,8 +8,8 @@ import runpy
 import pytest
 
 from rehab.people.random_codes import ALPHABET
-from rehab.people.sign_in import recovery_codes, totp
-from rehab.people.sign_in.totp import TIME_STEP_S, generate_code, matching_time_step
+from rehab.people.sign_in.factors import recovery_codes, totp
+from rehab.people.sign_in.factors.totp import TIME_STEP_S, generate_code, matching_time_step
 from tests.support.world import NOW
 
 RFC_SECRET = "GEZDGNBVGY3TQOJQGEZDGNBVGY3TQOJQ"  # "12345678901234567890"

@@ -12,9 +12,10 @@ from django.utils import timezone
 
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
-from rehab.people.sign_in import factors, lockout
+from rehab.people.sign_in import lockout
 from rehab.people.sign_in.backends import PasswordBackend
-from rehab.people.sign_in.totp import generate_code, generate_secret
+from rehab.people.sign_in.factors import factors
+from rehab.people.sign_in.factors.totp import generate_code, generate_secret
 
 pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.postgres]
 PASSWORD = "walk well 2026"

@@ -14,10 +14,10 @@ from django.utils import timezone
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.models import Clinic, User
 from rehab.people.roles import Role
-from rehab.people.sign_in import factors
 from rehab.people.sign_in.attempts import SignInAttempts
-from rehab.people.sign_in.factors import Authenticator, RecoveryCode
-from rehab.people.sign_in.totp import (
+from rehab.people.sign_in.factors import factors
+from rehab.people.sign_in.factors.factors import Authenticator, RecoveryCode
+from rehab.people.sign_in.factors.totp import (
     TIME_STEP_S,
     generate_code,
     generate_secret,

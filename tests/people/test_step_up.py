@@ -13,11 +13,12 @@ from django.utils import timezone
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
-from rehab.people.sign_in import factors, passkeys, resets
-from rehab.people.sign_in.factors import Authenticator
+from rehab.people.sign_in import resets
+from rehab.people.sign_in.factors import factors, passkeys
+from rehab.people.sign_in.factors.factors import Authenticator
+from rehab.people.sign_in.factors.totp import TIME_STEP_S, generate_code, generate_secret
 from rehab.people.sign_in.step_up import CONFIRMED_AT, LIFETIME
 from rehab.people.sign_in.tokens import ApiToken
-from rehab.people.sign_in.totp import TIME_STEP_S, generate_code, generate_secret
 
 pytestmark = pytest.mark.django_db
 PASSWORD = "walk well 2026"

@@ -26,9 +26,9 @@ from rehab.sessions.corrections import (
 )
 from rehab.sessions.log import SessionEvent, SessionMetric, Step
 from rehab.sessions.models import TrainingSession
+from rehab.sessions.reports.day.week import week_summary
 from rehab.sessions.reports.takehome import summarize_for_patient
 from rehab.sessions.reports.trend import load_trend
-from rehab.sessions.reports.week import week_summary
 from tests.support.walks import strides, walk
 from tests.support.world import NOW, World, agreeing, build_world, client_of
 

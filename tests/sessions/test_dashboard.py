@@ -18,9 +18,9 @@ from rehab.people.models import Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.live import runtime
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports import dashboard
-from rehab.sessions.reports.dashboard import dashboard_context, find_alerts, sessions_today
-from rehab.sessions.reports.week import week_summary
+from rehab.sessions.reports.day import dashboard
+from rehab.sessions.reports.day.dashboard import dashboard_context, find_alerts, sessions_today
+from rehab.sessions.reports.day.week import week_summary
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import format_last_seen
 from rehab.training.changes import ChangeKind, State

@@ -20,13 +20,13 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.stations.models import Station
 from rehab.training.changes import Change, ChangeKind, NotAllowed
-from rehab.training.figures.metrics import compute_metrics
 from rehab.training.fold.checkpoints import fold_to_json
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from rehab.training.phases import make_phase
 from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import Measurement, Side
+from rehab.training.summary.metrics import compute_metrics
 from tests.support.world import NOW, store
 
 pytestmark = [pytest.mark.django_db, pytest.mark.postgres]

@@ -23,7 +23,7 @@ from rehab.people.consent.tombstones import ImportTombstone
 from rehab.people.models import BoardsConsent, Clinic, Patient, User
 from rehab.people.roles import Role
 from rehab.people.sign_in.attempts import SignInAttempts
-from rehab.people.sign_in.factors import Authenticator, RecoveryCode
+from rehab.people.sign_in.factors.factors import Authenticator, RecoveryCode
 from rehab.people.sign_in.resets import ResetRequest
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.questionnaires.instrument import Instrument, Item

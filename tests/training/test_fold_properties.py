@@ -13,7 +13,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rehab.training.changes import Change, ChangeKind, PauseReason
-from rehab.training.figures.metrics import compute_metrics
 from rehab.training.fold import SessionFold
 from rehab.training.fold.checkpoints import fold_from_json, fold_to_json
 from rehab.training.fold.tallies import Tally
@@ -21,6 +20,7 @@ from rehab.training.measures import InvalidSetting
 from rehab.training.phases import PHASE_KINDS, make_phase
 from rehab.training.plans import ChartStyle, SessionPlan
 from rehab.training.steps import InvalidMeasurement, InvalidReason, Measurement, ScoredStep, Side
+from rehab.training.summary.metrics import compute_metrics
 from rehab.training.valences import VALENCES, Band, Confetti, Valence, bands_to_json
 from robot.wire.limits import PERFORMANCE_MAX
 from tests.support.folds import fold_log

@@ -6,10 +6,10 @@ import math
 
 import pytest
 
-from rehab.training.figures.metrics import METRICS, compute_metrics
 from rehab.training.fold import SessionFold
 from rehab.training.goals import Target
 from rehab.training.phases import make_phase
+from rehab.training.summary.metrics import METRICS, compute_metrics
 from tests.training.sessions import SWAY, make_plan, start, walk
 
 

@@ -7,11 +7,11 @@ import json
 import pytest
 
 from rehab.training.changes import Change, ChangeKind
-from rehab.training.figures.summary import summarize_session
 from rehab.training.fold import SessionFold
 from rehab.training.goals import Target
 from rehab.training.phases import make_phase
 from rehab.training.steps import Side
+from rehab.training.summary.summary import summarize_session
 from rehab.training.valences import VALENCES
 from tests.training.sessions import make_plan, start, walk
 

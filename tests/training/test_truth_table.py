@@ -8,10 +8,10 @@ import math
 import pytest
 
 from rehab.training.changes import Change, ChangeKind
-from rehab.training.figures.summary import summarize_phases
 from rehab.training.phases import make_phase
 from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import InvalidReason, Measurement, ScoredStep, Side
+from rehab.training.summary.summary import summarize_phases
 from rehab.training.valences import VALENCES, CueGestures
 from tests.training.sessions import make_plan, others_than, start, walk
 

@@ -17,7 +17,7 @@ from rehab.boards.ranking.visibility import VisibleRow
 from rehab.people.aliases import format_alias
 from rehab.sessions.formatting import NBSP, format_day, format_duration, format_number
 from rehab.sessions.models import TrainingSession
-from rehab.training.figures.metrics import METRICS
+from rehab.training.summary.metrics import METRICS
 
 UNITS = {"%", "min"}  # written beside a figure; others follow from the board's name
 

@@ -18,7 +18,7 @@ from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import QuestionnaireResponse
 from rehab.training.changes import State
-from rehab.training.figures.metrics import METRICS
+from rehab.training.summary.metrics import METRICS
 
 SYSTEM = "urn:garry"
 UCUM = "http://unitsofmeasure.org"

@@ -22,7 +22,8 @@ from rehab.people.audit.audit_log import Act, record_security_change
 from rehab.people.models import User
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
-from rehab.people.sign_in import attempts, factors, resets, step_up
+from rehab.people.sign_in import attempts, resets, step_up
+from rehab.people.sign_in.factors import factors
 from rehab.people.web.admin_base import ScopedOptions, TrackedAdmin, rights_for
 
 

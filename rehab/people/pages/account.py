@@ -17,7 +17,8 @@ from rehab.people.audit.audit_log import Act, record_security_change
 from rehab.people.models import LANGUAGES
 from rehab.people.networks import client_address
 from rehab.people.roles import Role
-from rehab.people.sign_in import factors, passkeys, resets, step_up
+from rehab.people.sign_in import resets, step_up
+from rehab.people.sign_in.factors import factors, passkeys
 from rehab.people.sign_in.forms import NewPasswordForm
 
 

@@ -12,7 +12,8 @@ from django.views.decorators.http import require_http_methods
 
 from rehab.people.access import for_roles, user_of
 from rehab.people.roles import Role
-from rehab.people.sign_in import passkeys, step_up
+from rehab.people.sign_in import step_up
+from rehab.people.sign_in.factors import passkeys
 from rehab.people.sign_in.forms import ProofForm
 
 

@@ -19,7 +19,8 @@ from django.views.decorators.http import require_http_methods, require_POST
 from rehab.people.access import public
 from rehab.people.models import User
 from rehab.people.roles import Role
-from rehab.people.sign_in import factors, flow, passkeys
+from rehab.people.sign_in import flow
+from rehab.people.sign_in.factors import factors, passkeys
 from rehab.people.sign_in.forms import FactorForm, SignInForm
 
 

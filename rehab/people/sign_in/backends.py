@@ -10,7 +10,8 @@ from django.http import HttpRequest
 from django.utils import timezone
 
 from rehab.people.models import User
-from rehab.people.sign_in import factors, lockout, passkeys
+from rehab.people.sign_in import lockout
+from rehab.people.sign_in.factors import factors, passkeys
 from rehab.people.sign_in.hashing import HashingBusy
 
 

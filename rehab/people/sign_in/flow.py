@@ -16,7 +16,8 @@ from django.utils import timezone
 from django.utils.crypto import constant_time_compare
 
 from rehab.people.models import User
-from rehab.people.sign_in import browser_sessions, factors, lockout
+from rehab.people.sign_in import browser_sessions, lockout
+from rehab.people.sign_in.factors import factors
 
 # Keys of the browser session.
 PENDING = "pending_second_factor"

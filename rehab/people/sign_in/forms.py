@@ -12,7 +12,8 @@ from django.http import HttpRequest
 from django.utils.translation import gettext_lazy as _
 
 from rehab.people.models import User
-from rehab.people.sign_in import factors, lockout
+from rehab.people.sign_in import lockout
+from rehab.people.sign_in.factors import factors
 
 WRONG_LOGIN = _("Name and password do not fit. Look at capitals, and try again.")
 WRONG_PASSWORD = _("That is not your password.")

@@ -18,11 +18,11 @@ from rehab.sessions.models import TrainingSession
 from rehab.sources.recording import Recording
 from rehab.sources.synthetic import SyntheticWalker
 from rehab.training.changes import ChangeKind
-from rehab.training.figures.summary import summarize_session
 from rehab.training.fold import SessionFold
 from rehab.training.measures import A2
 from rehab.training.scoring import judge
 from rehab.training.steps import Measurement
+from rehab.training.summary.summary import summarize_session
 
 # Steps that are queued before waiting for the disk: few commits, constant memory.
 BATCH = 500

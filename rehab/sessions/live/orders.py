@@ -33,7 +33,7 @@ class Obeying(Protocol):
     def announce(self, session_id: int, station_id: int | None) -> None: ...
 
 
-class Orders:
+class SessionOrders:
     """Each raises OwnedElsewhere where the session is another server's."""
 
     def __init__(self, obeying: Obeying) -> None:

@@ -20,7 +20,7 @@ from rehab.sessions.live.database import lease, owners
 from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored, describe_failure
 from rehab.sessions.live.devices import Devices
-from rehab.sessions.live.orders import Orders
+from rehab.sessions.live.orders import SessionOrders
 from rehab.sessions.live.routines import Routines
 from rehab.sessions.live.servers.handover import Handover
 from rehab.sessions.live.servers.servers import Servers
@@ -56,7 +56,7 @@ class Runtime:
         self.writer = Writer(self._call)
         self.devices = Devices()
         self.robots = StationRobots(self.sessions)
-        self.orders = Orders(self)
+        self.orders = SessionOrders(self)
         self.handover = Handover(self)
         self.audit_queue = AuditQueue()
         self.sockets: set[Any] = set()  # closed when the server stops

@@ -22,9 +22,9 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.replay import fold_log
 from rehab.sessions.reports.trend import metrics_by_session
 from rehab.training.controls import CONTROLS, marked_kinds
-from rehab.training.figures.summary import summarize_session
 from rehab.training.fold import SessionFold
 from rehab.training.plans import SessionPlan
+from rehab.training.summary.summary import summarize_session
 from rehab.training.valences import VALENCES
 
 # Only counted: in a list they would hide what people did.

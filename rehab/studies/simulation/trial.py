@@ -22,10 +22,10 @@ from rehab.studies.analysis.participants import (
 from rehab.studies.analysis.walks import COLUMNS, read_walk
 from rehab.studies.simulation.walkers import ENDLESS, Person, Population, draw_person, walk_through
 from rehab.training.changes import Change, ChangeKind
-from rehab.training.figures.metrics import compute_metrics
 from rehab.training.fold import SessionFold
 from rehab.training.measures import InvalidSetting
 from rehab.training.plans import SessionPlan
+from rehab.training.summary.metrics import compute_metrics
 
 PARTICIPANTS_MAX = 2000
 EFFECT_MAX = 100.0

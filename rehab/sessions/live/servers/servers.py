@@ -22,7 +22,7 @@ from rehab.sessions.live.database.own_connection import DatabaseThread
 from rehab.sessions.live.database.owners import OwnedElsewhere
 from rehab.sessions.live.database.trouble import NotStored
 from rehab.sessions.live.devices import Devices
-from rehab.sessions.live.orders import Orders
+from rehab.sessions.live.orders import SessionOrders
 from rehab.sessions.live.servers.answers import pack, raise_refusal
 from rehab.sessions.live.servers.followed_sessions import FollowedSessions
 from rehab.sessions.live.servers.following import FollowedSession, Follower
@@ -47,7 +47,7 @@ class Owning(Protocol):
     sessions: dict[int, LiveSession]
     devices: Devices
     robots: StationRobots
-    orders: Orders
+    orders: SessionOrders
     handover: Handover
 
     def close_pages(self, live: LiveSession) -> None: ...

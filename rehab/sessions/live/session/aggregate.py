@@ -15,10 +15,10 @@ from rehab.sessions.payloads import change_mark
 from rehab.sessions.replay import fold_log
 from rehab.training.changes import ENDED_STATES, Change, ChangeKind, ChangeValue, State
 from rehab.training.controls import CONTROLS, marked_kinds
-from rehab.training.figures.metrics import compute_metrics
 from rehab.training.fold import SessionFold
 from rehab.training.fold.checkpoints import fold_from_json, fold_to_json
 from rehab.training.steps import Measurement, ScoredStep
+from rehab.training.summary.metrics import compute_metrics
 
 log = logging.getLogger(__name__)
 

@@ -21,7 +21,7 @@ from fido2.webauthn import (
 )
 
 from rehab.people.models import User
-from rehab.people.sign_in.factors import Authenticator, add_authenticator, authenticators_of
+from rehab.people.sign_in.factors.factors import Authenticator, add_authenticator, authenticators_of
 
 CHALLENGE = "passkey"  # key of the browser session, until the browser has answered
 VERIFICATION = UserVerificationRequirement.PREFERRED

@@ -15,10 +15,10 @@ from rehab.people.models import Clinic, User
 from rehab.people.roles import Right, Role, may_see_names, rights_of
 from rehab.sessions.formatting import clinic_time, format_duration, format_rate, midnight_of
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.reports.stations import StationStatus, find_live_session, station_statuses
-from rehab.sessions.reports.today import IS_OPEN, todays_sessions
+from rehab.sessions.reports.day.stations import StationStatus, find_live_session, station_statuses
+from rehab.sessions.reports.day.today import IS_OPEN, todays_sessions
+from rehab.sessions.reports.day.week import week_summary
 from rehab.sessions.reports.trend import with_metrics
-from rehab.sessions.reports.week import week_summary
 from rehab.stations.models import Device, Station
 from rehab.stations.presence import is_overdue
 from rehab.training.changes import OPEN_STATES, State

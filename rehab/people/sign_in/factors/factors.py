@@ -16,8 +16,8 @@ from django.utils.translation import gettext_lazy as _
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.scope import Scope, ScopedModel
-from rehab.people.sign_in.recovery_codes import CODE_COUNT, generate_code, hash_code
-from rehab.people.sign_in.totp import matching_time_step
+from rehab.people.sign_in.factors.recovery_codes import CODE_COUNT, generate_code, hash_code
+from rehab.people.sign_in.factors.totp import matching_time_step
 
 
 class Authenticator(ScopedModel):

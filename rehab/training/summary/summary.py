@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from rehab.training.figures.metrics import compute_metrics
 from rehab.training.fold import SessionFold
 from rehab.training.fold.tallies import Block, Tally
+from rehab.training.summary.metrics import compute_metrics
 
 
 def summarize_tally(tally: Tally) -> dict[str, Any]:

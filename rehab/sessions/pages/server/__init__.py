@@ -1,0 +1,1 @@
+"""Pages that tell programs how the server is."""

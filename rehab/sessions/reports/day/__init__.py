@@ -1,0 +1,1 @@
+"""A clinic today and this week."""

@@ -1,0 +1,1 @@
+"""What a session adds up to: its metrics and its summary."""
