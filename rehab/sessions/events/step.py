@@ -73,8 +73,8 @@ def step_event(
 
     ``live`` is False for a step that came too late to be shown as one.
     """
-    plan, standing, answer = fold.plan, Standing.of(fold), fold.telling.answer
-    coaching = coaching_of(fold)
+    plan, standing, coaching = fold.plan, Standing.of(fold), coaching_of(fold)
+    answer = fold.telling.answer
 
     def build(audience: Audience) -> Message | None:
         score, streak = standing.score, standing.streak

@@ -44,7 +44,10 @@ class GoalFollowing:
         return DEFAULT_HIT_RATE if wanted is None else wanted
 
     def suggestion(self, gain: float) -> Callable[[], float | None]:
-        """Return what computes the goal that the latest strides would have reached as wanted."""
+        """Return what computes, later, the goal that is suggested now.
+
+        The latest strides would have reached it as often as is wanted.
+        """
         measure, latest, wanted = self.plan.measure, tuple(self.latest), self.wanted_hit_rate
         return lambda: suggest_goal(measure, [gain * value for value in latest], wanted)
 

@@ -112,7 +112,7 @@ def test_many_sessions_take_hardly_more_queries_than_one():
     keys = [walk(build_place(name), 2).pk for name in ("elm", "oak", "ash", "fir")]
     with CaptureQueriesContext(connection) as asked:
         loading.load_together(keys)
-    for_each = 4 * len(keys)  # two to claim it, two for its latest steps
+    for_each = 3 * len(keys)  # two to claim it, one for its latest steps
     savepoint = 2
     assert len(asked.captured_queries) <= for_each + savepoint + 4
 

@@ -45,6 +45,7 @@ STEP_COLUMNS = (
     "extra",
 )
 _to_json = msgspec.json.Encoder().encode  # of plain, finite values: both were checked
+_from_json = msgspec.json.Decoder(list[tuple[int, int, int | None]]).decode
 # SQLite takes 32,766 parameters a statement, PostgreSQL 65,535.
 STEPS_A_STATEMENT = 500
 COPIED_ROWS = 4  # from so many on PostgreSQL's COPY is quicker than INSERT
@@ -52,9 +53,12 @@ COPIED_ROWS = 4  # from so many on PostgreSQL's COPY is quicker than INSERT
 # number in the session's row, which is wide and is then rewritten whole (docs/performance.md).
 LOG_ENDS = (
     "SELECT id, epoch, "
-    "(SELECT MAX(number) FROM rehab_step WHERE session_id = rehab_trainingsession.id) "
-    "FROM rehab_trainingsession WHERE id IN ({marks}){lock}"
+    "(SELECT MAX(number) FROM rehab_step WHERE session_id = rehab_trainingsession.id) AS last "
+    "FROM rehab_trainingsession WHERE id IN ({marks})"
 )
+# From SQLite in one row: its module gives up the interpreter's lock for each, and the event loop
+# takes it meanwhile.
+IN_ONE_ROW = "SELECT json_group_array(json_array(id, epoch, last)) FROM ({select})"
 
 
 def _step_values(row: StepRow, ops: BaseDatabaseOperations) -> tuple[Any, ...]:
@@ -180,11 +184,14 @@ def _check_logs(epochs: dict[int, int], firsts: dict[int, int]) -> None:
     number. Raises Fenced and LogDiffers.
     """
     marks = ", ".join(["%s"] * len(epochs))
-    # Elsewhere than in SQLite, other transactions run at the same time: they must not claim it now.
-    lock = "" if connection.vendor == "sqlite" else " FOR SHARE"
+    select = LOG_ENDS.format(marks=marks)
     with connection.cursor() as cursor:
-        cursor.execute(LOG_ENDS.format(marks=marks, lock=lock), list(epochs))
-        stored = cursor.fetchall()
+        if connection.vendor == "sqlite":
+            cursor.execute(IN_ONE_ROW.format(select=select), list(epochs))
+            stored = _from_json(cursor.fetchone()[0])
+        else:  # other transactions run at the same time: they must not claim it now
+            cursor.execute(f"{select} FOR SHARE", list(epochs))
+            stored = cursor.fetchall()
     if {key: epoch for key, epoch, _ in stored} != epochs:
         raise Fenced("Another process has taken the session over.")
     differing = [

@@ -32,6 +32,7 @@ from rehab.training.controls import CONTROLS
 
 log = logging.getLogger(__name__)
 
+_measured = attrgetter(*MEASURED)
 TOGETHER = 50  # sessions that are loaded at a time
 
 
@@ -140,24 +141,28 @@ def _load(session_ids: Collection[int]) -> dict[int, LoadResult]:
     for key, last in last_numbers.items():
         session, events = sessions[key], logs.get(key, [])
         aggregate = SessionAggregate.from_checkpoint(session)
-        _fold_rest(aggregate, events)
+        after = min(aggregate.fold.last_number, last - RECENT_STEPS)
+        steps = list(_read_steps(key, after))  # once, for the fold and for pages
+        _fold_rest(aggregate, steps, events)
         aggregate.keep_marks([event for event in events if event.kind in marked][-MARKS:])
         before = owned_before.get(key, "")
         found[key] = LoadedSession(
             aggregate=aggregate,
-            recent=list(_read_steps(key, after=last - RECENT_STEPS)),
+            recent=steps[-RECENT_STEPS:],
             robot_stopped=is_robot_stopped(session, events),
             was_orphaned=before not in ("", owners.HANDED_ON, session.owner),
         )
     return found
 
 
-def _fold_rest(aggregate: SessionAggregate, events: Sequence[SessionEvent]) -> None:
+def _fold_rest(
+    aggregate: SessionAggregate, steps: Sequence[Step], events: Sequence[SessionEvent]
+) -> None:
     """Fold what came after the checkpoint."""
     session_id, after = aggregate.session.pk, aggregate.fold.last_number
     changes = [one for one in events if one.kind in CONTROLS and one.after_number >= after]
-    steps = _read_steps(session_id, after).values_list(*MEASURED).iterator()
-    fold_entries(aggregate.fold, session_id, merge_entries(session_id, after, steps, changes))
+    measured = (_measured(step) for step in steps if step.number > after)
+    fold_entries(aggregate.fold, session_id, merge_entries(session_id, after, measured, changes))
 
 
 def _read_steps(session_id: int, after: int) -> QuerySet[Step]:

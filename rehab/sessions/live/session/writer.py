@@ -27,7 +27,7 @@ from rehab.sessions.live.session.commits import EarlierWriteFailed, Job, commit
 log = logging.getLogger(__name__)
 
 MAX_ROWS = 5000  # rows a transaction
-SPACING_S = 0.008  # between the beginnings of commits while several sessions walk
+SPACING_S = 0.012  # between the beginnings of commits while several sessions walk
 LATE_S = 1.0  # a commit that takes longer is told to people and robots
 CLOSE_S = 20.0  # how long a stop waits for a database that does not answer
 # Of the writer's own connection to PostgreSQL: what waits longer has failed, and is said.
