@@ -29,7 +29,7 @@ class Walk:
     minutes: int
     hits: int  # of ten steps
     percent: float  # of all steps, for its bar
-    points: str
+    points: str  # empty where none were won
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,8 @@ def summarize_for_family(patient: Patient, now: datetime) -> FamilySummary:
             max(1, round(session.active_s / 60)),
             round(10 * session.rate),
             round(100 * session.rate, 1),
-            "" if session.points is None else format_number(session.points, 0),
+            # Some types only take points: what is below nothing would be read as a failure.
+            format_number(session.points, 0) if (session.points or 0) > 0 else "",
         )
         for session in sessions
     ]
