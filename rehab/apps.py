@@ -18,6 +18,7 @@ class RehabConfig(AppConfig):
         from rehab import checks  # noqa: F401
         from rehab.boards.signals import connect_receivers
         from rehab.models import TRACKED
+        from rehab.patients import family
         from rehab.people.audit import guards, sign_in_log
         from rehab.people.audit.history import track_models
         from rehab.people.models import User
@@ -39,4 +40,5 @@ class RehabConfig(AppConfig):
         pre_save.connect(revoke_with_account, sender=User)
         connect_signals()
         studies.connect_receivers()
+        family.connect_receivers()
         step_up.connect_signals()

@@ -4,6 +4,7 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
+from rehab.patients.family import FamilyLink
 from rehab.patients.visits import Visit
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
@@ -61,6 +62,7 @@ __all__ = [
     "ConsentText",
     "Device",
     "Enrollment",
+    "FamilyLink",
     "FeedbackBand",
     "FeedbackType",
     "Gesture",

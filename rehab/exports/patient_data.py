@@ -15,6 +15,7 @@ from rehab.boards.rows import BoardEntry
 from rehab.exports.archive import write_csv, write_json
 from rehab.exports.selection import Selection
 from rehab.exports.tables import CODEBOOK, TABLES, codebook_rows
+from rehab.patients.family import FamilyLink
 from rehab.patients.visits import Visit
 from rehab.people.audit.history import HistoryEntry
 from rehab.people.consent.models import Consent
@@ -28,6 +29,7 @@ FILES = {
     "patient.json": _("who it is, and how the pages are set"),
     "consent.json": _("what was agreed to, to which words, and when"),
     "visits.json": _("the days on which a visit is or was planned"),
+    "family.json": _("which links a family was given, and how often they were opened"),
     "boards.json": _("the rows on leaderboards, and the groups of boards"),
     "studies.json": _("the part in studies; the arm once a study is closed"),
     "changes.json": _("when details were changed, each with its value before and after"),
@@ -71,6 +73,7 @@ def _patient_tables(user: User, patient: Patient) -> Iterator[tuple[str, Any]]:
     yield "patient.json", write_json(describe_patient(patient))
     yield "consent.json", write_json(list_consents(user, patient))
     yield "visits.json", write_json(list_visits(user, patient))
+    yield "family.json", write_json(list_family_links(user, patient))
     yield "boards.json", write_json(list_boards(user, patient))
     yield "studies.json", write_json(list_studies(user, patient))
     yield "changes.json", write_json(list_changes(user, patient))
@@ -145,6 +148,21 @@ def list_visits(user: User, patient: Patient) -> list[dict[str, Any]]:
     """Return the visits that were planned."""
     visits = Visit.objects.visible_to(user).filter(patient=patient)
     return [{"day": visit.day, "at": visit.at} for visit in visits]
+
+
+def list_family_links(user: User, patient: Patient) -> list[dict[str, Any]]:
+    """Return the links that the family was given; who gave them is not named."""
+    return [
+        {
+            "created_at": link.created_at,
+            "valid_until": link.expires_at,
+            "ended_at": link.ended_at,
+            "with_the_nickname": link.shows_name,
+            "last_opened_at": link.opened_at,
+            "times_opened": link.opened,
+        }
+        for link in FamilyLink.objects.visible_to(user).filter(patient=patient)
+    ]
 
 
 def list_boards(user: User, patient: Patient) -> list[dict[str, Any]]:

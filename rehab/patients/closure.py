@@ -11,7 +11,8 @@ from datetime import datetime
 from django.db import transaction
 from django.utils.translation import gettext as _
 
-from rehab.people.models import EndReason, Patient
+from rehab.patients.family import end_links
+from rehab.people.models import EndReason, Patient, User
 from rehab.sessions.models import TrainingSession
 from rehab.training.changes import OPEN_STATES
 
@@ -20,8 +21,8 @@ class SessionStillOpen(ValueError):
     """The patient has an open session, which must be ended first."""
 
 
-def end_program(patient: Patient, reason: EndReason, now: datetime) -> None:
-    """End a patient's program; until it is reopened, no session can be set up.
+def end_program(patient: Patient, reason: EndReason, now: datetime, by: User | None = None) -> None:
+    """End a patient's program, and the links to it; until it is reopened, no session can be set up.
 
     Raises SessionStillOpen.
     """
@@ -30,6 +31,7 @@ def end_program(patient: Patient, reason: EndReason, now: datetime) -> None:
         if patient.erased_at is None:
             patient.ended_at, patient.end_reason = now, reason
             patient.save(update_fields=["ended_at", "end_reason"])
+            end_links(patient, by, now)
 
 
 def reopen_program(patient: Patient) -> None:

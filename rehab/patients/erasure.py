@@ -13,6 +13,7 @@ from django.db.models.functions import Coalesce, Greatest
 from django.utils.translation import gettext as _
 
 from rehab.patients.closure import lock_without_open_session
+from rehab.patients.family import FamilyLink
 from rehab.patients.visits import Visit
 from rehab.people.audit import audit_log, seals
 from rehab.people.audit.audit_log import Act
@@ -55,6 +56,7 @@ def erase(patient: Patient, reason: ErasureReason, by: User | None, now: datetim
         ).update(data={})
         anonymize_corrections(patient, old_pseudonym)
         Visit.everywhere.filter(patient=patient).delete()
+        FamilyLink.everywhere.filter(patient=patient).delete()
         erase_values("Patient", patient.pk)
         LogEntry.objects.filter(
             content_type=ContentType.objects.get_for_model(Patient), object_id=str(patient.pk)

@@ -2,7 +2,7 @@
 
 from django.urls import path
 
-from rehab.patients.pages import ending, first_steps, records, start, visits
+from rehab.patients.pages import ending, family, first_steps, records, start, visits
 
 urlpatterns = [
     path("start/", start.choose_patient, name="start"),
@@ -16,6 +16,9 @@ urlpatterns = [
     path("sessions/<int:session_id>/ending/", ending.show_ending, name="ending"),
     path("patients/<int:patient_id>/visits/", visits.change_visits, name="visits"),
     path("patients/<int:patient_id>/records/", records.show_records, name="records"),
+    path("patients/<int:patient_id>/family/", family.show_links, name="family-links"),
+    path("family-links/<int:link_id>/end/", family.end_family_link, name="end-family-link"),
+    path("family/<str:token>/", family.show_family, name="family"),
     path("patients/<int:patient_id>/end/", records.end_patient_program, name="end-program"),
     path("patients/<int:patient_id>/reopen/", records.reopen_patient_program, name="reopen"),
     path("patients/<int:patient_id>/erase/", records.erase_patient, name="erase"),

@@ -52,6 +52,7 @@ RIGHTS: dict[str, dict[Role, Right]] = {
     "Pairing": {},
     "PinAttempts": {},
     "Visit": {Role.LEAD: Right.ALL, Role.PT: Right.ALL},
+    "FamilyLink": {Role.LEAD: Right.VIEW, Role.PT: Right.VIEW},
     "Measure": {
         Role.HOST: Right.EDIT,
         Role.LEAD: Right.EDIT,

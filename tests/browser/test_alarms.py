@@ -8,9 +8,10 @@ import sqlite3
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, WebSocketRoute, expect
 from websockets.sync.client import ClientConnection, connect
 
 from tests.support.servers import Server
@@ -208,3 +209,43 @@ def test_a_tablet_that_is_lost_and_a_robot_that_stands(
         expect(monitor.locator("[data-alarm=tablet]")).to_contain_text("The tablet is lost")
         expect(monitor.locator(".mirror h2")).to_have_text("Patient’s page no tablet")
     expect(monitor.locator("[data-alarm=robot]")).to_contain_text("The robot is lost")
+
+
+def unheard_page(browser: Browser, server: Server, walk: Walk, path: str) -> Page:
+    """Return a page whose stop is answered as where the session's own server is silent."""
+    context = browser.new_context(base_url=server.url, reduced_motion="reduce")
+    context.add_cookies([{"name": "sessionid", "value": walk.cookie, "url": server.url}])
+    page = context.new_page()
+
+    def pass_on(socket: WebSocketRoute) -> None:
+        server_side = socket.connect_to_server()
+
+        def answer(text: str | bytes) -> None:
+            message = json.loads(text)
+            if message.get("order") == "stop":
+                error = {"type": "error", "code": "robot_unheard", "order": "stop"}
+                socket.send(json.dumps(error | {"message": "The robot's server is silent."}))
+            else:
+                server_side.send(text)
+
+        socket.on_message(answer)
+
+    page.clock.install()
+    page.route_web_socket(re.compile("/ws/session/"), pass_on)
+    page.goto(path)
+    return page
+
+
+def test_a_stop_that_the_sessions_server_does_not_hear_is_told_at_once(
+    server: Server, browser: Browser, walk: Walk
+) -> None:
+    """On a page at another server; it says what to do, and no time has to pass for that."""
+    with robot_of(server, walk):
+        page = unheard_page(browser, server, walk, f"/sessions/{walk.session}/monitor/")
+        expect(page.locator("[data-robot=stop]:visible").first).to_be_enabled()
+        page.clock.pause_at(datetime.now(UTC) + timedelta(seconds=5))
+        page.locator("[data-robot=stop]:visible").first.click()
+        told = page.get_by_text("No answer. If the robot moves, use its own switch.").first
+        expect(told).to_be_visible()
+        expect(page.locator("[data-robot=stop].asked")).to_have_count(0)
+        page.context.close()

@@ -80,7 +80,7 @@ def test_a_patients_file_holds_everything_that_is_kept(world):
     files = fetch(world, Role.PT)
     assert set(files) == {
         *("README.txt", "patient.json", "consent.json", "codebook.csv"),
-        *("visits.json", "boards.json", "studies.json", "changes.json"),
+        *("visits.json", "family.json", "boards.json", "studies.json", "changes.json"),
         *("sessions.csv", "steps.csv", "events.csv", "corrections.csv", "incidents.csv"),
         *("feedback.csv", "answers.csv", "study_visits.csv"),
     }
@@ -106,6 +106,7 @@ def test_the_file_says_what_is_in_it_in_the_language_of_whoever_asks(world):
 TOLD_IN = {
     "Consent": "consent.json",
     "Visit": "visits.json",
+    "FamilyLink": "family.json",
     "BoardEntry": "boards.json",
     "Leaderboard_group": "boards.json",
     "TrainingSession": "sessions.csv",

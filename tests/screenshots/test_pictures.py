@@ -67,6 +67,7 @@ PAGES = {
     "corrected": "/sessions/11/details/",
     "records": "/patients/2/records/",
     "consent": "/patients/2/consent/",
+    "family-links": "/patients/2/family/",
     "consent-words": "/consent/words/",
     "export": "/export/",
     "audit-log": "/admin/rehab/auditentry/",

@@ -145,7 +145,14 @@ def test_what_was_left_open_is_told_however_many_walked_since(world, rosa, monke
 def test_the_hit_rate_of_who_walks_is_told_as_it_stands(world, rosa, monkeypatch):
     session = ago(rosa, "positive", strides(3, 1), NOW, end=None)
     pt = world.people[Role.PT]
-    assert sessions_today(pt, world.clinic, NOW)[0].hit_rate == ""  # another process runs it
+    elsewhere = sessions_today(pt, world.clinic, NOW)[0]  # another process runs it
+    assert (elsewhere.state, elsewhere.is_open, elsewhere.hit_rate) == ("Running", True, "")
+    told = dashboard_context(pt, NOW)
+    assert told["walking"] == 1
+    assert [status.connected for status in told["stations"]] == [{}] * len(told["stations"])
+    page = front(pt)
+    assert "running open" in page
+    assert "missing" not in page  # nobody here knows who is connected there
     fold = SimpleNamespace(feedback=Tally(judged=4, hits=3))
     running = SimpleNamespace(
         aggregate=SimpleNamespace(fold=fold),
@@ -159,6 +166,19 @@ def test_the_hit_rate_of_who_walks_is_told_as_it_stands(world, rosa, monkeypatch
         "75\N{NO-BREAK SPACE}%"
         in re.search(r'<li class="running open">.*?</li>', page, re.DOTALL)[0]
     )
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"token_expires_at": NOW}, "has expired"),
+        ({"copy_seen_at": NOW - timedelta(days=3)}, "Somebody used an old token of"),
+    ],
+)
+def test_a_device_whose_token_is_over_or_was_copied_wants_attention(world, rosa, fields, words):
+    Device.everywhere.filter(pk=world.device.pk).update(last_seen_at=NOW, **fields)
+    alerts = dashboard_context(world.people[Role.PT], NOW)["alerts"]
+    assert [words in alert.message for alert in alerts if alert.key == world.device.pk] == [True]
 
 
 def test_a_session_left_open_and_devices_shut_out_want_attention(world, rosa):

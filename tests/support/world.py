@@ -14,6 +14,7 @@ from rehab.boards.models import Leaderboard
 from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.gestures.models import Gesture, GestureStep
+from rehab.patients.family import FamilyLink
 from rehab.patients.visits import Visit
 from rehab.people.audit.audit_log import AuditEntry
 from rehab.people.audit.history import HistoryEntry
@@ -383,6 +384,13 @@ def build_world(name: str) -> World:
             station=station, screen=f"tablet {device.pk}", locked_until=NOW
         ),
         ImportTombstone.everywhere.create(clinic=clinic, id_hash=mark(name, ImportTombstone)),
+        FamilyLink.everywhere.create(
+            clinic=clinic,
+            patient=patient,
+            token_hash=f"family-{name}",
+            created_at=NOW,
+            expires_at=NOW,
+        ),
         Visit.everywhere.create(clinic=clinic, patient=patient, day=NOW.date()),
         Pairing.everywhere.create(
             code=f"P{clinic.pk}",

@@ -61,7 +61,8 @@ def end_patient_program(request: HttpRequest, patient_id: int) -> HttpResponse:
     if not form.is_valid():
         return render_records(request, patient, ending=form)
     try:
-        end_program(patient, EndReason(form.cleaned_data["reason"]), timezone.now())
+        reason = EndReason(form.cleaned_data["reason"])
+        end_program(patient, reason, timezone.now(), user_of(request))
     except SessionStillOpen as problem:
         form.add_error(None, str(problem))
         return render_records(request, patient, ending=form)

@@ -23,6 +23,7 @@ class Purpose(models.TextChoices):
     RESEARCH = "research", _("Research")
     BOARDS = "boards", _("Boards")
     REMOTE = "remote", _("Remote view")
+    FAMILY = "family", _("Family view")
 
 
 class ImmutableConsentText(TypeError):

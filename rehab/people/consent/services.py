@@ -36,8 +36,12 @@ DEFAULT_TEXT = (
     ),
     REMOTE_VIEW_TEXT,
     _(
+        "Family view: people whom you choose see on a page of their own when you walked, how many "
+        "steps reached your goal, and your next visit, until the link ends."
+    ),
+    _(
         "You may say no to any of these, and change your mind at any time. Your care does not "
-        "depend on research, boards or remote view."
+        "depend on research, boards, remote view or family view."
     ),
 )
 

@@ -138,4 +138,11 @@ def _device_problem(device: Device, now: datetime) -> str | None:
             "%(name)s at %(station)s is revoked and shut out. Give it a new token to let "
             "it in again."
         )
+    if device.has_expired(now):
+        return gettext("The token of %(name)s at %(station)s has expired. Give it a new one.")
+    if device.copy_seen_at is not None:
+        return gettext(
+            "Somebody used an old token of %(name)s at %(station)s. Give it a new one, and find "
+            "out who has the old one."
+        )
     return None

@@ -1,0 +1,223 @@
+"""Family view: a link that shows a little, to who has it, until it ends; and then nothing."""
+
+from __future__ import annotations
+
+import logging
+import re
+from datetime import datetime, time, timedelta
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+
+from rehab.patients import family
+from rehab.patients.closure import end_program
+from rehab.patients.erasure import erase
+from rehab.patients.family import FamilyLink, FamilyLinkRefused, find_link, give_link
+from rehab.patients.family_summary import describe_change, summarize_for_family
+from rehab.patients.pages import family as page
+from rehab.patients.visits import plan_visit
+from rehab.people.audit.audit_log import Act, AuditEntry
+from rehab.people.consent.models import Purpose
+from rehab.people.consent.services import record_consent, withdraw_consent
+from rehab.people.models import EndReason, ErasureReason, Patient
+from rehab.people.roles import Role
+from rehab.people.sign_in.gate import AddressLimit
+from rehab.sessions.models import TrainingSession
+from tests.support.world import NOW, build_world, client_of
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture(autouse=True)
+def calm_gate(monkeypatch):
+    monkeypatch.setattr(page, "limit", AddressLimit(burst=1000))
+
+
+@pytest.fixture
+def agreed(world):
+    """A clinic whose patient has agreed."""
+    FamilyLink.everywhere.all().delete()
+    record_consent(world.patient, Purpose.FAMILY, None, NOW)
+    return world
+
+
+def links_page(world):
+    return reverse("family-links", kwargs={"patient_id": world.patient.pk})
+
+
+def give(world, weeks=4, name="yes"):
+    """Give a link on the page; return its path."""
+    answer = client_of(world).post(links_page(world), {"weeks": weeks, "name": name})
+    found = re.search(r"http://testserver(/family/[\w-]{43}/)", answer.content.decode())
+    assert found, answer.content.decode()
+    return found[1]
+
+
+def acts():
+    return [entry.act for entry in AuditEntry.everywhere.order_by("pk") if "family" in entry.act]
+
+
+def shows(path, client=None):
+    """Return what the page shows to who taps its button; empty where it shows nothing."""
+    answer = (client or Client()).post(path)
+    assert answer["Cache-Control"] == "no-store"
+    assert answer["Referrer-Policy"] == "no-referrer"
+    assert "noindex" in answer["X-Robots-Tag"]
+    assert not answer.cookies
+    return answer.content.decode() if answer.status_code == 200 else ""
+
+
+def test_a_link_shows_sessions_and_the_next_visit_to_who_has_it(agreed):
+    Patient.everywhere.filter(pk=agreed.patient.pk).update(code="CASE-4711")
+    agreed.patient.refresh_from_db()
+    path = give(agreed)
+    text = shows(path)
+    assert agreed.patient.nickname in text
+    for secret in (agreed.patient.code, agreed.patient.pseudonym, "W/kg"):
+        assert secret not in text
+    assert acts() == [Act.FAMILY_LINK, Act.FAMILY_VIEW]
+    entry = AuditEntry.everywhere.get(act=Act.FAMILY_VIEW)
+    assert (entry.patient_id, entry.clinic_id) == (agreed.patient.pk, agreed.clinic.pk)
+    link = FamilyLink.everywhere.get()
+    assert (link.opened, link.token_hash in path) == (1, False)
+    answer = client_of(agreed).get(links_page(agreed)).content.decode()
+    assert "opened once" in answer.replace("\n", " ")
+    assert path not in answer  # it is shown this once
+
+
+def test_a_preview_of_the_link_shows_and_counts_nothing(agreed):
+    path = give(agreed)
+    answer = Client().get(path)
+    assert answer.status_code == 200
+    assert agreed.patient.nickname not in answer.content.decode()
+    assert FamilyLink.everywhere.get().opened == 0
+    assert Act.FAMILY_VIEW not in acts()
+
+
+def test_without_a_name_none_is_shown(agreed):
+    assert agreed.patient.nickname not in shows(give(agreed, name="no"))
+
+
+def test_it_needs_no_cookie_where_forgeries_are_checked(agreed):
+    assert shows(give(agreed), Client(enforce_csrf_checks=True))
+
+
+def test_the_therapists_forms_come_with_an_origin(agreed):
+    """Where a page sends no referrer, browsers send the origin "null", which Django refuses."""
+    answer = client_of(agreed).get(links_page(agreed))
+    assert answer["Referrer-Policy"] == "same-origin"
+
+
+ENDS = {
+    "the consent is withdrawn": lambda world: withdraw_consent(
+        world.patient, Purpose.FAMILY, None, NOW
+    ),
+    "the program ends": lambda world: end_program(world.patient, EndReason.DONE, NOW),
+    "the person is erased": lambda world: erase(world.patient, ErasureReason.ASKED, None, NOW),
+    "a blinded study begins": lambda world: Patient.everywhere.filter(pk=world.patient.pk).update(
+        blinded=True
+    ),
+    "the link expires": lambda world: FamilyLink.everywhere.update(expires_at=NOW),
+    "the therapist ends it": lambda world: client_of(world).post(
+        reverse("end-family-link", kwargs={"link_id": FamilyLink.everywhere.get().pk})
+    ),
+}
+
+
+@pytest.mark.parametrize("why", ENDS)
+def test_a_link_ends_when(agreed, why):
+    path = give(agreed)
+    assert shows(path)
+    TrainingSession.everywhere.update(state="finished")
+    ENDS[why](agreed)
+    assert not shows(path)
+    assert Client().get(path).status_code == 404
+    assert Client().get(path).content == Client().get(f"/family/{'a' * 43}/").content
+    if why not in ("a blinded study begins", "the link expires", "the person is erased"):
+        assert acts()[-1] == Act.FAMILY_END
+        record_consent(agreed.patient, Purpose.FAMILY, None, NOW)
+        Patient.everywhere.filter(pk=agreed.patient.pk).update(ended_at=None)
+        assert not shows(path)  # for good
+
+
+REFUSED = {
+    "nothing was agreed": lambda world: withdraw_consent(world.patient, Purpose.FAMILY, None, NOW),
+    "the study is blinded": ENDS["a blinded study begins"],
+    "the program has ended": ENDS["the program ends"],
+    "five are in use": lambda world: [give(world) for _ in range(5)],
+    "a study hides the sessions": lambda world: None,
+}
+
+
+@pytest.mark.parametrize("why", REFUSED)
+def test_no_link_is_given_where(agreed, why, monkeypatch):
+    TrainingSession.everywhere.update(state="finished")
+    REFUSED[why](agreed)
+    if why == "a study hides the sessions":
+        monkeypatch.setattr(family, "hidden_patients", lambda _by: Patient.everywhere.all())
+    before = FamilyLink.everywhere.count()
+    answer = client_of(agreed).post(links_page(agreed), {"weeks": 4, "name": "yes"}, follow=True)
+    assert "/family/" not in re.sub(r"/patients/\d+/family/", "", answer.content.decode())
+    assert FamilyLink.everywhere.count() == before
+
+
+@pytest.mark.parametrize("weeks", [0, 3, 520])
+def test_a_link_ends_in_weeks(agreed, weeks):
+    by = agreed.people[Role.PT]
+    with pytest.raises(FamilyLinkRefused, match="how long"):
+        give_link(agreed.patient, weeks, by, "", NOW, shows_name=True)
+    token = give_link(agreed.patient, 2, by, "", NOW, shows_name=True)
+    assert find_link(token, NOW + timedelta(days=14) - timedelta(seconds=1)) is not None
+    assert find_link(token, NOW + timedelta(days=14)) is None
+
+
+def test_another_clinic_neither_sees_nor_ends_it(agreed):
+    give(agreed)
+    stranger = client_of(build_world("birch"))
+    link = FamilyLink.everywhere.get(patient=agreed.patient)
+    url = reverse("end-family-link", kwargs={"link_id": link.pk})
+    assert stranger.post(url).status_code == 404
+    assert stranger.get(links_page(agreed)).status_code == 404
+    link.refresh_from_db()
+    assert link.ended_at is None
+
+
+def test_who_asks_too_often_waits(agreed, monkeypatch):
+    path = give(agreed)
+    monkeypatch.setattr(page, "limit", AddressLimit(burst=3, interval_s=60.0))
+    client = Client()
+    assert [client.get(path).status_code for _ in range(5)] == [200, 200, 200, 429, 429]
+    assert int(client.get(path)["Retry-After"]) > 0
+
+
+def test_no_log_has_a_token(agreed, caplog):
+    caplog.set_level(logging.DEBUG)
+    path = give(agreed)
+    ENDS["the link expires"](agreed)
+    Client().post(path)
+    token = path.split("/")[2]
+    assert token not in caplog.text
+    assert not AuditEntry.everywhere.filter(about__contains=token).exists()
+
+
+def test_the_next_visit_is_one_that_is_to_come(agreed):
+    now = datetime(2026, 5, 4, 12, 0, tzinfo=NOW.tzinfo)
+    patient = agreed.patient
+    for day, at in ((3, None), (4, time(9)), (11, time(9, 30))):
+        plan_visit(patient, now.date().replace(day=day), at)
+    summary = summarize_for_family(patient, now)
+    assert (summary.next_day.day, summary.next_at) == (11, time(9, 30))
+
+
+@pytest.mark.parametrize(
+    ("rates", "word"),
+    [
+        ([0.9, 0.8, 0.8, 0.5, 0.6, 0.5], "more steps"),
+        ([0.4, 0.5, 0.5, 0.7, 0.6, 0.8], "fewer steps"),
+        ([0.6, 0.6, 0.6, 0.6, 0.6, 0.62], "as many"),
+        ([0.9, 0.1, 0.1, 0.1, 0.1], ""),
+    ],
+)
+def test_the_sentence_says_what_was_and_judges_nobody(rates, word):
+    assert word in describe_change(rates)
