@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
+from threading import Lock
 from typing import Any
 
 from django.db.models import Count, Sum
@@ -70,6 +71,7 @@ class _Kept:
 
 # By the study's key and its seal, which no other one has, also after a restore.
 _kept: OrderedDict[tuple[int, str], _Kept] = OrderedDict()
+_lock = Lock()  # requests have threads
 
 
 def analyze(study: Study, arms: tuple[str, ...], until: date) -> Analysis:
@@ -80,10 +82,11 @@ def analyze(study: Study, arms: tuple[str, ...], until: date) -> Analysis:
     analysis = Analysis(tuple(one for _key, one in people.values()), arms, study.crossover)
     if known is not None and _is_same(known.analysis, analysis):
         analysis = known.analysis
-    _kept[place] = _Kept(people, analysis)
-    _kept.move_to_end(place)
-    while len(_kept) > KEPT_STUDIES:
-        _kept.popitem(last=False)
+    with _lock:
+        _kept[place] = _Kept(people, analysis)
+        _kept.move_to_end(place)
+        while len(_kept) > KEPT_STUDIES:
+            _kept.popitem(last=False)
     return analysis
 
 

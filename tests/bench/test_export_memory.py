@@ -1,4 +1,4 @@
-"""An export of a million strides takes the memory of one of a hundred thousand."""
+"""An export of a million strides takes the memory of one of some ten thousand."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from tests.support.servers import ROOT
 
 pytestmark = [pytest.mark.bench, pytest.mark.timeout(3600)]
-FEW, MANY = 50, 500  # sessions of 2000 strides
+FEW, MANY = 20, 500  # sessions of 2000 strides
 MORE_MB = 20  # of its own memory, for a list of sessions ten times as long
 
 

@@ -18,7 +18,7 @@ from tests.support.servers import ROOT, clean_environment, serve
 pytestmark = pytest.mark.browser
 
 FOLDER = ROOT / "screenshots"
-CLOSED_STUDY = ("simulatestudy", "--seed", "1", "--participants", "40", "--visits", "2")
+CLOSED_STUDY = ("simulatestudy", "--seed", "1", "--participants", "24", "--visits", "2")
 # A draft with power simulations, a study that runs with five participants, and what is asked.
 STUDIES = """
 import json

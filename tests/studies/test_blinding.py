@@ -202,8 +202,10 @@ def test_an_assessor_is_refused_by_every_page_call_and_export_of_a_session(world
 def ask(client: Client, url: str) -> int:
     """Return the answer's status, also where only changes are taken."""
     status = int(client.get(url).status_code)
-    pause = {"data": {"kind": "pause"}, "content_type": "application/json"}
-    return int(client.post(url, **pause).status_code) if status == 405 else status
+    if status == 405:
+        answer = client.post(url, {"kind": "pause"}, content_type="application/json")
+        status = int(answer.status_code)
+    return status
 
 
 @pytest.mark.parametrize("ended", [False, True])

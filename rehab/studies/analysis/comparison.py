@@ -92,9 +92,7 @@ def compare(groups: Mapping[str, Mapping[str, float]], *, paired: bool) -> list[
             of_group, of_reference = (np.array(list(of.values())) for of in (here, there))
             sizes = len(of_group), len(of_reference)
             told = (group, reference, sizes, paired)
-            interval = (
-                _paired(of_group - of_reference) if paired else _welch(of_group, of_reference)
-            )
+            interval = _paired(of_group - of_reference) if paired else welch(of_group, of_reference)
             found.append(
                 Difference(*told, interval, _effect(of_group, of_reference, paired=paired))
             )
@@ -105,7 +103,7 @@ def _t(freedom: float) -> float:
     return float(stats.t.ppf((1 + CONFIDENCE) / 2, freedom))
 
 
-def _welch(a: Floats, b: Floats) -> Interval:
+def welch(a: Floats, b: Floats) -> Interval:
     """Return the difference of two means, whatever their variances (Welch 1947)."""
     difference = float(a.mean() - b.mean())
     if min(len(a), len(b)) < MIN_PARTICIPANTS:

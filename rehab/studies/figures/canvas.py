@@ -55,7 +55,9 @@ class Canvas:
         halo: bool = False,
     ) -> None:
         """Write a line of text whose foot is at y. ``halo``: white about it, over other lines."""
-        about = {"stroke": "#fff", "stroke_width": 4, "paint_order": "stroke"} if halo else {}
+        about: dict[str, float | str] = (
+            {"stroke": "#fff", "stroke_width": 4, "paint_order": "stroke"} if halo else {}
+        )
         self.add(
             "text",
             escape(text),
