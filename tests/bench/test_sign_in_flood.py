@@ -63,7 +63,8 @@ def drive_block(name: str, server: Server, file: Path) -> dict[str, Any]:
     print(
         f"{name}: step→view p50 {result['view_p50_ms']:.1f} p99 {result['view_p99_ms']:.1f} "
         f"max {result['view_max_ms']:.0f} ms; ack p50 {result['ack_p50_ms']:.1f} "
-        f"p99 {result['ack_p99_ms']:.1f} ms; RSS {result['rss_mb']:.0f} MB"
+        f"p99 {result['ack_p99_ms']:.1f} ms; {result['us_per_step']:.0f} µs of processor a step; "
+        f"RSS {result['rss_mb']:.0f} MB"
     )
     assert result["arrived"] == result["expected"]
     return result

@@ -317,6 +317,9 @@ def test_an_export_goes_on_where_it_was_stopped(world, tmp_path, monkeypatch):
     list(found.advance(1e9))
     assert unpack(found) == whole
     assert Package.find(package.folder, world.people[Role.RESEARCHER], NOW) is None
+    user.role = Role.RESEARCHER  # who is told less than a lead was
+    assert Package.find(package.folder, user, NOW) is None
+    user.role = Role.LEAD
     assert Package.find(package.folder, user, NOW + timedelta(hours=25)) is None
     assert not package.folder.exists()
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
+import shutil
 import subprocess
-import sys
 
 import pytest
 
-from rehab.gait.recordings.limits import NICENESS
 from rehab.sessions.setup import recordings
 from rehab.sessions.setup.recordings import (
     UploadRefused,
@@ -98,11 +96,6 @@ def test_one_file_is_checked_at_a_time_and_after_everything_else(monkeypatch):
     for _again in range(2):
         assert check_upload(uploaded_file(7, ".csv"), None).found == {}
     assert len(began) == 2
-    assert all("--bounded" in arguments for arguments in began)
-
-
-def test_a_process_that_reads_files_of_strangers_goes_last_and_is_bounded():
-    told = "import os, resource; from rehab.gait.recordings.limits import *; limit_resources(); "
-    told += "print(os.nice(0), resource.getrlimit(resource.RLIMIT_AS)[0] <= MEMORY_BYTES)"
-    done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == [str(min(19, os.nice(0) + NICENESS)), "True"]
+    for arguments in began:
+        assert "--bounded" in arguments
+        assert (arguments[0] == "nice") == bool(shutil.which("nice"))

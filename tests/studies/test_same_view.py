@@ -170,15 +170,15 @@ def test_an_assessor_sees_the_same_whichever_arm_is_walked(withdrawn):
     assert find_differences(trial, trial.assessor) == []
 
 
-def test_an_assessors_previews_of_boards_are_the_same(monkeypatch):
+@pytest.mark.parametrize("withdrawn", [False, True])
+def test_an_assessors_previews_of_boards_are_the_same(monkeypatch, withdrawn):
     monkeypatch.setitem(globals(), "all_routes", lambda worlds: [])
-    for withdrawn in (False, True):
-        trial = Trial(withdrawn=withdrawn)
-        assert find_differences(trial, trial.assessor) == []
+    trial = Trial(withdrawn=withdrawn)
+    assert find_differences(trial, trial.assessor) == []
 
 
 @pytest.mark.long
-def test_who_treats_sees_which_arm_is_walked(monkeypatch):
+def test_who_treats_sees_which_arm_is_walked():
     """So the search finds what there is."""
     trial = Trial(withdrawn=False)
     found = find_differences(trial, trial.world.people[Role.PT])

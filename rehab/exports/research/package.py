@@ -85,6 +85,7 @@ class Package:
         keys = sessions_for(user, study).order_by("pk").values_list("pk", flat=True)
         about = {
             "user": user.pk,
+            "role": user.role,
             "keys": list(keys),
             "study": study.code if study else "",
             "shift_dates": shift_dates,
@@ -99,7 +100,8 @@ class Package:
     def find(cls, folder: Path, user: User, now: datetime) -> Package | None:
         """Return the export that somebody has begun in a folder; None if there is none.
 
-        One that is too old is removed; one of another account is left alone.
+        One that is too old is removed; one of another account, or of a former role, which may have
+        been told more, is left alone.
         """
         try:
             about = json.loads((folder / ABOUT_EXPORT).read_text("utf-8"))
@@ -109,7 +111,7 @@ class Package:
             )
         except (OSError, ValueError, KeyError):
             return None
-        if about["user"] != user.pk:
+        if (about["user"], about.get("role")) != (user.pk, user.role):
             return None
         if not timedelta() <= now - made_at < KEPT_FOR:
             package.discard()

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import os
-
 CPU_S = 60
-NICENESS = 10
 MEMORY_BYTES = 4 * 1024**3  # of addresses; a minute of walking takes less than half a gigabyte
 
 
 def limit_resources() -> None:
-    """Bound what this process may use from now on; beyond, the system ends it.
-
-    What else runs on the machine, such as a training, goes first.
-    """
+    """Bound what this process may use from now on; beyond, the system ends it."""
     import resource  # Windows has none; files of strangers are read by servers
 
-    os.nice(NICENESS)
     for kind, most in ((resource.RLIMIT_CPU, CPU_S), (resource.RLIMIT_AS, MEMORY_BYTES)):
         _, hard = resource.getrlimit(kind)
         soft = most if hard == resource.RLIM_INFINITY else min(most, hard)

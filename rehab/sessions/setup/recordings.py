@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -105,7 +106,8 @@ def check_upload(
 def _check(
     file: Path, mass_kg: float | None, columns: list[str] | None, save: Path | None
 ) -> Checked:
-    arguments = [sys.executable, "-m", "rehab.gait", "check", str(file), "--json", "--bounded"]
+    arguments = ["nice"] if shutil.which("nice") else []  # a training goes first
+    arguments += [sys.executable, "-m", "rehab.gait", "check", str(file), "--json", "--bounded"]
     arguments += ["--mass", f"{mass_kg:g}"] if mass_kg else []
     arguments += ["--save", str(save)] if save else []
     arguments += ["--columns", *columns] if columns else []

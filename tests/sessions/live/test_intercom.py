@@ -14,7 +14,7 @@ from rehab.sessions.live.servers import intercom as intercoms
 from rehab.sessions.live.servers.intercom import Intercom, Unheard
 
 
-class RecordingLayer(InMemoryChannelLayer):  # type: ignore[misc]
+class RecordingLayer(InMemoryChannelLayer):
     """A layer at which a neighbor records what passes."""
 
     def __init__(self) -> None:
