@@ -18,6 +18,8 @@ from rehab.gait import (
 )
 from tests.gait.walks import ANGLE, FORCE, MOMENT, make_walk, pair_up, read_moore
 
+pytestmark = pytest.mark.matrix
+
 KINDS: dict[str, dict[str, float]] = {
     "500 Hz": {"rate_hz": 500},
     "slow 1 kHz": {"rate_hz": 1000, "a2_w_kg": 0.5, "stride_s": 1.8, "mass_kg": 60.0},

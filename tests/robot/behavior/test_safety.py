@@ -15,6 +15,8 @@ from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.pose import HOME, Pose
 from robot.motion.twist import STILL, Twist
 
+pytestmark = pytest.mark.matrix
+
 REAL = Abilities(simulated=False, moves=True, announces=True)
 SIMULATED = Abilities(simulated=True, moves=True)
 FINE = BaseState(HOME, STILL, SensorState(battery_v=15.5))
