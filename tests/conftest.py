@@ -219,9 +219,7 @@ def _snapshots(django_db_setup: None) -> Iterator[Any]:
 # pytest makes class fixtures anew for each test outside a class, before those of a function: so
 # before pytest-django's savepoint, which must be inside the transaction of the kept rows.
 @pytest.fixture(scope="class")
-def keep(
-    request: pytest.FixtureRequest, _kept_rows: Any, _snapshots: Any
-) -> Callable[[Any], Any]:
+def keep(request: pytest.FixtureRequest, _kept_rows: Any, _snapshots: Any) -> Callable[[Any], Any]:
     """A function that stores rows once for all tests in a row that ask for the same: it takes the
     function that builds them and returns one that copies what was built.
     """
