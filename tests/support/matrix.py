@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Hashable, Iterable, Sequence
-
-import pytest
+from typing import Any
 
 
 def choose(cases: Sequence[set[Hashable]]) -> set[int]:
@@ -25,7 +24,7 @@ def choose(cases: Sequence[set[Hashable]]) -> set[int]:
     return chosen
 
 
-def values_of(item: pytest.Function) -> set[Hashable]:
+def values_of(item: Any) -> set[Hashable]:
     """Return a case's values: one for each `parametrize`, also of several names, and fixture."""
     named = [mark.args[0] for mark in item.iter_markers("parametrize")]
     tables = [name.replace(" ", "").split(",") if isinstance(name, str) else name for name in named]
@@ -37,14 +36,13 @@ def values_of(item: pytest.Function) -> set[Hashable]:
     }
 
 
-def mark_the_others(items: Iterable[pytest.Item]) -> None:
+def mark_the_others(items: Iterable[Any]) -> None:
     """Mark those cases `long` whose values others of their matrix show."""
-    matrices: dict[Hashable, list[pytest.Function]] = defaultdict(list)
+    matrices: dict[Hashable, list[Any]] = defaultdict(list)
     for item in items:
-        if item.get_closest_marker("matrix") and hasattr(item, "callspec"):
-            assert isinstance(item, pytest.Function)
-            if not item.get_closest_marker("long"):
-                matrices[item.parent, item.originalname].append(item)
+        is_case = hasattr(item, "callspec") and not item.get_closest_marker("long")
+        if is_case and item.get_closest_marker("matrix"):
+            matrices[item.parent, item.originalname].append(item)
     for matrix in matrices.values():
         chosen = choose([values_of(item) for item in matrix])
         for index, item in enumerate(matrix):
