@@ -1,5 +1,6 @@
 """The cases of a matrix that a change is tested with show each of its values."""
 
+from collections.abc import Hashable
 from itertools import product
 from types import SimpleNamespace
 
@@ -31,7 +32,7 @@ class Case:
 
 @pytest.mark.parametrize("sizes", [(1,), (5, 14), (4, 3, 2), (7, 7)])
 def test_as_many_cases_as_the_longest_side_show_each_value(sizes):
-    cases = [set(enumerate(case)) for case in product(*map(range, sizes))]
+    cases: list[set[Hashable]] = [set(enumerate(case)) for case in product(*map(range, sizes))]
     chosen = matrix.choose(cases)
     assert set().union(*(cases[index] for index in chosen)) == set().union(*cases)
     assert len(chosen) == max(sizes)

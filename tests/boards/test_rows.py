@@ -28,6 +28,7 @@ from tests.support.world import NOW
 pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 
+@pytest.mark.wide
 def test_rows_that_were_kept_up_are_those_that_are_made_anew(clinic):
     for number, fields in enumerate(
         (
@@ -144,6 +145,7 @@ def test_everyone_locks_boards_in_one_order_and_each_once(clinic, monkeypatch):
     assert locked == [board.pk for board in boards]
 
 
+@pytest.mark.wide
 @settings(deadline=None, max_examples=examples(40))
 @given(st.lists(st.integers(0, 6), min_size=1, max_size=14), st.sampled_from(TieRule))
 def test_stored_and_counted_standings_are_the_same(figures, ties):

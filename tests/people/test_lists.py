@@ -34,6 +34,7 @@ def is_refused(client: Client, url: str, **asked: str) -> bool:
     return answer.status_code == 400 or answer.headers.get("Location", "").endswith("?e=1")
 
 
+@pytest.mark.wide
 def test_a_list_is_called_what_it_lists(world):
     client, titled = client_of(world, Role.LEAD), 0
     for model in REGISTERED:
@@ -57,6 +58,7 @@ def test_a_researcher_cannot_ask_letter_by_letter_what_is_hidden(world):
     assert is_refused(client, url, metric_score__gt="0")  # of what the list adds by itself
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("model", REGISTERED, ids=lambda model: model.__name__)
 def test_a_list_is_not_narrowed_by_fields_that_it_has_no_filter_for(world, model):
     client, url = client_of(world, Role.LEAD), list_of(model)
@@ -79,6 +81,7 @@ def test_the_check_above_finds_a_list_that_takes_any_field(world, monkeypatch):
     assert not is_refused(client_of(world, Role.LEAD), url, name__icontains="1")
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(
     "role",
     [

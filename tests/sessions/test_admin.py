@@ -171,6 +171,7 @@ def multiply(world: World) -> None:
         )
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(
     "name",
     [

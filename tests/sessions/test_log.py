@@ -188,6 +188,7 @@ actions = st.lists(
 )
 
 
+@pytest.mark.wide
 @settings(
     max_examples=examples(40),
     deadline=None,

@@ -84,6 +84,7 @@ frames = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.wide
 @settings(max_examples=examples(80), deadline=None)
 @given(st.lists(st.tuples(frames, st.integers(0, 25)), max_size=40))
 def test_any_json_moves_a_base_only_by_gestures_that_were_told(told):
