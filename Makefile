@@ -56,8 +56,8 @@ run: $(VENV)/.server $(VENV)/.twin node_modules/.server ## Serve at 127.0.0.1:80
 
 test: test-main test-postgres test-pure ## Run the tests of a change (ARGS='-k goal' picks some)
 
-test-fast: setup ## Run the tests without browser, server, PostgreSQL, real time and long ones
-	$(call shared,$(PYTHON),,and not (browser or server))
+test-fast: setup ## Run the tests without browser, server, PostgreSQL, real time, wide and long ones
+	$(call shared,$(PYTHON),,and not (browser or server or wide))
 
 test-all: export GARRY_TEST_ALL = 1
 test-all: test-main test-postgres test-pure test-clocks ## Run all tests, as CI does

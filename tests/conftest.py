@@ -14,7 +14,7 @@ from unittest import mock
 import hypothesis
 import pytest
 
-from tests.support import clock
+from tests.support import clock, matrix
 from tests.support.extent import EVERYTHING
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("database")
         if item.get_closest_marker("browser") and not chromium and "CI" not in os.environ:
             item.add_marker(pytest.mark.skip(reason="no Chromium: apt-get install chromium"))
+    matrix.mark_the_others(items)
 
 
 @pytest.hookimpl(trylast=True)
@@ -97,6 +98,27 @@ def django_db_modify_db_settings(tmp_path_factory: pytest.TempPathFactory) -> No
 
 
 @pytest.fixture(scope="session")
+def _is_migrated(django_db_modify_db_settings: None) -> Iterator[bool]:
+    """Begin with the tables of a run before, if the code has not changed since."""
+    from django.db import connection
+
+    from tests.support import templates
+
+    kept = templates.read(clock.NAME) if connection.vendor == "sqlite" else None
+
+    def copy(*_: Any) -> str:
+        assert kept is not None
+        name: str = connection.settings_dict["TEST"]["NAME"]
+        Path(name).write_bytes(kept)
+        return name
+
+    with pytest.MonkeyPatch.context() as patch:
+        if kept is not None:
+            patch.setattr(connection.creation, "_create_test_db", copy)
+        yield kept is not None
+
+
+@pytest.fixture(scope="session")
 def _without_durability() -> Iterator[None]:
     """Wait for no disk, hash passwords quickly and build boards in no thread, which would outlive
     its test: rows of this process need not outlive a power cut. Servers and commands that tests
@@ -138,6 +160,7 @@ def _logs_can_be_flushed() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def django_db_setup(
+    _is_migrated: bool,
     _without_durability: None,
     _logs_can_be_flushed: None,
     django_db_setup: None,
@@ -150,14 +173,19 @@ def django_db_setup(
     from django.db import connection
     from django.test import TransactionTestCase
 
-    from tests.support.first_rows import FirstRows
+    from tests.support import templates
+    from tests.support.snapshots import Snapshot
 
     with pytest.MonkeyPatch.context() as patch:
-        if connection.vendor == "sqlite":  # whose values go back as they came
+        if connection.vendor == "sqlite":
             with django_db_blocker.unblock():
-                first = FirstRows()
+                first = Snapshot()
+            if not _is_migrated:
+                templates.keep(clock.NAME, first.file())
             patch.setattr(TransactionTestCase, "_fixture_teardown", lambda _: first.restore())
         yield
+        if connection.vendor == "sqlite":
+            first.close()
 
     # Chromium first: beside the loop of its driver Django refuses to touch a database.
     for name in ("chromium", "rows"):
@@ -179,23 +207,37 @@ def _kept_rows(django_db_setup: None, django_db_blocker: Any) -> Any:
     return KeptRows(django_db_blocker.unblock)
 
 
+@pytest.fixture(scope="session")
+def _snapshots(django_db_setup: None) -> Iterator[Any]:
+    from tests.support.snapshots import Snapshots
+
+    snapshots = Snapshots()
+    yield snapshots
+    snapshots.close()
+
+
 # pytest makes class fixtures anew for each test outside a class, before those of a function: so
 # before pytest-django's savepoint, which must be inside the transaction of the kept rows.
 @pytest.fixture(scope="class")
-def keep(request: pytest.FixtureRequest, _kept_rows: Any) -> Callable[[Any], Any]:
+def keep(request: pytest.FixtureRequest, _kept_rows: Any, _snapshots: Any) -> Callable[[Any], Any]:
     """A function that stores rows once for all tests in a row that ask for the same: it takes the
     function that builds them and returns one that copies what was built.
     """
+    from django.db import connection
+
     mark = request.node.get_closest_marker("django_db")
     others_see_it = "transactional_db" in request.fixturenames or (
         mark and mark.kwargs.get("transaction")
     )
-    if others_see_it or clock.has_real_clock(request.node):
-        _kept_rows.end()
+    real_clock = clock.has_real_clock(request.node)
+    if not others_see_it and not real_clock:
+        shares = lambda item: "keep" in getattr(item, "fixturenames", ())  # noqa: E731
+        SHARED["rows"] = shares, _kept_rows.end
+        return _kept_rows.begin  # type: ignore[no-any-return]
+    _kept_rows.end()
+    if real_clock or connection.vendor != "sqlite":
         return lambda build: build
-    SHARED["rows"] = (lambda item: "keep" in getattr(item, "fixturenames", ())), _kept_rows.end
-    begin: Callable[[Any], Any] = _kept_rows.begin
-    return begin
+    return _snapshots.begin  # type: ignore[no-any-return]
 
 
 def _build_amber() -> World:

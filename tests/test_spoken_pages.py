@@ -179,6 +179,7 @@ def pages(world: World, admin: bool = False) -> Iterator[tuple[str, Page]]:
             yield f"{name} {path}", Page(answer.content.decode())
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(
     "admin",
     [
@@ -195,6 +196,7 @@ def test_no_word_of_a_page_is_left_in_english(world, bracketed, admin):
     assert not found, json.dumps({name: sorted(left) for name, left in found.items()}, indent=1)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(
     "admin",
     [

@@ -33,6 +33,7 @@ class DryRun:
         return max(pose.distance_m(HOME) for pose in self.poses)
 
 
+@lru_cache(maxsize=64)  # a gesture comes with every cue, a list shows all; a run takes some 20 ms
 def dry_run(gesture: Gesture, limits: Limits = DEFAULT_LIMITS, pace: float = 1.0) -> DryRun:
     """Return the result of playing a gesture from home to its end.
 
@@ -75,7 +76,6 @@ def validate_gesture(data: Any, limits: Limits = DEFAULT_LIMITS) -> Gesture:
     return gesture
 
 
-@lru_cache(maxsize=64)  # a gesture comes with every cue, and a dry run takes some 20 ms
 def _check_dry_run(gesture: Gesture, limits: Limits) -> None:
     result = dry_run(gesture, limits)
     if result.farthest_m > TETHER_M:

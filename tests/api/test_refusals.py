@@ -14,7 +14,7 @@ from rehab.people import api as people_api
 from rehab.people.models import User
 from rehab.people.roles import Role
 from tests.support.programs import ROOT, program_of
-from tests.support.world import build_world
+from tests.support.world import World
 
 pytestmark = pytest.mark.django_db
 METHODS = ("get", "post", "put", "patch", "delete", "options")
@@ -30,8 +30,8 @@ def problem_of(response: Any, status: int) -> dict[str, Any]:
 
 
 @pytest.fixture
-def program() -> Client:
-    return program_of(build_world("amber"), Role.PT).client
+def program(world: World) -> Client:
+    return program_of(world, Role.PT).client
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -101,6 +101,7 @@ def find_leaks(worlds: tuple[World, World]) -> tuple[list[str], Counter[str]]:
     return leaks, counts
 
 
+@pytest.mark.wide
 def test_no_program_reads_or_changes_anything_of_another_clinic(capsys):
     worlds = build_world("amber"), build_world("birch")
     leaks, counts = find_leaks(worlds)

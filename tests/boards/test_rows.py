@@ -22,12 +22,14 @@ from rehab.people.models import Clinic, Patient
 from rehab.sessions.log import SessionMetric
 from rehab.sessions.models import TrainingSession
 from tests.support.boards import COMMON, board_of, everything, patient_of, people_of, walk_down
+from tests.support.extent import examples
 from tests.support.walks import strides, walk
 from tests.support.world import NOW
 
 pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
 
+@pytest.mark.wide
 def test_rows_that_were_kept_up_are_those_that_are_made_anew(clinic):
     for number, fields in enumerate(
         (
@@ -144,7 +146,8 @@ def test_everyone_locks_boards_in_one_order_and_each_once(clinic, monkeypatch):
     assert locked == [board.pk for board in boards]
 
 
-@settings(deadline=None, max_examples=40)
+@pytest.mark.wide
+@settings(deadline=None, max_examples=examples(40))
 @given(st.lists(st.integers(0, 6), min_size=1, max_size=14), st.sampled_from(TieRule))
 def test_stored_and_counted_standings_are_the_same(figures, ties):
     clinic = Clinic.everywhere.get_or_create(name="Ash")[0]

@@ -117,6 +117,7 @@ def test_no_sessions_and_the_first_ever(clinic):
     assert told(shown) == [(1, "75%", True)]
 
 
+@pytest.mark.wide
 def test_the_newest_session_is_the_worst_of_a_hundred_own_ones(clinic):
     Leaderboard.everywhere.create(clinic=clinic, name="Own", period="all", min_valid_strides=1)
     person = patient_of(clinic, "A", "own")

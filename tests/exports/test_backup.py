@@ -145,6 +145,7 @@ def elsewhere(do: Callable[[], int]) -> int:
     return done[0]
 
 
+@pytest.mark.wide
 def test_it_goes_into_a_new_installation_only(file, key):
     fill()
     call_command("backup", file)
@@ -154,6 +155,7 @@ def test_it_goes_into_a_new_installation_only(file, key):
     assert rows() == before
 
 
+@pytest.mark.wide
 @pytest.mark.django_db(transaction=True)
 def test_a_damaged_one_changes_nothing(file, key):
     fill()

@@ -18,6 +18,8 @@ from rehab.gait import (
 )
 from tests.gait.walks import ANGLE, FORCE, MOMENT, make_walk, pair_up, read_moore
 
+pytestmark = pytest.mark.matrix
+
 KINDS: dict[str, dict[str, float]] = {
     "500 Hz": {"rate_hz": 500},
     "slow 1 kHz": {"rate_hz": 1000, "a2_w_kg": 0.5, "stride_s": 1.8, "mass_kg": 60.0},
@@ -360,6 +362,7 @@ def test_a_plate_that_chatters_is_the_same_in_any_chunks(plate, gain, seed):
 ODD = st.sampled_from([0.0, np.nan, np.inf, -np.inf, 1e300, -1e300, 25.0, 700.0, -700.0, 1e-300])
 
 
+@pytest.mark.wide
 @settings(deadline=None)
 @given(
     odd=st.lists(st.tuples(st.integers(0, 6), st.integers(0, 2999), st.integers(1, 400), ODD)),

@@ -6,6 +6,8 @@ import pytest
 from rehab.gait.signals.clock import SampleClock, estimate_rate
 from tests.gait.walks import read_moore
 
+pytestmark = pytest.mark.matrix
+
 
 def run(stamps, size=10**9):
     clock, times, late = SampleClock(), [], []

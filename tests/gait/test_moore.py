@@ -6,6 +6,8 @@ import pytest
 from rehab.gait import Flag, LegSamples, RejectionReason, StrideDetector, TwoLegDetector
 from tests.gait.walks import pair_up, read_moore
 
+pytestmark = pytest.mark.matrix
+
 LOOK_AHEADS = [0.0, 0.05]
 
 

@@ -8,6 +8,8 @@ import pytest
 from rehab.gait import Flag, LegSamples, StrideDetector, TwoLegDetector
 from tests.gait.walks import CLEAN, FORCE, filter_offline, make_walk, pair_up
 
+pytestmark = pytest.mark.matrix
+
 SIDES = ("left", "right")
 PEOPLE = {
     "usual": {},

@@ -12,6 +12,8 @@ from rehab.gait.stances.plausibility import STANCE_MAX_S
 from rehab.gait.strides import RejectionReason
 from tests.gait.walks import ANGLE, FORCE, MOMENT, make_walk, read_moore
 
+pytestmark = pytest.mark.matrix
+
 
 def check(walk, **settings):
     return check_signals(

@@ -15,6 +15,8 @@ from rehab.gait.setup.shapes import SHAPES
 from tests.gait.walks import make_walk
 from tests.support.data import signals
 
+pytestmark = pytest.mark.matrix
+
 MASS = 75.0
 
 

@@ -5,6 +5,8 @@ import pytest
 
 from tests.gait.walks import ANGLE, MOMENT, make_walk, pair_up, read_moore
 
+pytestmark = pytest.mark.matrix
+
 CLEAN = {"moment_noise_nm": 0.0, "angle_noise_rad": 0.0, "force_noise_n": 0.0, "jitter_s": 0.0}
 
 

@@ -75,6 +75,7 @@ def test_a_recordings_gestures_are_those_of_the_oracle(valence, above, below):
     assert 0.5 < result["robot"]["activated_share"] < 1
 
 
+@pytest.mark.wide
 def test_explicit_feedback_and_a_null_base_have_no_gestures():
     assert run("explicit", "kinematic")["gestures"] == []
     result = run("positive", "null")

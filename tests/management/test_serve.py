@@ -17,7 +17,7 @@ from tests.support.servers import ROOT, clean_environment, serve
 pytestmark = pytest.mark.server
 
 
-@pytest.fixture(params=["daphne", "uvicorn"])
+@pytest.fixture(params=["daphne", pytest.param("uvicorn", marks=pytest.mark.long)])
 def server(request, tmp_path):
     with serve(tmp_path, "--server", request.param, new_machine=True) as running:
         yield running

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.server
 AT_ONCE = 100
 
 
-@pytest.fixture(scope="module", params=["daphne", "uvicorn"])
+@pytest.fixture(scope="module", params=["daphne", pytest.param("uvicorn", marks=pytest.mark.long)])
 def server(request, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     # Behind a proxy of ours, so that each test comes from addresses of its own.
     folder = tmp_path_factory.mktemp("data")

@@ -15,6 +15,7 @@ from tests.support.world import build_world, client_of
 
 
 # tests/bench has 10,000.
+@pytest.mark.wide
 @pytest.mark.parametrize("requests", [30, pytest.param(230, marks=pytest.mark.long)])
 @pytest.mark.django_db
 def test_noise_to_every_form_fails_nowhere_and_leaks_nothing(capsys, requests):

@@ -129,6 +129,7 @@ def test_nobody_shuts_a_therapist_out_from_elsewhere(pt):
     assert is_in(here)
 
 
+@pytest.mark.wide
 def test_whoever_tries_many_names_is_shut_out_at_that_address(pt):
     thief = Client(REMOTE_ADDR="203.0.113.9")
     for number in range(30):
@@ -140,6 +141,7 @@ def test_whoever_tries_many_names_is_shut_out_at_that_address(pt):
     assert is_in(elsewhere)
 
 
+@pytest.mark.wide
 def test_guesses_from_many_addresses_count_together_but_not_where_the_owner_comes_from(pt):
     enter(Client(REMOTE_ADDR="198.51.100.1"))  # the owner, a while ago
     for number in range(50):
@@ -151,6 +153,7 @@ def test_guesses_from_many_addresses_count_together_but_not_where_the_owner_come
     assert is_in(owner)
 
 
+@pytest.mark.wide
 def test_right_passwords_shut_nobody_out(pt):
     for _ in range(35):
         client = Client()

@@ -114,6 +114,7 @@ def test_the_matrix_has_everybody(worlds):
     assert {*WHO, *WHO_ELSE} == {actor.label for actor in all_actors(*worlds)}
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(
     "who", [*WHO, *(pytest.param(who, marks=pytest.mark.long) for who in WHO_ELSE)]
 )

@@ -12,6 +12,8 @@ from robot.calibration import BadCalibration, apply_calibration, store_calibrati
 from robot.motion.response import Response
 from robot.play_gesture import VirtualClock
 
+pytestmark = pytest.mark.matrix
+
 
 @pytest.fixture
 def file(tmp_path, monkeypatch):

@@ -56,6 +56,7 @@ async def end_with_sigint(process):
     process.send_signal(signal.SIGINT)
 
 
+@pytest.mark.server
 @pytest.mark.parametrize(
     ("end", "arguments", "status"),
     [
@@ -82,6 +83,7 @@ async def test_it_performs_until_it_is_told_to_end(end, arguments, status):
     assert "Traceback" not in said
 
 
+@pytest.mark.server
 async def test_ctrl_c_of_the_server_is_the_servers_business():
     garry = FakeGarry()
     async with serve_garry(garry):
@@ -93,6 +95,7 @@ async def test_ctrl_c_of_the_server_is_the_servers_business():
         assert (await finish(process))[0] == 0
 
 
+@pytest.mark.server
 async def test_without_a_server_that_supervises_it_closed_input_is_nothing():
     garry = FakeGarry()
     async with serve_garry(garry):
@@ -104,6 +107,7 @@ async def test_without_a_server_that_supervises_it_closed_input_is_nothing():
         await process.wait()
 
 
+@pytest.mark.server
 async def test_a_refusal_ends_it_with_status_3():
     garry = FakeGarry()
     async with serve_garry(garry):

@@ -172,6 +172,7 @@ def multiply(world: World) -> None:
         )
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(
     "name",
     [

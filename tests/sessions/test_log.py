@@ -27,6 +27,7 @@ from rehab.training.phases import make_phase
 from rehab.training.scoring import RULES_VERSION
 from rehab.training.steps import Measurement, Side
 from rehab.training.summary.metrics import compute_metrics
+from tests.support.extent import examples
 from tests.support.world import NOW, store
 
 pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
@@ -187,8 +188,9 @@ actions = st.lists(
 )
 
 
+@pytest.mark.wide
 @settings(
-    max_examples=40,
+    max_examples=examples(40),
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )

@@ -184,6 +184,7 @@ def test_an_assessor_sees_no_session_of_the_study_and_all_others(world):
     assert session in TrainingSession.objects.visible_to(assessor)
 
 
+@pytest.mark.wide
 def test_an_assessor_is_refused_by_every_page_call_and_export_of_a_session(world):
     study = running_study(world)
     assessor, colleague = new_pt(world), new_pt(world, "colleague")

@@ -171,6 +171,7 @@ def people():
     return simulate(example_trial(12, visits=2), seed=5)
 
 
+@pytest.mark.wide
 def test_a_study_from_a_seed_is_the_same_again_to_the_last_digit():
     arms = list("ABCD")
     first, second = people(), people()

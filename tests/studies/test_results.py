@@ -41,6 +41,7 @@ def text_of(response) -> str:
     return str(response.content.decode())
 
 
+@pytest.mark.wide
 @pytest.mark.django_db(transaction=True)  # the writer has its own connection
 def test_three_seeds_by_the_real_path_agree_with_the_fold_to_the_last_digit():
     trial = example_trial(4, visits=2, population=Population(dropout=0.2))
@@ -49,6 +50,7 @@ def test_three_seeds_by_the_real_path_agree_with_the_fold_to_the_last_digit():
         assert figures_of(results.participants) == figures_of(simulate(trial, seed))
 
 
+@pytest.mark.wide
 @pytest.mark.django_db(transaction=True)
 def test_a_simulated_study_goes_on_where_it_was_broken_off_and_writes_the_same_files():
     trial = example_trial(4)

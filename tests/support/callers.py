@@ -268,6 +268,11 @@ def sign_in(user: User) -> str:
     return _keys[user.pk]
 
 
+def remember(place: Place) -> None:
+    """Sign a place's people in by the keys that they have."""
+    _keys.update(place.keys)
+
+
 @dataclass
 class Place:
     """A station with its devices, in a clinic with its people."""
@@ -278,6 +283,7 @@ class Place:
     people: dict[Role, User]
     tokens: dict[str, str]
     devices: dict[str, Device]
+    keys: dict[int, str]  # of their browser sessions, by the account
 
     @property
     def pt(self) -> User:
@@ -304,12 +310,12 @@ class Place:
 def build_place(name: str, clinic: Clinic | None = None, spares: int = 0) -> Place:
     """Build a station, in a new clinic unless one is given, with ``spares`` further sources."""
     clinic = clinic or Clinic.everywhere.create(name=name)
-    people = {}
+    people, keys = {}, {}
     for role in Role:
         home = None if role == Role.HOST else clinic
         user = User.everywhere.create_user(f"{role.value}-{name}", role=role, clinic=home)
         browser = signed_in(user)
-        _keys[user.pk] = browser.cookies["sessionid"].value
+        keys[user.pk] = browser.cookies["sessionid"].value
         people[role] = user
     station = Station.everywhere.create(clinic=clinic, name=name)
     patient = Patient.everywhere.create(
@@ -322,7 +328,9 @@ def build_place(name: str, clinic: Clinic | None = None, spares: int = 0) -> Pla
         tokens[kind] = device.new_token()
         device.save()
         devices[kind] = device
-    return Place(clinic, station, patient, people, tokens, devices)
+    place = Place(clinic, station, patient, people, tokens, devices, keys)
+    remember(place)
+    return place
 
 
 def open_session(

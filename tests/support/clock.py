@@ -18,6 +18,7 @@ import pytest
 START = datetime.fromisoformat(os.environ.get("GARRY_TEST_CLOCK") or "2026-11-21T10:00:00+00:00")
 ZONE = os.environ.get("GARRY_TEST_ZONE") or "UTC"
 HERE = START.astimezone(ZoneInfo(ZONE))  # as a clinic's clock shows it
+NAME = f"{START:%Y-%m-%d-%H%M%S}-{ZONE.replace('/', '-')}"  # of the clock, for a file
 
 # Their children (servers, Chromium) have the machine's clock, or they measure it.
 REAL = ("bench", "browser", "realtime", "screenshots")

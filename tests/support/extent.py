@@ -3,3 +3,8 @@
 import os
 
 EVERYTHING = "GARRY_TEST_ALL" in os.environ  # set by `make test-all`
+
+
+def examples(count: int) -> int:
+    """Return with how many examples a property is tried that has so many in `make test-all`."""
+    return count if EVERYTHING else max(10, count // 5)

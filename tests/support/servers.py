@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from tests.support import templates
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -63,6 +65,8 @@ def clean_environment(folder: Path, port: int) -> dict[str, str]:
 @cache
 def _tables() -> bytes:
     """Return a database with the tables and no row of ours, as a server makes one at first."""
+    if kept := templates.read("server"):
+        return kept
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run(
             [sys.executable, "manage.py", "migrate", "--verbosity", "0"],
@@ -72,7 +76,9 @@ def _tables() -> bytes:
         )
         database = Path(folder, "garry.sqlite3")
         assert not database.with_name("garry.sqlite3-wal").exists()  # all is in the file
-        return database.read_bytes()
+        made = database.read_bytes()
+    templates.keep("server", made)
+    return made
 
 
 @contextmanager

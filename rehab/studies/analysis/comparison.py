@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 from rehab.studies.analysis.walks import Floats
 
@@ -100,7 +100,7 @@ def compare(groups: Mapping[str, Mapping[str, float]], *, paired: bool) -> list[
 
 
 def _t(freedom: float) -> float:
-    return float(stats.t.ppf((1 + CONFIDENCE) / 2, freedom))
+    return float(stdtrit(freedom, (1 + CONFIDENCE) / 2))
 
 
 def welch(a: Floats, b: Floats) -> Interval:
@@ -125,6 +125,8 @@ def _effect(a: Floats, b: Floats, *, paired: bool) -> Interval | None:
     """Return Hedges' g with the interval of a bootstrap over participants (BCa: Efron 1987)."""
     if min(len(a), len(b)) < MIN_PARTICIPANTS or not a.var() + b.var() > 0:
         return None
+    from scipy import stats  # takes half a second, which each start of a server would
+
     correction = 1 - 3 / (4 * (len(a) + len(b) - 2) - 1)  # Hedges 1981
 
     def g(x: Floats, y: Floats, axis: int = -1) -> Floats:

@@ -7,8 +7,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from scipy.stats import binomtest
-
 from rehab.studies.analysis.comparison import CONFIDENCE, Interval
 from rehab.studies.simulation.trial import Trial, differences, simulate
 
@@ -89,5 +87,7 @@ def _power(group: str, reference: str, found: Sequence[Found]) -> PairPower:
 
 def wilson(hits: int, count: int) -> tuple[float, float]:
     """Return the 95 % interval of a share (Wilson 1927)."""
+    from scipy.stats import binomtest  # takes half a second, which each start of a server would
+
     interval = binomtest(hits, count).proportion_ci(CONFIDENCE, method="wilson")
     return float(interval.low), float(interval.high)

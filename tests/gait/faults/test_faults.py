@@ -19,6 +19,8 @@ from tests.gait.faults.spoil import lose, shake, stall
 from tests.gait.faults.tally import count
 from tests.gait.walks import make_walk, pair_up
 
+pytestmark = pytest.mark.matrix
+
 SYNTHETIC = [name for name in RECORDINGS if name != "moore"]
 
 

@@ -11,6 +11,7 @@ from robot.motion.limits import TICK_S
 from robot.motion.pose import HOME
 from robot.motion.twist import STILL
 from robot.wire.limits import TIME_MAX_S
+from tests.support.extent import examples
 from tests.support.robot_stage import CUE, RealBase, Stage
 
 BAD = [
@@ -83,7 +84,8 @@ frames = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=80, deadline=None)
+@pytest.mark.wide
+@settings(max_examples=examples(80), deadline=None)
 @given(st.lists(st.tuples(frames, st.integers(0, 25)), max_size=40))
 def test_any_json_moves_a_base_only_by_gestures_that_were_told(told):
     """It never raises; and whatever moves is a gesture that was decided, armed and not stopped."""

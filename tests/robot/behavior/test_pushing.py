@@ -9,6 +9,8 @@ from robot.motion.limits import TICK_S
 from robot.motion.twist import Twist
 from tests.support.robot_stage import CUE, WELCOME, Stage
 
+pytestmark = pytest.mark.matrix
+
 
 class PushedBase(KinematicBase):
     """A real base that a foot can hold; counts how long it pushes."""

@@ -14,6 +14,9 @@ from robot.behavior.safety import Safety
 from robot.motion.gestures import GESTURES, ORIGINALS
 from robot.motion.pose import HOME, Pose
 from robot.motion.twist import STILL, Twist
+from tests.support.extent import examples
+
+pytestmark = pytest.mark.matrix
 
 REAL = Abilities(simulated=False, moves=True, announces=True)
 SIMULATED = Abilities(simulated=True, moves=True)
@@ -274,7 +277,7 @@ deeds = st.one_of(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 @given(st.lists(deeds, max_size=40))
 def test_nothing_but_an_arming_ends_a_latch(told):
     safety, now_s, state = Safety(REAL), 0.0, FINE

@@ -13,6 +13,8 @@ from robot.motion.response import AT_ONCE, OrdersInFlight, Response
 from robot.motion.twist import STILL, Twist
 from tests.support.gesture_runs import play_in_a_row
 
+pytestmark = pytest.mark.matrix
+
 AHEAD = Twist(0.2, 0.0)
 
 

@@ -15,6 +15,8 @@ from robot.motion.gestures import GESTURES
 from robot.motion.path import Drive, Turn, plan_path
 from robot.motion.pose import HOME, Pose
 
+pytestmark = pytest.mark.matrix
+
 AWAY = Waypoint(0.1, 0.0, 0.0, within_s=4)
 BACK = Waypoint(0.0, 0.0, 0.0, within_s=4)
 

@@ -12,6 +12,7 @@ from robot.motion.limits import Limits
 from robot.motion.player import BAD_ODOMETRY, DONE, OUT_OF_TIME, Player
 from robot.motion.pose import HOME, Pose, advance
 from robot.motion.twist import STILL, Twist
+from tests.support.extent import examples
 
 each_gesture = pytest.mark.parametrize("gesture", GESTURES.values(), ids=lambda g: g.name)
 gestures = st.sampled_from(list(GESTURES.values()))
@@ -54,7 +55,7 @@ def test_a_gesture_is_over_within_3_s_and_ends_at_home(gesture):
     assert floor.orders[-1] == STILL
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(
     gestures,
     st.floats(0.1, 1),
@@ -79,7 +80,7 @@ def test_it_ends_at_home_whatever_the_floor(gesture, intensity, dt_s, lag, grip,
         assert floor.pose.distance_m(HOME) < 0.02
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(gestures, st.sampled_from([0.01, 0.02, 0.05]), st.floats(0.0, 4.0))
 def test_every_order_keeps_the_limits_also_while_it_is_stopped(gesture, dt_s, stop_s):
     limits = Limits()

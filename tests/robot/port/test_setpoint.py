@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robot.port.setpoint import Setpoint
+from tests.support.extent import examples
 
 STOP, GO, OTHER = b"\xaa\x55stop", b"\xaa\x55go", b"\xaa\x55other"
 
@@ -99,7 +100,7 @@ def test_what_is_no_order_is_counted(setpoint, bad):
     assert setpoint.frame(10.0) == STOP
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 @given(
     st.lists(
         st.tuples(

@@ -304,6 +304,7 @@ ENDS: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.server
 @pytest.mark.parametrize("how", [*ENDS, "silence", "end"])
 async def test_the_original_s_nodes_are_told_to_end_where_our_robot_may_not_act(ros, how):
     garry, heard = FakeGarry(), hear_good_steps(ros)

@@ -18,7 +18,7 @@ from rehab.sessions.live.session import commits
 from rehab.sessions.live.session import writer as writers
 from rehab.sessions.log import Step
 from rehab.sessions.models import TrainingSession
-from tests.support.callers import Caller, Place, build_place, change, open_session
+from tests.support.callers import Caller, Place, build_place, change, open_session, remember
 
 
 class Stall:
@@ -85,10 +85,16 @@ def stall(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stall]:
     hold.end()
 
 
+def _build_elm() -> Place:
+    return build_place("elm", spares=1)
+
+
 @pytest.fixture
-async def place(live_path: None) -> Place:
+async def place(live_path: None, keep: Callable[..., Callable[[], Place]]) -> Place:
     """Return a station in a clinic."""
-    return await sync_to_async(build_place)("elm", spares=1)
+    place = await sync_to_async(keep(_build_elm))()
+    remember(place)
+    return place
 
 
 @pytest.fixture

@@ -310,12 +310,12 @@ async def test_silence_after_the_connection(place, monkeypatch, bystander):
 
 
 async def test_hello_ends_the_wait_for_it(place, begun, monkeypatch):
-    monkeypatch.setattr(base.Socket, "first_frame_s", 0.02)
+    monkeypatch.setattr(base.Socket, "first_frame_s", 0.2)
     await begun(place)
     source, robot = await place.source().dial(), await place.robot().dial()
     await source.hello()
     await robot.hello()
-    await asyncio.sleep(0.04)
+    await asyncio.sleep(0.3)
     await source.walk(4.0)
     await robot.hear("step")
 

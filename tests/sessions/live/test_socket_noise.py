@@ -8,6 +8,7 @@ from tests.support.socket_noise import run_noise
 
 
 # tests/bench has 10,000.
+@pytest.mark.wide
 @pytest.mark.parametrize("frames", [40, pytest.param(240, marks=pytest.mark.long)])
 async def test_noise_on_every_socket_harms_nobody(live_path, capsys, frames):
     told = await run_noise(frames)

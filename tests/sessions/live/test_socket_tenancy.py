@@ -150,6 +150,7 @@ async def find_leaks(everyone: Everyone) -> tuple[list[str], Counter[str]]:
     return leaks, opened
 
 
+@pytest.mark.wide
 async def test_no_socket_lets_others_in(everyone, capsys):
     leaks, opened = await find_leaks(everyone)
     with capsys.disabled():
@@ -161,6 +162,7 @@ async def test_no_socket_lets_others_in(everyone, capsys):
     }
 
 
+@pytest.mark.wide
 async def test_a_leak_is_caught(everyone, monkeypatch):
     @database_sync_to_async
     def open_to_all(actor: Any, session_id: int) -> bool:

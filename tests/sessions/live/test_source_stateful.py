@@ -59,6 +59,7 @@ def walk(transactional_db: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[Ca
     assert not [t for t in set(threading.enumerate()) - threads if t.name == "garry-writer"]
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("walks", [8, pytest.param(25, marks=pytest.mark.long)])
 def test_the_log_is_what_a_plain_list_says(walk: Callable[..., None], walks: int) -> None:
     walk(max_examples=walks)

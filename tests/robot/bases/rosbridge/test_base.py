@@ -13,6 +13,7 @@ from robot.behavior.safety import BASE_SILENT_S
 from robot.motion.limits import CEILING_M_S, CEILING_RAD_S, TICK_S
 from robot.motion.pose import HOME
 from robot.motion.twist import STILL, Twist
+from tests.support.extent import examples
 from tests.support.rosbridge_stage import Stage, moving
 
 # --- what every base promises -------------------------------------------------------------------
@@ -145,7 +146,7 @@ orders = st.builds(Twist, st.sampled_from([0.0, 0.0, 0.05, 0.1]), st.sampled_fro
 deeds = st.sampled_from(["pass", "pass", "wait", "freeze", "thaw", "lose", "connect"])
 
 
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 @given(st.lists(st.tuples(deeds, orders), max_size=60))
 def test_whatever_happens_the_base_hears_fresh_orders_only(story):
     stage = Stage()

@@ -10,6 +10,8 @@ from robot.play_gesture import play_gesture
 from tests.support.robot_stage import CUE
 from tests.support.rosbridge_stage import OPEN, Stage, moving
 
+pytestmark = pytest.mark.matrix
+
 
 @pytest.mark.parametrize("name", GESTURES | ORIGINALS)
 @pytest.mark.parametrize("goes", [1.0, 0.93])

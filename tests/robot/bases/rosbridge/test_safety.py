@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from robot.bases.rosbridge.topics import PROFILES
 from robot.motion.limits import TICK_S
+from tests.support.extent import examples
 from tests.support.json_values import ANYTHING
 from tests.support.rosbridge_stage import BUMPER, CLOSED, CMD, OPEN, Stage, moving
 
@@ -126,7 +127,7 @@ frames = st.one_of(
 )
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(st.lists(frames, max_size=5))
 @pytest.mark.long
 def test_no_frame_of_a_bridge_moves_it_or_ends_it(said):

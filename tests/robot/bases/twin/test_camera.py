@@ -51,6 +51,7 @@ def test_it_shows_where_the_twin_is_now(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["twin.png"]
 
 
+@pytest.mark.server
 def test_it_comes_and_goes_with_the_twin(tmp_path):
     file = tmp_path / "twin.png"
     with subprocess.Popen(

@@ -25,6 +25,8 @@ from tests.support.twin_bench import (
     passed,
 )
 
+pytestmark = pytest.mark.matrix
+
 
 @pytest.mark.parametrize(
     ("name", "value", "place"),

@@ -121,6 +121,7 @@ def test_a_byte_client_hears_it_at_a_socket(start):
         assert driver.recv(2) == b"\xaa\x55"
 
 
+@pytest.mark.server
 def test_as_a_child_it_ends_with_its_parent():
     twin = Process("--child", "--line", "socket", "--body", "kinematic")
     twin.child.stdin.close()

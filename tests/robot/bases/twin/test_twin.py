@@ -27,6 +27,8 @@ from tests.support.twin_bench import (
     passed,
 )
 
+pytestmark = pytest.mark.matrix
+
 
 def test_a_frame_is_a_kobukis(bench):
     frames = bench.live(1)
