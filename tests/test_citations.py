@@ -25,6 +25,12 @@ CITATION = re.compile(r"(?<![\w./\"-])([\w./-]+\.md)\b(?:#([\w-]+))?")
 LINK = re.compile(r"\]\(([^()\s]+)\)|\b(?:src|href)=\"([^\"]+)\"")
 # A path in quotation marks of code, without places to fill in.
 PATH = re.compile(r"`((?:docs|rehab|robot|static|templates|tests)/[\w./-]+)(?:::\w+)?`")
+# The end of a path, as documents shorten them (`people/scope.py`).
+SHORTENED = re.compile(r"`([\w./-]+\.(?:css|html|js|py))`")
+OTHERS = {
+    "data_processing.py",
+    "gesture_generation.py",
+}  # files of the original, which docs tell of
 FENCE = re.compile(r"^ *(```|~~~).*?^ *\1 *$", re.MULTILINE | re.DOTALL)
 HEADING = re.compile(r"^#{1,6} +(.+?) *#* *$", re.MULTILINE)
 
@@ -114,6 +120,28 @@ def test_whatever_is_cited_exists(sources):
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda file: str(file.relative_to(ROOT)))
 def test_links_lead_on(document):
     assert not list(find_bad_links(document.read_text(encoding="utf-8"), document))
+
+
+def find_unknown_files(text: str, there: str) -> list[str]:
+    """Return the files that a document names and that no path ends with.
+
+    ``there``: all paths, each in a line, after a ``/``.
+    """
+    named = {path for path in SHORTENED.findall(text) if path not in OTHERS}
+    return sorted(path for path in named if f"/{path.lstrip('./')}\n" not in there)
+
+
+def test_files_that_documents_name_exist(sources):
+    files = [*sources, Path(__file__).resolve()]
+    there = "".join(f"/{file.relative_to(ROOT)}\n" for file in files)
+    own = [one for one in DOCUMENTS if REFERENCE not in str(one) and one.name != "CHANGELOG.md"]
+    bad = [
+        f"{document.relative_to(ROOT)} names {path}"
+        for document in own
+        for path in find_unknown_files(document.read_text(encoding="utf-8"), there)
+    ]
+    assert not bad, "\n".join(bad)
+    assert find_unknown_files("`gone.py` `scope.py` `e.py`", there) == ["e.py", "gone.py"]
 
 
 def test_every_reference_is_listed_and_cited(sources):

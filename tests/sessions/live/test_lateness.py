@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rehab.sessions.live import runtime as runtime_module
+from rehab.sessions.live import orders
 from rehab.sessions.live.consumers import source as source_module
 from rehab.sessions.live.session.lateness import Lateness
 from rehab.sessions.log import Step
@@ -132,7 +132,7 @@ async def test_after_a_pause_steps_of_before_are_late_unless_the_clock_stood(
     now = SimpleNamespace(s=1000.0)
     clock = SimpleNamespace(monotonic=lambda: now.s, time=lambda: now.s)
     monkeypatch.setattr(source_module, "time", clock)
-    monkeypatch.setattr(runtime_module, "time", clock)
+    monkeypatch.setattr(orders, "time", clock)
     session = await begun(place)
     tablet, robot = place.tablet(session), place.robot()
     await tablet.watch()
