@@ -123,6 +123,23 @@ def test_step_length_and_symmetry():
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("look_ahead_s", [0.0, 0.05])
+@pytest.mark.parametrize("size", [7, 50, 999])
+def test_the_same_in_any_chunks(size, look_ahead_s):
+    """At 1 kHz, where a stance is averaged down and the buffer moves at other samples."""
+    walk, _ = make_walk(rate_hz=1000, strides=30)
+    detector = TwoLegDetector(walk.rate_hz, walk.mass_kg, look_ahead_s=look_ahead_s)
+    strides = []
+    for first in range(0, len(walk.t_s), size):
+        part = slice(first, first + size)
+        strides += detector.feed(
+            walk.t_s[part], LegSamples(*walk.left[:, part]), LegSamples(*walk.right[:, part])
+        )
+
+    assert sum(stride.valid for stride in strides) > 50
+    assert strides + detector.finish() == walk.both_legs(look_ahead_s=look_ahead_s)
+
+
 def test_memory_stays_as_it_is():
     walk, _ = make_walk(rate_hz=500)
     span = walk.t_s[-1] + 0.002
