@@ -188,3 +188,15 @@ def test_a_clock_that_is_set():
     assert clock.problem == ""
     assert np.abs(times - stamps).max() < 0.0025
     assert late_s.max() == 0
+
+
+def test_stamps_of_a_clock_that_ticks_every_16_ms():
+    """By themselves they stand still; with numbers they need not be exact."""
+    walk, clean = open_walk("100 Hz")
+    ticking = np.floor(walk.t_s / 0.0156) * 0.0156
+    frames = np.arange(len(ticking), dtype=np.float64)
+    tally = count(replace(walk, t_s=ticking, frames=frames).both_legs(), clean)
+
+    assert count(replace(walk, t_s=ticking).both_legs(), clean).lost == tally.strides
+    assert (tally.lost, tally.wrong) == (0, 0)
+    assert tally.contacts_s[-1] < 0.012  # by half a tick

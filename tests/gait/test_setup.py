@@ -190,3 +190,41 @@ def test_a_delay_is_taken_out(walk, tmp_path, capsys):
 
     expected = walk.one_leg(look_ahead_s=0.05)
     assert [s["a2_w_kg"] for s in found] == pytest.approx([s.a2_w_kg for s in expected], rel=0.01)
+
+
+def test_a_count_of_samples_is_proposed_as_such_and_never_as_time(walk):
+    columns = {"FrameNumber": np.arange(len(walk.t_s), dtype=np.float64)} | columns_of(walk)
+    found = check_setup(columns, MASS)
+
+    assert (found.proposal.time, found.proposal.frame) == ("t", "FrameNumber")
+    assert "frame=FrameNumber" in format_arguments(found)
+
+
+def test_a_count_alone_may_be_milliseconds():
+    walk, _ = make_walk(mass_kg=MASS, rate_hz=1000, jitter_s=0.0)
+    columns = columns_of(walk) | {"t": np.arange(len(walk.t_s), dtype=np.float64)}
+
+    assert check_setup(columns, MASS).proposal.time_factor == 0.001
+
+
+@pytest.mark.parametrize("force", [1 / 9.81, 1 / MASS, 1 / 9.81 / MASS])
+def test_a_moment_that_is_larger_than_the_force_is_none(force):
+    """Of moore2013 the moment looks like a force, which in kgf is smaller."""
+    path = signals("moore2013_s15_pre") / "UnpertPre_data.csv"
+    with path.open() as file:
+        names = next(csv.reader(file))
+        table = np.loadtxt(file, delimiter=",", unpack=True)
+    columns = dict(zip(names, table, strict=True))
+    for side in ("Left", "Right"):
+        columns[f"{side}GRF_y"] = columns[f"{side}GRF_y"] * force
+    guesses = check_setup(columns, MASS).proposal.guesses
+
+    assert guesses["left", "force"].column == "LeftGRF_y"
+    assert guesses["right", "moment"].column == "RightAnklePlantarFlexionMoment"
+
+
+def test_a_mass_that_is_no_adults_is_doubted(walk):
+    found = check_setup(columns_of(walk, force=1 / 4.44822))
+
+    assert not found.is_certain
+    assert any("lbf" in text and "give the mass" in text for text in found.findings)

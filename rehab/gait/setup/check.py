@@ -159,7 +159,8 @@ def _make_map(proposal: Proposal) -> ColumnMap:
             f"No leg is whole: a vertical force, an ankle moment and an ankle angle are needed, "
             f"seen was {seen}. Let the lab send what is missing."
         )
-    return ColumnMap(Column(proposal.time, proposal.time_factor), whole)
+    frame = None if proposal.frame is None else Column(proposal.frame)
+    return ColumnMap(Column(proposal.time, proposal.time_factor), whole, frame)
 
 
 def _measure(time_s: Floats, legs: dict[str, LegSamples], proposal: Proposal) -> list[Stride]:

@@ -27,6 +27,7 @@ from rehab.gait.setup.units import (
 )
 from rehab.gait.signals.clock import find_period
 from rehab.gait.signals.filters import Floats
+from rehab.gait.signals.frames import find_frame_problem
 from rehab.gait.strides import GaitInputError
 
 LIKE = 0.8  # correlation with a shape from which a column may be that channel
@@ -78,6 +79,8 @@ class Proposal:
         Body mass; whether it is from the plates.
     guesses
         By side and channel.
+    frame
+        Name of the column that counts the samples, if there is one.
     """
 
     time: str
@@ -86,6 +89,7 @@ class Proposal:
     mass_kg: float
     is_mass_measured: bool
     guesses: dict[tuple[str, str], Guess]
+    frame: str | None = None
 
 
 def propose(columns: Mapping[str, Floats], mass_kg: float | None = None) -> Proposal:
@@ -114,10 +118,20 @@ def propose(columns: Mapping[str, Floats], mass_kg: float | None = None) -> Prop
         )
     sides = name_sides([name for name, *_ in forces])
     scale, unit, mass, measured = _find_force_unit(columns, time_s, forces, mass_kg)
+    light = ""
+    if measured and mass < MASS_USUAL_KG[0]:
+        light = f"in lbf or kgf it would carry a grown-up, in {unit} {mass:.1f} kg; give the mass"
     guesses = {}
     for (name, sign, likeness, contacts), side in zip(forces, sides, strict=True):
         guesses[side, "force"] = Guess(
-            name, side, "force", sign * scale, unit, likeness, likeness > CERTAIN_LIKE
+            name,
+            side,
+            "force",
+            sign * scale,
+            unit,
+            likeness,
+            likeness > CERTAIN_LIKE and not light,
+            light,
         )
         taken = {time_name, *(one[0] for one in forces)}
         force_n = columns[name] * sign * scale
@@ -127,11 +141,23 @@ def propose(columns: Mapping[str, Floats], mass_kg: float | None = None) -> Prop
             if guess is not None:
                 guesses[side, channel] = guess
                 taken.add(guess.column)
-    return Proposal(time_name, time_factor, 1 / period_s, mass, measured, guesses)
+    frame = _find_frame(columns, time_name, time_s)
+    return Proposal(time_name, time_factor, 1 / period_s, mass, measured, guesses, frame)
+
+
+def _find_frame(columns: Mapping[str, Floats], time_name: str, time_s: Floats) -> str | None:
+    """Return the column called a frame that counts the samples."""
+    for name, values in columns.items():
+        if "frame" in name.lower() and name != time_name and not find_frame_problem(time_s, values):
+            return name
+    return None
 
 
 def _find_time(columns: Mapping[str, Floats]) -> tuple[str, float]:
-    for name, values in columns.items():
+    """Return the time's column and factor; what counts by one is a time if nothing else is."""
+    counts = [name for name, values in columns.items() if find_period(values[:1000]) == 1.0]
+    for name in (*(name for name in columns if name not in counts), *counts):
+        values = columns[name]
         if len(values) < 100 or not np.isfinite(values).all():
             continue
         steps = np.diff(values)
@@ -182,7 +208,7 @@ def _find_forces(
             like = {shape: find_likeness(profile, shape) for shape in ("force", "moment")}
             if like["force"] > LIKE and like["force"] > like["moment"]:
                 found.append((name, sign, like["force"], contacts))
-    found.sort(key=lambda one: (-float(np.percentile(np.abs(columns[one[0]]), 98)), -one[2]))
+    found.sort(key=lambda one: -one[2])
     kept: list[tuple[str, float, float, Floats]] = []
     for one in found:
         is_same = any(_is_in_phase(one[3], other[3]) for other in kept)

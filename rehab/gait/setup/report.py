@@ -35,6 +35,7 @@ def _describe_guess(guess: Guess, delay_s: float | None) -> str:
 def format_arguments(check: SetupCheck) -> str:
     """Return the command line's arguments that measure with this set-up."""
     pairs = [f"time={_format_column(check.columns.time)}"]
+    pairs += [] if check.columns.frame is None else [f"frame={check.columns.frame.name}"]
     pairs += [
         f"{side}.{channel}={_format_column(column)}"
         for side, leg in check.columns.legs.items()

@@ -20,12 +20,12 @@ from rehab.gait.signals.clock import (
     LATE_S,
     UNDECIDED_S,
     SampleClock,
-    find_period,
 )
 from rehab.gait.signals.filters import Floats
 from rehab.gait.strides import GaitInputError
 
 BLOCK, BLOCKS = 64, 16  # samples, and how many of these the line through the stamps is drawn by
+SPREAD = 3.0  # times that of stamps around the line a sample is late; clocks may tick every 16 ms
 USUAL = 0.9  # of the first steps that count on
 RESTARTS = 3  # of the count, within a minute
 RESTARTS_S = 60.0
@@ -38,6 +38,19 @@ def find_frame_problem(t_s: Floats, frames: Floats | None) -> str:
     if frames is not None:
         clock.add(np.array([t_s]), 0, frames)
     return clock.problem
+
+
+def _find_pace(stamps: Floats, frames: Floats) -> float:
+    """Return the time of a number: the slope of a line through the samples that do not stall."""
+    half = len(stamps) // 2
+    counted = frames[half:] - frames[:-half]
+    if not (counted > 0).all():
+        return math.nan
+    pace_s = float(np.median((stamps[half:] - stamps[:-half]) / counted))
+    off = stamps - pace_s * frames
+    off = np.abs(off - np.median(off))
+    usual = off <= SPREAD * np.median(off)
+    return float(np.polynomial.Polynomial.fit(frames[usual], stamps[usual], 1).convert().coef[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +178,7 @@ class FrameClock:
         """Find the line of the first samples; return whether there is one."""
         steps = np.diff(frames)
         usual = float(np.sort(steps)[len(steps) // 2])
-        period_s = find_period(stamps)
+        period_s = _find_pace(stamps, frames)
         if not np.isfinite(frames).all():
             self._ignore("some are missing")
         elif (frames % 1 != 0).any():
@@ -174,14 +187,15 @@ class FrameClock:
             self._ignore("they stay as they are, or run backwards")
         elif not ((steps > 0) & (steps % usual == 0)).mean() >= USUAL:
             self._ignore("they do not count on from sample to sample")
-        elif period_s is None:
-            self._ignore("the stamps beside them tell no rate")
+        elif not period_s > 0:
+            self._ignore("the stamps beside them do not go on")
         else:
-            self._step, self._period_s = usual, period_s / usual
-            self._tolerance_s = max(LATE_PERIODS * period_s, LATE_S)
-            at = float(frames[0])
-            first_s = float(np.median(stamps - self._period_s * (frames - at)))
-            self._base = at, first_s
+            self._step, self._period_s = usual, period_s
+            behind = stamps - period_s * (frames - frames[0])
+            first_s = float(np.median(behind))
+            self._base = float(frames[0]), first_s
+            spread_s = float(np.median(np.abs(behind - first_s)))
+            self._tolerance_s = max(LATE_PERIODS * usual * period_s, LATE_S, SPREAD * spread_s)
         return not self.problem
 
     def _follow(self, stamps: list[float], frames: list[float]) -> tuple[list[int], Floats, int]:
