@@ -8,7 +8,7 @@ import stat
 import pytest
 
 from robot.token_file import TokenFile
-from tests.robot.test_link import dial, serving
+from tests.robot.link_stage import dial, serving
 
 
 def test_the_file_is_replaced_whole_and_closed_to_others(tmp_path):
