@@ -73,10 +73,10 @@ def addresses(world: World, patients: list[Patient]) -> Iterator[str]:
                 "name": "b",
                 "among": among,
                 "group": group,
-                "metric": "score",
+                "metric": "hit_rate",
                 "types": "chosen",
                 "valences": valence,
-                "aggregation": "each",
+                "aggregation": "each" if among == Participants.SELF else "best",
                 "period": "all",
                 "display": "top",
                 "top_n": 10,
@@ -88,6 +88,7 @@ def addresses(world: World, patients: list[Patient]) -> Iterator[str]:
                 "mean_of": 3,
                 "show_ranks": "on",
                 "active": "on",
+                "higher_is_better": "on",
             }
             for patient in patients:
                 yield f"{preview}?{urlencode(asked | {'seen_as': patient.pk}, doseq=True)}"
@@ -105,8 +106,10 @@ def see_everything(world: World, who: User, patients: list[Patient]) -> dict[str
     for url in addresses(world, patients):
         if url not in left_out:
             answer = browser.get(url)
+            words = words_of(answer)
             assert answer.status_code < 500 or "readyz" in url, url
-            seen[url] = f"{answer.status_code} {VARYING.sub('', words_of(answer))}"
+            assert "No board yet" not in words, url
+            seen[url] = f"{answer.status_code} {VARYING.sub('', words)}"
     return seen
 
 
@@ -122,6 +125,8 @@ class Trial:
         self.patients = [new_patient(world, number) for number in (1, 2)]
         self.sessions = []
         for patient in self.patients:
+            patient.boards = "clinic"
+            patient.save()
             record_consent(patient, Purpose.BOARDS, None, NOW, "clinic")
             enrollment = enrolled(self.study, patient)
             self.sessions.append(walk_visit(enrollment))
