@@ -36,8 +36,10 @@ from tests.support.world import NOW, World, build_world, fill_board, signed_in, 
 pytestmark = pytest.mark.django_db
 ARMS = ("positive", "negative")
 # They have a new secret, code or animal each time, or tell of this very look.
-OTHERWISE_EACH_TIME = ("admin:logout", "admin:rehab_patient_add", "api:openapi-view", "add-app")
-OTHERWISE_EACH_TIME += ("own-sign-ins", "tablet")
+OTHERWISE_EACH_TIME = (
+    *("admin:logout", "admin:rehab_patient_add", "api:openapi-view", "add-app"),
+    *("own-sign-ins", "tablet"),
+)
 # What differs each time, whatever a patient walks.
 VARYING = re.compile(
     r'csrfmiddlewaretoken" value="\w+"|nonce="[^"]+"|"data-csrf": "\w+"|\d{1,2}:\d\d(:\d\d)?|'
@@ -143,8 +145,10 @@ class Trial:
         one, other = self.sessions
         exchange([one], [other], {"patient_id", "created_at"})
         for model in (Step, SessionEvent, SessionMetric):
-            rows = [list(model.everywhere.filter(session=x).order_by("pk")) for x in self.sessions]
-            exchange(*rows, {"session_id"})
+            rows = model.everywhere.order_by("pk")
+            exchange(
+                list(rows.filter(session=one)), list(rows.filter(session=other)), {"session_id"}
+            )
         allocations = Allocation.everywhere.filter(enrollment__study=self.study).order_by("pk")
         exchange(list(allocations[:1]), list(allocations[1:]), {"enrollment_id"})
         entries.refresh_patients([patient.pk for patient in self.patients], now=NOW)
