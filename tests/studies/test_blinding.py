@@ -8,10 +8,12 @@ import pytest
 from django.test import Client
 from django.urls import get_resolver, reverse
 
+from rehab.boards.models import Leaderboard
+from rehab.boards.ranking.eligibility import eligible_patients
 from rehab.patients.erasure import erase
 from rehab.patients.visits import Visit
 from rehab.people.consent.models import Purpose
-from rehab.people.consent.services import withdraw_consent
+from rehab.people.consent.services import record_consent, withdraw_consent
 from rehab.people.models import ErasureReason, Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.log import SessionEvent, Step
@@ -339,3 +341,19 @@ def test_erasing_a_patient_leaves_numbers_and_no_way_back(world):
     assert enrollment.allocation.group in {"A", "B"}
     assert not study.events.filter(reason__contains="fell").exists()
     assert study.enrollments.count() == 1
+
+
+def test_who_left_stands_on_no_board_before_the_study_is_closed(world):
+    """A board of one feedback type tells the arm, also to those who assess."""
+    study = running_study(world)
+    patient = new_patient(world)
+    patient.boards = "clinic"
+    patient.save()
+    record_consent(patient, Purpose.BOARDS, None, NOW, "clinic")
+    enrollment = enrolled(study, patient)
+    board = Leaderboard.everywhere.filter(clinic=world.clinic, among="clinic").get()
+    withdraw(enrollment, None, NOW)
+    assert not Patient.everywhere.get(pk=patient.pk).blinded  # the own page tells scores again
+    assert patient not in eligible_patients(board)
+    close(study, None, NOW)
+    assert patient in eligible_patients(board)
