@@ -13,7 +13,6 @@ from rehab.gait.signals.filters import (
     find_last,
     interpolate_peak,
 )
-from rehab.gait.stances.lag_watch import CUTOFF_HZ, GRID_HZ, SEARCH_S, BrakingFinder
 from tests.support.data import signals
 
 
@@ -52,20 +51,6 @@ def test_last():
         2,
         0,
     ]
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_braking_is_found_as_by_filter_and_two_derivatives(seed):
-    grid_s = np.arange(-80, 81) / GRID_HZ
-    wave = 0.3 * np.tanh((grid_s - 0.02) / 0.05)
-    wave += np.cumsum(np.random.default_rng(seed).normal(size=len(grid_s))) * 1e-3
-    smooth = ZeroPhaseFilter(CUTOFF_HZ, GRID_HZ).smooth(wave[np.newaxis])[0]
-    braking = -differentiate(differentiate(smooth, GRID_HZ), GRID_HZ)
-    first, last = np.searchsorted(grid_s, SEARCH_S)
-    peak = first + int(braking[first:last].argmax())
-
-    expected = interpolate_peak(braking, peak)[0] / GRID_HZ + grid_s[0]
-    assert BrakingFinder().find_in_wave(wave) == pytest.approx(expected, abs=1e-12)
 
 
 def test_moment_of_a_force():

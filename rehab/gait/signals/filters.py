@@ -35,7 +35,7 @@ class ZeroPhaseFilter:
         impulse = np.zeros(4 * self.reach + 1)
         impulse[2 * self.reach] = 1.0
         response = lfilter(b, a, lfilter(b, a, impulse)[::-1])[self.reach : -self.reach]
-        self.response: Floats = np.asarray((response + response[::-1]) / (2 * response.sum()))
+        self._response: Floats = np.asarray((response + response[::-1]) / (2 * response.sum()))
 
     def smooth(self, signals: Floats) -> Floats:
         """Return each row filtered, extended point-symmetrically beyond its ends for the purpose.
@@ -70,7 +70,7 @@ class ZeroPhaseFilter:
         """Return rows filtered and without the ``reach`` samples that they have at each end."""
         smooth = np.empty((len(wide), wide.shape[1] - 2 * self.reach))
         for row, values in zip(smooth, wide, strict=True):
-            row[:] = np.correlate(values, self.response, "valid")  # which is symmetric
+            row[:] = np.correlate(values, self._response, "valid")  # which is symmetric
         return smooth
 
 

@@ -41,8 +41,13 @@ from rehab.gait.stances.plausibility import (
     check_push_off,
     has_clonus,
 )
-from rehab.gait.stances.resampling import ResampledStance, Resampler
-from rehab.gait.stances.timing import HARMFUL_FROM, ClockJudge, StanceClock
+from rehab.gait.stances.resampling import (
+    ResampledStance,
+    Resampler,
+    bridge_gaps,
+    decimate,
+)
+from rehab.gait.stances.timing import HARMFUL_FROM, ClockJudge
 from rehab.gait.stances.uncertainty import Uncertainty
 from rehab.gait.strides import Flag, RejectionReason
 
@@ -164,8 +169,8 @@ class StanceAnalyzer:
         is_sure = late_s is None and contact.known_index == end
         self._watch_angle((end, end_s) if is_sure else None, end)
         is_known = all(math.isfinite(channel.jump) for channel in channels)
-        bridged, gap_s = _bridge_gaps(window, clock, critical, is_known)
-        clean = None if bridged is None else _decimate(bridged, self._decimation)
+        bridged, gap_s = bridge_gaps(window, clock, critical, is_known)
+        clean = None if bridged is None else decimate(bridged, self._decimation)
         push_off, a2_sd, flags = None, None, list(clock.flags)
         if clean is not None and clean[TIME, -1] - clean[TIME, 0] < LONGEST_S:
             stance = self._resampler.resample(
@@ -259,7 +264,7 @@ class StanceAnalyzer:
         forward = window[FORWARD : FORWARD + 1]
         if not math.isfinite(forward[0, -1]) or not np.isfinite(forward).all():
             return None
-        decimated = _decimate(forward, self._decimation)
+        decimated = decimate(forward, self._decimation)
         if decimated is None:
             return None
         smooth = self._forward_filter.smooth(decimated)[0]
@@ -274,44 +279,3 @@ class StanceAnalyzer:
         share = (contact.begin_s - t0) / (t1 - t0) if t1 > t0 else 1.0
         position = p0 + share * (p1 - p0)
         return position if math.isfinite(position) else None
-
-
-def _bridge_gaps(
-    window: Floats, clock: StanceClock, critical: int, is_known: bool
-) -> tuple[Floats | None, float]:
-    """Return a stance's samples with gaps in moment and angle bridged, and the longest bridge [s].
-
-    The samples are None where nothing is known to bridge between; a fifth row is when moment and
-    angle were measured, where that is not when the force was. The time is the longest from sample
-    ``critical`` on that a straight line bridges. Longer gaps have made the stride invalid already,
-    so that values measured across them are not shown.
-    """
-    time = clock.kinetics_s
-    rows = window[: ANGLE + 1]
-    if time is not window[TIME] and clock.late_s > 0:
-        rows = np.vstack((rows, time))
-    steps = time[critical:] - time[critical - 1 : -1]
-    longest_s = find_maximum(steps) if len(steps) else 0.0
-    if is_known:
-        return rows, longest_s
-    bridged = rows.copy()
-    for row in bridged[MOMENT : ANGLE + 1]:
-        known = np.isfinite(row)
-        if known.sum() < 2:
-            return None, longest_s
-        row[~known] = np.interp(time[~known], time[known], row[known])
-        longest_s = max(longest_s, float(np.diff(time[known]).max()))
-    return bridged, longest_s
-
-
-def _decimate(window: Floats, factor: int) -> Floats | None:
-    """Return the means of each ``factor`` neighbors, aligned to the end, if there are two."""
-    if factor == 1:
-        return window
-    rows, samples = window.shape
-    count = samples // factor
-    if count < 2:
-        return None
-    neighbors = window[:, samples - count * factor :].reshape(rows, count, factor)
-    decimated: Floats = neighbors @ np.full(factor, 1 / factor)
-    return decimated

@@ -122,13 +122,10 @@ class BrakingFinder:
         self._search_s = search_s
         self._grid = np.arange(-round(AROUND_S * GRID_HZ), round(AROUND_S * GRID_HZ) + 1) / GRID_HZ
         self._first, last = np.searchsorted(self._grid, search_s).tolist()
-        # Filter and derivatives are linear: their one response takes a wave to its braking.
-        response = ZeroPhaseFilter(CUTOFF_HZ, GRID_HZ).response
-        padded = np.pad(response, 8)
-        self._bend = -differentiate(differentiate(padded, GRID_HZ), GRID_HZ)[4:-4]
-        reach = len(self._bend) // 2
-        self._looked_at = slice(self._first - reach, last + reach)
-        self._beyond = max(0, self._looked_at.stop - len(self._grid))
+        # Filter and derivatives are linear: one matrix takes a wave to its braking in the search.
+        units = ZeroPhaseFilter(CUTOFF_HZ, GRID_HZ).smooth(np.eye(len(self._grid)))
+        bent = [-differentiate(differentiate(unit, GRID_HZ), GRID_HZ) for unit in units]
+        self._bend = np.ascontiguousarray(np.array(bent).T[self._first : last])
 
     def find(self, time_s: Floats, angle_rad: Floats, end_s: float) -> float | None:
         """Return the seconds from terminal contact to the hardest braking, None without one.
@@ -152,10 +149,7 @@ class BrakingFinder:
 
     def find_in_wave(self, wave: Floats) -> float | None:
         """Return the same for an angle around terminal contact, at the times of the grid."""
-        # Extended point-symmetrically behind its end, as far as the last times look.
-        after = 2 * wave[-1] - wave[-2 : -2 - self._beyond : -1]
-        seen = np.concatenate((wave, after))[self._looked_at]
-        braking = np.correlate(seen, self._bend, "valid")
+        braking: Floats = self._bend @ wave
         peak = int(braking.argmax())
         if peak in (0, len(braking) - 1) or braking[peak] < DECELERATION_MIN_RAD_S2:
             return None

@@ -1,4 +1,4 @@
-"""A stance at evenly spaced times, as filters need it."""
+"""A stance at evenly spaced times, its gaps bridged, as filters need it."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehab.gait.signals.filters import Floats
-from rehab.gait.signals.samples import FORCE, TIME
+from rehab.gait.signals.filters import Floats, find_maximum
+from rehab.gait.signals.samples import ANGLE, FORCE, MOMENT, TIME
+from rehab.gait.stances.timing import StanceClock
 
 MIN_STANCE_SAMPLES = 8  # 0.16 s at 50 Hz
 
@@ -92,3 +93,44 @@ class Resampler:
         if end - begin < MIN_STANCE_SAMPLES:
             return None
         return ResampledStance(signals, rate_hz, first, begin_s, end_s, begin, end)
+
+
+def bridge_gaps(
+    window: Floats, clock: StanceClock, critical: int, is_known: bool
+) -> tuple[Floats | None, float]:
+    """Return a stance's samples with gaps in moment and angle bridged, and the longest bridge [s].
+
+    The samples are None where nothing is known to bridge between; a fifth row is when moment and
+    angle were measured, where that is not when the force was. The time is the longest from sample
+    ``critical`` on that a straight line bridges. Longer gaps have made the stride invalid already,
+    so that values measured across them are not shown. ``is_known``: whether nothing is missing.
+    """
+    time = clock.kinetics_s
+    rows = window[: ANGLE + 1]
+    if time is not window[TIME] and clock.late_s > 0:
+        rows = np.vstack((rows, time))
+    steps = time[critical:] - time[critical - 1 : -1]
+    longest_s = find_maximum(steps) if len(steps) else 0.0
+    if is_known:
+        return rows, longest_s
+    bridged = rows.copy()
+    for row in bridged[MOMENT : ANGLE + 1]:
+        known = np.isfinite(row)
+        if known.sum() < 2:
+            return None, longest_s
+        row[~known] = np.interp(time[~known], time[known], row[known])
+        longest_s = max(longest_s, float(np.diff(time[known]).max()))
+    return bridged, longest_s
+
+
+def decimate(window: Floats, factor: int) -> Floats | None:
+    """Return the means of each ``factor`` neighbors, aligned to the end, if there are two."""
+    if factor == 1:
+        return window
+    rows, samples = window.shape
+    count = samples // factor
+    if count < 2:
+        return None
+    neighbors = window[:, samples - count * factor :].reshape(rows, count, factor)
+    decimated: Floats = neighbors @ np.full(factor, 1 / factor)
+    return decimated
