@@ -11,7 +11,7 @@ from rehab.gait.signals.frames import FrameClock
 from tests.gait.faults.bench import open_walk
 from tests.gait.faults.spoil import lose, stall
 from tests.gait.faults.tally import count
-from tests.gait.walks import Walk, make_walk
+from tests.gait.walks import make_walk
 
 RATE_HZ = 100.0
 
@@ -39,7 +39,7 @@ def run(stamps, frames, size=None):
     return clock, np.concatenate(times), np.concatenate(lates)
 
 
-def stall_with_loss(walk: Walk, clean, *, by_stamp=False) -> Walk:
+def stall_with_loss(walk, clean, *, by_stamp=False):
     """Let samples wait for 80 ms once a stride, and lose 20 ms of them."""
     stalled: Walk = stall(walk, clean, 0.08, by_stamp=by_stamp)
     lost = np.zeros(len(walk.t_s), dtype=bool)
