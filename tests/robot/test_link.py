@@ -3,11 +3,9 @@
 import asyncio
 import json
 import time
-from contextlib import asynccontextmanager
 from dataclasses import replace
 
 import pytest
-from websockets.asyncio.server import serve
 
 from robot.connection_args import BadConnectionArgs, check_token, websocket_url
 from robot.link import (
@@ -19,6 +17,7 @@ from robot.link import (
     Timing,
 )
 from robot.wire.limits import MAX_FRAME_BYTES
+from tests.support.running_client import serving
 
 QUICK = Timing(retry_first_s=0.01, retry_longest_s=0.05, close_within_s=0.1)
 HELLO = {"type": "hello", "version": 1}
@@ -29,12 +28,6 @@ async def until(condition):
     async with asyncio.timeout(5):
         while not condition():  # noqa: ASYNC110
             await asyncio.sleep(0.002)
-
-
-@asynccontextmanager
-async def serving(handler, **settings):
-    async with serve(handler, "127.0.0.1", 0, **settings) as server:
-        yield f"ws://127.0.0.1:{server.sockets[0].getsockname()[1]}/ws/robot/"
 
 
 class Losses:

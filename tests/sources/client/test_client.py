@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-from contextlib import asynccontextmanager
 from functools import partial
 
 import pytest
@@ -11,10 +10,9 @@ from rehab.sources.client import SourceClient, StepsLost, StridePlayback
 from rehab.sources.synthetic import GOOD, SyntheticWalker
 from rehab.training.phases import make_phase
 from rehab.training.steps import Measurement, Side
-from robot.link import Link, LinkRefused, Timing
+from robot.link import Link, LinkRefused
 from tests.sources.fake_garry import TOKEN, FakeGarry, serve_garry
-
-QUICK = Timing(retry_first_s=0.005, retry_longest_s=0.02, close_within_s=0.1)
+from tests.support.running_client import QUICK, running, until
 
 
 @pytest.fixture
@@ -42,24 +40,6 @@ def make_client(garry, open_walk, token=TOKEN, **settings):
     dial = partial(Link, garry.url, token, timing=QUICK)
     how = {"speed": None} | {name: settings.pop(name) for name in PLAYED if name in settings}
     return SourceClient(dial, StridePlayback(open_walk, **how), **settings)
-
-
-async def until(condition):
-    """Wait until something holds that nobody will tell us of."""
-    async with asyncio.timeout(5):
-        while not condition():  # noqa: ASYNC110
-            await asyncio.sleep(0.002)
-
-
-@asynccontextmanager
-async def running(client):
-    """Run a client beside the test."""
-    task = asyncio.create_task(client.run())
-    try:
-        yield task
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
 
 
 async def run(client):

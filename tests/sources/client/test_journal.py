@@ -17,8 +17,8 @@ from rehab.sources.client import journal as journal_module
 from rehab.sources.reporting import SourceError
 from rehab.training.steps import Measurement, Side
 from robot.link import Link
-from tests.sources.client.test_client import QUICK, running, until
 from tests.sources.fake_garry import TOKEN, FakeGarry, serve_garry
+from tests.support.running_client import QUICK, running, until
 
 SERVER = "wss://garry.example/ws/source/"
 
