@@ -12,11 +12,42 @@ from robot.link import (
     REFUSALS,
     BackOff,
     FrameTooLarge,
+    Link,
     LinkRefused,
     Timing,
 )
 from robot.wire.limits import MAX_FRAME_BYTES
-from tests.robot.link_stage import HELLO, QUICK, Losses, dial, serving, until
+from tests.support.running_client import serving
+
+QUICK = Timing(retry_first_s=0.01, retry_longest_s=0.05, close_within_s=0.1)
+HELLO = {"type": "hello", "version": 1}
+
+
+async def until(condition):
+    """Wait until something holds that nobody will tell us of."""
+    async with asyncio.timeout(5):
+        while not condition():  # noqa: ASYNC110
+            await asyncio.sleep(0.002)
+
+
+class Losses:
+    """Writes down losses and pauses; pauses are not waited for."""
+
+    def __init__(self):
+        self.reasons = []
+        self.pauses_s = []
+
+    def __call__(self, reason, pause_s):
+        self.reasons.append(reason)
+
+    async def sleep(self, pause_s):
+        self.pauses_s.append(pause_s)
+        await asyncio.sleep(0)
+
+
+def dial(url, losses=None, *, greet=lambda: HELLO, timing=QUICK, **settings):
+    losses = losses or Losses()
+    return Link(url, "t-1", greet, on_lost=losses, timing=timing, sleep=losses.sleep, **settings)
 
 
 def closing(*codes, before=None):

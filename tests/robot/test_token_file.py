@@ -7,8 +7,9 @@ import stat
 
 import pytest
 
+from robot.link import Link
 from robot.token_file import TokenFile
-from tests.robot.link_stage import dial, serving
+from tests.support.running_client import QUICK, serving
 
 
 def test_the_file_is_replaced_whole_and_closed_to_others(tmp_path):
@@ -60,7 +61,8 @@ async def test_a_token_is_said_back_once_it_is_stored(is_kept):
         await socket.wait_closed()
 
     async with serving(handler) as url, asyncio.timeout(5):
-        link = dial(url, keep_token=keep)
+        hello = {"type": "hello", "version": 1}
+        link = Link(url, "t-1", lambda: hello, timing=QUICK, keep_token=keep)
         assert (await anext(link))["type"] == "welcome"
         assert (await anext(link))["type"] == "welcome"  # of the second connection
         await link.close()

@@ -16,6 +16,7 @@ from django.test import Client, RequestFactory
 from django.urls import URLPattern, URLResolver, get_resolver, reverse
 
 from rehab.boards.models import Leaderboard
+from rehab.patients.family import FamilyLink
 from rehab.people.models import Patient
 from rehab.people.roles import Role
 from rehab.sessions.incidents import RobotIncident
@@ -41,6 +42,7 @@ KEYS: dict[str, tuple[type[Model], str]] = {
     "device_id": (Device, "pk"),
     "enrollment_id": (Enrollment, "pk"),
     "incident_id": (RobotIncident, "pk"),
+    "link_id": (FamilyLink, "pk"),
     "patient_id": (Patient, "pk"),
     "run_id": (PowerRun, "pk"),
     "session_id": (TrainingSession, "pk"),
@@ -169,6 +171,9 @@ def fill(
                 yield Route(name, url, world.name, target)
         elif wanted == {"app_label"}:
             yield Route(name, reverse(name, kwargs={"app_label": "rehab"}))
+            return
+        elif wanted == {"token"}:  # of a family's link; nobody knows one that is there
+            yield Route(name, reverse(name, kwargs={"token": "no-such-link"}))
             return
         elif wanted == {"language"}:
             yield Route(name, reverse(name, kwargs={"language": "es"}))

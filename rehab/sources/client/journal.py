@@ -118,7 +118,7 @@ class Journal:
                 f"{self.path} is damaged from byte {read} on: what stood there is not sent. The "
                 f"whole file is kept as {aside}; the disk may be failing."
             )
-        if kept.steps and kept.unsent_from is None:
+        if kept.session is not None and kept.unsent_from is None:
             kept.unsent_from = kept.last + 1
         return kept
 

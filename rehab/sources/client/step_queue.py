@@ -125,7 +125,7 @@ class StepQueue:
             kept = journal.kept
             self.session, self.side, self.state = kept.session, kept.side, kept.state
             self.last, self._next = kept.last, kept.last + 1
-            self._unsent_from = kept.unsent_from or self._next
+            self._unsent_from = kept.unsent_from
             self._keep(kept.steps, -math.inf)
 
     @property

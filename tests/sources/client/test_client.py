@@ -11,8 +11,8 @@ from rehab.sources.synthetic import GOOD, SyntheticWalker
 from rehab.training.phases import make_phase
 from rehab.training.steps import Measurement, Side
 from robot.link import Link, LinkRefused
-from tests.sources.client_runs import QUICK, running, until
 from tests.sources.fake_garry import TOKEN, FakeGarry, serve_garry
+from tests.support.running_client import QUICK, running, until
 
 
 @pytest.fixture

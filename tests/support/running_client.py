@@ -1,7 +1,9 @@
-"""Sources that run beside a test, without waiting."""
+"""A source's client that runs beside a test, and servers for a link."""
 
 import asyncio
 from contextlib import asynccontextmanager
+
+from websockets.asyncio.server import serve
 
 from robot.link import Timing
 
@@ -24,3 +26,10 @@ async def running(client):
     finally:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
+
+
+@asynccontextmanager
+async def serving(handler, **settings):
+    """Serve websockets, and yield the address of a robot's."""
+    async with serve(handler, "127.0.0.1", 0, **settings) as server:
+        yield f"ws://127.0.0.1:{server.sockets[0].getsockname()[1]}/ws/robot/"
