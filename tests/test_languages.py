@@ -163,7 +163,7 @@ def test_the_catalogs_have_every_marked_word(tmp_path):
 
 # --- templates ----------------------------------------------------------------------------------
 
-UNMARKED = {"GARRY", "JSON", "PDF", "csv", "svg", "W/kg", "W", "kg", "min", "s"}
+UNMARKED = {"GARRY", "JSON", "PDF", "csv", "png", "svg", "W/kg", "W", "kg", "min", "s"}
 SAID = {"aria-label", "title", "placeholder", "alt", "label"}
 BLOCK = re.compile(
     r"{% (blocktranslate|comment)\b.*?{% end\1 %}|{#.*?#}|"
