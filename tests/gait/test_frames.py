@@ -41,7 +41,7 @@ def run(stamps, frames, size=None):
 
 def stall_with_loss(walk, clean, *, by_stamp=False):
     """Let samples wait for 80 ms once a stride, and lose 20 ms of them."""
-    stalled: Walk = stall(walk, clean, 0.08, by_stamp=by_stamp)
+    stalled = stall(walk, clean, 0.08, by_stamp=by_stamp)
     lost = np.zeros(len(walk.t_s), dtype=bool)
     for at in np.flatnonzero(np.diff(stalled.t_s, prepend=0.0) > 0.05):
         first = at + round(0.02 * walk.rate_hz)
