@@ -6,6 +6,7 @@ from datetime import timedelta
 from typing import Any
 
 import pytest
+from django.db import transaction
 from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
@@ -193,6 +194,25 @@ def test_after_some_minutes_the_same_is_an_entry_of_its_own(world):
         actor = world.people[Role.PT]
         record_counted(build_entry(Act.REFUSED, actor, about="/x/", now=now))
     assert [row[-1] for row in traced(Act.REFUSED)] == [2, 1]
+
+
+def test_a_repeat_is_never_counted_in_the_row_of_somebody_else(world):
+    """A row that was rolled back is remembered, and another one gets its key."""
+    pt, lead = world.people[Role.PT], world.people[Role.LEAD]
+    with transaction.atomic():
+        record_counted(build_entry(Act.REFUSED, pt, about="/lost/", now=NOW))
+        (lost,) = AuditEntry.everywhere.filter(about="/lost/")
+        transaction.set_rollback(True)
+    AuditEntry(pk=lost.pk, **vars_of(build_entry(Act.REFUSED, lead, about="/x/", now=NOW))).save()
+    record_counted(build_entry(Act.REFUSED, pt, about="/lost/", now=NOW))
+    counted = AuditEntry.everywhere.filter(act=Act.REFUSED).order_by("pk")
+    assert [(entry.by, entry.count) for entry in counted] == [(lead, 1), (pt, 1)]
+
+
+def vars_of(entry: AuditEntry) -> dict[str, Any]:
+    """Return what an entry says."""
+    fields = ("clinic_id", "at", "by", "through", "act", "about", "address")
+    return {name: getattr(entry, name) for name in fields}
 
 
 # --- who reads it ---------------------------------------------------------------------------------

@@ -263,12 +263,14 @@ def record_counted(entry: AuditEntry) -> None:
 
     A failure is logged: care must go on.
     """
-    who = (entry.clinic_id, entry.by_id, entry.through, entry.address)
-    key = (*who, entry.act, entry.patient_id, entry.about)
+    names = ("clinic_id", "by_id", "through", "address", "act", "patient_id", "about")
+    same = {name: getattr(entry, name) for name in names}
+    key = tuple(same.values())
     try:
         with transaction.atomic():
-            known = recent_entries.find(key, entry.at)
-            repeated = _mutable_rows().filter(pk=known or 0).update(count=F("count") + entry.count)
+            # Another row has its key where the one that is remembered was rolled back.
+            rows = _mutable_rows().filter(pk=recent_entries.find(key, entry.at) or 0, **same)
+            repeated = rows.update(count=F("count") + entry.count)
             if not repeated:
                 entry.save()
                 recent_entries.add(key, entry.at, entry.pk)
