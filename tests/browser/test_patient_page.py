@@ -72,8 +72,7 @@ def synthetic(server: Server, walk: Walk, seed: int) -> subprocess.Popen[bytes]:
     command = f"-m rehab.sources synthetic --speed 25 --strides {STRIDES} --seed {seed} --stay"
     return subprocess.Popen(
         [sys.executable, *command.split(), "--server", server.url, "--token", walk.source],
-        cwd=ROOT,
-        stderr=subprocess.DEVNULL,
+        cwd=ROOT,  # what it says is shown with a failure
     )
 
 
