@@ -130,7 +130,7 @@ def test_every_control_of_the_monitor_reaches_the_tablet_with_the_next_step(serv
         expect(monitor.locator("[data-show=types]")).to_have_text(types)
 
         legend = monitor.locator(".legend")
-        for told in ("goal 4.10", "words on", "line", "robot gentle", "feedback type Negative"):
+        for told in ("goal 4.10", "words on", "line", "robot gentle", "feedback type Binary"):
             expect(legend).to_contain_text(told)
         monitor.locator("[data-main]").click()
         expect(monitor.locator(".notice.why")).to_have_text("Paused by the therapist.")
