@@ -12,11 +12,12 @@ from django.utils import timezone
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.sign_in.tokens import hash_token
 from rehab.sessions.live import auth, runtime
+from rehab.sessions.live.consumers import device as device_sockets
 from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.stations import tokens
 from rehab.stations.models import Device
 from rehab.stations.presence import format_device_state
-from tests.support.callers import RobotCaller, SourceCaller
+from tests.support.callers import RobotCaller, SourceCaller, open_session, turns
 
 find = sync_to_async(tokens.find_device)
 
@@ -75,6 +76,27 @@ async def test_a_token_that_was_not_stored_leaves_the_old_one_good(place):
         await source.hello(rotates=True)
         token = (await source.hear("token"))["token"]
         await source.hang_up()
+    assert await find(token, timezone.now()) is not None
+
+
+async def test_a_session_that_opens_meanwhile_brings_no_second_token(place, monkeypatch):
+    """It would make the first one, which the device stores just then, worth nothing."""
+    source = await place.source().dial()
+    give = auth.offer_successor
+
+    async def give_slowly(device, now):
+        (socket,) = runtime.current().devices.at(place.station.pk)
+        monkeypatch.setattr(device_sockets, "offer_successor", give)
+        socket.on_session_opened(session.pk)
+        await turns()
+        return await give(device, now)
+
+    session = await sync_to_async(open_session)(place, at_station=False)
+    monkeypatch.setattr(device_sockets, "offer_successor", give_slowly)
+    await source.hello(rotates=True)
+    token = (await source.hear("token"))["token"]
+    await source.overhear()
+    assert len([m for m in source.heard if m["type"] == "token"]) == 1
     assert await find(token, timezone.now()) is not None
 
 
