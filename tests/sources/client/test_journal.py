@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rehab.sources.client import Journal, LiveFeed, SourceClient, StepQueue
+from rehab.sources.client import Journal, LiveFeed, SourceClient, StepQueue, StepsLost
 from rehab.sources.client import journal as journal_module
 from rehab.sources.reporting import SourceError
 from rehab.training.steps import Measurement, Side
@@ -132,6 +132,29 @@ def test_numbers_that_the_server_has_already_are_not_given_twice(tmp_path, ackno
             (8, 1.6),
         ]
         assert queue.add(stride(17)) == 9
+
+
+def test_a_restart_gets_over_a_server_that_was_set_back(tmp_path):
+    """The number of its session may be another one's now: what is kept is put aside."""
+    path = tmp_path / "journal"
+    with opened(path) as journal:
+        queue = walk(journal, range(1, 8))
+        queue.acknowledge(5)
+        with pytest.raises(StepsLost):
+            queue.join(7, 3)
+    before, said = path.read_bytes(), list[str]()
+    with opened(path, said) as journal:
+        queue = walk(journal, [])
+        assert queue.join(7, 3) == 2
+        assert queue.add(stride(8)) == 3
+    assert (tmp_path / "journal.aside").read_bytes().splitlines()[2:] == [
+        line for line in before.splitlines() if b'"number":6' in line or b'"number":7' in line
+    ]
+    assert "journal.aside" in said[-1]
+    with opened(path) as journal:  # it has heard of the server that it has now
+        queue = walk(journal, [])
+        assert queue.join(7, 3) == 0
+        assert [(kept.number, kept.step["value"]) for kept in queue._kept] == [(3, 0.8)]
 
 
 def test_the_file_stays_small_while_all_is_stored(tmp_path, monkeypatch):
