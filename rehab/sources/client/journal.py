@@ -178,6 +178,8 @@ class Journal:
         """Wait until the disk has what was written; called from a thread of its own."""
         with self._lock:
             self._is_dirty = False
+            if self._file < 0:
+                return  # it could not be opened again, which was said
             try:
                 os.fsync(self._file)
             except OSError as problem:
@@ -229,7 +231,8 @@ class Journal:
             os.close(file)
         with self._lock:
             if self._file >= 0:  # Windows replaces no file that is open
-                os.close(self._file)
+                old, self._file = self._file, -1  # what is opened next may get its number
+                os.close(old)
             try:
                 new.replace(self.path)
             finally:

@@ -213,6 +213,31 @@ def test_a_full_disk_is_said_and_tried_again(tmp_path, monkeypatch):
         assert values(journal._read()) == [n / 10 for n in range(1, 11)]
 
 
+def test_a_disk_that_is_gone_costs_no_other_file(tmp_path, monkeypatch):
+    """What this program opens next gets the number that the journal's file had."""
+    path, now = tmp_path / "journal", [0.0]
+    with opened(path, monotonic=lambda: now[0]) as journal:
+        queue = walk(journal, [1])
+        open_file = os.open
+        with monkeypatch.context() as gone:
+
+            def open_unless_journal(name, flags, *mode):
+                if name == path:
+                    raise OSError(errno.ENOENT, "No such file or directory")
+                return open_file(name, flags, *mode)
+
+            gone.setattr(os, "open", open_unless_journal)
+            journal.renew(queue._all())
+        assert journal.trouble
+        with (tmp_path / "other").open("wb") as other:
+            journal.sync()
+            now[0] = 11.0
+            queue.add(stride(2))
+            other.write(b"whole")
+        assert values(journal._read()) == [0.1, 0.2]
+    assert (tmp_path / "other").read_bytes() == b"whole"
+
+
 async def test_hours_offline_over_a_restart_end_up_once_in_the_log(tmp_path):
     """Strides 1 to 5 with a server, 6 to 10 without, 11 to 15 after the program was killed."""
     garry, path = FakeGarry(), tmp_path / "journal"
