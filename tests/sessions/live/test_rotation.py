@@ -70,6 +70,27 @@ async def test_a_token_that_was_stored_and_not_said_back_is_good(place):
     assert await find(place.tokens["source"], timezone.now()) is None
 
 
+@pytest.mark.parametrize("when", ["before it is looked for again", "before it is adopted"])
+def test_who_says_a_token_back_and_connects_by_it_at_once_is_let_in(place, monkeypatch, when):
+    device, now = place.devices["robot"], timezone.now()
+    token = tokens.give_successor(device, now)
+    said_back = Device.everywhere.get(pk=device.pk)
+    name = "find_by_token" if when == "before it is looked for again" else "adopt_successor"
+    do = getattr(tokens, name)
+
+    def do_after_the_other(*given):
+        found = do(*given) if name == "find_by_token" else None
+        monkeypatch.setattr(tokens, name, do)
+        assert tokens.adopt_successor(said_back, token, "", now)
+        return found if name == "find_by_token" else do(*given)
+
+    monkeypatch.setattr(tokens, name, do_after_the_other)
+    found = tokens.find_device(token, now)
+    assert found is not None
+    assert (found.pk, found.token_hash) == (device.pk, hash_token(token))
+    assert AuditEntry.everywhere.filter(act=Act.TOKEN).count() == 1
+
+
 async def test_a_token_that_was_not_stored_leaves_the_old_one_good(place):
     for _ in range(2):
         source = await place.source().dial()
