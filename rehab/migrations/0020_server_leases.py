@@ -1,4 +1,4 @@
-"""Leases of the servers on a hosted database (rehab/sessions/live/lease.py).
+"""Leases of the servers on a hosted database (rehab/sessions/live/database/lease.py).
 
 No model: the rows are no clinic's, are read and written by the database's clock alone, and belong
 in no backup. SQLite has one server, which needs none.

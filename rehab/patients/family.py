@@ -1,7 +1,8 @@
 """Links by which a patient's family looks at how training goes: who has one, and until when.
 
 A link is a token of 256 bits, of which only the hash is stored. It shows nothing unless the patient
-consents to it now, is in no blinded study, and the program goes on.
+consents to it now, is in no blinded study, and the program goes on. Who has left a study has none
+until it is closed: whoever assesses there may have kept a link from before.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from rehab.people.audit.audit_log import Act, build_entry, record, record_counte
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import active_consents, consent_withdrawn
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.models.blinding import hidden_patients
+from rehab.people.models.blinding import RUNNING, hidden_patients
 from rehab.people.scope import ClinicModel, Scope
 from rehab.people.sign_in.tokens import TOKEN_BYTES, hash_token
 
@@ -72,7 +73,7 @@ def why_not(patient: Patient) -> str:
     """Return why a patient's family sees nothing now; empty where it may."""
     if patient.erased_at is not None or patient.ended_at is not None:
         return str(_("The program has ended: the family sees nothing any more."))
-    if patient.blinded:
+    if patient.blinded or patient.enrollments.filter(study__state=RUNNING).exists():
         return str(
             _("In a blinded study there is no family view: points and hits would tell too much.")
         )

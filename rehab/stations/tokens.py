@@ -24,13 +24,16 @@ EXPIRES_AFTER = timedelta(days=90)  # of one that was given in this way
 def find_device(token: str, now: datetime, address: str = "") -> Device | None:
     """Return the device that this token belongs to; None for an unknown, revoked or expired one."""
     device = find_by_token(Device, token, now)
-    if device is not None:
-        return None if device.has_expired(now) else device
     hashed = hash_token(token)
-    rows = Device.everywhere.filter(revoked_at__isnull=True).select_related("clinic")
-    device = rows.filter(Q(successor_hash=hashed) | Q(retired_hash=hashed)).first()
+    if device is None:
+        rows = Device.everywhere.filter(revoked_at__isnull=True).select_related("clinic")
+        # Its own, too: it may have become that since, by a connection of before.
+        known = Q(token_hash=hashed) | Q(successor_hash=hashed) | Q(retired_hash=hashed)
+        device = rows.filter(known).first()
     if device is None:
         return None
+    if device.token_hash == hashed:
+        return None if device.has_expired(now) else device
     if device.successor_hash == hashed:
         return device if adopt_successor(device, token, address, now) else None
     _note_copy(device, address, now)
@@ -55,12 +58,20 @@ def give_successor(device: Device, now: datetime) -> str:
 
 
 def adopt_successor(device: Device, token: str, address: str, now: datetime) -> bool:
-    """Make the successor that a device has used its token; return whether it is the one."""
+    """Make the successor that a device has used its token; return whether it is the one.
+
+    Where a device says it back and connects by it at the same time, the second one is right, too.
+    """
     hashed = hash_token(token)
     with transaction.atomic():
         rows = Device.everywhere.select_for_update(no_key=True, of=("self",))
         row = rows.get(pk=device.pk)
-        if row.successor_hash != hashed or row.is_revoked:
+        if row.is_revoked:
+            return False
+        if row.token_hash == hashed:
+            device.token_hash, device.rotated_at = hashed, row.rotated_at
+            return True
+        if row.successor_hash != hashed:
             return False
         record(Act.TOKEN, row, about=f"{row._meta.verbose_name}: {row}", address=address, now=now)
         changed = {

@@ -117,8 +117,9 @@ class Untold:
 
     Attributes
     ----------
-    steps, hits, performance_sum, shown_sum, close
-        Of them, as a summary tells them; ``hits`` has none that was close.
+    steps, hits, performance_sum, shown_sum, close, points
+        Of them, as a summary tells them; ``hits`` has none that was close, ``points`` are what each
+        earned by the feedback type of its time.
     """
 
     steps: int = 0
@@ -126,19 +127,18 @@ class Untold:
     performance_sum: float = 0.0
     shown_sum: float = 0.0
     close: int = 0
+    points: int = 0
 
-    def add(self, performance: float, shown: float, hit: bool, close: bool = False) -> None:
+    def add(
+        self, performance: float, shown: float, hit: bool, close: bool = False, points: int = 0
+    ) -> None:
         """Count one more step."""
         self.steps += 1
         self.hits += hit and not close
         self.close += close
+        self.points += points
         self.performance_sum += performance
         self.shown_sum += shown
-
-    @property
-    def misses(self) -> int:
-        """Steps below the goal that were not close."""
-        return self.steps - self.hits - self.close
 
     @property
     def mean_performance(self) -> float:

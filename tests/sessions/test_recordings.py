@@ -6,6 +6,7 @@ import shutil
 import subprocess
 
 import pytest
+from django.db import connection
 
 from rehab.sessions.setup import recordings
 from rehab.sessions.setup.recordings import (
@@ -99,3 +100,18 @@ def test_one_file_is_checked_at_a_time_and_after_everything_else(monkeypatch):
     for arguments in began:
         assert "--bounded" in arguments
         assert (arguments[0] == "nice") == bool(shutil.which("nice"))
+
+
+@pytest.mark.django_db(transaction=True)
+def test_who_waits_for_a_check_holds_no_connection(monkeypatch):
+    """A server has a handful of them for all its pages."""
+    held: list[object] = []
+
+    def run(arguments: list[str], **options: object) -> subprocess.CompletedProcess[str]:
+        held.append(connection.connection)
+        return subprocess.CompletedProcess(arguments, 0, "{}", "")
+
+    connection.ensure_connection()
+    monkeypatch.setattr(subprocess, "run", run)
+    check_upload(uploaded_file(7, ".csv"), None)
+    assert held == [None]

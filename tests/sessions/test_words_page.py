@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from django.urls import reverse
 
@@ -48,6 +50,20 @@ def test_words_of_one_session_change_there_alone_and_who_did_it_is_logged(world)
     page = client_of(world).get(url).content.decode()
     assert "Push, Ana!" in page
     assert reverse("admin:rehab_feedbacktype_changelist") in page
+
+
+def test_words_go_to_the_type_that_they_were_typed_for(world):
+    """Somebody changes the type while they are typed."""
+    session = begin(world)
+    before, url = words_of(session), reverse("words", args=[session.pk])
+    shown = client_of(world).get(url).content.decode()
+    sent = dict(re.findall(r'name="(valence|words_\d+)" value="([^"]*)"', shown))
+    change_session(session, ChangeKind.VALENCE_NOW, "negative")
+    negative = words_of(session)
+    assert client_of(world).post(url, sent | {"words_0": "Push, Ana!"}).status_code == 302
+    assert words_of(session) == negative
+    change_session(session, ChangeKind.VALENCE_NOW, "positive")
+    assert words_of(session) == ["Push, Ana!", *before[1:]]
 
 
 def test_words_too_long_are_refused_and_an_ended_session_has_none_to_edit(world):

@@ -11,6 +11,7 @@ from django.urls import get_resolver, reverse
 from rehab.boards.models import Leaderboard
 from rehab.boards.ranking.eligibility import eligible_patients
 from rehab.patients.erasure import erase
+from rehab.patients.family import find_link, give_link
 from rehab.patients.visits import Visit
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import record_consent, withdraw_consent
@@ -357,3 +358,15 @@ def test_who_left_stands_on_no_board_before_the_study_is_closed(world):
     assert patient not in eligible_patients(board)
     close(study, None, NOW)
     assert patient in eligible_patients(board)
+
+
+def test_who_left_has_no_family_view_before_the_study_is_closed(world):
+    """An assessor may have kept a link that was given before."""
+    study = running_study(world)
+    patient = new_patient(world)
+    record_consent(patient, Purpose.FAMILY, None, NOW)
+    token = give_link(patient, 4, world.people[Role.PT], "", NOW, shows_name=False)
+    withdraw(enrolled(study, patient), None, NOW)
+    assert find_link(token, NOW) is None
+    close(study, None, NOW)
+    assert find_link(token, NOW) is not None

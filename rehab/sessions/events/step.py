@@ -150,11 +150,6 @@ def _summary(
     """Return what the patient is told of a block of steps: their hits, their mean, their points."""
     valence, mean = context.valence, answer.mean_performance
     band = valence.band(mean)
-    points = None
-    if valence.has_points:
-        points = answer.hits * (valence.hit_points or 0) + answer.misses * (
-            valence.miss_points or 0
-        )
     return {
         "kind": "step",
         "number": step.number,
@@ -165,7 +160,7 @@ def _summary(
         "chart": context.chart_style,
         "emblem": valence.emblem(mean >= 1),
         "confetti": band.confetti,
-        "points": points,
+        "points": answer.points if valence.has_points else None,
         "score": score,
         "streak": streak if valence.rewards else None,
         "shown": None if valence.has_points else round(answer.mean_shown, 2),

@@ -28,7 +28,7 @@ from rehab.training.valences import Valence
 
 
 class WordsForm(forms.Form):
-    """The words of each band of the feedback type in force."""
+    """The words of each band of a feedback type."""
 
     def __init__(self, *args: Any, valence: Valence, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -61,7 +61,10 @@ def edit_words(request: HttpRequest, session_id: int) -> HttpResponse:
     if session.state not in {state.value for state in OPEN_STATES}:
         messages.error(request, gettext("This session has ended: nobody reads its words any more."))
         return redirect("session", session_id=session.pk)
-    form = WordsForm(request.POST or None, valence=SessionAggregate.load(session).fold.valence)
+    valences = SessionAggregate.load(session).fold.valences
+    # The type that the words were typed for; another one may be in force by now.
+    valence = valences.known.get(request.POST.get("valence", ""), valences.current)
+    form = WordsForm(request.POST or None, valence=valence)
     if request.method == "POST" and form.is_valid():
         try:
             change_session(session, ChangeKind.FEEDBACK_TEXT, form.to_change(), user)

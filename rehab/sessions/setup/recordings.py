@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from django.conf import settings
+from django.db import close_old_connections
 from django.utils.text import slugify
 from django.utils.translation import gettext
 
@@ -93,8 +94,10 @@ def check_upload(
 ) -> Checked:
     """Return what the columns of an upload are, compared with those given; store it if asked.
 
-    It is stored in SI units, and only where nothing is wrong. A server checks one file at a time.
+    It is stored in SI units, and only where nothing is wrong. A server checks one file at a time;
+    who waits for that takes no connection to the database from other pages.
     """
+    close_old_connections()
     if not _one_at_a_time.acquire(timeout=WAIT_S):
         return Checked(None, [gettext("Other files are being checked. Try again in a minute.")])
     try:

@@ -119,7 +119,7 @@ class SessionFollower:
             return
         is_new = session != self._queue.session
         side, next_number = _read_side(message), _read(message, "next", int)
-        self._queue.join(_read(message, "session", int), next_number, side)
+        self.lost += self._queue.join(_read(message, "session", int), next_number, side)
         self.goal = _read_goal(message)
         self.unit = str(message.get("unit", ""))
         self._feed.phase = self._read_phase(message)

@@ -112,8 +112,7 @@ class Journal:
                 break
             read += len(line)
         if b"\n" in data[read:].strip(b"\0"):  # more than one torn line
-            aside = self.path.with_name(f"{self.path.name}.damaged")
-            aside.write_bytes(data)
+            aside = self._write_aside("damaged", data)
             self._notify(
                 f"{self.path} is damaged from byte {read} on: what stood there is not sent. The "
                 f"whole file is kept as {aside}; the disk may be failing."
@@ -121,6 +120,23 @@ class Journal:
         if kept.session is not None and kept.unsent_from is None:
             kept.unsent_from = kept.last + 1
         return kept
+
+    def put_aside(self) -> None:
+        """Keep a copy of what is there, for a person: it is not sent."""
+        try:
+            aside = self._write_aside("aside", self.path.read_bytes())
+        except OSError as problem:
+            self._suffer(f"cannot be copied ({problem.strerror})")
+        else:
+            self._notify(
+                "The server has less of the session than it had acknowledged: it seems to run on "
+                f"an older copy of its database. What is not stored is not sent: it is in {aside}."
+            )
+
+    def _write_aside(self, kind: str, data: bytes) -> Path:
+        aside = self.path.with_name(f"{self.path.name}.{kind}")
+        aside.write_bytes(data)
+        return aside
 
     # --- Noting ---
 
@@ -162,6 +178,8 @@ class Journal:
         """Wait until the disk has what was written; called from a thread of its own."""
         with self._lock:
             self._is_dirty = False
+            if self._file < 0:
+                return  # it could not be opened again, which was said
             try:
                 os.fsync(self._file)
             except OSError as problem:
@@ -213,7 +231,8 @@ class Journal:
             os.close(file)
         with self._lock:
             if self._file >= 0:  # Windows replaces no file that is open
-                os.close(self._file)
+                old, self._file = self._file, -1  # what is opened next may get its number
+                os.close(old)
             try:
                 new.replace(self.path)
             finally:

@@ -149,23 +149,33 @@ class StepQueue:
         waiting = self._kept[self._sent] if self._sent < len(self._kept) else None
         return waiting is not None and InvalidReason.PAUSED in waiting.step.get("reasons", ())
 
-    def join(self, session: int, next_number: int, side: str = "") -> None:
+    def join(self, session: int, next_number: int, side: str = "") -> int:
         """Apply a welcome: the session, its trained leg, and the number to go on from.
+
+        Return how many kept steps are dropped.
 
         Steps below ``next_number`` stay kept until an acknowledgment covers them: the server has
         received them, which is not yet stored. The last of them is sent once more, to be
         acknowledged again. Steps that were measured after a restart and before this welcome get
         numbers anew where the server has more than is known here: it had stored what the journal
-        lost with the power. Raises StepsLost where steps are wanted that were acknowledged.
+        lost with the power. Where after a restart it has less than it had acknowledged, all that is
+        kept is put aside: a server that was set back may have given the session's number again, to
+        somebody else's. Raises StepsLost where steps are wanted that were acknowledged since.
         """
         if session != self.session:
             self.leave()
             self.session, self.side = session, side
         unsent_from, self._unsent_from = self._unsent_from, None
+        dropped = 0
+        first = self._kept[0].number if self._kept else self.last + 1
         if unsent_from is not None and unsent_from < next_number:
             self._number_anew(unsent_from, next_number)
+        elif unsent_from is not None and next_number < first:
+            if self._kept and self._journal is not None:
+                self._journal.put_aside()
+            dropped = self.leave()
+            self.session, self.side = session, side
         if self.last:
-            first = self._kept[0].number if self._kept else self.last + 1
             if next_number < first:
                 raise StepsLost(
                     f"The server wants step {next_number} of session {session} and has "
@@ -177,6 +187,7 @@ class StepQueue:
         self._next = max(next_number, self.last + 1)
         if self._journal is not None:
             self._journal.renew(self._all())
+        return dropped
 
     def _number_anew(self, old: int, new: int) -> None:
         """Set the numbers of the steps from ``old`` on to those from ``new`` on."""

@@ -18,7 +18,7 @@ from rehab.training.schedules import Untold
 from rehab.training.steps import Side
 
 # Rises with every change of the fold that an older checkpoint would not fit; such a one is ignored.
-CHECKPOINT_VERSION = 2
+CHECKPOINT_VERSION = 3
 # What is plain data already.
 PLAIN = (
     *("last_number", "last_time_s", "active_s", "goal", "was_walking"),

@@ -40,7 +40,8 @@ class Telling:
         """
         if step.performance is None or step.hit is None or step.shown is None:
             return
-        self.untold.add(step.performance, step.shown, step.hit, step.close)
+        points = step.points or 0
+        self.untold.add(step.performance, step.shown, step.hit, step.close, points)
         if self.schedule.tells(judged, step.performance):
             self.answer, self.untold = self.untold, Untold()
             if not self.schedule.tells_all:

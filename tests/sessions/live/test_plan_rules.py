@@ -199,3 +199,16 @@ async def test_a_summary_tells_hits_mean_and_points_of_its_block(place, begun):
     assert told["words"]
     kinds = [event["kind"] for event in tablet.events if "number" in event]
     assert kinds == ["calm"] * 4 + ["step"]
+
+
+async def test_a_summary_over_a_change_of_type_tells_the_points_that_were_earned(place, begun):
+    session = await begun(place, TRAINING, schedule=Schedule(ScheduleKind.SUMMARY, 4))
+    source, tablet, monitor = place.source(), place.tablet(session), place.monitor(session)
+    await (await source.dial()).hello()
+    await tablet.watch()
+    await monitor.watch()
+    await source.walk(6.0, 6.0)  # one point each
+    await monitor.change("valence_now", "negative")
+    await source.walk(1.5, 6.0)  # one is taken
+    told = await tablet.until_step(4)
+    assert (told["points"], told["score"]) == (1, 1)

@@ -12,11 +12,12 @@ from django.utils import timezone
 from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.sign_in.tokens import hash_token
 from rehab.sessions.live import auth, runtime
+from rehab.sessions.live.consumers import device as device_sockets
 from rehab.sessions.live.consumers.device import DeviceSocket
 from rehab.stations import tokens
 from rehab.stations.models import Device
 from rehab.stations.presence import format_device_state
-from tests.support.callers import RobotCaller, SourceCaller
+from tests.support.callers import RobotCaller, SourceCaller, open_session, turns
 
 find = sync_to_async(tokens.find_device)
 
@@ -69,12 +70,54 @@ async def test_a_token_that_was_stored_and_not_said_back_is_good(place):
     assert await find(place.tokens["source"], timezone.now()) is None
 
 
+@pytest.mark.parametrize("when", ["before it is looked for again", "before it is adopted"])
+def test_who_says_a_token_back_and_connects_by_it_at_once_is_let_in(place, monkeypatch, when):
+    device, now = place.devices["robot"], timezone.now()
+    token = tokens.give_successor(device, now)
+    said_back = Device.everywhere.get(pk=device.pk)
+    name = "find_by_token" if when == "before it is looked for again" else "adopt_successor"
+    do = getattr(tokens, name)
+
+    def do_after_the_other(*given):
+        found = do(*given) if name == "find_by_token" else None
+        monkeypatch.setattr(tokens, name, do)
+        assert tokens.adopt_successor(said_back, token, "", now)
+        return found if name == "find_by_token" else do(*given)
+
+    monkeypatch.setattr(tokens, name, do_after_the_other)
+    found = tokens.find_device(token, now)
+    assert found is not None
+    assert (found.pk, found.token_hash) == (device.pk, hash_token(token))
+    assert AuditEntry.everywhere.filter(act=Act.TOKEN).count() == 1
+
+
 async def test_a_token_that_was_not_stored_leaves_the_old_one_good(place):
     for _ in range(2):
         source = await place.source().dial()
         await source.hello(rotates=True)
         token = (await source.hear("token"))["token"]
         await source.hang_up()
+    assert await find(token, timezone.now()) is not None
+
+
+async def test_a_session_that_opens_meanwhile_brings_no_second_token(place, monkeypatch):
+    """It would make the first one, which the device stores just then, worth nothing."""
+    source = await place.source().dial()
+    give = auth.offer_successor
+
+    async def give_slowly(device, now):
+        (socket,) = runtime.current().devices.at(place.station.pk)
+        monkeypatch.setattr(device_sockets, "offer_successor", give)
+        socket.on_session_opened(session.pk)
+        await turns()
+        return await give(device, now)
+
+    session = await sync_to_async(open_session)(place, at_station=False)
+    monkeypatch.setattr(device_sockets, "offer_successor", give_slowly)
+    await source.hello(rotates=True)
+    token = (await source.hear("token"))["token"]
+    await source.overhear()
+    assert len([m for m in source.heard if m["type"] == "token"]) == 1
     assert await find(token, timezone.now()) is not None
 
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rehab.sources.client import Journal, LiveFeed, SourceClient, StepQueue
+from rehab.sources.client import Journal, LiveFeed, SourceClient, StepQueue, StepsLost
 from rehab.sources.client import journal as journal_module
 from rehab.sources.reporting import SourceError
 from rehab.training.steps import Measurement, Side
@@ -134,6 +134,29 @@ def test_numbers_that_the_server_has_already_are_not_given_twice(tmp_path, ackno
         assert queue.add(stride(17)) == 9
 
 
+def test_a_restart_gets_over_a_server_that_was_set_back(tmp_path):
+    """The number of its session may be another one's now: what is kept is put aside."""
+    path = tmp_path / "journal"
+    with opened(path) as journal:
+        queue = walk(journal, range(1, 8))
+        queue.acknowledge(5)
+        with pytest.raises(StepsLost):
+            queue.join(7, 3)
+    before, said = path.read_bytes(), list[str]()
+    with opened(path, said) as journal:
+        queue = walk(journal, [])
+        assert queue.join(7, 3) == 2
+        assert queue.add(stride(8)) == 3
+    assert (tmp_path / "journal.aside").read_bytes().splitlines()[2:] == [
+        line for line in before.splitlines() if b'"number":6' in line or b'"number":7' in line
+    ]
+    assert "journal.aside" in said[-1]
+    with opened(path) as journal:  # it has heard of the server that it has now
+        queue = walk(journal, [])
+        assert queue.join(7, 3) == 0
+        assert [(kept.number, kept.step["value"]) for kept in queue._kept] == [(3, 0.8)]
+
+
 def test_the_file_stays_small_while_all_is_stored(tmp_path, monkeypatch):
     monkeypatch.setattr(journal_module, "REWRITE_BYTES", 2000)
     path = tmp_path / "journal"
@@ -188,6 +211,31 @@ def test_a_full_disk_is_said_and_tried_again(tmp_path, monkeypatch):
         now[0] += 11.0
         queue.add(stride(10))
         assert values(journal._read()) == [n / 10 for n in range(1, 11)]
+
+
+def test_a_disk_that_is_gone_costs_no_other_file(tmp_path, monkeypatch):
+    """What this program opens next gets the number that the journal's file had."""
+    path, now = tmp_path / "journal", [0.0]
+    with opened(path, monotonic=lambda: now[0]) as journal:
+        queue = walk(journal, [1])
+        open_file = os.open
+        with monkeypatch.context() as gone:
+
+            def open_unless_journal(name, flags, *mode):
+                if name == path:
+                    raise OSError(errno.ENOENT, "No such file or directory")
+                return open_file(name, flags, *mode)
+
+            gone.setattr(os, "open", open_unless_journal)
+            journal.renew(queue._all())
+        assert journal.trouble
+        with (tmp_path / "other").open("wb") as other:
+            journal.sync()
+            now[0] = 11.0
+            queue.add(stride(2))
+            other.write(b"whole")
+        assert values(journal._read()) == [0.1, 0.2]
+    assert (tmp_path / "other").read_bytes() == b"whole"
 
 
 async def test_hours_offline_over_a_restart_end_up_once_in_the_log(tmp_path):

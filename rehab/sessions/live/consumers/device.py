@@ -39,7 +39,7 @@ class DeviceSocket(Socket):
     slot: ClassVar[str]
     device: Device | None = None
     hello_received = False
-    rotates = False  # it can store another token
+    rotates = False  # it can store another token, and none is being given
 
     @property
     def device_id(self) -> int | None:
@@ -70,10 +70,13 @@ class DeviceSocket(Socket):
 
     async def _offer_token(self) -> None:
         """Send the device its next token, if it is time and the device can store one."""
-        if self.rotates and self.device is not None and not self.device.given_hash:
-            token = await offer_successor(self.device, timezone.now())
-            if token is not None:
-                await self.send_message({"type": "token", "token": token})
+        if not self.rotates or self.device is None or self.device.given_hash:
+            return
+        self.rotates = False  # a second one would make the first one useless on its way
+        token = await offer_successor(self.device, timezone.now())
+        self.rotates = True
+        if token is not None:
+            await self.send_message({"type": "token", "token": token})
 
     async def _take_token(self, token: object) -> None:
         device = self._authorize(self.device)
