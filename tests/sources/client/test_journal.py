@@ -5,8 +5,10 @@ import json
 import os
 import re
 import stat
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
+from threading import Event
 
 import pytest
 from hypothesis import given, settings
@@ -188,6 +190,27 @@ def test_a_full_disk_is_said_and_tried_again(tmp_path, monkeypatch):
         now[0] += 11.0
         queue.add(stride(10))
         assert values(journal._read()) == [n / 10 for n in range(1, 11)]
+
+
+def test_no_stride_waits_for_the_disk(tmp_path, monkeypatch):
+    with opened(tmp_path / "journal") as journal, monkeypatch.context() as slow:
+        queue = walk(journal, [1])
+        is_waiting, has_written = Event(), Event()
+
+        def sync(_file):
+            is_waiting.set()
+            assert has_written.wait(5)
+
+        slow.setattr(os, "fsync", sync)
+        with ThreadPoolExecutor() as threads:
+            disk = threads.submit(journal.sync)
+            assert is_waiting.wait(5)
+            stepping = threads.submit(queue.add, stride(2))
+            stepping.result(1)
+            has_written.set()
+            disk.result(5)
+        assert journal.is_dirty  # what came meanwhile is for the next time
+        assert values(journal._read()) == [0.1, 0.2]
 
 
 async def test_hours_offline_over_a_restart_end_up_once_in_the_log(tmp_path):
