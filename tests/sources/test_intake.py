@@ -323,6 +323,26 @@ def test_frame_numbers_of_channels_in_rows_of_their_own(made, table):
     assert harness.said[-1].startswith("Signals of") or "frame" not in " ".join(harness.said)
 
 
+@pytest.mark.parametrize("late", ["force", ""], ids=["the forces", "everything"])
+def test_frame_numbers_stay_with_forces_that_are_put_back(made, table, late):
+    delays = ["" if late not in name else "@0.012" for name in NAMES]
+    pairs = [
+        f"{name.split('_')[0]}.{name.split('_')[1]}={name}{delay}"
+        for name, delay in zip(NAMES, delays, strict=True)
+    ]
+    columns = read_column_map(["time=time_s", "frame=frame", *pairs])
+    harness = IntakeHarness(columns=columns)
+    harness.send([row | {"frame": 70.0 + n} for n, row in enumerate(rows_of(table))])
+    harness.intake.finish()
+    detector = harness.intake._pipeline._detector
+
+    assert detector._clock.problem == ""
+    assert detector._samples.end == len(table)
+    if not late:
+        shown = [m.value for m in harness.strides() if not m.reasons]
+        assert shown == pytest.approx([s.a2_w_kg for s in measure(made) if s.valid], rel=0.01)
+
+
 def test_wrong_frame_numbers_are_told_once(table):
     harness = IntakeHarness()
     harness.send([row | {"frame": 3.0} for row in rows_of(table)])

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from rehab.gait import GyroscopeStride, Stride
-from rehab.gait.recordings.columns import Column
 from rehab.gait.selfcheck.cures import CURES
 from rehab.sources.client import LiveFeed
 from rehab.sources.intake.alignment import FRAME, Alignment, Channel, Floats, Samples
@@ -251,12 +250,14 @@ class Intake:
         for place in known:
             channel, column = self._columns[names[place]]
             values[channel] = table[:, place] * column.factor
-        columns = [self._columns[names[place]][1] for place in known]
-        if frames is not None and self._frame is not None and self._is_counted(stream, values):
+        delays_s = [self._columns[names[place]][1].delay_s for place in known]
+        if frames is not None and frame is not None and self._is_counted(stream, values):
+            force = next(place for place, (_, channel) in enumerate(values) if channel == "force")
+            delays_s.append(delays_s[force])  # they count its samples
+            known.append(list(names).index(frame))
             values[FRAME] = frames
-            known, columns = [*known, list(names).index(self._frame.name)], [*columns, self._frame]
         sent = np.ones((len(t_s), len(known))) if there is None else there[:, known]
-        for samples in self._align(t_s, values, sent, columns):
+        for samples in self._align(t_s, values, sent, delays_s):
             self._measure(*samples)
 
     def _is_counted(self, stream: str, values: Mapping[Channel, Floats]) -> bool:
@@ -266,10 +267,9 @@ class Intake:
         return stream == self._counted
 
     def _align(
-        self, t_s: Floats, values: dict[Channel, Floats], sent: Floats, columns: Sequence[Column]
+        self, t_s: Floats, values: dict[Channel, Floats], sent: Floats, delays_s: Sequence[float]
     ) -> list[Samples]:
         """Return the samples that are complete; a channel that is known to be late is put back."""
-        delays_s = [column.delay_s for column in columns]
         complete: list[Samples] = []
         for delay_s in dict.fromkeys(delays_s):
             own = [place for place, one in enumerate(delays_s) if one == delay_s]
