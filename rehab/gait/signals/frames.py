@@ -57,14 +57,13 @@ def _find_pace(stamps: Floats, frames: Floats) -> float:
 class Newest:
     """The newest sample: its number in a count that never begins anew, and when it was taken.
 
-    ``shift`` is added to numbers as they come, ``lost`` samples were missing until it.
+    ``shift`` is added to numbers as they come.
     """
 
     number: float = -math.inf
     stamp_s: float = -math.inf
     time_s: float = -math.inf
     shift: float = 0.0
-    lost: int = 0
 
 
 def read_frames(frame: ArrayLike | None, count: int) -> Floats:
@@ -253,8 +252,7 @@ class FrameClock:
                 self._note_restart(stamp_s)
         if frame % 1 > 0:
             self._ignore("they are not whole")
-        lost = last.lost + max(0, round((number - last.number) / self._step) - 1)
-        return Newest(number, stamp_s, max(time_s, last.time_s + step_s / 10), shift, lost)
+        return Newest(number, stamp_s, max(time_s, last.time_s + step_s / 10), shift)
 
     def _find_time(self, number: float) -> float:
         return self._base[1] + self._period_s * (number - self._base[0])
