@@ -353,6 +353,20 @@ def test_wrong_frame_numbers_are_told_once(table):
     assert [m for m in harness.strides() if not m.reasons]
 
 
+def test_stamps_of_seconds_since_1970_and_large_counts_are_kept(table, tmp_path):
+    path = tmp_path / "kept.csv"
+    stamps, frames = 1_763_800_000 + table[:, 0], 2.0**32 + np.arange(len(table))
+    rows = rows_of(np.column_stack((stamps, table[:, 1:])))
+    harness = IntakeHarness(keep=path)
+    harness.send([row | {"frame": n} for row, n in zip(rows, frames, strict=True)])
+    harness.intake.finish()
+    harness.intake.close()
+    t_s, _, kept = read_signals(path)
+
+    assert np.abs(t_s - stamps).max() < 1e-5
+    assert (kept == frames).all()
+
+
 def test_frame_numbers_are_kept(table, tmp_path):
     path = tmp_path / "kept.csv"
     harness = IntakeHarness(keep=path)

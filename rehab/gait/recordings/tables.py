@@ -81,8 +81,9 @@ def read_signals(
         raise GaitInputError(
             f"{path.name} has no column {', '.join(missing)}. It has: {', '.join(table)}."
         )
-    empty = [name for name in names if np.isnan(table[name]).all()]
+    frame = columns.frame and columns.frame.name  # which may be empty: then it is ignored
+    empty = [name for name in names if name != frame and np.isnan(table[name]).all()]
     if empty:
         raise GaitInputError(f"{path.name}: column {', '.join(empty)} holds no numbers.")
-    frames = None if columns.frame is None else table[columns.frame.name]
+    frames = None if frame is None else table[frame]
     return (*apply_columns(table, columns), frames)
