@@ -126,6 +126,19 @@ def test_a_column_of_frame_numbers_may_be_empty(walk, tmp_path):
     assert measure_strides(t_s, *legs["left"], rate_hz=RATE, mass_kg=75.0, frame=frames)
 
 
+def test_frame_numbers_are_saved_with_the_signals(walk, tmp_path, capsys):
+    path, saved = tmp_path / "walk.csv", tmp_path / "saved.csv"
+    frames = 2.0**32 + np.arange(len(walk.t_s))
+    columns = [walk.t_s, *walk.left, frames]
+    np.savetxt(path, np.column_stack(columns), "%.15g", ",", header="t,Fz,M,A,Frame", comments="")
+    pairs = ["time=t", "left.force=Fz", "left.moment=M", "left.angle=A"]
+    assert main(["check", str(path), "--mass=75", "--save", str(saved), "--columns", *pairs]) < 2
+
+    assert (read_signals(saved)[2] == frames).all()
+    assert main(["check", str(path), "--save", str(saved), "--columns", *pairs, "frame=n"]) == 2
+    assert "has no column n. It has: t, Fz" in capsys.readouterr().err
+
+
 def test_markers(tmp_path):
     path = tmp_path / "walk.trc"
     lines = [

@@ -336,7 +336,7 @@ def test_frame_numbers_stay_with_forces_that_are_put_back(made, table, late):
     harness.intake.finish()
     detector = harness.intake._pipeline._detector
 
-    assert detector._clock.problem == ""
+    assert detector.frame_problem == ""
     assert detector._samples.end == len(table)
     if not late:
         shown = [m.value for m in harness.strides() if not m.reasons]

@@ -128,7 +128,9 @@ def write_rows(file: TextIO, rows: Floats, counts: Collection[int] = ()) -> None
     np.savetxt(file, rows, [f"%.{most}g" for most in digits], ",")
 
 
-def save_signals(path: Path, time_s: Floats, legs: Mapping[str, LegSamples]) -> None:
+def save_signals(
+    path: Path, time_s: Floats, legs: Mapping[str, LegSamples], frames: Floats | None = None
+) -> None:
     """Write signals in SI units to a new CSV file, in the layout ``garry``.
 
     Raises
@@ -144,11 +146,15 @@ def save_signals(path: Path, time_s: Floats, legs: Mapping[str, LegSamples]) -> 
         for channel, values in zip(CHANNELS, leg, strict=True):
             if values is not None:
                 columns[layout.legs[side][channel].name] = np.asarray(values)
+    counts = set()
+    if layout.frame is not None and frames is not None:
+        counts = {len(columns)}
+        columns[layout.frame.name] = frames
     rows = np.column_stack(list(columns.values()))
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(",".join(columns) + "\n")
-            write_rows(file, rows)
+            write_rows(file, rows, counts)
     except FileExistsError:
         raise GaitInputError(
             f"There is a recording {path.name} already. Choose another name."
