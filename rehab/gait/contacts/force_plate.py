@@ -21,8 +21,8 @@ RELEASE_N = 20.0
 STEP_PEAK = 0.25  # of body weight; a contact that never bears more is no step
 BOUNCE_S = 0.15  # no foot swings faster; a contact sooner than that goes on with the last stance
 # A foot that is dragged over the belt loads its plate by 60 N and more in swing. A contact is
-# certain above that; its ends are timed at the release threshold where the force gets there, else
-# where it leaves the level of the drag.
+# certain above that; its ends are timed at the release threshold where the force gets there and no
+# drag is found, else by slope and dip (`drag`).
 CERTAIN = 0.15  # of body weight
 LOOK_BACK_S = 0.25  # from there to the release threshold, for a foot that is loaded slowly
 DRAG_S, LOOK_EVERY_S = 0.08, 0.02  # after so long of an uncertain contact a drag is looked for
@@ -67,7 +67,7 @@ class ContactFinder:
 
     A contact is certain at 0.15 of the body weight, ``contact_n`` at least; its beginning and
     end are timed where the force crosses ``release_n``, by linear interpolation between samples.
-    Where a dragged foot keeps the force above that, they are timed at ``release_n`` above the drag.
+    Those of a foot that is dragged are told by ``drag.find_edge``.
 
     Parameters
     ----------
