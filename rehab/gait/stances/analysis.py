@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehab.gait.contacts.force_plate import Contact
+from rehab.gait.contacts.contact import Contact
 from rehab.gait.signals.buffer import LegBuffer
 from rehab.gait.signals.filters import (
     Floats,
