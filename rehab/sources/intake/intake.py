@@ -11,7 +11,7 @@ import numpy as np
 from rehab.gait import GyroscopeStride, Stride
 from rehab.gait.selfcheck.cures import CURES
 from rehab.sources.client import LiveFeed
-from rehab.sources.intake.alignment import FRAME, Alignment, Channel, Floats, Samples
+from rehab.sources.intake.alignment import FRAME, Alignment, Channel, Floats
 from rehab.sources.intake.gyroscopes import GyroscopePipeline
 from rehab.sources.intake.measurements import to_measurement, to_timed_measurement
 from rehab.sources.intake.pipeline import SignalPipeline
@@ -22,9 +22,8 @@ from rehab.sources.intake.rows import (
     VALUE,
     BadRow,
     Cell,
-    read_number,
+    read_sample,
     read_stride,
-    read_time,
 )
 from rehab.sources.intake.settings import IntakeSettings
 from rehab.sources.reporting import Notify, SourceError
@@ -194,17 +193,11 @@ class Intake:
         times, cells = [], []
         for row in rows:
             try:
-                if time.name not in row:
-                    raise BadRow(
-                        f"Samples come without {time.name}. Send the device's own time in seconds: "
-                        "when they arrive says too little."
-                    )
-                time_s = read_time(row, time.name) * time.factor
-                numbers = [read_number(row, name) for name in names]
+                time_s, numbers = read_sample(row, time.name, names)
             except BadRow as problem:
                 self.reject_row(str(problem))
                 continue
-            times.append(time_s)
+            times.append(time_s * time.factor)
             cells.append(numbers)
         if cells:
             there = np.array([[cell is not None for cell in row] for row in cells])
@@ -257,7 +250,7 @@ class Intake:
             known.append(list(names).index(frame))
             values[FRAME] = frames
         sent = np.ones((len(t_s), len(known))) if there is None else there[:, known]
-        for samples in self._align(t_s, values, sent, delays_s):
+        for samples in self._alignment.add(t_s, values, sent, delays_s, self._monotonic()):
             self._measure(*samples)
 
     def _is_counted(self, stream: str, values: Mapping[Channel, Floats]) -> bool:
@@ -265,19 +258,6 @@ class Intake:
         if self._counted is None and any(channel == "force" for _, channel in values):
             self._counted = stream
         return stream == self._counted
-
-    def _align(
-        self, t_s: Floats, values: dict[Channel, Floats], sent: Floats, delays_s: Sequence[float]
-    ) -> list[Samples]:
-        """Return the samples that are complete; a channel that is known to be late is put back."""
-        complete: list[Samples] = []
-        for delay_s in dict.fromkeys(delays_s):
-            own = [place for place, one in enumerate(delays_s) if one == delay_s]
-            part = {c: v for p, (c, v) in enumerate(values.items()) if p in own}
-            complete += self._alignment.add(
-                t_s - delay_s if delay_s else t_s, part, sent[:, own], self._monotonic()
-            )
-        return complete
 
     @property
     def forces(self) -> set[str]:
