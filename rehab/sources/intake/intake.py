@@ -71,7 +71,7 @@ class Intake:
             for side, leg in settings.columns.legs.items()
             for channel, column in leg.items()
         }
-        self._frame = settings.columns.frame
+        self._frame = None if settings.columns.frame is None else settings.columns.frame.name
         self._counted: str | None = None  # the stream whose frame numbers are used
         self._rate_hz = settings.rate_hz
         self._gyroscopes = GyroscopePipeline(settings.gyroscopes, settings.rate_hz, notify)
@@ -185,10 +185,8 @@ class Intake:
 
     def _add_samples(self, rows: list[Mapping[str, Cell]]) -> None:
         """Add rows that have the same cells."""
-        frame = None if self._frame is None else self._frame.name
-        names = [
-            n for n in rows[0] if n in self._columns or n in self._gyroscopes.names or n == frame
-        ]
+        used = {*self._columns, *self._gyroscopes.names, self._frame}
+        names = [name for name in rows[0] if name in used]
         time = self._settings.columns.time
         times, cells = [], []
         for row in rows:
@@ -227,11 +225,10 @@ class Intake:
         """
         if not len(t_s):
             return
-        frame = self._frame.name if self._frame is not None and self._frame.name in names else None
-        frames = None if frame is None else table[:, list(names).index(frame)]
+        frame = next((place for place, name in enumerate(names) if name == self._frame), None)
+        frames = None if frame is None else table[:, frame]
         self.quality.count_samples(stream, t_s, frames)
-        problem = self.quality.frame_problem
-        if problem and problem not in self._reported_reasons:
+        if (problem := self.quality.frame_problem) and problem not in self._reported_reasons:
             self._reported_reasons.add(problem)
             self._notify(problem)
         if self._settings.gyroscopes:
@@ -247,7 +244,7 @@ class Intake:
         if frames is not None and frame is not None and self._is_counted(stream, values):
             force = next(place for place, (_, channel) in enumerate(values) if channel == "force")
             delays_s.append(delays_s[force])  # they count its samples
-            known.append(list(names).index(frame))
+            known.append(frame)
             values[FRAME] = frames
         sent = np.ones((len(t_s), len(known))) if there is None else there[:, known]
         for samples in self._alignment.add(t_s, values, sent, delays_s, self._monotonic()):
