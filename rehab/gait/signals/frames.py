@@ -128,6 +128,7 @@ class FrameClock:
         if self._held is not None:
             table, self._held = np.concatenate((self._held, table), axis=1), None
         frames, self._numbers = np.concatenate((self._numbers, frames)), np.empty(0)
+        frames[~np.isfinite(frames)] = np.nan
         if not self._period_s and len(frames) < FIRST_SAMPLES:
             self._held, self._numbers = table, frames
             return table[:, :0], None
