@@ -60,7 +60,7 @@ test-fast: setup ## Run the tests without browser, server, PostgreSQL, real time
 	$(call shared,$(PYTHON),,and not (browser or server or wide))
 
 test-all: export GARRY_TEST_ALL = 1
-test-all: test-main test-postgres test-pure test-clocks ## Run all tests, as CI does
+test-all: test-main test-postgres test-pure test-clocks ## Run all tests, before a merge
 
 test-main: setup
 	$(call run_tests,$(PYTHON))

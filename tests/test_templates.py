@@ -1,5 +1,7 @@
 """A migrated database is kept for later runs, and made anew when the product's code has changed."""
 
+from pathlib import Path
+
 import pytest
 
 from tests.support import templates
@@ -32,3 +34,10 @@ def test_other_code_makes_it_anew(code, file):
     assert templates.read("server") is None
     templates.keep("server", b"new tables")
     assert [kept.read_bytes() for kept in templates.FOLDER.iterdir()] == [b"new tables"]
+
+
+def test_it_never_goes_while_another_worker_reads_it(code, monkeypatch):
+    templates.keep("server", b"tables")
+    monkeypatch.delattr(Path, "unlink")
+    templates.keep("server", b"the same tables")
+    assert templates.read("server") == b"the same tables"

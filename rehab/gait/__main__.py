@@ -23,7 +23,7 @@ from rehab.gait.recordings.columns import CHANNELS, read_column, read_column_map
 from rehab.gait.recordings.csv_files import apply_columns, read_mass, save_signals
 from rehab.gait.recordings.limits import limit_resources
 from rehab.gait.recordings.plot import load_pyplot, plot_strides
-from rehab.gait.recordings.tables import read_any_table, read_signals
+from rehab.gait.recordings.tables import read_any_table, read_signals, require_columns
 from rehab.gait.selfcheck.checks import check_signals
 from rehab.gait.setup.check import check_setup, compare_with_setup
 from rehab.gait.setup.report import describe_setup, setup_to_json
@@ -205,7 +205,11 @@ def _check_file(path: Path, options: argparse.Namespace) -> int:
     for text in wrong:
         print(text, file=sys.stderr)
     if options.save and not wrong:
-        save_signals(options.save, *apply_columns(table, given or check.columns))
+        columns = given or check.columns
+        require_columns(path, table, columns)
+        frame = columns.frame or check.columns.frame
+        frames = None if frame is None else table[frame.name]
+        save_signals(options.save, *apply_columns(table, columns), frames)
     return 2 if wrong else 0 if check.is_certain else 1
 
 

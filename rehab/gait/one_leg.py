@@ -6,7 +6,8 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
-from rehab.gait.contacts.force_plate import Contact, ContactFinder
+from rehab.gait.contacts.contact import Contact
+from rehab.gait.contacts.force_plate import ContactFinder
 from rehab.gait.settings import DetectorSettings
 from rehab.gait.signals.buffer import LegBuffer
 from rehab.gait.signals.filters import find_maximum, find_minimum

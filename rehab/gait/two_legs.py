@@ -9,7 +9,8 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from rehab.gait.contacts.force_plate import STEP_PEAK, Contact
+from rehab.gait.contacts.contact import Contact
+from rehab.gait.contacts.force_plate import STEP_PEAK
 from rehab.gait.detector import Detector
 from rehab.gait.one_leg import LegDetector, OneLegStride, OtherLeg
 from rehab.gait.signals.filters import find_maximum

@@ -73,6 +73,7 @@ def why_not(patient: Patient) -> str:
     """Return why a patient's family sees nothing now; empty where it may."""
     if patient.erased_at is not None or patient.ended_at is not None:
         return str(_("The program has ended: the family sees nothing any more."))
+    # Who has left a study stays hidden until it is closed, as on boards.
     if patient.blinded or patient.enrollments.filter(study__state=RUNNING).exists():
         return str(
             _("In a blinded study there is no family view: points and hits would tell too much.")

@@ -51,7 +51,7 @@ def make_rows(session, first):
 def test_rows(capsys):
     """PostgreSQL's pages and indexes, after VACUUM; a batch of four as COPY writes them."""
     if connection.vendor != "postgresql":
-        pytest.skip("needs GARRY_TEST_DATABASE_URL=postgres://…")
+        pytest.skip("needs GARRY_DATABASE_URL=postgres://…")
     session = build_world("amber").session
     Step.everywhere.bulk_create(make_rows(session, 1000), batch_size=1000)
     with connection.cursor() as cursor:

@@ -19,7 +19,7 @@ from rehab.sessions.live import instruments, runtime
 from rehab.sessions.live.database.trouble import Trouble
 from rehab.sessions.live.process import STOP_S
 from rehab.sources import load_source
-from rehab.sources.__main__ import make_parser as make_source_parser
+from rehab.sources.arguments import make_parser as make_source_parser
 from robot.__main__ import make_parser
 from tests.support.servers import ROOT
 

@@ -5,10 +5,11 @@ import gzip
 import numpy as np
 import pytest
 
-from rehab.gait import GaitInputError
+from rehab.gait import GaitInputError, measure_strides
 from rehab.gait.__main__ import main
 from rehab.gait.recordings.tables import read_any_table, read_signals
 from rehab.gait.setup.check import check_setup
+from rehab.gait.signals.frames import find_frame_problem
 from tests.gait.c3d import write_c3d
 from tests.gait.walks import make_walk
 
@@ -112,6 +113,30 @@ def test_gzipped_csv(walk, tmp_path):
 
     assert time_s == pytest.approx(walk.t_s, abs=1e-6)
     assert legs["left"].moment_nm == pytest.approx(walk.left[1], abs=1e-3)
+
+
+def test_a_column_of_frame_numbers_may_be_empty(walk, tmp_path):
+    path = tmp_path / "walk.csv"
+    names = "time_s,left_force_n,left_moment_nm,left_angle_rad,frame"
+    rows = ["".join(f"{value:.9g}," for value in row) for row in np.array([walk.t_s, *walk.left]).T]
+    path.write_text("\n".join([names, *rows]) + "\n")
+    t_s, legs, frames = read_signals(path)
+
+    assert find_frame_problem(t_s, frames).startswith("The frame numbers are ignored: some are")
+    assert measure_strides(t_s, *legs["left"], rate_hz=RATE, mass_kg=75.0, frame=frames)
+
+
+def test_frame_numbers_are_saved_with_the_signals(walk, tmp_path, capsys):
+    path, saved = tmp_path / "walk.csv", tmp_path / "saved.csv"
+    frames = 2.0**32 + np.arange(len(walk.t_s))
+    columns = [walk.t_s, *walk.left, frames]
+    np.savetxt(path, np.column_stack(columns), "%.15g", ",", header="t,Fz,M,A,Frame", comments="")
+    pairs = ["time=t", "left.force=Fz", "left.moment=M", "left.angle=A"]
+    assert main(["check", str(path), "--mass=75", "--save", str(saved), "--columns", *pairs]) < 2
+
+    assert (read_signals(saved)[2] == frames).all()
+    assert main(["check", str(path), "--save", str(saved), "--columns", *pairs, "frame=n"]) == 2
+    assert "has no column n. It has: t, Fz" in capsys.readouterr().err
 
 
 def test_markers(tmp_path):

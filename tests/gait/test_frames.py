@@ -138,6 +138,7 @@ WRONG = {
     "backwards": (lambda frames: frames[::-1], "run backwards"),
     "seconds": (lambda frames: frames * 0.01, "not whole"),
     "missing": (lambda frames: np.full(len(frames), np.nan), "missing"),
+    "infinite": (lambda frames: np.where(frames % 9, frames, np.inf), "missing"),
     "noise": (lambda frames: np.random.default_rng(0).permutation(frames), "run backwards|count"),
     "a byte": (lambda frames: frames % 256, "began anew 3 times"),
     "not whole later": (lambda frames: frames + 0.5 * (frames > 5500), "not whole"),

@@ -24,6 +24,8 @@ from rehab.people.models import EndReason, ErasureReason, Patient
 from rehab.people.roles import Role
 from rehab.people.sign_in.gate import AddressLimit
 from rehab.sessions.models import TrainingSession
+from rehab.studies.enrolling import withdraw
+from tests.support.studies import enrolled, running_study
 from tests.support.world import NOW, build_world, client_of
 
 pytestmark = pytest.mark.django_db
@@ -109,6 +111,13 @@ def test_the_therapists_forms_come_with_an_origin(agreed):
     assert answer["Referrer-Policy"] == "same-origin"
 
 
+def leave_a_study(world):
+    enrollment = enrolled(running_study(world), world.patient)
+    withdraw(enrollment, None, NOW)
+    world.patient.refresh_from_db()
+    assert not world.patient.blinded
+
+
 ENDS = {
     "the consent is withdrawn": lambda world: withdraw_consent(
         world.patient, Purpose.FAMILY, None, NOW
@@ -144,6 +153,7 @@ def test_a_link_ends_when(agreed, why):
 REFUSED = {
     "nothing was agreed": lambda world: withdraw_consent(world.patient, Purpose.FAMILY, None, NOW),
     "the study is blinded": ENDS["a blinded study begins"],
+    "the study that was left goes on": leave_a_study,
     "the program has ended": ENDS["the program ends"],
     "five are in use": lambda world: [give(world) for _ in range(5)],
     "a study hides the sessions": lambda world: None,

@@ -10,7 +10,7 @@ from pathlib import Path
 from websockets.asyncio.server import serve
 
 from rehab.sources import load_source
-from rehab.sources.__main__ import make_parser
+from rehab.sources.arguments import make_parser
 from rehab.sources.serial_sensor import compute_checksum
 from rehab.training.steps import Measurement
 from tests.sources.fake_lsl import FakeLsl

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+import time
 from collections.abc import Callable
 from copy import deepcopy
 from functools import partial
@@ -13,6 +14,8 @@ from django.db import connection
 from tests.support import clock
 
 Made = TypeVar("Made")
+
+PATIENCE_S = 30.0
 
 
 class Snapshot:
@@ -28,9 +31,15 @@ class Snapshot:
         connection.connection.backup(self._pages)
 
     def restore(self) -> None:
-        """Leave nothing but them."""
+        """Leave nothing but them. Raises TimeoutError while a thread goes on writing."""
         connection.ensure_connection()
-        self._pages.backup(connection.connection)
+        began_s = time.monotonic()
+
+        def wait(status: int, *_: int) -> None:  # else SQLite's driver waits for ever
+            if status != sqlite3.SQLITE_DONE and time.monotonic() - began_s > PATIENCE_S:
+                raise TimeoutError("A thread of a test before is still writing to the database.")
+
+        self._pages.backup(connection.connection, progress=wait)
 
     def file(self) -> bytes:
         """Return the database file that has them."""

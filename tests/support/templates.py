@@ -28,15 +28,21 @@ def _digest() -> str:
 
 def read(name: str) -> bytes | None:
     """Return the file of a kind of database, if it was made since the code has changed."""
-    file = FOLDER / f"{name}-{_digest()}.sqlite3"
-    return file.read_bytes() if file.exists() else None
+    try:
+        return _file(name).read_bytes()
+    except FileNotFoundError:
+        return None
 
 
 def keep(name: str, made: bytes) -> None:
-    """Keep such a file for the runs to come."""
+    """Keep such a file for the runs to come. Other workers may read it, or keep it as well."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    for old in FOLDER.glob(f"{name}-*.sqlite3"):
-        old.unlink(missing_ok=True)
-    beside = FOLDER / f"{name}-{os.getpid()}.new"  # another process may keep one as well
+    beside = FOLDER / f"{name}-{os.getpid()}.new"
     beside.write_bytes(made)
-    beside.replace(FOLDER / f"{name}-{_digest()}.sqlite3")
+    beside.replace(_file(name))
+    for old in set(FOLDER.glob(f"{name}-*.sqlite3")) - {_file(name)}:
+        old.unlink(missing_ok=True)
+
+
+def _file(name: str) -> Path:
+    return FOLDER / f"{name}-{_digest()}.sqlite3"

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 
+from rehab.gait.contacts.contact import Contact
 from rehab.gait.contacts.drag import QUIET_S, REST_N, average, find_edge
 from rehab.gait.contacts.zero import PlateZero, find_finite_median
 from rehab.gait.signals.buffer import LegBuffer
-from rehab.gait.signals.filters import Floats, find_maximum, find_minimum
+from rehab.gait.signals.filters import Floats, find_finite_maximum, find_minimum
 from rehab.gait.signals.samples import FORCE, TIME
 
 # Force is not filtered here: 20 Hz of causal filter would move both events by 10 ms
@@ -21,8 +21,8 @@ RELEASE_N = 20.0
 STEP_PEAK = 0.25  # of body weight; a contact that never bears more is no step
 BOUNCE_S = 0.15  # no foot swings faster; a contact sooner than that goes on with the last stance
 # A foot that is dragged over the belt loads its plate by 60 N and more in swing. A contact is
-# certain above that; its ends are timed at the release threshold where the force gets there, else
-# where it leaves the level of the drag.
+# certain above that; its ends are timed at the release threshold where the force gets there and no
+# drag is found, else by slope and dip (`drag`).
 CERTAIN = 0.15  # of body weight
 LOOK_BACK_S = 0.25  # from there to the release threshold, for a foot that is loaded slowly
 DRAG_S, LOOK_EVERY_S = 0.08, 0.02  # after so long of an uncertain contact a drag is looked for
@@ -31,43 +31,12 @@ BLOCK_S = 0.1
 AROUND_S = 0.015  # around both ends of a swing, where a plate bears least if the foot is dragged
 
 
-@dataclass(slots=True, eq=False)
-class Contact:
-    """One contact of a foot with its plate. Indices count samples since the start.
-
-    Attributes
-    ----------
-    begin_index, begin_s, end_index, end_s
-        When the foot met and left the floor; None until it left.
-    offset_n
-        What the plate read in the swing before [N].
-    is_onset_seen
-        Whether its beginning was observed (not so at the start of the record or after a loss).
-    is_bounce
-        Whether it only continues the stance before it.
-    peak_n
-        Largest force above the offset [N], once the contact has ended.
-    known_index
-        The sample at which it was known that the contact has ended.
-    """
-
-    begin_index: int
-    begin_s: float
-    offset_n: float
-    is_onset_seen: bool
-    is_bounce: bool
-    end_index: int | None = None
-    end_s: float | None = None
-    peak_n: float = 0.0
-    known_index: int | None = None
-
-
 class ContactFinder:
     """Finds contacts by hysteresis and tracks the plate's zero in swing.
 
     A contact is certain at 0.15 of the body weight, ``contact_n`` at least; its beginning and
     end are timed where the force crosses ``release_n``, by linear interpolation between samples.
-    Where a dragged foot keeps the force above that, they are timed at ``release_n`` above the drag.
+    Those of a foot that is dragged are told by ``drag.find_edge``.
 
     Parameters
     ----------
@@ -218,7 +187,7 @@ class ContactFinder:
 
     def _find_crossing(self, index: int) -> tuple[int, float]:
         """Return a sample, and when the force crossed the release threshold before it [s]."""
-        return index, self._interpolate_crossing(index, self.offset_n + self._release_n)
+        return index, self._buffer.find_crossing(FORCE, index, self.offset_n + self._release_n)
 
     def truncate(self) -> Contact | None:
         """Return the step under way, as if it ended with the last sample, if there is one."""
@@ -276,17 +245,10 @@ class ContactFinder:
     def _is_step(self, contact: Contact, stop: int) -> bool:
         """Find the peak of a contact until ``stop``; return whether it is that of a step."""
         begin = max(contact.begin_index, stop - self._buffer.samples.keep // 2)
-        contact.peak_n = _find_peak(self._buffer.channel(FORCE, begin, stop)) - contact.offset_n
+        contact.peak_n = (
+            find_finite_maximum(self._buffer.channel(FORCE, begin, stop)) - contact.offset_n
+        )
         return contact.peak_n >= STEP_PEAK * self._weight_n
-
-    def _interpolate_crossing(self, index: int, level: float) -> float:
-        """Return when the force crossed a level between samples ``index - 1`` and ``index`` [s]."""
-        if index == 0:
-            return float(self._buffer.channel(TIME, index, index + 1)[0])
-        (t0, t1), (f0, f1) = self._buffer.view(index - 1, index + 1)[:2].tolist()
-        share = (level - f0) / (f1 - f0) if f1 != f0 else 1.0
-        crossed: float = t0 + share * (t1 - t0) if 0 <= share <= 1 else t1  # t1 beside NaN
-        return crossed
 
     def _learn_zero(self, index: int) -> None:
         """Learn the plate's zero from the swing that ends at ``index``."""
@@ -329,12 +291,3 @@ class ContactFinder:
             self._current.end_index = self._current.known_index = index
         self._current = self._low_index = None
         self._last = None
-
-
-def _find_peak(force: Floats) -> float:
-    """Return the largest finite value, 0 without one."""
-    peak = find_maximum(force) if len(force) else 0.0
-    if math.isfinite(peak):
-        return peak
-    finite = force[np.isfinite(force)]
-    return float(finite.max()) if len(finite) else 0.0

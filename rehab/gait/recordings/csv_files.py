@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import gzip
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -119,7 +119,18 @@ def apply_columns(
     }
 
 
-def save_signals(path: Path, time_s: Floats, legs: Mapping[str, LegSamples]) -> None:
+def write_rows(file: TextIO, rows: Floats, counts: Collection[int] = ()) -> None:
+    """Write samples, shape (n, columns), the first of which is their time.
+
+    Times and ``counts`` have all digits: stamps may be of seconds since 1970, counts of 32 bits.
+    """
+    digits = (15 if place == 0 or place in counts else 9 for place in range(rows.shape[1]))
+    np.savetxt(file, rows, [f"%.{most}g" for most in digits], ",")
+
+
+def save_signals(
+    path: Path, time_s: Floats, legs: Mapping[str, LegSamples], frames: Floats | None = None
+) -> None:
     """Write signals in SI units to a new CSV file, in the layout ``garry``.
 
     Raises
@@ -135,10 +146,15 @@ def save_signals(path: Path, time_s: Floats, legs: Mapping[str, LegSamples]) -> 
         for channel, values in zip(CHANNELS, leg, strict=True):
             if values is not None:
                 columns[layout.legs[side][channel].name] = np.asarray(values)
+    counts = set()
+    if layout.frame is not None and frames is not None:
+        counts = {len(columns)}
+        columns[layout.frame.name] = frames
     rows = np.column_stack(list(columns.values()))
     try:
         with path.open("x", encoding="utf-8") as file:
-            np.savetxt(file, rows, "%.9g", ",", header=",".join(columns), comments="")
+            file.write(",".join(columns) + "\n")
+            write_rows(file, rows, counts)
     except FileExistsError:
         raise GaitInputError(
             f"There is a recording {path.name} already. Choose another name."

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from rehab.gait.recordings import c3d_files, csv_files, motion_files
-from rehab.gait.recordings.columns import find_layout, read_column_map
+from rehab.gait.recordings.columns import ColumnMap, find_layout, read_column_map
 from rehab.gait.recordings.csv_files import apply_columns
 from rehab.gait.signals.filters import Floats
 from rehab.gait.signals.samples import LegSamples
@@ -75,14 +75,20 @@ def read_signals(
     """
     table = read_any_table(path)
     columns = read_column_map(pairs) if pairs else find_layout(list(table))
+    require_columns(path, table, columns)
     names = [column.name for column in columns.columns]
-    missing = [name for name in names if name not in table]
+    frame = None if columns.frame is None else columns.frame.name  # an empty one is ignored
+    empty = [name for name in names if name != frame and np.isnan(table[name]).all()]
+    if empty:
+        raise GaitInputError(f"{path.name}: column {', '.join(empty)} holds no numbers.")
+    frames = None if frame is None else table[frame]
+    return (*apply_columns(table, columns), frames)
+
+
+def require_columns(path: Path, table: Mapping[str, Floats], columns: ColumnMap) -> None:
+    """Raise GaitInputError, with the cure, where a file's table lacks a column of a map."""
+    missing = [column.name for column in columns.columns if column.name not in table]
     if missing:
         raise GaitInputError(
             f"{path.name} has no column {', '.join(missing)}. It has: {', '.join(table)}."
         )
-    empty = [name for name in names if np.isnan(table[name]).all()]
-    if empty:
-        raise GaitInputError(f"{path.name}: column {', '.join(empty)} holds no numbers.")
-    frames = None if columns.frame is None else table[columns.frame.name]
-    return (*apply_columns(table, columns), frames)

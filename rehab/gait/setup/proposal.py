@@ -10,6 +10,7 @@ import numpy as np
 
 from rehab.gait.one_leg import GRAVITY_M_S2
 from rehab.gait.settings import MASS_MAX_KG, MASS_MIN_KG, RATE_MAX_HZ, RATE_MIN_HZ
+from rehab.gait.setup.guess import Guess
 from rehab.gait.setup.shapes import SHAPES, find_likeness, make_profile
 from rehab.gait.setup.sides import name_sides
 from rehab.gait.setup.units import (
@@ -35,34 +36,6 @@ CERTAIN_LIKE, CERTAIN_LEAD = 0.88, 0.05  # and by how much it leads the next sha
 SWING = (0.15, 0.7)  # of the time a plate is unloaded, in walking
 # Of each channel, the shapes that a column may have instead.
 RIVALS = {"moment": ("force", "forward", "knee angle"), "angle": ("knee angle", "hip angle")}
-
-
-@dataclass(frozen=True, slots=True)
-class Guess:
-    """What a column is thought to be.
-
-    Attributes
-    ----------
-    column, side, channel
-        Its name; and what it is.
-    factor, unit
-        What its numbers are multiplied with to SI units and our signs, and their unit.
-    likeness
-        Correlation with the channel's shape.
-    is_certain
-        Whether nothing else is nearly as likely.
-    doubt
-        What speaks against it, else empty.
-    """
-
-    column: str
-    side: str
-    channel: str
-    factor: float
-    unit: str
-    likeness: float
-    is_certain: bool
-    doubt: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from typing import Any
 
 from rehab.gait.recordings.columns import Column
 from rehab.gait.setup.check import SetupCheck
-from rehab.gait.setup.proposal import Guess
+from rehab.gait.setup.guess import Guess
 
 
 def describe_setup(check: SetupCheck) -> list[str]:

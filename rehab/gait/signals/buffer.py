@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rehab.gait.signals.filters import Floats
-from rehab.gait.signals.samples import Layout
+from rehab.gait.signals.samples import TIME, Layout
 
 
 class SampleBuffer:
@@ -85,3 +85,13 @@ class LegBuffer:
         """Return samples ``start:stop`` of one channel, shape (samples,), without copying."""
         first = self.samples.first
         return self._rows[row][start - first : stop - first]
+
+    def find_crossing(self, row: int, index: int, level: float) -> float:
+        """Return when a channel crossed a level between samples ``index - 1`` and ``index`` [s]."""
+        if index == 0:
+            return self.channel(TIME, 0, 1).item()
+        t0, t1 = self.channel(TIME, index - 1, index + 1).tolist()
+        v0, v1 = self.channel(row, index - 1, index + 1).tolist()
+        share = (level - v0) / (v1 - v0) if v1 != v0 else 1.0
+        crossed: float = t0 + share * (t1 - t0) if 0 <= share <= 1 else t1  # t1 beside NaN
+        return crossed

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
@@ -121,6 +123,15 @@ def interpolate_peak(values: Floats, index: int) -> tuple[float, float]:
 def find_maximum(values: Floats) -> float:
     """Return the largest value, NaN if there is a NaN."""
     return values.item(values.argmax())
+
+
+def find_finite_maximum(values: Floats) -> float:
+    """Return the largest finite value, 0 without one."""
+    largest = find_maximum(values) if len(values) else 0.0
+    if math.isfinite(largest):
+        return largest
+    finite = values[np.isfinite(values)]
+    return find_maximum(finite) if len(finite) else 0.0
 
 
 def find_minimum(values: Floats) -> float:

@@ -57,14 +57,13 @@ def _find_pace(stamps: Floats, frames: Floats) -> float:
 class Newest:
     """The newest sample: its number in a count that never begins anew, and when it was taken.
 
-    ``shift`` is added to numbers as they come, ``lost`` samples were missing until it.
+    ``shift`` is added to numbers as they come.
     """
 
     number: float = -math.inf
     stamp_s: float = -math.inf
     time_s: float = -math.inf
     shift: float = 0.0
-    lost: int = 0
 
 
 def read_frames(frame: ArrayLike | None, count: int) -> Floats:
@@ -129,6 +128,7 @@ class FrameClock:
         if self._held is not None:
             table, self._held = np.concatenate((self._held, table), axis=1), None
         frames, self._numbers = np.concatenate((self._numbers, frames)), np.empty(0)
+        frames[~np.isfinite(frames)] = np.nan
         if not self._period_s and len(frames) < FIRST_SAMPLES:
             self._held, self._numbers = table, frames
             return table[:, :0], None
@@ -253,8 +253,7 @@ class FrameClock:
                 self._note_restart(stamp_s)
         if frame % 1 > 0:
             self._ignore("they are not whole")
-        lost = last.lost + max(0, round((number - last.number) / self._step) - 1)
-        return Newest(number, stamp_s, max(time_s, last.time_s + step_s / 10), shift, lost)
+        return Newest(number, stamp_s, max(time_s, last.time_s + step_s / 10), shift)
 
     def _find_time(self, number: float) -> float:
         return self._base[1] + self._period_s * (number - self._base[0])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehab.gait.contacts.force_plate import Contact
+from rehab.gait.contacts.contact import Contact
 from rehab.gait.signals.buffer import LegBuffer
 from rehab.gait.signals.filters import (
     Floats,
@@ -247,9 +247,9 @@ class StanceAnalyzer:
         return reasons
 
     def _find_window(self, begin: int, stop: int) -> tuple[Floats, Floats, int]:
-        """Return the samples from swing to ``stop``, the steps of their times, and how many are
+        """Return the samples from swing to ``stop``, their steps of time, and how many come before.
 
-        before the stance: as many as follow each other closely enough to be used.
+        Before the stance come as many as follow each other closely enough to be used.
         """
         before = min(self._before, begin)
         window = self._buffer.view(begin - before, stop)

@@ -57,7 +57,9 @@ class Journal:
         self._notify, self._monotonic = notify, monotonic
         self.trouble = ""  # why the latest strides are in memory only
         self._retry_s = 0.0
-        self._lock = Lock()  # the file is changed for another while a thread waits for the disk
+        # Of the file, which is not changed for another while a thread waits for the disk; lines are
+        # written meanwhile.
+        self._lock = Lock()
         self._file = -1
         self._size = self._needed = 0
         self._is_dirty = False
@@ -156,8 +158,7 @@ class Journal:
             self.renew(keep())
             return
         try:
-            with self._lock:
-                self._write(line)
+            self._write(line)
         except OSError as problem:
             self._suffer(f"cannot be written ({problem.strerror})")
 

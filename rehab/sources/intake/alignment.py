@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,12 @@ class Alignment:
         self._collected_s = -np.inf
 
     def add(
-        self, t_s: Floats, values: Mapping[Channel, Floats], there: Floats, now_s: float
+        self,
+        t_s: Floats,
+        values: Mapping[Channel, Floats],
+        there: Floats,
+        delays_s: Sequence[float],
+        now_s: float,
     ) -> list[Samples]:
         """Add rows and return the samples that are complete by now.
 
@@ -47,9 +52,21 @@ class Alignment:
             Of each channel, shape (n,).
         there
             Whether each cell was sent at all, shape (n, channels), in the order of ``values``.
+        delays_s
+            By how much each channel is late, in the order of ``values``: it is put back [s].
         now_s
             Our clock [s].
         """
+        complete: list[Samples] = []
+        for delay_s in dict.fromkeys(delays_s):
+            own = [place for place, one in enumerate(delays_s) if one == delay_s]
+            part = {c: v for p, (c, v) in enumerate(values.items()) if p in own}
+            complete += self._add(t_s - delay_s if delay_s else t_s, part, there[:, own], now_s)
+        return complete
+
+    def _add(
+        self, t_s: Floats, values: Mapping[Channel, Floats], there: Floats, now_s: float
+    ) -> list[Samples]:
         if not self._tracks and there.all() and _is_whole(values):
             return [(t_s, dict(values))]
         for place, (channel, column) in enumerate(values.items()):

@@ -9,10 +9,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from rehab.gait import GyroscopeStride, Stride
-from rehab.gait.recordings.columns import Column
 from rehab.gait.selfcheck.cures import CURES
 from rehab.sources.client import LiveFeed
-from rehab.sources.intake.alignment import FRAME, Alignment, Channel, Floats, Samples
+from rehab.sources.intake.alignment import FRAME, Alignment, Channel, Floats
 from rehab.sources.intake.gyroscopes import GyroscopePipeline
 from rehab.sources.intake.measurements import to_measurement, to_timed_measurement
 from rehab.sources.intake.pipeline import SignalPipeline
@@ -23,9 +22,8 @@ from rehab.sources.intake.rows import (
     VALUE,
     BadRow,
     Cell,
-    read_number,
+    read_sample,
     read_stride,
-    read_time,
 )
 from rehab.sources.intake.settings import IntakeSettings
 from rehab.sources.reporting import Notify, SourceError
@@ -73,7 +71,7 @@ class Intake:
             for side, leg in settings.columns.legs.items()
             for channel, column in leg.items()
         }
-        self._frame = settings.columns.frame
+        self._frame = None if settings.columns.frame is None else settings.columns.frame.name
         self._counted: str | None = None  # the stream whose frame numbers are used
         self._rate_hz = settings.rate_hz
         self._gyroscopes = GyroscopePipeline(settings.gyroscopes, settings.rate_hz, notify)
@@ -187,25 +185,17 @@ class Intake:
 
     def _add_samples(self, rows: list[Mapping[str, Cell]]) -> None:
         """Add rows that have the same cells."""
-        frame = None if self._frame is None else self._frame.name
-        names = [
-            n for n in rows[0] if n in self._columns or n in self._gyroscopes.names or n == frame
-        ]
+        used = {*self._columns, *self._gyroscopes.names, self._frame}
+        names = [name for name in rows[0] if name in used]
         time = self._settings.columns.time
         times, cells = [], []
         for row in rows:
             try:
-                if time.name not in row:
-                    raise BadRow(
-                        f"Samples come without {time.name}. Send the device's own time in seconds: "
-                        "when they arrive says too little."
-                    )
-                time_s = read_time(row, time.name) * time.factor
-                numbers = [read_number(row, name) for name in names]
+                time_s, numbers = read_sample(row, time.name, names)
             except BadRow as problem:
                 self.reject_row(str(problem))
                 continue
-            times.append(time_s)
+            times.append(time_s * time.factor)
             cells.append(numbers)
         if cells:
             there = np.array([[cell is not None for cell in row] for row in cells])
@@ -235,11 +225,10 @@ class Intake:
         """
         if not len(t_s):
             return
-        frame = self._frame.name if self._frame is not None and self._frame.name in names else None
-        frames = None if frame is None else table[:, list(names).index(frame)]
+        frame = next((place for place, name in enumerate(names) if name == self._frame), None)
+        frames = None if frame is None else table[:, frame]
         self.quality.count_samples(stream, t_s, frames)
-        problem = self.quality.frame_problem
-        if problem and problem not in self._reported_reasons:
+        if (problem := self.quality.frame_problem) and problem not in self._reported_reasons:
             self._reported_reasons.add(problem)
             self._notify(problem)
         if self._settings.gyroscopes:
@@ -251,12 +240,14 @@ class Intake:
         for place in known:
             channel, column = self._columns[names[place]]
             values[channel] = table[:, place] * column.factor
-        columns = [self._columns[names[place]][1] for place in known]
-        if frames is not None and self._frame is not None and self._is_counted(stream, values):
+        delays_s = [self._columns[names[place]][1].delay_s for place in known]
+        if frames is not None and frame is not None and self._is_counted(stream, values):
+            force = next(place for place, (_, channel) in enumerate(values) if channel == "force")
+            delays_s.append(delays_s[force])  # they count its samples
+            known.append(frame)
             values[FRAME] = frames
-            known, columns = [*known, list(names).index(self._frame.name)], [*columns, self._frame]
         sent = np.ones((len(t_s), len(known))) if there is None else there[:, known]
-        for samples in self._align(t_s, values, sent, columns):
+        for samples in self._alignment.add(t_s, values, sent, delays_s, self._monotonic()):
             self._measure(*samples)
 
     def _is_counted(self, stream: str, values: Mapping[Channel, Floats]) -> bool:
@@ -264,20 +255,6 @@ class Intake:
         if self._counted is None and any(channel == "force" for _, channel in values):
             self._counted = stream
         return stream == self._counted
-
-    def _align(
-        self, t_s: Floats, values: dict[Channel, Floats], sent: Floats, columns: Sequence[Column]
-    ) -> list[Samples]:
-        """Return the samples that are complete; a channel that is known to be late is put back."""
-        delays_s = [column.delay_s for column in columns]
-        complete: list[Samples] = []
-        for delay_s in dict.fromkeys(delays_s):
-            own = [place for place, one in enumerate(delays_s) if one == delay_s]
-            part = {c: v for p, (c, v) in enumerate(values.items()) if p in own}
-            complete += self._alignment.add(
-                t_s - delay_s if delay_s else t_s, part, sent[:, own], self._monotonic()
-            )
-        return complete
 
     @property
     def forces(self) -> set[str]:

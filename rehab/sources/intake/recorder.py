@@ -8,6 +8,7 @@ from typing import TextIO
 import numpy as np
 
 from rehab.gait.recordings.columns import SIGNAL_LAYOUTS
+from rehab.gait.recordings.csv_files import write_rows
 from rehab.sources.intake.alignment import FRAME, Channel, Floats
 from rehab.sources.reporting import Notify, SourceError
 
@@ -47,7 +48,8 @@ class SignalRecorder:
                 ]
                 self._file.write(",".join(["time_s", *names]) + "\n")
             columns = [t_s, *(values.get(channel, nothing) for channel in self._channels)]
-            np.savetxt(self._file, np.column_stack(columns), "%.9g", ",")
+            counts = {1 + place for place, one in enumerate(self._channels) if one == FRAME}
+            write_rows(self._file, np.column_stack(columns), counts)
             self._file.flush()
         except OSError as problem:
             self._notify(f"{self.path} ends here: {problem.strerror}. The session goes on without.")

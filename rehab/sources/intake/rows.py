@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from rehab.training.steps import InvalidReason, Measurement, Side
 from robot.wire.frames import NAME
@@ -40,6 +40,18 @@ def read_time(cells: Mapping[str, Cell], name: str) -> float:
             "seconds. Send the device's own clock, in seconds."
         )
     return time_s
+
+
+def read_sample(
+    cells: Mapping[str, Cell], time: str, names: Sequence[str]
+) -> tuple[float, list[float | None]]:
+    """Return a sample's time, and the cells of these names. Raises BadRow."""
+    if time not in cells:
+        raise BadRow(
+            f"Samples come without {time}. Send the device's own time in seconds: when they arrive "
+            "says too little."
+        )
+    return read_time(cells, time), [read_number(cells, name) for name in names]
 
 
 def read_stride(

@@ -5,8 +5,10 @@ import json
 import os
 import re
 import stat
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
+from threading import Event
 
 import pytest
 from hypothesis import given, settings
@@ -236,6 +238,27 @@ def test_a_disk_that_is_gone_costs_no_other_file(tmp_path, monkeypatch):
             other.write(b"whole")
         assert values(journal._read()) == [0.1, 0.2]
     assert (tmp_path / "other").read_bytes() == b"whole"
+
+
+def test_no_stride_waits_for_the_disk(tmp_path, monkeypatch):
+    with opened(tmp_path / "journal") as journal, monkeypatch.context() as slow:
+        queue = walk(journal, [1])
+        is_waiting, has_written = Event(), Event()
+
+        def sync(_file):
+            is_waiting.set()
+            assert has_written.wait(5)
+
+        slow.setattr(os, "fsync", sync)
+        with ThreadPoolExecutor() as threads:
+            disk = threads.submit(journal.sync)
+            assert is_waiting.wait(5)
+            stepping = threads.submit(queue.add, stride(2))
+            stepping.result(1)
+            has_written.set()
+            disk.result(5)
+        assert journal.is_dirty  # what came meanwhile is for the next time
+        assert values(journal._read()) == [0.1, 0.2]
 
 
 async def test_hours_offline_over_a_restart_end_up_once_in_the_log(tmp_path):
