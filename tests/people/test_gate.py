@@ -12,7 +12,15 @@ from django.test import RequestFactory
 from rehab.people.models import User
 from rehab.people.roles import Role
 from rehab.people.sign_in import hashing, lockout
-from rehab.people.sign_in.gate import AT_ONCE, BURST, INTERVAL_S, MAX_WAITING, SignInGate
+from rehab.people.sign_in.gate import (
+    ALL_BURST,
+    ALL_INTERVAL_S,
+    AT_ONCE,
+    BURST,
+    INTERVAL_S,
+    MAX_WAITING,
+    SignInGate,
+)
 from rehab.people.sign_in.hashing import HashingBusy, HashingPool
 
 
@@ -79,6 +87,20 @@ async def test_after_a_burst_an_address_comes_in_at_the_pace_of_people():
     caller.now_s += BURST * INTERVAL_S
     assert [(await caller.call())[0] for _ in range(BURST + 1)] == [200] * BURST + [429]
     assert site.entered == 2 * BURST + 2
+
+
+async def test_a_flood_from_many_addresses_comes_in_at_a_pace_that_training_bears():
+    caller = Caller(site := Site())
+    answers = [(await caller.call(f"192.0.2.{number}"))[0] for number in range(2 * ALL_BURST)]
+    assert answers == [200] * ALL_BURST + [429] * ALL_BURST
+    for _ in range(3):
+        caller.now_s += ALL_INTERVAL_S
+        assert [(await caller.call(f"198.51.100.{n}"))[0] for n in range(2)] == [200, 429]
+    caller.now_s += ALL_BURST * ALL_INTERVAL_S
+    for _ in range(2 * BURST):
+        await caller.call("203.0.113.1")  # who is refused alone takes no other's place
+    assert (await caller.call("203.0.113.2"))[0] == 200
+    assert site.entered == ALL_BURST + 3 + BURST + 1
 
 
 async def test_only_attempts_to_sign_in_are_counted():
