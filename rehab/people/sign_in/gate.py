@@ -27,8 +27,6 @@ MAX_ADDRESSES = 10_000
 ALL_BURST = 40  # attempts at once from all addresses
 ALL_INTERVAL_S = 0.25  # between further ones
 AT_ONCE = 1  # inside Django: several held up each other and the steps (docs/performance.md)
-    1  # inside Django: several held each other and the steps up for 0.7 s (docs/performance.md)
-)
 MAX_WAITING = 19
 
 
