@@ -45,7 +45,8 @@ class SessionRequest:
     ``phases``: those of the protocol unless given. ``measure``: A2 unless given.
     ``trained_side``: the patient's paretic side unless given. ``cue``: that of the feedback type
     unless given. ``source_args``: arguments of `python -m rehab.sources` for a source that the
-    server runs beside the session.
+    server runs beside the session. ``may_change_type``: whether the feedback type can be another
+    one along the way.
     """
 
     patient: Patient
@@ -68,6 +69,7 @@ class SessionRequest:
     simulated: bool = False
     source_args: Sequence[str] = ()
     walking: WalkingConditions = field(default_factory=WalkingConditions)
+    may_change_type: bool = True
 
 
 def check_station_is_free(station: Station) -> None:
@@ -151,7 +153,7 @@ def _make_plan(request: SessionRequest, measure: Measure) -> SessionPlan:
     valence = default if request.cue is None else replace(default, cue=request.cue)
     gestures = {gesture["name"]: gesture for gesture in composed_gestures(patient, valence.cue)}
     alternatives: list[Valence] = []
-    for other in others.values():
+    for other in others.values() if request.may_change_type else ():
         cue = silence_cue(other.cue, default.cue, valence.cue)
         try:
             gestures |= {gesture["name"]: gesture for gesture in composed_gestures(patient, cue)}

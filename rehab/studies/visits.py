@@ -92,6 +92,7 @@ def start_session(
                 simulated=place.simulated,
                 source_args=place.source_args,
                 walking=place.walking,
+                may_change_type=False,  # it is what the arm was allocated for
             )
         )
         visit.save()

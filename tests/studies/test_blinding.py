@@ -31,6 +31,8 @@ from rehab.studies.enrolling import enroll, withdraw
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
 from rehab.studies.registration import close
 from rehab.studies.visits import Place, next_visit, start_session
+from rehab.training.changes import Change, ChangeKind
+from rehab.training.fold import SessionFold
 from rehab.training.goals import GoalRule
 from rehab.training.measures import InvalidSetting
 from tests.support.studies import enrolled, new_patient, running_study
@@ -134,6 +136,15 @@ def test_a_session_of_the_study_is_the_arms(world):
     assert [phase["gain"] for phase in second["phases"]] == [1.0, 1.0, 1.0]
     assert (first["robot_intensity"], second["robot_intensity"]) == (0.0, 1.0)
     assert first["goal"] == {"value": None, "percent_of_baseline": 100, "asks": False}
+
+
+@pytest.mark.parametrize("kind", [ChangeKind.VALENCE, ChangeKind.VALENCE_NOW])
+def test_a_sessions_type_stays_that_of_its_arm(world, kind):
+    study = running_study(world, "positive", "negative")
+    session = start_session(enrolled(study, new_patient(world)), Place(), None, NOW)
+    other = "negative" if session.valence == "positive" else "positive"
+    with pytest.raises(InvalidSetting, match="can be changed to one of"):
+        SessionFold(session.to_plan()).change(Change(kind, other))
 
 
 def test_each_visit_is_walked_once_and_again_after_a_session_that_was_broken_off(world):
