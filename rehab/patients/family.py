@@ -19,7 +19,7 @@ from rehab.people.audit.audit_log import Act, build_entry, record, record_counte
 from rehab.people.consent.models import Purpose
 from rehab.people.consent.services import active_consents, consent_withdrawn
 from rehab.people.models import Clinic, Patient, User
-from rehab.people.models.blinding import RUNNING, hidden_patients
+from rehab.people.models.blinding import hidden_patients, is_in_running_study
 from rehab.people.scope import ClinicModel, Scope
 from rehab.people.sign_in.tokens import TOKEN_BYTES, hash_token
 
@@ -73,8 +73,7 @@ def why_not(patient: Patient) -> str:
     """Return why a patient's family sees nothing now; empty where it may."""
     if patient.erased_at is not None or patient.ended_at is not None:
         return str(_("The program has ended: the family sees nothing any more."))
-    # Who has left a study stays hidden until it is closed, as on boards.
-    if patient.blinded or patient.enrollments.filter(study__state=RUNNING).exists():
+    if patient.blinded or is_in_running_study(patient):
         return str(
             _("In a blinded study there is no family view: points and hits would tell too much.")
         )

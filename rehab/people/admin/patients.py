@@ -16,7 +16,7 @@ from django.utils.translation import gettext_lazy as _
 
 from rehab.people.aliases import format_alias
 from rehab.people.models import Patient
-from rehab.people.models.blinding import RUNNING
+from rehab.people.models.blinding import is_in_running_study
 from rehab.people.web.admin_base import ScopedAdmin
 
 
@@ -70,7 +70,7 @@ class PatientAdmin(ScopedAdmin):
     def get_readonly_fields(self, request: HttpRequest, obj: Any = None) -> Any:
         """Return what follows from elsewhere; of a study's participant also the blinding."""
         fields = super().get_readonly_fields(request, obj)
-        in_study = obj is not None and obj.enrollments.filter(study__state=RUNNING).exists()
+        in_study = obj is not None and is_in_running_study(obj)
         return (*fields, "blinded") if in_study else fields
 
     def get_object(self, request: HttpRequest, object_id: str, from_field: Any = None) -> Any:

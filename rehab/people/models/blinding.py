@@ -28,6 +28,14 @@ def hidden_patients(user: User) -> QuerySet[Patient]:
     return _marked(user, "assessor")
 
 
+def is_in_running_study(patient: Patient) -> bool:
+    """Return whether a study that is not closed has, or had, this patient.
+
+    Who has withdrawn counts: what the study hides would still tell an assessor which arm it was.
+    """
+    return patient.enrollments.filter(study__state=RUNNING).exists()
+
+
 def _marked(user: User, task: str) -> QuerySet[Patient]:
     """Return the participants of running studies in which somebody has a mark."""
     return Patient.everywhere.filter(
