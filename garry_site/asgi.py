@@ -13,12 +13,15 @@ pages: Any = get_asgi_application()
 from rehab.people.sign_in.gate import SignInGate  # noqa: E402
 from rehab.people.web.static_files import StaticFilesHandler  # noqa: E402
 from rehab.routing import websocket_urlpatterns  # noqa: E402  (models must be loaded first)
+from rehab.sessions.live.consumers.isolation_gate import IsolationGate  # noqa: E402
 
 if not settings.HOSTED:  # hosted, WhiteNoise serves the static files
     pages = StaticFilesHandler(pages)
 
 # Devices send no Origin, so it is not asked for here; cookies count only on sockets that our own
 # pages opened (rehab.sessions.live.auth).
-application = ProtocolTypeRouter(
-    {"http": SignInGate(pages), "websocket": URLRouter(websocket_urlpatterns)},
+application = IsolationGate(
+    ProtocolTypeRouter(
+        {"http": SignInGate(pages), "websocket": URLRouter(websocket_urlpatterns)},
+    )
 )

@@ -18,15 +18,19 @@ SQLITE_OPTIONS = {
         "PRAGMA wal_autocheckpoint=20000;"
     ),
 }
-# Nobody waits for ever for a lock, or for a database that is gone. The writer of steps has a
-# connection of its own, which gives up sooner (rehab/sessions/live/session/writer.py).
+# Nobody waits for ever for a lock, or for a database that is gone; and the database does not wait
+# for a server that is gone, whose locks would keep others from taking its sessions over. The writer
+# of steps has a connection of its own, which gives up sooner
+# (rehab/sessions/live/database/own_connection.py).
 POSTGRESQL_OPTIONS = {
     "connect_timeout": 5,
     "keepalives_idle": 10,
     "keepalives_interval": 3,
     "keepalives_count": 3,
     "tcp_user_timeout": 10_000,
-    "options": "-c lock_timeout=10s -c statement_timeout=60s",
+    "options": "-c lock_timeout=10s -c statement_timeout=60s "
+    "-c idle_in_transaction_session_timeout=60s -c tcp_user_timeout=10s "
+    "-c tcp_keepalives_idle=10 -c tcp_keepalives_interval=3 -c tcp_keepalives_count=3",
 }
 POOL = {"min_size": 1, "max_size": 8, "timeout": 10}
 

@@ -57,19 +57,36 @@ def find_initdb() -> Path | None:
 
 
 Restarts = dict[str, Callable[[], None]]  # by program: kills it and starts it again
+REVIVE_POSTGRES = "postgres that ended"  # starts it where it gave up by itself, as systemd does
 
 
 @contextmanager
-def run_postgres(restarts: Restarts | None = None) -> Iterator[str]:
+def run_postgres(
+    restarts: Restarts | None = None,
+    *,
+    disk: Path | None = None,
+    variables: dict[str, str] | None = None,
+) -> Iterator[str]:
     """Run a PostgreSQL of our own until the block ends; yield the address of its database.
 
     It refuses to run as root, so then it runs as somebody else, in a folder that is theirs.
+
+    Parameters
+    ----------
+    restarts
+        Gets what kills it and starts it again.
+    disk
+        Where its folder is made, else among the temporary ones.
+    variables
+        Environment variables of its own.
     """
-    with tempfile.TemporaryDirectory(prefix="garry-postgres-") as name:
-        yield from _run_postgres(Path(name), {} if restarts is None else restarts)
+    with tempfile.TemporaryDirectory(prefix="garry-postgres-", dir=disk) as name:
+        yield from _run_postgres(Path(name), {} if restarts is None else restarts, variables)
 
 
-def _run_postgres(folder: Path, restarts: Restarts) -> Iterator[str]:
+def _run_postgres(
+    folder: Path, restarts: Restarts, variables: dict[str, str] | None
+) -> Iterator[str]:
     bin_folder = find_initdb().parent
     port = free_port()
     data, sockets = folder / "data", folder / "sockets"
@@ -99,6 +116,7 @@ def _run_postgres(folder: Path, restarts: Restarts) -> Iterator[str]:
         return subprocess.Popen(
             [bin_folder / "postgres", "-D", data, *options.split()],
             cwd="/",
+            env=os.environ | (variables or {}),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             **account,
@@ -107,9 +125,12 @@ def _run_postgres(folder: Path, restarts: Restarts) -> Iterator[str]:
     server = start()
 
     def restart() -> None:
-        nonlocal server
         server.send_signal(signal.SIGQUIT)  # at once, as in a crash: it recovers from its log
         server.wait(30)
+        start_again()
+
+    def start_again() -> None:
+        nonlocal server
         for _ in range(100):  # not while a process of the old one has its memory still
             server = start()
             time.sleep(0.2)
@@ -117,7 +138,12 @@ def _run_postgres(folder: Path, restarts: Restarts) -> Iterator[str]:
                 break
         _wait_for_postgres(bin_folder, port)
 
+    def revive() -> None:
+        if server.poll() is not None:
+            start_again()
+
     restarts["postgres"] = restart
+    restarts[REVIVE_POSTGRES] = revive
     try:
         _wait_for_postgres(bin_folder, port)
         _make_database(port)
@@ -146,12 +172,12 @@ def run_redis(restarts: Restarts | None = None) -> Iterator[str]:
             server.wait(10)
             time.sleep(1.5)
             server = start()
-            _wait_for_port(port)
+            wait_for_port(port)
 
         if restarts is not None:
             restarts["redis"] = restart
         try:
-            _wait_for_port(port)
+            wait_for_port(port)
             yield f"redis://127.0.0.1:{port}/0"
         finally:
             server.kill()
@@ -167,7 +193,8 @@ def _wait_for_postgres(bin_folder: Path, port: int) -> None:
     raise RuntimeError("PostgreSQL does not answer")
 
 
-def _wait_for_port(port: int) -> None:
+def wait_for_port(port: int) -> None:
+    """Wait until something listens at a port."""
     for _ in range(200):
         try:
             socket.create_connection(("127.0.0.1", port), 1).close()
@@ -277,12 +304,12 @@ def run_nginx(
         server.kill()
         server.wait(10)
         server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
-        _wait_for_port(secure)
+        wait_for_port(secure)
 
     if restarts is not None:
         restarts["nginx"] = restart
     try:
-        _wait_for_port(secure)
+        wait_for_port(secure)
         yield f"http://{NAME}:{plain}", f"https://{NAME}:{secure}", tls
     finally:
         server.terminate()

@@ -121,6 +121,7 @@ class Pair:
             "GARRY_DATABASE_URL": database,
             "GARRY_REDIS_URL": redis,
         }
+        self.own_environments: list[dict[str, str]] = [{} for _ in range(count)]
         self.processes: list[subprocess.Popen[bytes] | None] = [None] * count
         self._open: list[Dialed] = []
 
@@ -160,9 +161,10 @@ class Pair:
         """Start a server."""
         port = str(self.ports[place])
         command = ["manage.py", "serve", "--port", port, "--server", self.server]
+        environment = self.environment | self.own_environments[place]
         with self.log.open("a") as log:
             self.processes[place] = subprocess.Popen(
-                [sys.executable, *command], cwd=ROOT, env=self.environment, stdout=log, stderr=log
+                [sys.executable, *command], cwd=ROOT, env=environment, stdout=log, stderr=log
             )
 
     async def until_ready(self, place: int, within_s: float = 60) -> None:

@@ -35,6 +35,10 @@ def sql(statement: str, *values: Any) -> list[Any]:
         return cursor.fetchall() if cursor.description else []
 
 
+def valid_ids() -> set[str]:
+    return {server.id for server in lease.valid_servers()}
+
+
 def enter(*, shares: bool, lost: threading.Event | None = None) -> Lease:
     one = Lease("127.0.0.1:1", shares=shares, on_excluded=(lost or threading.Event()).set)
     one.acquire(wait_s=0.3)
@@ -54,10 +58,9 @@ def test_servers_that_cannot_hear_each_other_do_not_share_a_database(first, seco
 
 def test_servers_with_redis_share_a_database():
     one, two = enter(shares=True), enter(shares=True)
-    assert {server.id for server in lease.valid_servers()} == {one.id, two.id}
+    assert valid_ids() == {one.id, two.id}
     one.release()
-    assert not lease.is_valid(one.id)
-    assert lease.is_valid(two.id)
+    assert valid_ids() == {two.id}
     two.release()
     assert lease.held() is None
 
@@ -65,12 +68,12 @@ def test_servers_with_redis_share_a_database():
 def test_a_lease_is_renewed_and_outlives_its_connection():
     one = enter(shares=True)
     time.sleep(0.8)
-    assert lease.is_valid(one.id)
+    assert valid_ids() == {one.id}
     assert one._connection is not None
     pid = one._connection.connection.info.backend_pid
     sql("SELECT pg_terminate_backend(%s, 5000)", pid)
     time.sleep(0.4)
-    assert lease.is_valid(one.id)
+    assert valid_ids() == {one.id}
     one.release()
 
 
@@ -99,12 +102,44 @@ def test_after_an_outage_of_the_database_nobody_is_taken_for_dead_at_once(monkey
     own.release()
 
 
+@pytest.fixture
+def two_servers(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Lease, Lease]]:
+    """Two servers, the second of them ours and judging; none renews its lease in the meantime."""
+    other, own = enter(shares=True), enter(shares=True)
+    time.sleep(0.2)
+    for one in (other, own):
+        one._closing.set()
+        one._thread.join()
+    monkeypatch.setattr(own, "_renewed_s", time.monotonic() + 60)
+    assert own.may_judge
+    yield other, own
+    own.release()
+    other.release()
+
+
+def test_nobody_is_taken_for_dead_when_the_databases_clock_jumps_ahead(two_servers):
+    other, _ = two_servers
+    sql("UPDATE rehab_server SET expires_at = expires_at - interval '1 hour'")
+    assert owners.is_alive(other.id)  # own lease has expired with it
+
+
+def test_a_dead_server_does_not_live_on_when_the_databases_clock_is_set_back(two_servers):
+    other, own = two_servers
+    sql("UPDATE rehab_server SET expires_at = expires_at + interval '1 hour'")
+    assert owners.is_alive(other.id)  # until own lease is renewed by the new time
+    assert own._execute(lease.RENEW) == 0
+    assert own._enter()
+    own._unbroken_since_s -= 1
+    assert not owners.is_alive(other.id)
+    assert valid_ids() == {own.id}
+
+
 def test_a_server_without_redis_whose_database_another_has_taken_ends(monkeypatch):
     lost = threading.Event()
     one = enter(shares=False, lost=lost)
     monkeypatch.setattr(one, "_execute", lambda _: 0)  # it hangs: its row expires
     sql("UPDATE rehab_server SET expires_at = now() - interval '1 s', id = 'x'")
-    sql("INSERT INTO rehab_server VALUES ('y', '127.0.0.1:2', false, now() + interval '60 s')")
+    sql("INSERT INTO rehab_server VALUES ('y', '127.0.0.1:2', false, now() + interval '9 s')")
     assert lost.wait(10)
     monkeypatch.undo()
     one.release()

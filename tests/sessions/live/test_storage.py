@@ -15,6 +15,7 @@ from django.test import Client
 
 from rehab.sessions.live import process, routines
 from rehab.sessions.live import runtime as runtimes
+from rehab.sessions.live.database import own_connection as own_connections
 from rehab.sessions.live.database.own_connection import own_connection
 from rehab.sessions.live.session import writer as writers
 from rehab.sessions.live.session.commits import Job
@@ -175,3 +176,21 @@ def test_the_writers_connection_is_its_own_and_gives_up(transactional_db):
             cursor.execute("SELECT 1")
     finally:
         own.close()
+
+
+@only_postgres
+def test_locks_of_a_server_that_is_gone_are_released(transactional_db, monkeypatch):
+    monkeypatch.setattr(own_connections, "IDLE_MS", 200)
+    gone = own_connection(LOCK_TIMEOUT_MS, STATEMENT_TIMEOUT_MS)
+    try:
+        with gone.cursor() as cursor:
+            cursor.execute("BEGIN")
+            cursor.execute("LOCK TABLE rehab_trainingsession")
+        assert TrainingSession.everywhere.update(owner="another") == 0  # waits, at most 10 s
+        with pytest.raises(OperationalError), gone.cursor() as cursor:
+            cursor.execute("COMMIT")
+        with connection.cursor() as cursor:
+            cursor.execute("SHOW tcp_user_timeout")
+            assert cursor.fetchone() == ("10s",)
+    finally:
+        gone.close()

@@ -12,7 +12,7 @@ import logging
 import threading
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -34,7 +34,11 @@ RETRY_S = 0.25
 TIMEOUT_MS = 2_000  # a database that is stuck
 KEY = 0x67_61_72_72_79  # "garry": advisory locks are numbers. Held while a server enters
 
-VALID = "expires_at > clock_timestamp()"
+# A lease that ends later than any server asks for is from before the database's clock was set back.
+VALID = f"""
+expires_at > clock_timestamp()
+AND expires_at < clock_timestamp() + {2 * LEASE_S} * interval '1 second'
+"""
 ENTER = """
 INSERT INTO rehab_server (id, address, shares, expires_at)
 VALUES (%(id)s, %(address)s, %(shares)s, clock_timestamp() + %(for)s * interval '1 second')
@@ -45,7 +49,8 @@ UPDATE rehab_server SET expires_at = clock_timestamp() + %(for)s * interval '1 s
 WHERE id = %(id)s AND {VALID}
 """  # noqa: S608
 FORGET = """
-DELETE FROM rehab_server WHERE expires_at < clock_timestamp() - interval '1 hour'
+DELETE FROM rehab_server WHERE expires_at
+NOT BETWEEN clock_timestamp() - interval '1 hour' AND clock_timestamp() + interval '1 hour'
 """
 EXCLUDING = f"""
 SELECT address FROM rehab_server WHERE id <> %(id)s AND {VALID} AND NOT (shares AND %(shares)s)
@@ -69,11 +74,6 @@ _held: Lease | None = None
 def held() -> Lease | None:
     """Return this process's lease; None in commands, and where one process is the clinic."""
     return _held
-
-
-def is_valid(server_id: str) -> bool:
-    """Return whether a server's lease is valid."""
-    return any(server.id == server_id for server in valid_servers())
 
 
 def valid_servers() -> list[Server]:
@@ -125,6 +125,14 @@ class Lease:
             return True  # there was nobody when it entered
         now_s = time.monotonic()
         return self.is_current and now_s - self._unbroken_since_s > 2 * RENEW_S
+
+    def may_judge_by(self, valid_ids: Collection[str]) -> bool:
+        """Return whether servers that are not among the valid ones are gone.
+
+        Where this one is not among them either, the database's clock was set: all leases expired
+        at once, and each server renews its own within a second.
+        """
+        return self.may_judge and (not self.shares or self.id in valid_ids)
 
     def acquire(self, wait_s: float = WAIT_S) -> None:
         """Enter, once no server is there that cannot share the database; then stay.

@@ -12,6 +12,7 @@ from django.db import DEFAULT_DB_ALIAS, connection, connections
 from django.db.backends.base.base import BaseDatabaseWrapper
 
 SQLITE_TIMEOUT_S = 10
+IDLE_MS = 5_000  # in a transaction: its server is stuck or gone, and another waits for its locks
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -26,8 +27,13 @@ def own_connection(lock_timeout_ms: int, statement_timeout_ms: int) -> BaseDatab
     if own.vendor == "sqlite":
         options["timeout"] = SQLITE_TIMEOUT_S
     else:
-        timeouts = f"-c lock_timeout={lock_timeout_ms} -c statement_timeout={statement_timeout_ms}"
-        options["options"] = f"{options.get('options', '')} {timeouts}".strip()
+        limits = {
+            "lock_timeout": lock_timeout_ms,
+            "statement_timeout": statement_timeout_ms,
+            "idle_in_transaction_session_timeout": IDLE_MS,
+        }
+        given = " ".join(f"-c {name}={value}" for name, value in limits.items())
+        options["options"] = f"{options.get('options', '')} {given}".strip()
     return own
 
 

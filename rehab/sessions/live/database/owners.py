@@ -69,7 +69,8 @@ def is_alive(owner: str) -> bool:
     """Return whether an owner's process runs, or nobody can tell."""
     own = lease.held()
     if owner and settings.HOSTED and owner != HANDED_ON and "|" not in owner:
-        return (own is not None and not own.may_judge) or lease.is_valid(owner)
+        valid_ids = {server.id for server in lease.valid_servers()}
+        return owner in valid_ids or not (own is None or own.may_judge_by(valid_ids))
     try:
         host, pid, started = owner.split("|")
     except ValueError:

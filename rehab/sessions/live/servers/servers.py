@@ -12,7 +12,7 @@ import logging
 import time
 from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 from django.utils import timezone
 
@@ -28,12 +28,14 @@ from rehab.sessions.live.servers.followed_sessions import FollowedSessions
 from rehab.sessions.live.servers.following import FollowedSession, Follower
 from rehab.sessions.live.servers.handover import Handover
 from rehab.sessions.live.servers.intercom import HEARD_S, Data, Intercom, Unheard
+from rehab.sessions.live.servers.isolation import Isolation
 from rehab.sessions.live.session.live_session import LiveSession
 from rehab.sessions.live.station_robots import StationRobots
 from rehab.sessions.log import Remark
 from rehab.sessions.payloads import Message
 from rehab.training.changes import ChangeValue
 from rehab.training.measures import InvalidSetting
+from robot.wire.close_codes import CloseCode
 
 log = logging.getLogger(__name__)
 
@@ -49,6 +51,7 @@ class Owning(Protocol):
     robots: StationRobots
     orders: SessionOrders
     handover: Handover
+    sockets: set[Any]
 
     def close_pages(self, live: LiveSession) -> None: ...
 
@@ -60,6 +63,8 @@ class Servers:
         self._owning = owning
         self._own = own
         self._entered = own.entered
+        self._isolation = Isolation(own)
+        self.is_isolated = False  # cut off from the database, which another server has
         self._addresses: dict[str, str] = {}  # of servers with a valid lease
         self._database = DatabaseThread("garry-follower", READ_TIMEOUT_MS)
         self.followed = FollowedSessions(self._database, self.tell_viewers, owning.close_pages)
@@ -75,12 +80,13 @@ class Servers:
                 "opened": self._on_opened,
                 "stop_at": self._on_stop_at,
                 "give_up": self._on_give_up,
+                "lease": self._on_lease,
             },
         )
         loop = asyncio.get_running_loop()
         self._tasks = [
             loop.create_task(work, context=contextvars.Context())
-            for work in (self._repeat(self._beat), self._repeat(self.followed.read))
+            for work in map(self._repeat, (self._beat, self._watch_database, self.followed.read))
         ]
 
     async def close(self) -> None:
@@ -180,8 +186,20 @@ class Servers:
             await self._owning.handover.take_over_left()
         await asyncio.sleep(BEAT_S)
 
+    async def _watch_database(self) -> None:
+        """Each second, whatever the database does: close all sockets once only others have it."""
+        self._tell_all("lease", {"current": self._own.is_current})
+        others = self._addresses.keys() - {self._own.id}
+        was_isolated = self.is_isolated
+        self.is_isolated = self._isolation.applies(others, is_deaf=bool(self.deaf_s))
+        if self.is_isolated and not was_isolated:
+            log.critical("This server is cut off from its database; clients go to another one.")
+            for socket in list(self._owning.sockets):
+                socket.close_soon(CloseCode.RESTARTING)
+        await asyncio.sleep(BEAT_S)
+
     def _is_gone(self, owner: str) -> bool:
-        return owner not in self._addresses and self._own.may_judge
+        return owner not in self._addresses and self._own.may_judge_by(self._addresses)
 
     async def _repeat(self, work: Callable[[], Awaitable[None]]) -> None:
         while True:
@@ -237,6 +255,9 @@ class Servers:
 
     async def _on_stop_at(self, server: str, stop: Data) -> None:
         self._owning.robots.stop_at(stop["station"], _account(stop["by"]), stop["told"])
+
+    async def _on_lease(self, server: str, told: Data) -> None:
+        self._isolation.hear(server, is_current=told["current"])
 
     async def _on_give_up(self, server: str, asked: Data) -> Data:
         return {"given": await self._owning.handover.give_up(asked["session"], asked["slot"])}
