@@ -4,8 +4,8 @@ GARRY_TEST_FAULTS times each (20), by GARRY_TEST_SEED (GARRY_TEST_FAULT: only th
 acknowledged step lost or doubled, no gap at a viewer, orderly restarts pause nobody, a stop at the
 other server arrives or is refused.
 
-A full disk needs root, which mounts a small one; clocks that jump need libfaketime (Debian:
-faketime). Without them these faults are left out, and the report says so.
+A full disk needs root, which mounts a small one; a clock of the database that jumps needs
+libfaketime (Debian: faketime). Without them these faults are left out, and the report says so.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ CUT_S = 60.0  # a network without a word
 FULL_S = 10.0
 DISK_MB = 256
 JUMPS = ("+3600", "-3600")  # seconds
-FAKE_TIME = next(iter(sorted(Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"))), None)
+FAKE_TIME = next(iter(sorted(Path("/usr/lib").glob("*/faketime/libfaketime.so.1"))), None)
 
 Heal = Callable[[], Awaitable[None]]
 
@@ -59,8 +59,13 @@ class Clock:
         self.jump("+0")
 
     @property
+    def program(self) -> tuple[str, ...]:
+        """The server that goes by it, in Python's terms."""
+        return ("-m", "tests.support.jumping_server", str(self._file))
+
+    @property
     def variables(self) -> dict[str, str]:
-        """What the program's environment needs."""
+        """What the environment of PostgreSQL needs to go by it; its sleeps are not touched."""
         if FAKE_TIME is None:
             return {}
         return {
@@ -133,11 +138,11 @@ class Faults:
             "nginx": lambda: asyncio.to_thread(self.restarts["nginx"]),
             "rolling restart": self.restart_each,
             "a server's network": self.cut_network,
+            "clock of a server": lambda: self.set_clock(self.random.randrange(2)),
         }
         if self.disk is not None:
             faults["disk full"] = self.fill_disk
         if FAKE_TIME is not None:
-            faults["clock of a server"] = lambda: self.set_clock(self.random.randrange(2))
             faults["clock of the database"] = lambda: self.set_clock(2)
         return faults
 
@@ -339,7 +344,8 @@ def run_set(
                 port = int(re.search(r"127.0.0.1:(\d+)/", url)[1])
                 cables[place].append(stack.enter_context(run_cable(port)))
                 own[name] = url.replace(f":{port}/", f":{cables[place][-1].port}/")
-            pair.own_environments[place] = own | clocks[place].variables
+            pair.own_environments[place] = own
+            pair.programs[place] = clocks[place].program
         yield pair, cables, disk, clocks
 
 
@@ -400,7 +406,7 @@ def report(faults: Faults, problems: list[str]) -> None:
     if faults.disk is None:
         print("disk full: left out, mounting needs root")
     if FAKE_TIME is None:
-        print("clocks: left out, apt-get install faketime")
+        print("clock of the database: left out, apt-get install faketime")
     stops = sorted(faults.stops_s)
     print(
         f"stop at the other server: n {len(stops)}, median "

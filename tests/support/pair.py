@@ -122,6 +122,7 @@ class Pair:
             "GARRY_REDIS_URL": redis,
         }
         self.own_environments: list[dict[str, str]] = [{} for _ in range(count)]
+        self.programs: list[tuple[str, ...]] = [("manage.py",)] * count
         self.processes: list[subprocess.Popen[bytes] | None] = [None] * count
         self._open: list[Dialed] = []
 
@@ -160,7 +161,7 @@ class Pair:
     def begin(self, place: int) -> None:
         """Start a server."""
         port = str(self.ports[place])
-        command = ["manage.py", "serve", "--port", port, "--server", self.server]
+        command = [*self.programs[place], "serve", "--port", port, "--server", self.server]
         environment = self.environment | self.own_environments[place]
         with self.log.open("a") as log:
             self.processes[place] = subprocess.Popen(
