@@ -13,7 +13,6 @@ from __future__ import annotations
 import asyncio
 import os
 import random
-import re
 import signal
 import statistics
 import subprocess
@@ -27,7 +26,7 @@ from typing import Any
 import psycopg
 import pytest
 
-from tests.support.cable import Cable, run_cable
+from tests.support.cable import Cable, run_cables
 from tests.support.hosted import (
     REVIVE_POSTGRES,
     Restarts,
@@ -338,13 +337,9 @@ def run_set(
         redis = stack.enter_context(run_redis(restarts))
         pair = Pair(folder / "garry", database, redis)
         for place in range(2):
-            own = {"GARRY_DATABASE_URL": database, "GARRY_REDIS_URL": redis}
-            cables.append([])
-            for name, url in own.items():
-                port = int(re.search(r"127.0.0.1:(\d+)/", url)[1])
-                cables[place].append(stack.enter_context(run_cable(port)))
-                own[name] = url.replace(f":{port}/", f":{cables[place][-1].port}/")
-            pair.own_environments[place] = own
+            urls = {"GARRY_DATABASE_URL": database, "GARRY_REDIS_URL": redis}
+            pair.own_environments[place], its_cables = stack.enter_context(run_cables(urls))
+            cables.append(its_cables)
             pair.programs[place] = clocks[place].program
         yield pair, cables, disk, clocks
 

@@ -1,4 +1,4 @@
-"""Ten behaviours of two servers on one database: whoever dials in to the wrong one is right, too.
+"""Behaviours of two servers on one database: whoever dials in to the wrong one is right, too.
 
 Each with either server as the owner of the session. PostgreSQL and Redis are our own.
 """
@@ -10,11 +10,14 @@ import json
 import signal
 import time
 from collections.abc import Callable, Coroutine, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
+from websockets.exceptions import InvalidStatus
 
+from tests.support.cable import Cable, run_cables
 from tests.support.hosted import find_missing, run_postgres, run_redis
 from tests.support.pair import Dialed, Message, Pair, of_kind, of_type, step
 from tests.support.robot_reports import STATUS
@@ -38,10 +41,22 @@ def run() -> Iterator[Run]:
 
 
 @pytest.fixture(scope="module")
-def pair(tmp_path_factory: pytest.TempPathFactory, run: Run) -> Iterator[Pair]:
+def cables() -> list[list[Cable]]:
+    """Return each server's cables to the database and to Redis."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def pair(
+    tmp_path_factory: pytest.TempPathFactory, run: Run, cables: list[list[Cable]]
+) -> Iterator[Pair]:
     folder: Path = tmp_path_factory.mktemp("pair")
-    with run_postgres() as database, run_redis() as redis:
+    with run_postgres() as database, run_redis() as redis, ExitStack() as stack:
         both = Pair(folder, database, redis)
+        for place in range(2):
+            urls = {"GARRY_DATABASE_URL": database, "GARRY_REDIS_URL": redis}
+            both.own_environments[place], own = stack.enter_context(run_cables(urls))
+            cables.append(own)
         run(both.__aenter__())
         yield both
         run(both.__aexit__())
@@ -50,7 +65,7 @@ def pair(tmp_path_factory: pytest.TempPathFactory, run: Run) -> Iterator[Pair]:
 @pytest.fixture(scope="module")
 def rows(pair: Pair) -> list[Message]:
     """Return running sessions, one for each test, taken from the end."""
-    return pair.seed(24)
+    return pair.seed(28)
 
 
 @pytest.fixture(scope="module")
@@ -329,5 +344,41 @@ def test_10_a_server_that_is_killed_is_replaced_and_one_that_hangs_is_told_of(
         await walk(source, range(24, 26))
         log = pair.read_log(row)
         assert (log["numbers"], log["paused"], log["refolds"]) == (list(range(1, 26)), 1, True)
+
+    run(story())
+
+
+@pytest.mark.parametrize(("owner", "cut"), [(0, 1), (1, 2)], ids=["database", "database and Redis"])
+def test_11_a_server_that_is_cut_off_sends_its_clients_to_the_other(
+    pair, run, rows, cables, owner, cut
+):
+    row = rows.pop()
+
+    async def story() -> None:
+        source = await begin(pair, owner, row)
+        tablet = await pair.tablet(owner, row)
+        await tablet.until(of_type("snapshot", number=3))
+        for cable in cables[owner][:cut]:
+            cable.cut()
+        began_s = time.monotonic()
+        assert await source.until_closed(SLOW_S) == 4012
+        assert await tablet.until_closed(SLOW_S) == 4012
+        with pytest.raises(InvalidStatus) as refused:
+            await pair.tablet(owner, row)
+        assert refused.value.response.status_code == 504  # the proxy asks another server
+        assert (await pair.get(owner, "/start/"))[0] == 504
+        source = await moved(lambda: pair.source(1 - owner, row, last=3))
+        assert time.monotonic() - began_s < LEASE_S + SLOW_S
+        await walk(source, range(4, 7))
+        for cable in cables[owner]:
+            cable.mend()
+        await pair.until_ready(owner)
+        async with asyncio.timeout(SLOW_S):
+            while (await pair.get(owner, "/start/"))[0] == 504:  # noqa: ASYNC110
+                await asyncio.sleep(0.1)
+        again = await pair.tablet(owner, row)  # it follows
+        await again.until(of_type("snapshot", number=6))
+        log = pair.read_log(row)
+        assert (log["numbers"], log["refolds"]) == ([1, 2, 3, 4, 5, 6], True)
 
     run(story())

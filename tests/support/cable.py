@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import re
 import signal
 import subprocess
 import sys
 from asyncio import StreamReader, StreamWriter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 from tests.support.hosted import wait_for_port
 from tests.support.servers import ROOT, free_port
@@ -45,6 +46,18 @@ def run_cable(target: int) -> Iterator[Cable]:
     finally:
         process.kill()
         process.wait(10)
+
+
+@contextmanager
+def run_cables(urls: dict[str, str]) -> Iterator[tuple[dict[str, str], list[Cable]]]:
+    """Run a cable to each service; yield the addresses behind them, by the same names."""
+    with ExitStack() as stack:
+        behind, cables = {}, []
+        for name, url in urls.items():
+            port = int(re.search(r"127.0.0.1:(\d+)/", url)[1])
+            cables.append(stack.enter_context(run_cable(port)))
+            behind[name] = url.replace(f":{port}/", f":{cables[-1].port}/")
+        yield behind, cables
 
 
 async def _copy(reader: StreamReader, writer: StreamWriter) -> None:
