@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import time
 from typing import Any
 
 import pytest
@@ -147,6 +148,27 @@ async def test_nothing_is_written_after_a_failed_job_of_the_same_owner(
     await until_done(bench, 6)
     assert bench.done[-1][1] is None
     assert await Step.everywhere.acount() == 1
+
+
+async def test_a_fault_of_the_thread_fails_its_jobs_and_does_not_end_it(
+    bench, aggregates, monkeypatch
+):
+    await until_done(bench, 3)
+
+    def sleep(_: float) -> None:
+        monkeypatch.undo()
+        raise OSError("the clock is broken")
+
+    one, two = aggregates[:2]
+    monkeypatch.setattr("rehab.sessions.live.session.writer.time.sleep", sleep)
+    bench.writer._next_commit_s = time.monotonic() + 1000
+    bench.walk(one)
+    await until_done(bench, 4)
+    assert [type(problem) for _, problem in bench.done[3:]] == [OSError]
+    bench.writer._next_commit_s = 0.0
+    bench.walk(two)
+    await until_done(bench, 5)
+    assert bench.done[4] == (two.session.pk, None)
 
 
 async def test_one_report_that_fails_keeps_no_other_from_its_source(bench, aggregates, caplog):

@@ -90,33 +90,39 @@ class Writer:
             connections[DEFAULT_DB_ALIAS] = own_connection(LOCK_TIMEOUT_MS, STATEMENT_TIMEOUT_MS)
             more = True
             while more:
-                jobs, more = self._next_jobs()
-                if jobs:
-                    self._busy_since_s = began_s = time.monotonic()
-                    self._write(jobs)
-                    self._busy_since_s = None
-                    self._next_commit_s = 0.0 if self._is_alone(jobs) else began_s + SPACING_S
+                jobs: list[Job] = []
+                try:
+                    more = self._collect(jobs)
+                    if jobs:
+                        self._busy_since_s = began_s = time.monotonic()
+                        self._write(jobs)
+                        self._next_commit_s = 0.0 if self._is_alone(jobs) else began_s + SPACING_S
+                except Exception as problem:  # a fault of ours: it must not end the thread
+                    self._fail(jobs, problem)
+                self._busy_since_s = None
         finally:
             connection.close()
 
-    def _next_jobs(self) -> tuple[list[Job], bool]:
-        """Wait for a job; return all that are queued, and whether the thread goes on."""
+    def _collect(self, jobs: list[Job]) -> bool:
+        """Wait for a job and add all that are queued; return whether the thread goes on."""
         job = self._queue.get()
+        if job is None:
+            return False
+        jobs.append(job)
         early_s = self._next_commit_s - time.monotonic()
         if early_s > 0:
             time.sleep(early_s)  # meanwhile more is queued
-        jobs: list[Job] = []
-        rows = 0
-        while job is not None:
-            jobs.append(job)
-            rows += len(job.rows)
-            if rows >= MAX_ROWS:
-                return jobs, True
+        rows = len(job.rows)
+        while rows < MAX_ROWS:
             try:
                 job = self._queue.get_nowait()
             except Empty:
-                return jobs, True
-        return jobs, False
+                break
+            if job is None:
+                return False
+            jobs.append(job)
+            rows += len(job.rows)
+        return True
 
     def _is_alone(self, jobs: list[Job]) -> bool:
         """Return whether the last two commits were of one and the same session."""
@@ -138,13 +144,16 @@ class Writer:
             WRITE_FAILURES.inc()
             close_old_connections()
             if concerns_all(problem):
-                log.exception("Nothing could be stored")
-                self._failure = classify_failure(problem)
-                self._failed.update(job.owner for job in jobs)
-                results = [(job, problem) for job in jobs]
-            else:
-                results = self._write_each(jobs)
+                self._fail(jobs, problem)
+                return
+            results = self._write_each(jobs)
         self._finish(results)
+
+    def _fail(self, jobs: list[Job], problem: Exception) -> None:
+        log.error("Nothing could be stored", exc_info=problem)
+        self._failure = classify_failure(problem)
+        self._failed.update(job.owner for job in jobs)
+        self._finish([(job, problem) for job in jobs])
 
     def _write_each(self, jobs: list[Job]) -> list[tuple[Job, Exception | None]]:
         """Write each job alone, so that the failure of one affects no other session."""
