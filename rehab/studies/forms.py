@@ -24,10 +24,10 @@ from rehab.sessions.setup.sources import build_source_args, source_choices
 from rehab.stations.models import Station
 from rehab.studies.allocation.lists import read_list
 from rehab.studies.allocation.scheme import Method, Secret
-from rehab.studies.document import describe
 from rehab.studies.models import OUTCOMES, SCHEDULE_FIELDS, Arm, Study
-from rehab.studies.registration import check_secret
-from rehab.studies.sealing import seal, unseal
+from rehab.studies.registration.document import describe
+from rehab.studies.registration.lifecycle import check_secret
+from rehab.studies.registration.sealing import seal, unseal
 from rehab.studies.visits import Place
 from rehab.training.measures import A2, InvalidSetting
 

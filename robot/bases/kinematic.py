@@ -18,8 +18,8 @@ from robot.bases.drive_train import (
     DriveTrain,
 )
 from robot.bases.kobuki_protocol.wheels import TICK_M, WHEELBASE_M, wheel_speeds
+from robot.bases.odometry import Odometry
 from robot.motion.limits import ORDER_HOLDS_S, TICK_S, WHEEL_LIMITS
-from robot.motion.odometry import Odometry
 from robot.motion.pose import HOME, advance
 from robot.motion.response import Response
 from robot.motion.twist import STILL, Twist

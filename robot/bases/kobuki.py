@@ -24,8 +24,8 @@ from robot.bases.kobuki_protocol.feedback import Button, decode_feedback
 from robot.bases.kobuki_protocol.frame_filter import Estimate, FrameFilter
 from robot.bases.kobuki_protocol.frames import BAUD, FrameReader
 from robot.bases.kobuki_protocol.wheels import STOP, WHEELBASE_M, control_to_twist, twist_to_control
+from robot.bases.odometry import Odometry
 from robot.motion.limits import WHEEL_LIMITS
-from robot.motion.odometry import Odometry
 from robot.motion.response import Response
 from robot.motion.score import Color, Note
 from robot.motion.twist import STILL, Twist

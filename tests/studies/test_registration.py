@@ -12,11 +12,11 @@ from rehab.sessions.questionnaires import Questionnaire
 from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.append_only import AppendOnlyRow
-from rehab.studies.document import describe, digest_of
 from rehab.studies.models import StudyState
 from rehab.studies.participants import StudyEvent
-from rehab.studies.registration import close, current_version, register, revise, start
-from rehab.studies.sealing import seal, unseal
+from rehab.studies.registration.document import describe, digest_of
+from rehab.studies.registration.lifecycle import close, current_version, register, revise, start
+from rehab.studies.registration.sealing import seal, unseal
 from rehab.studies.visits import Place, start_session
 from rehab.training.measures import InvalidSetting
 from tests.support.studies import SEED, draft_study, enrolled, new_patient, running_study

@@ -12,8 +12,8 @@ from rehab.sessions.setup.protocols import Measure, Protocol
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.models import Arm, Study
 from rehab.studies.participants import Enrollment
-from rehab.studies.registration import register, start
-from rehab.studies.sealing import seal
+from rehab.studies.registration.lifecycle import register, start
+from rehab.studies.registration.sealing import seal
 from rehab.training.measures import A2
 from tests.support.world import NOW, World
 

@@ -129,7 +129,7 @@ def seal_nothing(clinic: Clinic) -> LogSeal:
     return seal
 
 
-# What a version of a study tells (`describe` in rehab/studies/document.py), as short as can be.
+# What a version of a study tells (`describe`, studies/registration/document.py), in short.
 PLAN: dict[str, Any] = {
     **dict.fromkeys(("code", "title", "clinic", "question"), ""),
     "participants": 2,

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from robot.bases.kinematic import Faults
+from robot.bases.odometry import Odometry
 from robot.motion.gestures import GESTURES
-from robot.motion.odometry import Odometry
 from tests.support.gesture_runs import play_in_a_row
 
 FRAME_S = 0.02

@@ -15,7 +15,7 @@ from rehab.studies.figures.flow import Box, draw_flow
 from rehab.studies.figures.forest import Row, draw_forest
 from rehab.studies.figures.learning import PhaseLabel, Words, draw_curves
 from rehab.studies.figures.people import draw_people
-from rehab.studies.results import (
+from rehab.studies.results.results import (
     Results,
     curve_rows,
     difference_rows,

@@ -25,9 +25,9 @@ from rehab.studies.analysis.participants import (
 )
 from rehab.studies.models import Study, StudyMark, StudyState, has_mark
 from rehab.studies.participants import StudyEvent
-from rehab.studies.reading import Analysis, analyze
-from rehab.studies.registration import note
-from rehab.studies.sealing import unseal
+from rehab.studies.registration.lifecycle import note
+from rehab.studies.registration.sealing import unseal
+from rehab.studies.results.reading import Analysis, analyze
 
 
 def may_look(study: Study, user: User) -> bool:
