@@ -15,7 +15,7 @@ from rehab.people.audit.audit_log import Act, AuditEntry
 from rehab.people.models import Patient, User
 from rehab.people.roles import Role
 from rehab.sessions.models import TrainingSession
-from rehab.sessions.setup.protocols import Measure, Protocol
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Station
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.blinding import Task, give_mark
@@ -33,7 +33,7 @@ pytestmark = pytest.mark.django_db
 def plan(*valences: str, **changes: Any) -> dict[str, Any]:
     """Return what the browser sends for a study of these arms."""
     protocol = Protocol.everywhere.get(clinic=None, name="Baseline, training, washout").pk
-    measure = Measure.everywhere.get(clinic=None, slug="a2").pk
+    measure = MeasureDefinition.everywhere.get(clinic=None, slug="a2").pk
     form: dict[str, Any] = {
         "code": "VAL",
         "title": "Ways to answer a step",

@@ -9,7 +9,7 @@ import pytest
 from rehab.feedback.models import FeedbackBand, FeedbackType
 from rehab.people.roles import Role
 from rehab.sessions.questionnaires import Questionnaire
-from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.studies.allocation.scheme import Secret
 from rehab.studies.append_only import AppendOnlyRow
 from rehab.studies.models import StudyState
@@ -147,7 +147,7 @@ def edit_phase(**changes):
 
 
 def edit_measure(study, _phase) -> None:
-    Measure.everywhere.filter(clinic=study.clinic).update(value_max=9.0)
+    MeasureDefinition.everywhere.filter(clinic=study.clinic).update(value_max=9.0)
 
 
 def edit_words(study, _phase) -> None:
@@ -169,7 +169,7 @@ def edit_words(study, _phase) -> None:
 def test_nothing_that_decides_what_is_walked_changes_unseen(world, edit):
     study = draft_study(world)
     training = own_protocol(world, study)
-    own = Measure.everywhere.create(
+    own = MeasureDefinition.everywhere.create(
         clinic=world.clinic,
         slug="speed",
         unit="m/s",

@@ -13,7 +13,7 @@ from django.test import Client
 from rehab.boards.models import Leaderboard
 from rehab.boards.rows import BoardCount, BoardEntry
 from rehab.feedback.models import FeedbackBand, FeedbackType
-from rehab.gestures.models import Gesture, GestureStep
+from rehab.gestures.models import ComposedGesture, GestureStep
 from rehab.patients.family import FamilyLink
 from rehab.patients.visits import Visit
 from rehab.people.audit.audit_log import AuditEntry
@@ -38,7 +38,7 @@ from rehab.sessions.models import TrainingSession
 from rehab.sessions.questionnaires import Questionnaire, QuestionnaireResponse
 from rehab.sessions.services import SessionRequest, create_session
 from rehab.sessions.setup.presets import Preset
-from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.stations.models import Device, Pairing, PinAttempts, Station
 from rehab.studies.models import Arm, Study, StudyMark, StudyVersion
 from rehab.studies.participants import Allocation, Enrollment, StudyEvent, StudyVisit
@@ -213,10 +213,10 @@ def build_world(name: str) -> World:
     )
     token = device.new_token()
     device.save()
-    measure = Measure.everywhere.create(
+    measure = MeasureDefinition.everywhere.create(
         clinic=clinic,
         slug=f"m-{name}",
-        name=mark(name, Measure),
+        name=mark(name, MeasureDefinition),
         unit="m",
         value_min=0,
         value_max=2,
@@ -233,7 +233,7 @@ def build_world(name: str) -> World:
         name=mark(name, ProtocolPhase),
         feedback=True,
     )
-    gesture = Gesture.everywhere.create(clinic=clinic, name=mark(name, Gesture))
+    gesture = ComposedGesture.everywhere.create(clinic=clinic, name=mark(name, ComposedGesture))
     step = GestureStep.everywhere.create(gesture=gesture, position=1, hold_s=1.0)
     feedback = FeedbackType.everywhere.create(
         clinic=clinic, slug="negative", hit_points=0, miss_points=-1, cue_below="droop"

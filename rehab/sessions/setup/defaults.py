@@ -128,10 +128,10 @@ PROTOCOLS: dict[str, Template] = {
 
 def install_defaults(using: str = "default", **_signal: Any) -> None:
     """Add missing shared rows; existing ones are not changed."""
-    from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
+    from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 
     with transaction.atomic(using=using):
-        Measure.everywhere.using(using).get_or_create(
+        MeasureDefinition.everywhere.using(using).get_or_create(
             clinic=None,
             slug=A2.slug,
             defaults={name: value for name, value in asdict(A2).items() if name != "slug"},

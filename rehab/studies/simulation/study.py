@@ -10,7 +10,7 @@ from functools import partial
 from rehab.people.models import Clinic, Patient
 from rehab.sessions.live.headless import Pace, run_session
 from rehab.sessions.setup.defaults import install_defaults
-from rehab.sessions.setup.protocols import Measure, Protocol, ProtocolPhase
+from rehab.sessions.setup.protocols import MeasureDefinition, Protocol, ProtocolPhase
 from rehab.studies.enrolling import enroll, withdraw
 from rehab.studies.models import Arm, Study, StudyState
 from rehab.studies.participants import Enrollment
@@ -68,7 +68,7 @@ def _plan(clinic: Clinic, code: str, trial: Trial, seed: int, now: datetime) -> 
         secondary_outcomes=list(SECONDARY),
         sealed=seal(trial.secret(seed)),
     )
-    measure = Measure.everywhere.get(clinic=None, slug=A2.slug)
+    measure = MeasureDefinition.everywhere.get(clinic=None, slug=A2.slug)
     for position, (arm, valence, effect) in enumerate(ARMS):
         Arm.everywhere.create(
             study=study,
