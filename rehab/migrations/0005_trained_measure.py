@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import django.core.validators
 import django.db.models.deletion
 from django.apps.registry import Apps
@@ -12,7 +14,8 @@ from django.db.backends.base.schema import BaseDatabaseSchemaEditor
 def fill(apps: Apps, schema_editor: BaseDatabaseSchemaEditor) -> None:
     """Set A2's first goal, and make A2 the measure of all presets."""
     using = schema_editor.connection.alias
-    measures = apps.get_model("rehab", "Measure").everywhere.using(using)
+    model: Any = apps.get_model("rehab", "Measure")  # type: ignore[misc]  # renamed in 0025
+    measures = model.everywhere.using(using)
     a2 = measures.filter(clinic=None, slug="a2").first()
     if a2 is None:  # a new database: shared rows are made after all migrations
         return

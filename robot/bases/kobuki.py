@@ -13,7 +13,7 @@ from robot.bases.hazards import UNORDERED, StillWatch, UnreadHazards
 from robot.bases.kobuki_protocol.commands import (
     Extra,
     GpOutput,
-    Melody,
+    MelodyCode,
     Output,
     RequestExtra,
     Sound,
@@ -47,7 +47,7 @@ LIGHTS = {
     Indication.MOVING: Output.LED1_ORANGE,
     Indication.STOPPED: Output.LED1_RED,
 }
-SOUNDS = {Indication.STOPPED: Melody.ERROR}
+SOUNDS = {Indication.STOPPED: MelodyCode.ERROR}
 COLORS = {
     Color.OFF: (Output(0), Output(0)),
     Color.GREEN: (Output.LED1_GREEN, Output.LED2_GREEN),
@@ -201,7 +201,7 @@ class KobukiBase(MobileBase):
     def play(self, note: Note) -> None:
         """Play a note of a gesture's score."""
         if note.melody is not None:
-            self._sound = encode_commands(SoundSequence(Melody[note.melody.name]))
+            self._sound = encode_commands(SoundSequence(MelodyCode[note.melody.name]))
         else:
             self._sound = encode_commands(Sound.at(note.frequency_hz, note.duration_s))
 

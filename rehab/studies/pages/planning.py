@@ -40,8 +40,8 @@ from rehab.studies.visits import next_visit
 from rehab.training.measures import InvalidSetting
 
 # What moves a study on, by the name of its button.
-Step = Callable[[Study, User, datetime], Any]
-STEPS: dict[str, Step] = {"register": register, "start": start, "close": close}
+StudyAction = Callable[[Study, User, datetime], Any]
+STEPS: dict[str, StudyAction] = {"register": register, "start": start, "close": close}
 
 
 def get_study(user: User, study_id: int) -> Study:

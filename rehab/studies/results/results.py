@@ -19,7 +19,7 @@ from rehab.studies.analysis.outcomes import OUTCOMES
 from rehab.studies.analysis.participants import (
     CHANNEL,
     ArmFlow,
-    Finding,
+    OutcomeResult,
     Participant,
     flow,
 )
@@ -85,7 +85,7 @@ class Results:
         rest = [slug for slug in OUTCOMES if slug in found and slug not in self.registered]
         return (*rest, *sorted(slug for slug in found if slug.startswith(CHANNEL)))
 
-    def find(self, slug: str) -> Finding:
+    def find(self, slug: str) -> OutcomeResult:
         """Return what was found of an outcome."""
         return self.analysis.find(slug)
 

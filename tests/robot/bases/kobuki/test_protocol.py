@@ -34,13 +34,13 @@ from robot.bases.kobuki_protocol import (
     GyroRaw,
     Inertia,
     Malformed,
-    Melody,
+    MelodyCode,
     MotorCurrent,
     Output,
     RequestEeprom,
     RequestExtra,
+    SensorSide,
     SetGain,
-    Side,
     Sound,
     SoundSequence,
     Udid,
@@ -65,7 +65,7 @@ GOLDEN = [
     (STOP, "AA 55 06 01 04 00 00 00 00 03"),
     (BaseControl(207, 1), "AA 55 06 01 04 CF 00 01 00 CD"),
     (RequestExtra(Extra.HARDWARE | Extra.FIRMWARE | Extra.UDID), "AA 55 04 09 02 0B 00 04"),
-    (SoundSequence(Melody.ON), "AA 55 03 04 01 00 06"),
+    (SoundSequence(MelodyCode.ON), "AA 55 03 04 01 00 06"),
     (GpOutput(Output.POWER | Output.LED1_GREEN), "AA 55 04 0C 02 F0 02 F8"),
 ]
 
@@ -86,8 +86,8 @@ def test_golden_feedback():
     core = said.core
     assert core is not None
     assert (core.time_ms, core.left_ticks, core.right_ticks) == (0x1234, 65535, 1)
-    assert core.bumper == Side.RIGHT | Side.LEFT
-    assert (core.wheel_drop, core.cliff) == (2, Side.CENTER)
+    assert core.bumper == SensorSide.RIGHT | SensorSide.LEFT
+    assert (core.wheel_drop, core.cliff) == (2, SensorSide.CENTER)
     assert (core.left_pwm, core.right_pwm) == (-10, 10)
     assert core.buttons == Button.B1
     assert core.is_charging
