@@ -72,7 +72,7 @@ class KobukiBase(MobileBase):
         self._odometry = Odometry(WHEELBASE_M)
         self._estimate: Estimate | None = None
         self._opened = 0
-        self._seen_s = self._begun_s = monotonic()
+        self._seen_s = monotonic()
         self._unread, self._still_watch = UnreadHazards(), StillWatch()
         self._felt: frozenset[str] = frozenset()  # in the newest frame
         self._lights, self._sound = LIGHTS[Indication.WAITING], b""

@@ -180,11 +180,6 @@ def _check_move(number: int, move: Move) -> None:
         )
 
 
-def step_poses(moves: Sequence[Move]) -> list[Pose]:
-    """Return the pose at the end of each step, seen from home."""
-    return [step[-1].pose for step in _to_waypoints(moves)]
-
-
 def _to_waypoints(moves: Sequence[Move]) -> Iterator[list[Waypoint]]:
     """Yield the waypoints of each step: its turn, then its drive. Times are set later."""
     here = HOME
