@@ -30,8 +30,9 @@ from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Device
 from tests.support.archives import body_of
 from tests.support.extent import EVERYTHING
+from tests.support.marks import mark
 from tests.support.tenancy import Route, all_routes, walk_patterns
-from tests.support.world import NOW, client_of, mark
+from tests.support.world import NOW, client_of
 
 pytestmark = pytest.mark.django_db
 

@@ -16,7 +16,8 @@ from rehab.people.roles import Role
 from rehab.people.sign_in.tokens import ApiToken
 from rehab.stations.models import Device
 from rehab.stations.pins import set_pin
-from tests.support.world import build_world, client_of, mark
+from tests.support.marks import mark
+from tests.support.world import build_world, client_of
 
 pytestmark = pytest.mark.django_db
 

@@ -16,7 +16,8 @@ from rehab.sessions.setup.answers import USUAL_ANSWERS
 from rehab.sessions.setup.presets import Preset
 from rehab.sessions.setup.protocols import MeasureDefinition, Protocol
 from rehab.stations.models import Station
-from tests.support.world import World, build_world, client_of, mark
+from tests.support.marks import mark
+from tests.support.world import World, build_world, client_of
 
 pytestmark = [pytest.mark.django_db, pytest.mark.postgres]
 
